@@ -1,0 +1,163 @@
+"""What tfcompose says about a robot: findings with a code, a place and a way out.
+
+One space of codes serves lint, guard and the live tools, so that a second publisher that was predicted and one that
+was seen read alike. A code is never used again for something else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+Severity = Literal["error", "warning"]
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A stretch of a file. Lines and columns count from 1; the end is exclusive."""
+
+    file: str
+    line: int = 1
+    column: int = 1
+    end_line: int = 1
+    end_column: int = 1
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """A further place, or fact, that belongs to a finding."""
+
+    message: str
+    span: Span | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """One finding.
+
+    ``message`` is one line with the names and values involved and holds no advice; advice is ``help``; the other
+    place of a conflict is a note. ``span`` is None for what was seen on a live tree.
+    """
+
+    code: str
+    name: str
+    severity: Severity
+    message: str
+    span: Span | None = None
+    notes: tuple[Note, ...] = ()
+    help: str = ""
+
+    @property
+    def sort_key(self) -> tuple[str, int, int, str, str]:
+        """By place, then by code: the order in which findings are shown."""
+        at = self.span or Span("")
+        return (at.file, at.line, at.column, self.code, self.message)
+
+
+class RejectedError(Exception):
+    """Raised by a stage that cannot go on; it holds everything that the stage found, in order."""
+
+    def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
+        self.diagnostics = tuple(sorted(diagnostics, key=lambda found: found.sort_key))
+        super().__init__("; ".join(found.message for found in self.diagnostics))
+
+
+def finding(  # noqa: PLR0913 (a finding has that many parts; all but three are named)
+    code: str,
+    message: str,
+    span: Span | None,
+    *,
+    help: str = "",  # noqa: A002 (the field's name)
+    notes: Iterable[Note] = (),
+    severity: Severity = "error",
+) -> Diagnostic:
+    """Return the finding with the name that ``CODES`` gives its code."""
+    return Diagnostic(code, CODES[code], severity, message, span, tuple(notes), help)
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """Return the known word that a person most likely meant by ``word``, or None."""
+    found = get_close_matches(word.lower(), {name.lower(): name for name in known}, n=1, cutoff=0.6)
+    return next((name for name in known if name.lower() == found[0]), None) if found else None
+
+
+def did_you_mean(word: str, known: Iterable[str], otherwise: str = "") -> str:
+    """Return advice that names the word that was probably meant, or ``otherwise`` where none is near."""
+    near = nearest(word, list(known))
+    return f"did you mean {near}?" if near else otherwise
+
+
+# Every code with its name. Those of the check stage have a file each in ``tfcompose/check/rules``.
+CODES = {
+    # load: text and YAML
+    "TF001": "unreadable_file",
+    "TF002": "syntax",
+    "TF003": "duplicate_key",
+    "TF004": "key_not_text",
+    "TF005": "unknown_tag",
+    "TF006": "null_entry",
+    "TF007": "not_finite",
+    "TF008": "too_large",
+    "TF009": "unknown_profile",
+    "TF010": "overlay_removes_nothing",
+    "TF011": "bad_merge",
+    # validate: keys, types, values
+    "TF101": "unknown_key",
+    "TF102": "missing_key",
+    "TF103": "wrong_type",
+    "TF104": "unknown_unit",
+    "TF105": "bad_expression",
+    "TF106": "value_not_allowed",
+    "TF107": "keys_exclude_each_other",
+    # the tree
+    "TF201": "two_parents",
+    "TF202": "cycle",
+    "TF203": "unknown_frame",
+    "TF204": "several_roots",
+    "TF205": "edge_given_twice",
+    # ownership
+    "TF301": "edge_with_two_owners",
+    "TF302": "unknown_owner",
+    "TF303": "owner_cannot_publish",
+    # poses and conventions
+    "TF401": "optical_frame_not_rotated",
+    "TF402": "quaternion_not_unit",
+    "TF403": "rotation_not_orthonormal",
+    "TF404": "pose_cannot_be_solved",
+    # names
+    "TF501": "bad_frame_name",
+    "TF502": "name_used_twice",
+    # sensors
+    "TF601": "unknown_preset",
+    "TF602": "bad_preset",
+    "TF603": "unknown_option",
+    # bodies and joints
+    "TF701": "mimic_without_master",
+    "TF702": "mimic_loop",
+    "TF703": "body_without_frame",
+    # processes, guard, live tree
+    "TF801": "foreign_publisher",
+    "TF802": "second_parent_seen",
+    "TF803": "undeclared_edge",
+    "TF804": "owner_silent",
+    "TF805": "owner_slow",
+    "TF806": "volatile_static_writer",
+    "TF807": "edge_taken_before_start",
+    "TF808": "process_failed",
+    "TF809": "wrong_topic",
+    "TF810": "executable_not_found",
+    "TF811": "edge_never_seen",
+    "TF812": "start_order_loop",
+    "TF813": "frames_without_owner",
+    # the environment
+    "TF901": "no_ros",
+    "TF902": "bad_plan",
+    "TF903": "rule_crashed",
+}

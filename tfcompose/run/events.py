@@ -1,0 +1,97 @@
+"""What the guard tells the launcher: one JSON object a line, on a pipe of their own.
+
+The guard is a process like the others; its log is for people, these lines are for the launcher. ``EVENTS_FD`` names
+the environment variable that holds the pipe's file descriptor.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from tfcompose.diagnostic import Diagnostic, Note
+
+EVENTS_FD = "TFCOMPOSE_EVENTS_FD"
+
+
+@dataclass(frozen=True, slots=True)
+class Clear:
+    """The look before the start is over and no planned edge was published by anybody."""
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """A planned edge was published before the start: the plan must not start, or must end."""
+
+    found: Diagnostic
+
+
+@dataclass(frozen=True, slots=True)
+class Live:
+    """An edge was received from its owner for the first time."""
+
+    parent: str
+    child: str
+    owner: str
+    node: str
+
+
+@dataclass(frozen=True, slots=True)
+class OwnerReady:
+    """All edges of a process are live."""
+
+    process: str
+
+
+@dataclass(frozen=True, slots=True)
+class Complete:
+    """Every edge of the plan is live."""
+
+    edges: int
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A violation, once per case."""
+
+    found: Diagnostic
+
+
+@dataclass(frozen=True, slots=True)
+class Recovered:
+    """A case that was reported is over; the sentence says which."""
+
+    message: str
+
+
+GuardEvent = Clear | Taken | Live | OwnerReady | Complete | Found | Recovered
+
+_KINDS: dict[str, type[GuardEvent]] = {
+    kind.__name__: kind for kind in (Clear, Taken, Live, OwnerReady, Complete, Found, Recovered)
+}
+
+
+def to_line(event: GuardEvent) -> str:
+    """Return the event as one line of JSON, newline included."""
+    return json.dumps({"event": type(event).__name__} | asdict(event), ensure_ascii=False) + "\n"
+
+
+def from_line(line: str) -> GuardEvent:
+    """Return the event that ``to_line`` wrote.
+
+    Raises:
+        ValueError: if the line is not one.
+    """
+    data = json.loads(line)
+    kind = _KINDS.get(data.pop("event", "")) if isinstance(data, dict) else None
+    if kind is None:
+        raise ValueError(f"not an event: {line!r}")
+    if "found" in data:
+        data["found"] = _diagnostic(data["found"])
+    return kind(**data)
+
+
+def _diagnostic(data: dict[str, Any]) -> Diagnostic:
+    notes = tuple(Note(note["message"]) for note in data["notes"])
+    return Diagnostic(data["code"], data["name"], data["severity"], data["message"], None, notes, data["help"])

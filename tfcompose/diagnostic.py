@@ -96,7 +96,7 @@ def did_you_mean(word: str, known: Iterable[str], otherwise: str = "") -> str:
 
 # Every code with its name. Those of the check stage have a file each in ``tfcompose/check/rules``.
 CODES = {
-    # load: text and YAML
+    # text and YAML
     "TF001": "unreadable_file",
     "TF002": "syntax",
     "TF003": "duplicate_key",

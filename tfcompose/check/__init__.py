@@ -1,0 +1,1 @@
+"""Stage ``check``: a Robot becomes findings, one rule a file."""

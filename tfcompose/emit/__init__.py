@@ -1,0 +1,1 @@
+"""Stage ``emit``: a Robot becomes files, as text."""

@@ -1,0 +1,1 @@
+"""Stage ``load``: YAML text becomes a Source that knows where everything stands."""

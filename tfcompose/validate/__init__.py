@@ -1,0 +1,1 @@
+"""Stage ``validate``: a Source becomes a typed RobotSpec."""

@@ -1,0 +1,1 @@
+"""The rules, one a file; ``tfcompose.check.check`` lists them."""

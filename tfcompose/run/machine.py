@@ -1,0 +1,226 @@
+"""What the launcher does next: a pure function of what is known, what happened, and the time.
+
+The guard is started first and listens; once it says that nobody publishes a planned edge, the others follow in the
+plan's order, each when what it waits for is there. Without a guard nothing waits for its word, and ``after: ready``
+means ``started``. Whatever goes wrong, or is asked for, everything is stopped: a process when all that wait for it are
+gone, the guard last of all. What the guard says while everything stops is not heeded, because an owner that is stopped
+falls silent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tfcompose.run.events import Clear, Complete, Found, Live, OwnerReady, Recovered, Taken
+from tfcompose.run.failures import ended_by_itself, how_ended, never_clear, never_seen, not_started, signal_name
+from tfcompose.run.notice import EdgeLive, RecoveredShown, TreeComplete, Waiting
+from tfcompose.run.state import (
+    MAX_RESTARTS,
+    Action,
+    Begin,
+    Event,
+    Exited,
+    Kill,
+    OutputLost,
+    Signalled,
+    Started,
+    StartFailed,
+    State,
+    Stop,
+    TimeUp,
+    Tracked,
+)
+from tfcompose.run.timing import STOP_SIGNALS, backoff_s, by_owner, stop_level, waiting_due
+from tfcompose.run.turn import Turn
+
+if TYPE_CHECKING:
+    from tfcompose.diagnostic import Diagnostic
+
+
+def step(state: State, event: Event, now: float) -> tuple[State, tuple[Action, ...]]:
+    """Return what is known after the event, and what is to be done, in that order. ``now`` is in seconds."""
+    if state.finished:
+        return state, ()
+    turn = Turn(state, now)
+    _react(turn, event)
+    _settle(turn)
+    return turn.state, tuple(turn.actions)
+
+
+# What happened.
+
+
+def _react(turn: Turn, event: Event) -> None:
+    match event:
+        case Begin():
+            _begin(turn)
+        case Started(name, pid):
+            turn.enter(name, "RUNNING", pid=pid)
+        case StartFailed(name, why):
+            turn.enter(name, "FATAL", why)
+            turn.fail(not_started(name, why))
+        case Exited():
+            _exited(turn, event)
+        case Signalled(number):
+            _signalled(turn, signal_name(number))
+        case OutputLost():
+            turn.stop(Stop("failure", 1), "nobody reads the output any more")
+        case TimeUp():
+            _time_up(turn)
+        case Taken(found):
+            _taken(turn, found)
+        case _ if turn.state.stop is None:  # the guard's other events, and Tick
+            _guard_said(turn, event)
+
+
+def _begin(turn: Turn) -> None:
+    guard = turn.state.guard
+    turn.know(begun=turn.now, clear=None if guard else turn.now)
+    for name, tracked in turn.state.tracked.items():
+        if tracked.state == "EXPECTED":
+            turn.enter(name, "EXPECTED")
+    if guard:
+        turn.start(guard)
+
+
+def _exited(turn: Turn, event: Exited) -> None:
+    name, how = event.name, how_ended(event.returncode)
+    tracked = turn.state.tracked[name]
+    if turn.state.stop:
+        turn.enter(name, "STOPPED", how)
+        return
+    process = tracked.process
+    done = event.returncode == 0 and process.kind == "run"
+    if name != turn.state.guard and (process.restart == "always" or (process.restart == "on-failure" and not done)):
+        _restart_later(turn, tracked, event)
+        return
+    turn.enter(name, "EXITED", how)
+    if not done:
+        early = name == turn.state.guard and turn.state.clear is None
+        when = " before it said whether somebody publishes the plan's edges already" if early else ""
+        turn.fail(ended_by_itself(name, event.returncode, when, event.last_lines))
+
+
+def _restart_later(turn: Turn, tracked: Tracked, event: Exited) -> None:
+    name, times = event.name, turn.state.times
+    failures = 1 if turn.now - tracked.since >= times.steady_s else tracked.failures + 1
+    how = how_ended(event.returncode)
+    if failures > MAX_RESTARTS:
+        turn.enter(name, "FATAL", how)
+        when = f", after {MAX_RESTARTS} restarts"
+        turn.fail(ended_by_itself(name, event.returncode, when, event.last_lines))
+        return
+    delay = backoff_s(times, failures)
+    turn.enter(name, "BACKOFF", f"{how}; restart {failures} of {MAX_RESTARTS} in {delay:g} s", failures=failures)
+
+
+def _signalled(turn: Turn, name: str) -> None:
+    stop = turn.state.stop
+    if stop is None:
+        turn.stop(Stop("signal", 0, 1, turn.now), name)
+    elif stop.signals == 0 or turn.now - stop.signalled >= turn.state.times.same_signal_s:
+        turn.know(stop=replace(stop, signals=stop.signals + 1, signalled=turn.now))
+
+
+def _time_up(turn: Turn) -> None:
+    if turn.state.stop:
+        return
+    complete = turn.state.complete or turn.state.guard is None
+    if not complete and "TF811" not in turn.state.shown:
+        for owner, edges in by_owner(turn.state.missing):
+            turn.show(never_seen(owner, edges))
+    failed = not complete or bool(turn.state.shown)
+    turn.stop(Stop("time", 1 if failed else 0), "the time is up")
+
+
+def _taken(turn: Turn, found: Diagnostic) -> None:
+    stop = turn.state.stop
+    if stop is None or stop.cause == "taken":
+        turn.show(found)
+        turn.stop(Stop("taken", 1), found.message)
+
+
+def _guard_said(turn: Turn, event: Event) -> None:
+    seconds = turn.now - (turn.state.begun or 0.0)
+    match event:
+        case Clear():
+            turn.know(clear=turn.now if turn.state.clear is None else turn.state.clear)
+        case Live(parent, child, owner, node):
+            turn.know(live=turn.state.live | {child})
+            turn.tell(EdgeLive(parent, child, owner, node, seconds))
+        case OwnerReady(process) if process in turn.state.tracked:
+            turn.track(process, replace(turn.state.tracked[process], ready=True))
+        case Complete(edges):
+            turn.know(complete=True)
+            turn.tell(TreeComplete(edges, seconds))
+        case Found(found):
+            turn.show(found)
+            if found.severity == "error" and turn.state.plan.guard.on_violation == "stop":
+                turn.stop(Stop("failure", 1), found.message)
+        case Recovered(message):
+            turn.tell(RecoveredShown(message, seconds))
+        case _:
+            pass
+
+
+# What follows.
+
+
+def _settle(turn: Turn) -> None:
+    """Do what is due, now that the event has been taken in."""
+    state = turn.state
+    if state.begun is None:
+        return
+    if state.stop is None and state.clear is None and turn.now >= state.begun + state.times.clear_s:
+        turn.fail(never_clear(state.guard or "guard", state.times.clear_s))
+    if turn.state.stop is None:
+        _go_on(turn)
+    if turn.state.stop:
+        _stop_on(turn, turn.state.stop)
+
+
+def _go_on(turn: Turn) -> None:
+    tracked = turn.state.tracked
+    for name, one in tracked.items():
+        fresh = one.state == "STOPPED" and turn.state.clear is not None and _may_start(turn, one)
+        again = one.state == "BACKOFF" and turn.now >= one.since + backoff_s(turn.state.times, one.failures)
+        if fresh or again:
+            turn.start(name)
+    due = waiting_due(turn.state)
+    if due is not None and turn.now >= due:
+        missing = turn.state.missing
+        turn.know(waiting=frozenset(edge.child for edge in missing), waiting_said=turn.now)
+        turn.tell(Waiting(by_owner(missing)))
+    if all(one.state in ("EXITED", "EXPECTED") for one in turn.state.tracked.values()):
+        turn.finish(0)
+
+
+def _may_start(turn: Turn, one: Tracked) -> bool:
+    return all(_is_there(turn, name, what) for name, what in one.process.after.items())
+
+
+def _is_there(turn: Turn, name: str, what: str) -> bool:
+    other = turn.state.tracked.get(name)
+    if other is None:  # a guard that is switched off
+        return True
+    if what == "done":
+        return other.state == "EXITED"
+    started = other.was_started or other.state == "EXPECTED"
+    if what == "ready" and turn.state.guard and other.process.owns:
+        return started and other.ready
+    return started
+
+
+def _stop_on(turn: Turn, stop: Stop) -> None:
+    alive = [one for one in turn.state.tracked.values() if one.alive]
+    for one in sorted(alive, key=lambda one: -one.order):
+        level = stop_level(turn.state, stop, one, turn.now)
+        if one.state == "STARTING" or level <= one.level:
+            continue
+        name, number = one.process.name, STOP_SIGNALS[level - 1]
+        turn.actions.append(Kill(name, number))
+        before = f"still there after {STOP_SIGNALS[one.level - 1].name}: " if one.level else ""
+        turn.enter(name, "STOPPING", before + number.name, pid=one.pid, level=level)
+    if not alive:
+        turn.finish(stop.exit_code)

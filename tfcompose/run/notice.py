@@ -1,0 +1,91 @@
+"""What the launcher tells a person. How it looks is decided by whoever is given these."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.plan import PlanEdge
+
+#: supervisord's names, and EXPECTED for a process that somebody else starts.
+StateName = Literal["STOPPED", "STARTING", "RUNNING", "BACKOFF", "STOPPING", "EXITED", "FATAL", "EXPECTED"]
+Stream = Literal["stdout", "stderr"]
+
+
+@dataclass(frozen=True, slots=True)
+class LogLine:
+    """A line that a process wrote, without its end. A line longer than 64 KiB comes in pieces."""
+
+    process: str
+    stream: Stream
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessState:
+    """A process went into this state. ``detail`` says why, where there is more to say: "exit code 3; again in 2 s"."""
+
+    process: str
+    state: StateName
+    pid: int | None = None
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeLive:
+    """An edge was received from its owner for the first time, ``seconds`` after the start."""
+
+    parent: str
+    child: str
+    owner: str
+    node: str
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class TreeComplete:
+    """Every edge of the plan is live, ``seconds`` after the start."""
+
+    edges: int
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """Edges that nobody has published yet: each owner with its missing edges, in the plan's order."""
+
+    missing: tuple[tuple[str, tuple[PlanEdge, ...]], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class FindingShown:
+    """Something is wrong."""
+
+    found: Diagnostic
+
+
+@dataclass(frozen=True, slots=True)
+class RecoveredShown:
+    """A case that was shown is over, ``seconds`` after the start."""
+
+    text: str
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Stopping:
+    """Everything is being stopped, for this reason."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """Nothing runs any more: the last notice."""
+
+    exit_code: int
+
+
+Notice = LogLine | ProcessState | EdgeLive | TreeComplete | Waiting | FindingShown | RecoveredShown | Stopping | Ended

@@ -1,0 +1,208 @@
+"""What the process machine knows, what can happen to it, and what it wants done: values only.
+
+Times are seconds of one monotonic clock.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from tfcompose.run.events import GuardEvent
+
+if TYPE_CHECKING:
+    from tfcompose.plan import Plan, PlanEdge, PlanProcess
+    from tfcompose.run.notice import Notice, StateName
+
+
+@dataclass(frozen=True, slots=True)
+class Times:
+    """How long the launcher waits, in seconds."""
+
+    clear_s: float = 20.0
+    """for the guard's word that nobody publishes a planned edge yet"""
+    interrupt_s: float = 5.0
+    """between SIGINT and SIGTERM"""
+    terminate_s: float = 5.0
+    """between SIGTERM and SIGKILL"""
+    waiting_s: float = 5.0
+    """until missing edges are named, and between two such notices"""
+    backoff_s: float = 1.0
+    """before the first restart; doubled with each further one"""
+    backoff_limit_s: float = 30.0
+    """the longest wait before a restart"""
+    steady_s: float = 10.0
+    """a run as long as this makes earlier failures forgotten"""
+    same_signal_s: float = 0.2
+    """two signals closer than this are one: ``timeout`` and closing terminals send theirs twice"""
+
+
+MAX_RESTARTS = 5
+
+
+# What happens.
+
+
+@dataclass(frozen=True, slots=True)
+class Begin:
+    """The launcher is ready to start processes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Started:
+    """A process was started."""
+
+    name: str
+    pid: int
+
+
+@dataclass(frozen=True, slots=True)
+class StartFailed:
+    """A process could not be started."""
+
+    name: str
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Exited:
+    """A process ended: exit code, or minus the signal's number. ``last_lines`` is the end of its log."""
+
+    name: str
+    returncode: int
+    last_lines: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Signalled:
+    """The launcher was sent a signal."""
+
+    signal: int
+
+
+@dataclass(frozen=True, slots=True)
+class OutputLost:
+    """Nobody reads the launcher's output any more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """Nothing but time has passed."""
+
+
+@dataclass(frozen=True, slots=True)
+class TimeUp:
+    """The time that was asked for is over."""
+
+
+Event = Begin | Started | StartFailed | Exited | Signalled | OutputLost | Tick | TimeUp | GuardEvent
+
+
+# What is to be done.
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Start the process; the answer is ``Started`` or ``StartFailed``."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Kill:
+    """Send the signal to the process and all of its group."""
+
+    name: str
+    signal: int
+
+
+@dataclass(frozen=True, slots=True)
+class Tell:
+    """Tell the person."""
+
+    notice: Notice
+
+
+@dataclass(frozen=True, slots=True)
+class Finish:
+    """Nothing runs any more: leave with this exit code."""
+
+    exit_code: int
+
+
+Action = Start | Kill | Tell | Finish
+
+
+# What is known.
+
+
+@dataclass(frozen=True, slots=True)
+class Tracked:
+    """One process. ``since`` is when it came into its state, or when it was sent its last signal.
+
+    ``order`` counts the starts of all processes, 0 for one that was never started; ``failures`` the short runs in a
+    row; ``level`` how often it was told to stop, each time more firmly.
+    """
+
+    process: PlanProcess
+    state: StateName
+    pid: int | None = None
+    since: float = 0.0
+    order: int = 0
+    failures: int = 0
+    level: int = 0
+    ready: bool = False
+
+    @property
+    def alive(self) -> bool:
+        """Whether there is an operating system's process, or will be in a moment."""
+        return self.state in ("STARTING", "RUNNING", "STOPPING")
+
+    @property
+    def was_started(self) -> bool:
+        """Whether it has run, or runs."""
+        return self.order > 0 and self.state != "STARTING"
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Why everything stops, and how it will have ended. ``signals`` counts those that asked for it."""
+
+    cause: Literal["signal", "time", "taken", "failure"]
+    exit_code: int
+    signals: int = 0
+    signalled: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """Everything that is known about a running plan. ``live`` holds the children of the edges that were seen."""
+
+    plan: Plan
+    times: Times
+    tracked: dict[str, Tracked]
+    guard: str | None
+    begun: float | None = None
+    clear: float | None = None
+    live: frozenset[str] = frozenset()
+    complete: bool = False
+    shown: frozenset[str] = frozenset()
+    waiting: frozenset[str] = frozenset()
+    waiting_said: float | None = None
+    stop: Stop | None = None
+    finished: bool = False
+
+    @property
+    def missing(self) -> tuple[PlanEdge, ...]:
+        """The edges that were not seen yet; none where no guard looks."""
+        return () if self.guard is None else tuple(edge for edge in self.plan.edges if edge.child not in self.live)
+
+
+def initial(plan: Plan, times: Times | None = None) -> State:
+    """Return the state before ``Begin``: nothing runs. A guard that is switched off is not there at all."""
+    processes = [process for process in plan.processes if process.kind != "guard" or plan.guard.mode != "off"]
+    guards = [process.name for process in processes if process.kind == "guard"]
+    tracked = {
+        process.name: Tracked(process, "EXPECTED" if process.kind == "external" else "STOPPED") for process in processes
+    }
+    return State(plan, times or Times(), tracked, guards[0] if guards else None, complete=not plan.edges)

@@ -1,0 +1,59 @@
+"""Who publishes on a topic, as the graph says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+    from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+#: What rmw says instead of a name while it does not know whose node a publisher is.
+UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
+
+
+@dataclass(frozen=True, slots=True)
+class Writer:
+    """One publisher of a topic.
+
+    ``gid`` is its id, 16 bytes, and equals ``Received.gid`` of its messages. ``node`` is the full name, such as
+    ``/rover/static``. A publisher is discovered before its node's name is: until then, and for good when it belongs
+    to no ROS node, ``node`` is ``UNKNOWN_NODE``, while id, type and QoS are right. ``type`` reads like
+    ``tf2_msgs/msg/TFMessage``.
+    """
+
+    gid: bytes
+    node: str
+    durability: Literal["volatile", "transient_local"]
+    reliability: Literal["reliable", "best_effort"]
+    type: str
+
+
+def writers(node: Node, topic: str) -> list[Writer]:
+    """Return the publishers of the topic that ``node`` has discovered until now, its own too, sorted by node and id.
+
+    A relative ``topic`` is taken in the node's namespace; remappings are not applied.
+    """
+    found = [_writer(info) for info in node.get_publishers_info_by_topic(topic)]
+    return sorted(found, key=lambda writer: (writer.node, writer.gid))
+
+
+def _writer(info: TopicEndpointInfo) -> Writer:
+    latched = info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+    best_effort = info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+    return Writer(
+        gid=bytes(info.endpoint_gid[:16]),
+        node=_full_name(info.node_namespace, info.node_name),
+        durability="transient_local" if latched else "volatile",
+        reliability="best_effort" if best_effort else "reliable",
+        type=info.topic_type,
+    )
+
+
+def _full_name(namespace: str, name: str) -> str:
+    if name == UNKNOWN_NODE:
+        return UNKNOWN_NODE
+    return f"{namespace.rstrip('/')}/{name}"

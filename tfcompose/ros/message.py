@@ -1,0 +1,181 @@
+"""TFMessage as bytes: little-endian CDR with its four bytes of header, written and read without ROS.
+
+Layout (OMG CDR; sizes count from the end of the header): uint32 number of transforms; each one int32 seconds,
+uint32 nanoseconds, the parent and the child as uint32 length, bytes and a NUL that the length counts, then padding
+to a multiple of 8 and seven doubles: x y z in metres, the quaternion x y z w. The next one starts at a multiple of 4.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tfcompose.pose import Pose, Quaternion, Vector
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+LITTLE_ENDIAN = b"\x00\x01\x00\x00"
+BIG_ENDIAN = b"\x00\x00\x00\x00"
+
+_HEADER = 4
+_SECOND_NS = 1_000_000_000
+# Stamp, two empty names of 5 bytes, 56 bytes of doubles, and no padding: no transform is shorter.
+_SHORTEST = 8 + 5 + 5 + 56
+
+
+@dataclass(frozen=True, slots=True)
+class Transform:
+    """One transform of a TFMessage, as it was sent: nothing is normalised. ``stamp_ns`` counts from the epoch."""
+
+    stamp_ns: int
+    parent: str
+    child: str
+    xyz: Vector
+    quat_xyzw: Quaternion
+
+
+class Template:
+    """A TFMessage whose names stay: stamps and numbers are overwritten in place.
+
+    Until they are set, stamps are 0 and poses the identity.
+    """
+
+    def __init__(self, edges: Sequence[tuple[str, str]]) -> None:
+        pose = Pose()
+        self._buffer, self._stamps, self._poses = _write(
+            [Transform(0, parent, child, pose.xyz, pose.quat_xyzw) for parent, child in edges]
+        )
+
+    def __len__(self) -> int:
+        return len(self._poses)
+
+    @property
+    def data(self) -> bytes:
+        """The message as it stands now."""
+        return bytes(self._buffer)
+
+    def set_stamp(self, stamp_ns: int) -> None:
+        """Give every transform this time, in nanoseconds since the epoch.
+
+        Raises:
+            ValueError: if a message cannot hold it.
+        """
+        stamp = _stamp(stamp_ns)
+        for offset in self._stamps:
+            self._buffer[offset : offset + 8] = stamp
+
+    def set_pose(self, index: int, pose: Pose) -> None:
+        """Give the transform of that edge this pose of the child in the parent.
+
+        Raises:
+            IndexError: if there is no such edge.
+        """
+        _POSE.pack_into(self._buffer, self._poses[index], *pose.xyz, *pose.quat_xyzw)
+
+
+_POSE = struct.Struct("<7d")
+
+
+def encode(transforms: Sequence[Transform]) -> bytes:
+    """Return the transforms as one TFMessage, header included.
+
+    Raises:
+        ValueError: if a name holds a NUL or a lone surrogate, or a stamp does not fit.
+    """
+    return bytes(_write(transforms)[0])
+
+
+def decode(data: bytes) -> list[Transform]:
+    """Return the transforms of a TFMessage, in order; either byte order is read, and bytes after the last are ignored.
+
+    Work and memory are bounded by the length of ``data``, whatever it claims to hold.
+
+    Raises:
+        ValueError: with one sentence, if it is not one.
+    """
+    if data[:2] not in (LITTLE_ENDIAN[:2], BIG_ENDIAN[:2]) or len(data) < _HEADER:
+        raise ValueError(f"the message starts with {data[:_HEADER].hex(' ') or 'nothing'}: that is not plain CDR")
+    reader = _Reader(data, "<" if data[1] else ">")
+    count = reader.count()
+    if count * _SHORTEST > len(data) - _HEADER:
+        raise ValueError(f"the message claims {count} transforms and has {len(data)} bytes")
+    return [reader.transform() for _ in range(count)]
+
+
+class _Reader:
+    def __init__(self, data: bytes, order: str) -> None:
+        self._data = data
+        self._order = order
+        self._at = _HEADER
+
+    def numbers(self, kinds: str, alignment: int) -> tuple[int | float, ...]:
+        start = _aligned(self._at, alignment)
+        layout = struct.Struct(self._order + kinds)
+        self._at = start + layout.size
+        if self._at > len(self._data):
+            raise ValueError(f"the message ends at byte {len(self._data)}, inside a number")
+        return layout.unpack_from(self._data, start)
+
+    def count(self) -> int:
+        return int(self.numbers("I", 4)[0])
+
+    def text(self) -> str:
+        length = self.count()
+        end = self._at + length
+        if end > len(self._data):
+            raise ValueError(f"the message ends at byte {len(self._data)}, inside a name of {length} bytes")
+        raw = self._data[self._at : end]
+        self._at = end
+        try:
+            return raw.removesuffix(b"\0").decode()
+        except UnicodeDecodeError as error:
+            raise ValueError(f"a name in the message is not UTF-8: {error.reason}") from None
+
+    def transform(self) -> Transform:
+        seconds, nanoseconds = self.numbers("iI", 4)
+        parent, child = self.text(), self.text()
+        x, y, z, qx, qy, qz, qw = self.numbers("7d", 8)
+        stamp_ns = int(seconds) * _SECOND_NS + int(nanoseconds)
+        return Transform(stamp_ns, parent, child, (x, y, z), (qx, qy, qz, qw))
+
+
+def _write(transforms: Sequence[Transform]) -> tuple[bytearray, list[int], list[int]]:
+    """Return the message, and where each transform's stamp and numbers stand in it."""
+    out = bytearray(LITTLE_ENDIAN + struct.pack("<I", len(transforms)))
+    stamps, poses = [], []
+    for transform in transforms:
+        _pad(out, 4)
+        stamps.append(len(out))
+        out += _stamp(transform.stamp_ns)
+        for name in (transform.parent, transform.child):
+            _pad(out, 4)
+            raw = _name(name)
+            out += struct.pack("<I", len(raw)) + raw
+        _pad(out, 8)
+        poses.append(len(out))
+        out += _POSE.pack(*transform.xyz, *transform.quat_xyzw)
+    return out, stamps, poses
+
+
+def _name(name: str) -> bytes:
+    if "\0" in name:
+        raise ValueError(f"the name {name!r} holds a NUL")
+    return name.encode() + b"\0"
+
+
+def _stamp(stamp_ns: int) -> bytes:
+    seconds, nanoseconds = divmod(stamp_ns, _SECOND_NS)
+    try:
+        return struct.pack("<iI", seconds, nanoseconds)
+    except struct.error:
+        raise ValueError(f"the time {stamp_ns} ns does not fit into a message") from None
+
+
+def _aligned(at: int, alignment: int) -> int:
+    return at + (_HEADER - at) % alignment
+
+
+def _pad(out: bytearray, alignment: int) -> None:
+    out += bytes(_aligned(len(out), alignment) - len(out))

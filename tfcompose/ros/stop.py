@@ -1,0 +1,102 @@
+"""How an own process ends: SIGINT, SIGTERM and SIGHUP become a flag that wakes whoever waits.
+
+It imports no ROS, so that a process handles signals before it spends a second on starting ROS.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import FrameType
+
+    from typing_extensions import Self
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_END = b"\0"
+
+
+class Waker(Protocol):
+    """Something that ends a wait: rclpy's guard condition is one."""
+
+    def trigger_guard_condition(self) -> None:
+        """End the wait that is under way, or else the next one."""
+
+
+class Stop:
+    """A flag that signals set, from the main thread's ``with`` block on until it ends.
+
+    Python runs a signal's handler only when the main thread is back from C, which a wait in ROS may never be. So
+    the number of the signal goes through Python's wake-up descriptor to a thread, which sets the flag and ends the
+    wait. Without ``with`` no signal is handled and ``request`` sets the flag.
+    """
+
+    def __init__(self) -> None:
+        self._event = threading.Event()
+        self._lock = threading.Lock()
+        self._wakers: dict[int, tuple[object, Waker]] = {}
+
+    @property
+    def requested(self) -> bool:
+        """Whether the process is to end."""
+        return self._event.is_set()
+
+    def request(self) -> None:
+        """Set the flag and end every wait, from any thread."""
+        with self._lock:
+            self._event.set()
+            for _, waker in self._wakers.values():
+                waker.trigger_guard_condition()
+
+    def wait(self, timeout_s: float | None) -> bool:
+        """Wait until the flag is set, at most so many seconds, and return whether it is."""
+        return self._event.wait(timeout_s)
+
+    def waker(self, owner: object, make: Callable[[], Waker]) -> Waker:
+        """Return the waker of that owner (a ROS context), made at the first call and triggered by ``request``."""
+        with self._lock:
+            known = self._wakers.get(id(owner))
+            if known is None:
+                known = self._wakers[id(owner)] = (owner, make())
+                if self._event.is_set():
+                    known[1].trigger_guard_condition()
+            return known[1]
+
+    def forget(self, owner: object) -> None:
+        """Drop the waker of that owner, which is about to end."""
+        with self._lock:
+            self._wakers.pop(id(owner), None)
+
+    def __enter__(self) -> Self:
+        self._reader, self._writer = os.pipe()
+        os.set_blocking(self._writer, False)
+        self._previous_fd = signal.set_wakeup_fd(self._writer, warn_on_full_buffer=False)
+        ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN  # under nohup a hang-up is meant to be ignored
+        taken = _SIGNALS[:2] if ignored else _SIGNALS
+        self._previous = {number: signal.signal(number, self._on_signal) for number in taken}
+        self._thread = threading.Thread(target=self._watch, name="signals", daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._previous.items():
+            signal.signal(number, handler)
+        signal.set_wakeup_fd(self._previous_fd)
+        os.write(self._writer, _END)
+        self._thread.join()
+        os.close(self._reader)
+        os.close(self._writer)
+        with self._lock:
+            self._wakers.clear()
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        """Do nothing: the thread that watches the wake-up descriptor does it, at once."""
+
+    def _watch(self) -> None:
+        while (numbers := os.read(self._reader, 64)) and _END[0] not in numbers:
+            if any(number in numbers for number in _SIGNALS):
+                self.request()

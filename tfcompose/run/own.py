@@ -1,0 +1,124 @@
+"""What tfcompose's own processes share: arguments, the plan, signals, and their few lines of output.
+
+Exit codes: 0 ended by a signal, 1 ROS is missing or not usable, 2 the arguments or the plan are not.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import RejectedError, Span, finding
+from tfcompose.planfile import read_plan
+from tfcompose.ros.environment import RosError, child_environment, missing_ros
+from tfcompose.ros.stop import Stop
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tfcompose.plan import Plan, PlanEdge, PlanProcess
+
+_ARGUMENTS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Own:
+    """One of the plan's processes, as it runs. ``ros_args`` are what follows ``--ros-args``."""
+
+    plan: Plan
+    process: PlanProcess
+    file: Path
+    ros_args: tuple[str, ...]
+
+    @property
+    def node_name(self) -> str:
+        """The last part of its node's full name."""
+        return self._full_name.rpartition("/")[2]
+
+    @property
+    def namespace(self) -> str:
+        """The rest of its node's full name: empty, or with a slash in front."""
+        return self._full_name.rpartition("/")[0]
+
+    @property
+    def edges(self) -> tuple[PlanEdge, ...]:
+        """The edges that it publishes."""
+        return self.plan.edges_of(self.process.name)
+
+    @property
+    def description(self) -> Path:
+        """The file that becomes ``robot_description``; it stands beside the plan."""
+        return self.file.parent / self.plan.description
+
+    @property
+    def _full_name(self) -> str:
+        return self.process.nodes[0] if self.process.nodes else self.process.name
+
+
+def say(line: str) -> None:
+    """Write a line of output at once."""
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
+
+
+def start(argv: Sequence[str], kind: str) -> int:
+    """Run the process that ``argv`` names until a signal comes, and return the exit code.
+
+    ``argv`` is PLAN_FILE PROCESS_NAME, and may end with ``--ros-args …``. Signals are handled before ROS is imported,
+    which takes a third of a second: whoever is interrupted then ends without a traceback too.
+    """
+    with Stop() as stop:
+        try:
+            own = read_own(argv, kind)
+        except RejectedError as error:
+            return _fail(error, 2)
+        missing = missing_ros()
+        if missing:
+            return _fail(missing, 1)
+        os.environ.update(child_environment(os.environ, own.plan.ros, own=True))
+        try:
+            from tfcompose.run import roles  # noqa: PLC0415 (it imports ROS; see above)
+
+            if not stop.requested:
+                roles.ROLES[kind](own, stop)
+        except RosError as error:
+            return _fail(error, 1)
+    return 0
+
+
+def read_own(argv: Sequence[str], kind: str) -> Own:
+    """Return the process of that kind that ``argv`` names, with its plan.
+
+    Raises:
+        RejectedError: with a TF902 finding, if there is no such plan or process.
+    """
+    words = list(argv)
+    at = words.index("--ros-args") if "--ros-args" in words else len(words)
+    if at != _ARGUMENTS:
+        raise _unfit(f"usage: python -m tfcompose.run.{kind} PLAN_FILE PROCESS_NAME [--ros-args …]", "")
+    file, name = words[:at]
+    try:
+        plan = read_plan(Path(file).read_text(encoding="utf-8"), file)
+    except (OSError, UnicodeDecodeError) as error:
+        raise _unfit(f"cannot read the plan: {error}", file) from None
+    try:
+        process = plan.process(name)
+    except KeyError:
+        raise _unfit(f"the plan has no process {name}", file) from None
+    if process.kind != kind:
+        raise _unfit(f"process {name} is of kind {process.kind}, not {kind}", file)
+    if kind == "simulate" and (process.simulate is None or process.simulate.rate <= 0):
+        raise _unfit(f"process {name} does not say what to simulate at a rate above 0", file)
+    return Own(plan, process, Path(file), tuple(words[at + 1 :]))
+
+
+def _unfit(message: str, file: str) -> RejectedError:
+    return RejectedError([finding("TF902", message, Span(file) if file else None)])
+
+
+def _fail(what: object, code: int) -> int:
+    sys.stderr.write(f"{what}\n")
+    return code

@@ -1,0 +1,210 @@
+"""What tfcompose's own publishing processes do between start and signal; the part of them that needs ROS."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING, Any
+
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+
+from tfcompose.ros.clock import SimClock
+from tfcompose.ros.message import Template, Transform, encode
+from tfcompose.ros.node import JOINT_STATES, latch, open_node, remappings
+from tfcompose.ros.tf import Subscription, TFPublisher, wait
+from tfcompose.run.motion import Joints, circle, read_positions
+from tfcompose.run.own import say
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from contextlib import AbstractContextManager
+
+    from rclpy.node import Node
+
+    from tfcompose.plan import Simulation
+    from tfcompose.ros.stop import Stop
+    from tfcompose.ros.tf import Received
+    from tfcompose.run.own import Own
+
+_SECOND_NS = 1_000_000_000
+# Joint states come with one set of names from each driver; a source that never repeats itself must not fill the memory.
+_MOST_TEMPLATES = 64
+
+
+def static(own: Own, stop: Stop) -> None:
+    """Latch all fixed edges in one message on /tf_static, and the description where no joints process does."""
+    # A fixed edge holds at every time and tf2 does not look at its stamp; simulated time may not have begun.
+    stamp_ns = 0 if own.plan.ros.clock == "sim" else time.time_ns()
+    edges = [Transform(stamp_ns, e.parent, e.child, e.pose.xyz, e.pose.quat_xyzw) for e in own.edges]
+    with _node(own) as node:
+        publisher = TFPublisher(node, static=True)
+        if edges:
+            publisher.publish(encode(edges))
+        say(f"{_count(len(edges), 'edge')} on /tf_static")
+        latched = None
+        if not any(process.kind == "joints" for process in own.plan.processes):
+            latched = _latch_description(own, node)
+        stop.wait(None)
+        del latched
+
+
+def joints(own: Own, stop: Stop) -> None:
+    """Publish the moving edges of each message on ``joint_states``, with its stamp, and latch the description."""
+    with _node(own) as node:
+        mover = _JointMover(own, node)
+        latched = _latch_description(own, node)
+        subscription = Subscription(node, JointState, "joint_states", JOINT_STATES)
+        say(f"{_count(len(mover), 'edge')} on /tf, from {subscription.subscription.topic_name}")
+        while not stop.requested:
+            wait(node, [subscription], None, stop)
+            for received in subscription.take():
+                mover.take(received)
+        del latched
+
+
+def simulate(own: Own, stop: Stop) -> None:
+    """Publish the simulated edges, or joint states, at the plan's rate."""
+    simulation = own.process.simulate
+    if simulation is None:  # own.read_own has refused such a plan
+        return
+    with _node(own) as node:
+        if simulation.kind == "joints":
+            publish, what = _joint_states(node, simulation)
+        else:
+            publish, what = _body(own, node, simulation)
+        say(f"{what}, simulated at {simulation.rate:g} Hz")
+        if own.plan.ros.clock == "sim":
+            ticks = _sim_ticks(node, simulation.rate, stop)
+        else:
+            ticks = _wall_ticks(simulation.rate, stop)
+        for time_s, stamp_ns in ticks:
+            publish(time_s, stamp_ns)
+
+
+ROLES: dict[str, Callable[[Own, Stop], None]] = {"static": static, "joints": joints, "simulate": simulate}
+
+
+class _JointMover:
+    """From joint states to /tf."""
+
+    def __init__(self, own: Own, node: Node) -> None:
+        self._edges = [(edge.parent, edge.child) for edge in own.edges if edge.joint]
+        self._joints = Joints(own.edges)
+        self._sim = own.plan.ros.clock == "sim"
+        self._publisher = TFPublisher(node, static=False)
+        self._templates: dict[tuple[int, ...], Template] = {}
+        self._said: set[str] = set()
+
+    def __len__(self) -> int:
+        return len(self._edges)
+
+    def take(self, received: Received) -> None:
+        """Publish what a JointState says; one that cannot be believed is dropped, with a line the first time."""
+        try:
+            message = deserialize_message(received.data, JointState)
+            sent = read_positions(message.name, message.position, self._joints.names)
+        except ValueError as error:
+            self._drop(str(error))
+        except Exception:  # noqa: BLE001 (rclpy's name for bytes that are no JointState is not public)
+            self._drop("its bytes are not one")
+        else:
+            self._publish(sent, message.header.stamp, received.received_ns)
+
+    def _publish(self, sent: dict[str, float], stamp: Any, received_ns: int) -> None:
+        poses = self._joints.poses(sent)
+        if not poses:
+            return
+        template = self._template(tuple(poses))
+        for index, pose in enumerate(poses.values()):
+            template.set_pose(index, pose)
+        stamp_ns = stamp.sec * _SECOND_NS + stamp.nanosec
+        # Messages sent by hand often have no stamp, and tf2 takes only the first transform of one time.
+        template.set_stamp(stamp_ns if stamp_ns or self._sim else received_ns)
+        self._publisher.publish(template.data)
+
+    def _template(self, indices: tuple[int, ...]) -> Template:
+        found = self._templates.get(indices)
+        if found is None:
+            if len(self._templates) >= _MOST_TEMPLATES:
+                self._templates.clear()
+            found = self._templates[indices] = Template([self._edges[index] for index in indices])
+        return found
+
+    def _drop(self, why: str) -> None:
+        if why not in self._said:
+            self._said.add(why)
+            say(f"dropped a joint state: {why} (said once)")
+
+
+def _node(own: Own) -> AbstractContextManager[Node]:
+    return open_node(own.node_name, own.namespace, args=[*remappings(own.process.remap), *own.ros_args])
+
+
+def _latch_description(own: Own, node: Node) -> Any:
+    """Publish the description and return its publisher; without the file TF goes on, and a line says so."""
+    try:
+        text = own.description.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        say(f"no robot_description: {error}")
+        return None
+    return latch(node, "robot_description", text)
+
+
+def _body(own: Own, node: Node, simulation: Simulation) -> tuple[Callable[[float, int], None], str]:
+    edges = own.edges
+    template = Template([(edge.parent, edge.child) for edge in edges])
+    publisher = TFPublisher(node, static=False)
+
+    def publish(time_s: float, stamp_ns: int) -> None:
+        pose = simulation.pose
+        if simulation.kind == "circle":
+            pose = pose @ circle(simulation.radius, simulation.speed, time_s)
+        for index in range(len(edges)):
+            template.set_pose(index, pose)
+        template.set_stamp(stamp_ns)
+        publisher.publish(template.data)
+
+    return publish, f"{_count(len(edges), 'edge')} on /tf"
+
+
+def _joint_states(node: Node, simulation: Simulation) -> tuple[Callable[[float, int], None], str]:
+    publisher: Any = node.create_publisher(JointState, "joint_states", 10)
+    message = JointState(name=list(simulation.joints), position=list(simulation.joints.values()))
+
+    def publish(_: float, stamp_ns: int) -> None:
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, _SECOND_NS)
+        publisher.publish(message)
+
+    return publish, f"{_count(len(simulation.joints), 'joint')} on {publisher.topic_name}"
+
+
+def _wall_ticks(rate: float, stop: Stop) -> Iterator[tuple[float, int]]:
+    """Give seconds since the start and the time to stamp with, at ``rate``; ticks that were missed are left out."""
+    start, tick = time.monotonic(), 0
+    while not stop.wait(max(0.0, start + tick / rate - time.monotonic())):
+        elapsed_s = time.monotonic() - start
+        yield elapsed_s, time.time_ns()
+        tick = max(tick + 1, math.floor(elapsed_s * rate))
+
+
+def _sim_ticks(node: Node, rate: float, stop: Stop) -> Iterator[tuple[float, int]]:
+    """Give the same by /clock: nothing while it stands, and a new start when it jumps back."""
+    clock = SimClock(node)
+    start_ns = last_ns = tick = 0
+    while not stop.requested:
+        wait(node, [clock.subscription], None, stop)
+        now_ns = clock.now_ns()
+        if now_ns is None:
+            continue
+        if now_ns < last_ns or tick == 0:
+            start_ns, tick = now_ns, 0
+        last_ns = now_ns
+        elapsed_s = (now_ns - start_ns) / _SECOND_NS
+        if elapsed_s * rate >= tick:
+            yield elapsed_s, now_ns
+            tick = math.floor(elapsed_s * rate) + 1
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"

@@ -1,0 +1,20 @@
+"""The process that latches the fixed edges on /tf_static: ``python -m tfcompose.run.static PLAN_FILE PROCESS_NAME``."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+from tfcompose.run.own import start
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+def main(argv: Sequence[str]) -> int:
+    """Run it until a signal comes and return the exit code; ``own.start`` says which."""
+    return start(argv, "static")
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,49 @@
+"""Bytes into lines, and signals into values."""
+
+from __future__ import annotations
+
+import signal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tfcompose.run.child import Lines
+from tfcompose.run.signals import Signals
+
+
+@given(st.text(alphabet="ab\né", max_size=60), st.integers(1, 7))
+def test_lines_are_the_same_however_the_bytes_arrive(text: str, size: int) -> None:
+    data, lines = text.encode(), Lines()
+    said = [line for start in range(0, len(data), size) for line in lines.feed(data[start : start + size])]
+    expected = text.split("\n")
+    assert [*said, *lines.end()] == (expected if expected[-1] else expected[:-1])
+
+
+@given(st.lists(st.binary(max_size=40), max_size=20))
+def test_no_line_is_longer_than_the_limit_nothing_is_lost_and_little_is_kept(chunks: list[bytes]) -> None:
+    lines = Lines(8)
+    said: list[str] = []
+    for chunk in (chunk.replace(b"\r", b"").replace(b"\n", b"x") for chunk in chunks):
+        said.extend(lines.feed(chunk))
+        assert len(lines._rest) <= 8
+    said.extend(lines.end())
+    assert all(len(line) <= 8 for line in said)
+    if all(max(chunk, default=0) < 128 for chunk in chunks):
+        assert len("".join(said)) == sum(len(chunk) - chunk.count(b"\r") for chunk in chunks)
+
+
+@pytest.mark.parametrize(("data", "line"), [(b"a\r\n", "a"), (b"\xff\n", "\ufffd"), (b"\n", "")])
+def test_a_line_comes_without_its_end_and_never_fails_to_be_text(data: bytes, line: str) -> None:
+    assert list(Lines().feed(data)) == [line]
+
+
+def test_a_sighup_that_is_ignored_as_below_nohup_stays_ignored() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with Signals():
+            assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+            assert signal.getsignal(signal.SIGTERM) != signal.SIG_DFL
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)

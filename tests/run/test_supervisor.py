@@ -1,0 +1,338 @@
+"""Real processes, without ROS: plain Python children stand in for what a plan starts."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from signal import SIGHUP, SIGINT, SIGKILL, SIGTERM
+from typing import TYPE_CHECKING, Any
+
+import psutil
+import pytest
+
+from tfcompose.plan import GuardPolicy, Plan, PlanProcess, RosSettings
+from tfcompose.planfile import write_plan
+from tfcompose.run.events import Clear, Complete, Live, OwnerReady, to_line
+from tfcompose.run.notice import EdgeLive, Ended, FindingShown, LogLine, Notice, ProcessState, TreeComplete
+from tfcompose.run.state import Times
+from tfcompose.run.supervisor import supervise
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+PYTHON = ("${python}", "-I", "-S", "-c")
+SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); time.sleep(600)"
+#: Starts a child of its own that heeds no signal but SIGKILL, and says both process numbers.
+PARENT = """
+import os, signal, subprocess, sys, time
+ignore = "signal.signal(signal.SIGINT, signal.SIG_IGN); signal.signal(signal.SIGTERM, signal.SIG_IGN)"
+deaf = f"import signal, time; {ignore}; print('deaf', flush=True); time.sleep(600)"
+child = subprocess.Popen([sys.executable, "-I", "-S", "-c", deaf], stdout=subprocess.PIPE)
+child.stdout.readline()
+print("pids", os.getpid(), child.pid, flush=True)
+time.sleep(600)
+"""
+DEAF = """
+import os, signal, time
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+signal.signal(signal.SIGTERM, signal.SIG_IGN)
+print("pids", os.getpid(), flush=True)
+time.sleep(600)
+"""
+#: Runs a plan file as a process of its own, and prints the notices.
+LAUNCHER = """
+import signal, sys
+from pathlib import Path
+from tfcompose.planfile import read_plan
+from tfcompose.run.supervisor import supervise
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # the tests may run below nohup
+file = Path(sys.argv[1])
+plan = read_plan(file.read_text(), str(file))
+sys.exit(supervise(plan, file, report=lambda notice: print(notice, flush=True)))
+"""
+
+
+def program(name: str, code: str, *words: str, **more: Any) -> PlanProcess:
+    return PlanProcess(name, more.pop("kind", "run"), argv=(*PYTHON, code, *words), **more)
+
+
+def guard(*events: Any, end: str = SLEEPER) -> PlanProcess:
+    """Return a guard that says these events, or lines, and then sleeps."""
+    lines = "".join(event if isinstance(event, str) else to_line(event) for event in events)
+    say = f"import os; os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']), {lines.encode()!r}); {end}"
+    return program("guard", say, kind="guard")
+
+
+def plan_of(*processes: PlanProcess) -> Plan:
+    return Plan("rover", "", None, RosSettings(), (), processes, GuardPolicy())
+
+
+def until(condition: Callable[[], bool], seconds: float = 15.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it did not come to pass in time"
+        time.sleep(0.005)
+
+
+def gone(pid: int) -> bool:
+    try:
+        return bool(psutil.Process(pid).status() == psutil.STATUS_ZOMBIE)
+    except psutil.NoSuchProcess:
+        return True
+
+
+@dataclass
+class Launcher:
+    """A launcher that runs as a process of its own."""
+
+    popen: subprocess.Popen[bytes]
+    output: Path
+
+    def pids(self) -> list[int]:
+        """Return the process numbers that the children have said so far."""
+        said = [line.split("pids ")[1] for line in self.output.read_text().splitlines() if "pids " in line]
+        return [int(word) for words in said for word in words.rstrip("')").split()]
+
+    def below(self, *, recursive: bool = True) -> list[int]:
+        return [child.pid for child in psutil.Process(self.popen.pid).children(recursive=recursive)]
+
+
+@pytest.fixture
+def launch(tmp_path: Path) -> Iterator[Callable[..., Launcher]]:
+    launchers: list[Launcher] = []
+
+    def start(*processes: PlanProcess) -> Launcher:
+        file, output = tmp_path / "plan.json", tmp_path / "output.txt"
+        file.write_text(write_plan(plan_of(*processes)))
+        with output.open("wb") as out:
+            popen = subprocess.Popen([sys.executable, "-c", LAUNCHER, str(file)], stdout=out, stderr=out)
+        launchers.append(Launcher(popen, output))
+        return launchers[-1]
+
+    yield start
+    for launcher in launchers:
+        if launcher.popen.poll() is None:
+            for pid in (launcher.popen.pid, *launcher.below()):
+                os.kill(pid, SIGKILL)
+        launcher.popen.wait()
+
+
+def run(tmp_path: Path, *processes: PlanProcess, **more: Any) -> tuple[int, list[Notice]]:
+    """Run the plan in this process and return its exit code and what was told."""
+    told: list[Notice] = []
+    code = supervise(plan_of(*processes), tmp_path / "plan.json", report=told.append, **more)
+    return code, told
+
+
+def logged(told: list[Notice], process: str) -> list[str]:
+    return [notice.text for notice in told if isinstance(notice, LogLine) and notice.process == process]
+
+
+@pytest.mark.parametrize("number", [SIGINT, SIGTERM, SIGHUP])
+def test_a_signal_ends_everything_with_0_and_no_process_is_left(launch: Callable[..., Launcher], number: int) -> None:
+    launcher = launch(guard(Clear()), program("a", PARENT), program("b", PARENT))
+    until(lambda: len(launcher.pids()) == 4)
+    below = launcher.below()
+    assert set(launcher.pids()) < set(below)
+    os.kill(launcher.popen.pid, number)
+    assert launcher.popen.wait(15) == 0
+    assert [pid for pid in below if not gone(pid)] == []
+
+
+@pytest.mark.parametrize("keeper", ["with its keeper", "and its keeper is dead already"])
+def test_sigkill_of_the_launcher_takes_its_children_along_within_2_s(
+    launch: Callable[..., Launcher], keeper: str
+) -> None:
+    launcher = launch(program("a", PARENT), program("b", DEAF))
+    until(lambda: len(launcher.pids()) == 3)
+    below, children = launcher.below(), launcher.below()
+    if "dead" in keeper:
+        children = launcher.below(recursive=False)
+        (shell,) = [pid for pid in children if psutil.Process(pid).name() == "sh"]
+        os.kill(shell, SIGKILL)
+        until(lambda: gone(shell))
+    launcher.popen.kill()
+    launcher.popen.wait()
+    try:
+        until(lambda: all(gone(pid) for pid in children), 2)
+        assert len(children) == (3 if "dead" in keeper else 4)
+    finally:
+        for pid in below:
+            if not gone(pid):
+                os.kill(pid, SIGKILL)
+
+
+def test_a_child_that_heeds_neither_sigint_nor_sigterm_is_killed(tmp_path: Path) -> None:
+    times = Times(interrupt_s=0.2, terminate_s=0.2)
+    told: list[Notice] = []
+
+    def report(notice: Notice) -> None:
+        told.append(notice)
+        if isinstance(notice, LogLine):
+            os.kill(os.getpid(), SIGINT)
+
+    assert supervise(plan_of(program("a", DEAF)), tmp_path / "plan.json", report=report, times=times) == 0
+    details = [notice.detail for notice in told if isinstance(notice, ProcessState) and notice.state == "STOPPING"]
+    assert details == ["SIGINT", "still there after SIGINT: SIGTERM", "still there after SIGTERM: SIGKILL"]
+    assert gone(int(logged(told, "a")[0].split()[1]))
+
+
+def test_what_a_process_leaves_in_its_group_ends_with_it(tmp_path: Path) -> None:
+    code, told = run(tmp_path, program("a", PARENT.replace("time.sleep(600)\n", "")))
+    assert code == 0
+    assert gone(int(logged(told, "a")[0].split()[2]))
+
+
+def test_a_failed_process_is_named_with_its_last_lines_and_the_exit_code_is_1(tmp_path: Path) -> None:
+    failing = "import sys; [print(i) for i in range(20)]; sys.exit('no lidar at /dev/ttyUSB0')"
+    code, told = run(tmp_path, program("lidar", failing), program("b", SLEEPER))
+    (found,) = [notice.found for notice in told if isinstance(notice, FindingShown)]
+    assert (code, found.message) == (1, "lidar ended with exit code 1")
+    assert "lidar: no lidar at /dev/ttyUSB0" in [note.message for note in found.notes]
+    assert len(found.notes) == 8
+    assert told[-1] == Ended(1)
+
+
+def test_a_process_that_fails_is_started_again(tmp_path: Path) -> None:
+    flag = tmp_path / "flag"
+    code = "import os, sys; os.path.exists(sys.argv[1]) or sys.exit(bool(open(sys.argv[1], 'w'))); print('again')"
+    times = Times(backoff_s=0.05)
+    assert logged(run(tmp_path, program("a", code, str(flag), restart="on-failure"), times=times)[1], "a") == ["again"]
+
+
+def test_a_process_that_floods_neither_fills_the_memory_nor_keeps_the_others_from_being_heard(tmp_path: Path) -> None:
+    flood = "import os\nwhile True: os.write(1, b'flood\\n' * 1000)"
+    endless = "import os\nwhile True: os.write(2, b'x' * 6000)"
+    seen = {"a": 0, "b": 0, "c": 0}
+    longest = 0
+
+    def report(notice: Notice) -> None:
+        nonlocal longest
+        if isinstance(notice, LogLine):
+            seen[notice.process] += 1
+            longest = max(longest, len(notice.text))
+
+    before = psutil.Process().memory_info().rss
+    plan = plan_of(program("a", flood), program("b", endless), program("c", "print('heard', flush=True); " + SLEEPER))
+    began = time.monotonic()
+    supervise(plan, tmp_path / "plan.json", report=report, duration_s=2)
+    assert time.monotonic() - began < 4
+    assert psutil.Process().memory_info().rss - before < 20e6
+    assert seen["a"] > 10_000
+    assert seen["b"] > 10
+    assert seen["c"] == 1
+    assert longest == 64 * 1024
+
+
+def test_what_cannot_be_executed_is_named_and_everything_ends_with_1(tmp_path: Path) -> None:
+    broken = tmp_path / "broken"
+    broken.write_bytes(b"\x7fnothing")
+    broken.chmod(0o755)
+    code, told = run(tmp_path, program("b", SLEEPER), PlanProcess("a", "run", argv=(str(broken),)))
+    (found,) = [notice.found for notice in told if isinstance(notice, FindingShown)]
+    assert code == 1
+    assert found.message == f"a could not be started: Exec format error: {broken}"
+    assert [notice.state for notice in told if isinstance(notice, ProcessState) and notice.process == "b"][
+        -1
+    ] == "STOPPED"
+
+
+def test_missing_executables_are_all_reported_before_anything_is_started(tmp_path: Path) -> None:
+    missing = [PlanProcess(name, "run", argv=(f"no_such_{name}",)) for name in "ab"]
+    code, told = run(tmp_path, program("c", SLEEPER), *missing)
+    assert code == 1
+    assert [notice.found.code for notice in told[:-1] if isinstance(notice, FindingShown)] == ["TF810", "TF810"]
+    assert told[2:] == [Ended(1)]
+
+
+def test_placeholders_environment_and_folder_are_those_of_the_plan(tmp_path: Path) -> None:
+    (tmp_path / "maps").mkdir()
+    code = "import os, sys; print(*sys.argv[1:], os.getcwd(), os.environ['ROS_DOMAIN_ID'], os.environ['MINE'])"
+    words = ("${plan}", "${build_dir}/x", "${params_file}", "${other}")
+    process = program("a", code, *words, cwd="maps", params_file="params/a.yaml", env={"MINE": "1"})
+    plan = Plan("rover", "", None, RosSettings(domain_id=7), (), (process,))
+    told: list[Notice] = []
+    supervise(plan, tmp_path / "plan.json", report=told.append)
+    expected = [tmp_path / "plan.json", tmp_path / "x", tmp_path / "params/a.yaml", "${other}", tmp_path / "maps", 7, 1]
+    assert logged(told, "a") == [" ".join(map(str, expected))]
+
+
+def test_the_guards_events_steer_the_start_and_a_line_that_is_none_is_shown(tmp_path: Path) -> None:
+    seen = Live("base_link", "laser", "a", "/a")
+    events = guard(Clear(), "rubbish\n", seen, OwnerReady("a"), Complete(1))
+    a, b = program("a", SLEEPER, owns=(("base_link", "laser"),)), program("b", SLEEPER, after={"a": "ready"})
+    told: list[Notice] = []
+
+    def report(notice: Notice) -> None:
+        told.append(notice)
+        if notice == running_b():
+            os.kill(os.getpid(), SIGTERM)
+
+    def running_b() -> Notice | None:
+        return next(
+            (one for one in told if isinstance(one, ProcessState) and (one.process, one.state) == ("b", "RUNNING")),
+            None,
+        )
+
+    assert supervise(plan_of(events, b, a), tmp_path / "plan.json", report=report) == 0
+    started = [notice.process for notice in told if isinstance(notice, ProcessState) and notice.state == "STARTING"]
+    assert started == ["guard", "a", "b"]
+    assert logged(told, "guard")[:1] == ["not an event: rubbish"]
+    assert [type(notice) for notice in told if isinstance(notice, (EdgeLive, TreeComplete))] == [EdgeLive, TreeComplete]
+
+
+def test_a_guard_that_dies_before_it_is_clear_ends_everything_with_1(tmp_path: Path) -> None:
+    code, told = run(tmp_path, guard(end="raise SystemExit('no rclpy')"), program("a", SLEEPER))
+    assert code == 1
+    assert [notice.process for notice in told if isinstance(notice, ProcessState) and notice.state == "STARTING"] == [
+        "guard"
+    ]
+
+
+def test_output_that_nobody_reads_any_more_ends_everything_with_1(tmp_path: Path) -> None:
+    def report(notice: Notice) -> None:
+        if isinstance(notice, LogLine):
+            raise BrokenPipeError
+
+    assert supervise(plan_of(program("a", PARENT)), tmp_path / "plan.json", report=report) == 1
+
+
+def test_an_error_in_the_launcher_itself_leaves_no_process(tmp_path: Path) -> None:
+    pids: list[int] = []
+
+    def report(notice: Notice) -> None:
+        if isinstance(notice, LogLine):
+            pids.extend(int(word) for word in notice.text.split()[1:])
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        supervise(plan_of(program("a", PARENT)), tmp_path / "plan.json", report=report)
+    until(lambda: all(gone(pid) for pid in pids), 2)
+    assert len(pids) == 2
+
+
+def test_no_file_descriptor_is_left_open_and_no_handler_in_place_after_50_runs(tmp_path: Path) -> None:
+    broken = tmp_path / "broken"
+    broken.write_bytes(b"\x7fnothing")
+    broken.chmod(0o755)
+    sleeper = PlanProcess("a", "run", argv=("sleep", "60"))
+    plans = [
+        (PlanProcess("g", "guard", argv=("sleep", "60")), sleeper),
+        (PlanProcess("g", "guard", argv=(str(broken),)), sleeper),
+        (PlanProcess("b", "run", argv=("true",)),),
+        (sleeper, PlanProcess("c", "run", argv=(str(broken),))),
+    ]
+    handlers = [signal.getsignal(number) for number in (SIGINT, SIGTERM, SIGHUP, signal.SIGCHLD)]
+    run(tmp_path, *plans[0], duration_s=0)
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    for i in range(50):
+        run(tmp_path, *plans[i % len(plans)], duration_s=0.01)
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
+    assert [signal.getsignal(number) for number in (SIGINT, SIGTERM, SIGHUP, signal.SIGCHLD)] == handlers
+    assert signal.set_wakeup_fd(-1) == -1
+    assert psutil.Process().children() == []

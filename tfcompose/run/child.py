@@ -1,0 +1,179 @@
+"""One child process: it dies with the launcher, leads a process group of its own, and is read without waiting.
+
+The kernel sends a child SIGKILL when the launcher dies (PR_SET_PDEATHSIG), but not the child's own children. For those
+there is the keeper, a shell that knows the groups and kills them when the launcher is gone.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import signal
+import subprocess
+from collections import deque
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+    from io import FileIO
+    from typing import IO
+
+    from tfcompose.run.preflight import Command
+
+#: A line longer than this comes in pieces; bytes.
+LINE_LIMIT = 64 * 1024
+#: What is read at once, so that a process that floods leaves time for the others; bytes.
+READ_SIZE = 16 * 1024
+#: What is read from a process that has ended, at most: more than a pipe holds, less than for ever; bytes.
+DRAIN_LIMIT = 1024 * 1024
+
+#: How much of its log goes into the finding for a process that failed: lines, and characters of each.
+LAST_LINES = 8
+LAST_LINE_LENGTH = 300
+
+_PR_SET_PDEATHSIG = 1
+_LIBC = ctypes.CDLL(None, use_errno=True)
+
+
+class Lines:
+    """Bytes into lines. What is kept between two calls is never longer than the limit."""
+
+    def __init__(self, limit: int = LINE_LIMIT) -> None:
+        self._limit = limit
+        self._rest = b""
+
+    def feed(self, data: bytes) -> Iterator[str]:
+        """Yield the lines that are whole now, and pieces of a line that is too long."""
+        *whole, self._rest = (self._rest + data).split(b"\n")
+        for line in whole:
+            yield from self._pieces(line)
+        while len(self._rest) > self._limit:
+            piece, self._rest = self._rest[: self._limit], self._rest[self._limit :]
+            yield _text(piece)
+
+    def end(self) -> Iterator[str]:
+        """Yield what stands after the last line's end, if anything does."""
+        if self._rest:
+            yield _text(self._rest)
+        self._rest = b""
+
+    def _pieces(self, line: bytes) -> Iterator[str]:
+        for start in range(0, max(len(line), 1), self._limit):
+            yield _text(line[start : start + self._limit])
+
+
+def _text(line: bytes) -> str:
+    return line.removesuffix(b"\r").decode(errors="replace")
+
+
+class Pipe:
+    """The end of a pipe that the launcher reads. ``sink`` is given each line."""
+
+    def __init__(self, file: IO[bytes] | FileIO, sink: Callable[[str], None], limit: int = LINE_LIMIT) -> None:
+        self.file = file
+        self._sink = sink
+        self._lines = Lines(limit)
+        os.set_blocking(file.fileno(), False)
+
+    def read(self) -> int | None:
+        """Pass on some of what is there to read: how many bytes, 0 at the end, None if nothing is there now."""
+        data = self.file.read(READ_SIZE)
+        if data is None:
+            return None
+        for line in self._lines.feed(data) if data else self._lines.end():
+            self._sink(line)
+        return len(data)
+
+    def drain(self) -> None:
+        """Pass on what is left of a process that has ended, then close."""
+        left = DRAIN_LIMIT
+        while left > 0 and (count := self.read()):
+            left -= count
+        for line in self._lines.end():
+            self._sink(line)
+        self.file.close()
+
+
+@dataclass(slots=True)
+class Child:
+    """A running process, its pipes, and the end of what it wrote to each."""
+
+    name: str
+    popen: subprocess.Popen[bytes]
+    pipes: list[Pipe] = field(default_factory=list)
+    last_out: deque[str] = field(default_factory=lambda: deque(maxlen=LAST_LINES))
+    last_err: deque[str] = field(default_factory=lambda: deque(maxlen=LAST_LINES))
+
+    @property
+    def last_lines(self) -> tuple[str, ...]:
+        """What it said last; the errors come last and count first, because two pipes have no common order."""
+        return (*self.last_out, *self.last_err)[-LAST_LINES:]
+
+
+def spawn(command: Command, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes]:
+    """Start the command as the leader of a new session, with its output in pipes.
+
+    Raises:
+        OSError: if it cannot be started.
+    """
+    launcher = os.getpid()
+
+    def die_with_the_launcher() -> None:
+        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != launcher:  # it died before the line above
+            os._exit(1)
+
+    return subprocess.Popen(
+        command.argv,
+        bufsize=0,
+        cwd=command.folder,
+        env=command.env,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        pass_fds=pass_fds,
+        start_new_session=True,
+        preexec_fn=die_with_the_launcher,  # noqa: PLW1509 (the launcher has one thread)
+    )
+
+
+def has_ended(pid: int) -> bool:
+    """Return whether the child has ended. It stays a zombie, so that its group's number is not given away."""
+    return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
+
+
+def kill_group(pid: int, number: int) -> None:
+    """Send the signal to the child and everything in its group."""
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(pid, number)
+
+
+class Keeper:
+    """Outlives the launcher by a moment, and kills the groups that it was told last."""
+
+    _SCRIPT = "trap '' INT TERM HUP; while read -r line; do groups=$line; done; for g in $groups; do kill -9 -$g; done"
+
+    def __init__(self) -> None:
+        self._shell = subprocess.Popen(
+            ["/bin/sh", "-c", self._SCRIPT],
+            bufsize=0,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+
+    def keep(self, pids: Iterable[int]) -> None:
+        """Say which groups there are now."""
+        line = " ".join(map(str, pids)) + "\n"
+        if self._shell.stdin:
+            with contextlib.suppress(BrokenPipeError):
+                self._shell.stdin.write(line.encode())
+
+    def close(self) -> None:
+        """Let it go; the groups that it was told last are killed."""
+        if self._shell.stdin:
+            self._shell.stdin.close()
+        self._shell.wait()

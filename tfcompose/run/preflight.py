@@ -1,0 +1,89 @@
+"""Before anything is started: everything about the plan that cannot work on this machine, all at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.ros.environment import RosError
+from tfcompose.run.executable import executable_of, filled_in, folder_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from tfcompose.plan import Plan, PlanProcess, RosSettings
+
+
+class Environment(Protocol):
+    """What makes a process's environment; ``own`` says that the process is one of tfcompose's."""
+
+    def __call__(self, base: Mapping[str, str], ros: RosSettings, *, own: bool) -> dict[str, str]:
+        """Return the environment.
+
+        Raises:
+            RosError: if the plan's settings cannot be followed.
+        """
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """What is executed: program and arguments, environment, and folder."""
+
+    argv: tuple[str, ...]
+    env: dict[str, str]
+    folder: Path
+
+
+def commands_of(
+    plan: Plan, processes: list[PlanProcess], plan_file: Path, base: Mapping[str, str], environment: Environment
+) -> tuple[dict[str, Command], list[Diagnostic]]:
+    """Return each process's command, and what is wrong; with anything wrong, nothing should be started."""
+    found = _never_started(plan)
+    commands: dict[str, Command] = {}
+    for process in processes:
+        command = _command_of(process, plan.ros, plan_file.absolute(), base, environment)
+        if isinstance(command, Diagnostic):
+            found.append(command)
+        else:
+            commands[process.name] = command
+    return commands, list(dict.fromkeys(found))
+
+
+def _command_of(
+    process: PlanProcess, ros: RosSettings, plan_file: Path, base: Mapping[str, str], environment: Environment
+) -> Command | Diagnostic:
+    try:
+        env = environment(base, ros, own=process.kind != "run") | process.env
+    except RosError as error:
+        return finding("TF902", str(error), None)
+    argv = filled_in(process, plan_file)
+    if not argv:
+        return finding("TF902", f"the plan does not say how {process.name} is started", None)
+    folder = folder_of(process, plan_file.parent)
+    program = executable_of(process, argv[0], folder, env)
+    return program if isinstance(program, Diagnostic) else Command((program, *argv[1:]), env, folder)
+
+
+def _never_started(plan: Plan) -> list[Diagnostic]:
+    """Return a finding for each process that waits for what cannot come."""
+    known = {process.name: process for process in plan.processes}
+    found = []
+    for process in plan.processes:
+        for name, what in process.after.items():
+            if name not in known:
+                found.append(finding("TF902", f"{process.name} waits for {name}, which is not in the plan", None))
+            elif what not in _promises(known[name]):
+                found.append(finding("TF902", f"{process.name} waits until {name} is {what}: that never comes", None))
+    waiting = {process.name: set(process.after) & set(known) for process in plan.processes if process.kind != "guard"}
+    while free := [name for name, others in waiting.items() if not others & set(waiting)]:
+        for name in free:
+            del waiting[name]
+    if waiting:
+        found.append(finding("TF812", f"{', '.join(waiting)} wait for each other", None))
+    return found
+
+
+def _promises(process: PlanProcess) -> tuple[str, ...]:
+    return ("started", "ready", "done") if process.kind == "run" else ("started", "ready")

@@ -1,0 +1,66 @@
+"""YAML 1.2's core schema for scalars: ``1e-3`` is a number, ``on`` is a text, ``1:30`` is not 90.
+
+PyYAML reads YAML 1.1; only its parser is used here, with the patterns of the YAML 1.2.2 specification, section 10.3.2.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+
+TAG = "tag:yaml.org,2002:"
+NULL, BOOL, INT, FLOAT, STR, MAP, SEQ = (TAG + kind for kind in ("null", "bool", "int", "float", "str", "map", "seq"))
+
+#: Tag, pattern and possible first characters, in the order in which they are tried.
+IMPLICIT = (
+    (NULL, re.compile(r"(?:null|Null|NULL|~|)\Z"), "nN~"),
+    (BOOL, re.compile(r"(?:true|True|TRUE|false|False|FALSE)\Z"), "tTfF"),
+    (INT, re.compile(r"(?:[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+)\Z"), "-+0123456789"),
+    (
+        FLOAT,
+        re.compile(
+            r"(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?"
+            r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))\Z"
+        ),
+        "-+.0123456789",
+    ),
+)
+
+SCALAR_TAGS = frozenset((STR, *(tag for tag, _, _ in IMPLICIT)))
+
+_MOST_DIGITS = 300
+
+
+def implicit_tag(text: str) -> str:
+    """Return the tag of a plain scalar."""
+    for tag, pattern, first in IMPLICIT:
+        if text[:1] in first and pattern.match(text):
+            return tag
+    return STR
+
+
+def scalar(tag: str, text: str) -> str | bool | int | float | None:
+    """Return the value of a scalar with one of the core tags.
+
+    Raises:
+        ValueError: if the text is not of its tag's form (possible with a written tag), or no finite number.
+    """
+    if tag == STR:
+        return text
+    pattern = next(pattern for known, pattern, _ in IMPLICIT if known == tag)
+    if not pattern.match(text):
+        raise ValueError(f"{text!r} is no {tag.removeprefix(TAG)}")
+    if tag == NULL:
+        return None
+    if tag == BOOL:
+        return text.lower() == "true"
+    return _number(tag, text)
+
+
+def _number(tag: str, text: str) -> int | float:
+    if tag == INT and len(text) < _MOST_DIGITS:
+        return int(text, 0) if text[:2] in {"0o", "0x"} else int(text)
+    value = float("nan") if "n" in text.lower().replace("inf", "") else float(text.lower().replace(".inf", "inf"))
+    if not math.isfinite(value):
+        raise OverflowError(f"{text} is not a finite number")
+    return value

@@ -1,0 +1,151 @@
+"""The simple types of the language: texts, choices, quantities and lists of them."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.diagnostic import did_you_mean
+from tfcompose.validate.quantity import (
+    ANGLE,
+    INERTIA,
+    LENGTH,
+    MASS,
+    NUMBER,
+    RATE,
+    TURN_RATE,
+    Dimension,
+    Quantity,
+    UnitError,
+    dimension_name,
+    example,
+    quantity,
+)
+from tfcompose.validate.schema import BROKEN, Problems, Type, listing, shown, then
+
+if TYPE_CHECKING:
+    from tfcompose.load import Path
+    from tfcompose.pose import Vector
+
+
+def text(pattern: str | None = None, means: str = "") -> Type:
+    """Return the type of a text, of a pattern if given; ``means`` says the pattern in words."""
+    compiled = re.compile(pattern) if pattern else None
+
+    def read(value: Any, path: Path, problems: Problems) -> Any:
+        if not isinstance(value, str):
+            advice = "put it in quotes" if isinstance(value, (int, float)) else ""
+            return problems.refuse("TF103", path, f"{shown(value)} is no text", advice)
+        if compiled and not compiled.fullmatch(value):
+            return problems.refuse("TF106", path, f"{shown(value)} is not {means}")
+        return value
+
+    return Type(read, {"type": "string"} | ({"pattern": f"^{pattern}$"} if pattern else {}))
+
+
+def choice(*allowed: str | int) -> Type:
+    """Return the type of one of the values."""
+
+    def read(value: Any, path: Path, problems: Problems) -> Any:
+        if value in allowed and not isinstance(value, bool):
+            return value
+        advice = f"one of: {', '.join(map(str, allowed))}"
+        if isinstance(value, str):
+            advice = did_you_mean(value, [str(one) for one in allowed], advice)
+        return problems.refuse("TF106", path, f"{shown(value)} is not allowed here", advice)
+
+    return Type(read, {"enum": list(allowed)})
+
+
+def _boolean(value: Any, path: Path, problems: Problems) -> Any:
+    return value if isinstance(value, bool) else problems.refuse("TF103", path, f"{shown(value)} is not true or false")
+
+
+def _true(value: Any, path: Path, problems: Problems) -> Any:
+    return True if value is True else problems.refuse("TF106", path, f"{shown(value)} is not true", "leave the key out")
+
+
+def integer(least: int, most: int) -> Type:
+    """Return the type of a whole number within bounds."""
+
+    def read(value: Any, path: Path, problems: Problems) -> Any:
+        if isinstance(value, bool) or not isinstance(value, int):
+            return problems.refuse("TF103", path, f"{shown(value)} is no whole number")
+        if not least <= value <= most:
+            return problems.refuse("TF106", path, f"{value} is not between {least} and {most}")
+        return value
+
+    return Type(read, {"type": "integer", "minimum": least, "maximum": most})
+
+
+def read_quantity(value: Any, path: Path, problems: Problems, dimension: Dimension) -> Any:
+    """Return the value in SI, or ``BROKEN``: it is no number, its unit is unknown, or it has another dimension."""
+    want = dimension_name(dimension)
+    if isinstance(value, str):
+        try:
+            value = quantity(value)
+        except UnitError as error:
+            code = "TF104" if error.unit else "TF103"
+            return problems.refuse(code, path, f"{error}; a {want} is expected", error.advice)
+    elif isinstance(value, bool) or not isinstance(value, (int, float, Quantity)):
+        return problems.refuse("TF103", path, f"{shown(value)} is no {want}", f"for example {example(dimension)}")
+    if not isinstance(value, Quantity):
+        return float(value)
+    if value.dimension not in {NUMBER, dimension}:
+        message = f"a {want} is expected, and this is a {dimension_name(value.dimension)}"
+        return problems.refuse("TF104", path, message, f"for example {example(dimension)}")
+    return value.value
+
+
+def measure(dimension: Dimension, *, positive: bool = False) -> Type:
+    """Return the type of a quantity, in SI."""
+
+    def read(value: Any, path: Path, problems: Problems) -> Any:
+        number = read_quantity(value, path, problems, dimension)
+        if positive and number is not BROKEN and number <= 0:
+            return problems.refuse("TF106", path, f"{shown(value)} is not greater than 0")
+        return number
+
+    about = f"a {dimension_name(dimension)}: a bare number is SI, a text may carry a unit"
+    return Type(read, {"type": ["number", "string"], "description": about, "examples": [example(dimension)]})
+
+
+def _position(value: Any, path: Path, problems: Problems) -> Any:
+    """Return a joint's position: radians for a turning joint, metres for a sliding one."""
+    attempt = Problems()
+    number = read_quantity(value, path, attempt, ANGLE)
+    return number if number is not BROKEN else read_quantity(value, path, problems, LENGTH)
+
+
+def _colour_part(value: float, path: Path, problems: Problems) -> Any:
+    if 0 <= value <= 1:
+        return value
+    advice = "divide values up to 255 by 255"
+    return problems.refuse("TF106", path, f"{shown(value)} is no part of a colour: 0 to 1", advice)
+
+
+def _has_direction(axis: Vector, path: Path, problems: Problems) -> Any:
+    if any(axis):
+        return axis
+    return problems.refuse("TF106", path, "an axis of length 0 has no direction", "for example [0, 0, 1]")
+
+
+ANYTHING = Type(lambda value, _path, _problems: value, {})
+TEXT = text()
+NAME = text(r"[A-Za-z][A-Za-z0-9_]*", "a name: a letter, then letters, digits and _")
+BOOLEAN = Type(_boolean, {"type": "boolean"})
+ONLY_TRUE = Type(_true, {"const": True})
+NUMBER_ = measure(NUMBER)
+LENGTH_ = measure(LENGTH)
+ANGLE_ = measure(ANGLE)
+TURN_RATE_ = measure(TURN_RATE)
+INERTIA_ = measure(INERTIA)
+SIZE = measure(LENGTH, positive=True)
+MASS_ = measure(MASS, positive=True)
+RATE_ = measure(RATE, positive=True)
+POSITION = Type(_position, {"type": ["number", "string"], "description": "rad or m", "examples": ["90 deg", 0.1]})
+XYZ = listing(LENGTH_, count=3, sample="[0.2, 0, 30 cm]")
+SIZES = listing(SIZE, count=3, sample="[0.5, 0.4, 0.15]")
+NUMBERS = listing(NUMBER_, count=3, sample="[0, 0, 1]")
+AXIS = then(NUMBERS, _has_direction)
+RGBA = listing(then(NUMBER_, _colour_part), count=4, sample="[0.2, 0.4, 0.8, 1]")

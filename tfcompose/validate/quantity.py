@@ -1,0 +1,156 @@
+"""Quantities: numbers with a unit, in SI and radians.
+
+A dimension is the exponents of metre, kilogram, second and radian. A bare number has whatever dimension is asked for.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from tfcompose.diagnostic import did_you_mean
+
+Dimension = tuple[int, int, int, int]
+
+NUMBER: Dimension = (0, 0, 0, 0)
+LENGTH: Dimension = (1, 0, 0, 0)
+MASS: Dimension = (0, 1, 0, 0)
+TIME: Dimension = (0, 0, 1, 0)
+ANGLE: Dimension = (0, 0, 0, 1)
+RATE: Dimension = (0, 0, -1, 0)
+SPEED: Dimension = (1, 0, -1, 0)
+TURN_RATE: Dimension = (0, 0, -1, 1)
+FORCE: Dimension = (1, 1, -2, 0)
+TORQUE: Dimension = (2, 1, -2, 0)
+INERTIA: Dimension = (2, 1, 0, 0)
+
+DIMENSION_NAMES: dict[Dimension, str] = {
+    NUMBER: "number",
+    LENGTH: "length",
+    MASS: "mass",
+    TIME: "time",
+    ANGLE: "angle",
+    RATE: "rate",
+    SPEED: "speed",
+    TURN_RATE: "turn rate",
+    FORCE: "force",
+    TORQUE: "torque",
+    INERTIA: "moment of inertia",
+}
+
+#: Unit, its size in SI, its dimension. International inch and foot are exact since 1959; 1 lb = 0.45359237 kg.
+UNITS: dict[str, tuple[float, Dimension]] = {
+    "m": (1.0, LENGTH),
+    "cm": (0.01, LENGTH),
+    "mm": (0.001, LENGTH),
+    "um": (1e-6, LENGTH),
+    "km": (1000.0, LENGTH),
+    "in": (0.0254, LENGTH),
+    "ft": (0.3048, LENGTH),
+    "kg": (1.0, MASS),
+    "g": (0.001, MASS),
+    "lb": (0.45359237, MASS),
+    "s": (1.0, TIME),
+    "ms": (0.001, TIME),
+    "us": (1e-6, TIME),
+    "min": (60.0, TIME),
+    "rad": (1.0, ANGLE),
+    "mrad": (0.001, ANGLE),
+    "deg": (math.pi / 180, ANGLE),
+    "Hz": (1.0, RATE),
+    "kHz": (1000.0, RATE),
+    "m/s": (1.0, SPEED),
+    "rad/s": (1.0, TURN_RATE),
+    "deg/s": (math.pi / 180, TURN_RATE),
+    "rpm": (math.pi / 30, TURN_RATE),
+    "N": (1.0, FORCE),
+    "Nm": (1.0, TORQUE),
+    "kg*m^2": (1.0, INERTIA),
+}
+
+# Units that divide exactly, so that 15 deg is the double nearest to π/12 and 30 cm is 0.3.
+_DIVIDE = {"cm": 100.0, "mm": 1000.0, "um": 1e6, "g": 1000.0, "ms": 1000.0, "us": 1e6, "mrad": 1000.0}
+
+_QUANTITY = re.compile(r"\s*([-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?)\s*([A-Za-zµ°\"'%][^\s]*)?\s*")
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A value in SI with its dimension."""
+
+    value: float
+    dimension: Dimension = NUMBER
+
+
+class UnitError(ValueError):
+    """A text is no quantity; ``advice`` says what to write instead, ``unit`` is the unit that is not known."""
+
+    def __init__(self, message: str, advice: str = "", unit: str = "") -> None:
+        super().__init__(message)
+        self.advice = advice
+        self.unit = unit
+
+
+def quantity(text: str) -> Quantity:
+    """Return what a text such as ``30 cm`` or ``1e-3`` says.
+
+    Raises:
+        UnitError: if it is no number, or its unit is not known.
+    """
+    match = _QUANTITY.fullmatch(text)
+    if not match:
+        raise UnitError(f"{text!r} is no quantity", "write a number, or a number and a unit: 0.3, 30 cm, 15 deg")
+    number, unit = float(match[1]), match[2]
+    if not math.isfinite(number):
+        raise UnitError(f"{text!r} is not finite")
+    return in_unit(number, unit) if unit else Quantity(number)
+
+
+def in_unit(number: float, unit: str) -> Quantity:
+    """Return ``number`` times the unit.
+
+    Raises:
+        UnitError: if the unit is not known.
+    """
+    if unit not in UNITS:
+        advice = did_you_mean(unit, UNITS, f"known units: {', '.join(UNITS)}")
+        raise UnitError(f"unknown unit {unit}", _SPELLINGS.get(unit, advice), unit)
+    factor, dimension = UNITS[unit]
+    if unit == "deg":
+        return Quantity(math.radians(number), dimension)
+    return Quantity(number / _DIVIDE[unit] if unit in _DIVIDE else number * factor, dimension)
+
+
+_SPELLINGS = {
+    "°": "write deg",
+    "degree": "write deg",
+    "degrees": "write deg",
+    '"': "write in",
+    "inch": "write in",
+    "hz": "write Hz",
+    "µm": "write um",
+}
+
+
+def dimension_name(dimension: Dimension) -> str:
+    """Return what people call the dimension, or its exponents where it has no name."""
+    named = DIMENSION_NAMES.get(dimension)
+    powers = zip(("m", "kg", "s", "rad"), dimension, strict=True)
+    return named or " ".join(f"{base}^{power}" for base, power in powers if power)
+
+
+def example(dimension: Dimension) -> str:
+    """Return one way to write a quantity of the dimension."""
+    return _EXAMPLES.get(dimension, "1")
+
+
+_EXAMPLES = {
+    LENGTH: "30 cm",
+    MASS: "10 kg",
+    TIME: "200 ms",
+    ANGLE: "15 deg",
+    RATE: "50 Hz",
+    SPEED: "0.5 m/s",
+    TURN_RATE: "0.5 rad/s",
+}

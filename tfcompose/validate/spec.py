@@ -1,0 +1,279 @@
+"""The language of ``robot.yaml``, version 1: what a user writes, typed.
+
+The descriptions and examples here are what an editor shows; ``schemas/robot.schema.json`` is made from them.
+"""
+
+from __future__ import annotations
+
+from typing import Any, TYPE_CHECKING
+
+from tfcompose.validate.fields import (
+    ANYTHING,
+    AXIS,
+    BOOLEAN,
+    INERTIA_,
+    MASS_,
+    NAME,
+    NUMBER_,
+    ONLY_TRUE,
+    POSITION,
+    RATE_,
+    RGBA,
+    SIZE,
+    SIZES,
+    TEXT,
+    TURN_RATE_,
+    XYZ,
+    choice,
+    integer,
+    text,
+)
+from tfcompose.validate.rotation import AXIS_ANGLE, LOOK, MATRIX, QUAT_XYZW, RPY
+from tfcompose.validate.schema import Model, key, listing, mapping, record
+
+if TYPE_CHECKING:
+    from tfcompose.pose import Quaternion, Vector
+
+
+class Turned(Model):
+    """At most one rotation of the child in its parent."""
+
+    rpy: Quaternion | None = key(RPY, None, "roll, pitch, yaw about fixed axes; looking down is positive pitch")
+    quat_xyzw: Quaternion | None = key(QUAT_XYZW, None, "a unit quaternion in the order x, y, z, w")
+    axis_angle: Quaternion | None = key(AXIS_ANGLE, None, "a turn about an axis, right-handed")
+    matrix: Quaternion | None = key(MATRIX, None, "3×3 rows; column i is the child's axis i in the parent")
+    look: Quaternion | None = key(LOOK, None, "what is meant, not its sign", ("down", {"down": "15 deg"}))
+
+
+class Posed(Turned):
+    """A pose: where the child is, in its parent."""
+
+    xyz: Vector = key(XYZ, (0.0, 0.0, 0.0), "x forward, y left, z up", ([0.2, 0, "30 cm"],))
+
+
+class EdgeKeys(Posed):
+    """What may stand wherever a parent is."""
+
+    parent: str | None = key(TEXT, None, "the frame that this one hangs on", ("base_link",))
+    relative_to: str | None = key(TEXT, None, "the pose is given in this frame; the parent stays the parent")
+    owner: str | None = key(TEXT, None, "the process that publishes this edge", ("base_drive",))
+    rate: float | None = key(RATE_, None, "how often the owner sends it", ("50 Hz",))
+    static: bool | None = key(BOOLEAN, None, "the foreign owner sends it on /tf_static")
+
+
+class Cylinder(Model):
+    """A cylinder along z, its middle at the origin."""
+
+    radius: float = key(SIZE)
+    length: float = key(SIZE)
+
+
+class Sphere(Model):
+    """A sphere around the origin."""
+
+    radius: float = key(SIZE)
+
+
+class Material(Model):
+    """A colour with a name."""
+
+    name: str = key(NAME, "default", "materials of one name are one colour", ("blue",))
+    rgba: tuple[float, float, float, float] = key(RGBA, (0.5, 0.5, 0.5, 1.0), "red, green, blue, opacity: 0 to 1")
+
+
+class Shape(Posed):
+    """One shape and where it is in its link; one of box, cylinder and sphere."""
+
+    box: Vector | None = key(SIZES, None, "lengths along x, y, z", ([0.5, 0.4, 0.15],))
+    cylinder: Cylinder | None = key(record(Cylinder), None)
+    sphere: Sphere | None = key(record(Sphere), None)
+    material: Material | None = key(record(Material), None)
+
+
+class Tensor(Model):
+    """A moment of inertia about the centre of mass, in kg m²."""
+
+    ixx: float = key(INERTIA_)
+    iyy: float = key(INERTIA_)
+    izz: float = key(INERTIA_)
+    ixy: float = key(INERTIA_, 0.0)
+    ixz: float = key(INERTIA_, 0.0)
+    iyz: float = key(INERTIA_, 0.0)
+
+
+class Inertial(Posed):
+    """Mass and its distribution; the pose is that of the centre of mass."""
+
+    mass: float = key(MASS_, about="of the whole link", examples=("10 kg",))
+    inertia: Tensor | None = key(record(Tensor), None, "about the centre of mass; computed from the shapes if left out")
+
+
+SHAPES = listing(record(Shape), single=True)
+
+
+class LinkSpec(EdgeKeys):
+    """A body, in URDF's words. With a parent it has a fixed edge."""
+
+    visual: tuple[Shape, ...] = key(SHAPES, (), "one shape, or a list")
+    collision: tuple[Shape, ...] = key(SHAPES, (), "one shape, or a list; same: those of visual", ("same",))
+    inertial: Inertial | None = key(record(Inertial), None)
+
+
+def _same(value: Any) -> Any:
+    if isinstance(value, dict) and value.get("collision") == "same":
+        return value | {"collision": value.get("visual", [])}
+    return value
+
+
+class Limit(Model):
+    """What a joint can do; radians, or metres for a prismatic joint."""
+
+    lower: float | None = key(POSITION, None)
+    upper: float | None = key(POSITION, None)
+    effort: float | None = key(NUMBER_, None, "N m, or N")
+    velocity: float | None = key(NUMBER_, None, "rad/s, or m/s")
+
+
+class Mimic(Model):
+    """The joint follows another one: multiplier · q + offset."""
+
+    joint: str = key(TEXT)
+    multiplier: float = key(NUMBER_, 1.0)
+    offset: float = key(POSITION, 0.0)
+
+
+class JointSpec(EdgeKeys):
+    """An edge between bodies, in URDF's words."""
+
+    type: str = key(choice("fixed", "revolute", "continuous", "prismatic"))
+    parent: str = key(TEXT, about="the link that this joint hangs on")
+    child: str = key(TEXT, about="the link that moves")
+    axis: Vector = key(AXIS, (1.0, 0.0, 0.0), "in the child's frame; as in URDF the default is x", ([0, 0, 1],))
+    limit: Limit | None = key(record(Limit), None)
+    mimic: Mimic | None = key(record(Mimic), None)
+
+
+class FrameSpec(EdgeKeys):
+    """A bare frame. Without a parent it is a root, said so."""
+
+
+class FrameOverride(Turned):
+    """One frame of a sensor: its own value, or another name. What is left out is the preset's."""
+
+    xyz: Vector | None = key(XYZ, None)
+    name: str | None = key(TEXT, None, "another name for this frame")
+
+
+class Run(Model):
+    """An installed executable, or a command, word by word; no shell reads it."""
+
+    package: str | None = key(TEXT, None, examples=("slam_toolbox",))
+    executable: str | None = key(TEXT, None, examples=("async_slam_toolbox_node",))
+    args: tuple[str, ...] = key(listing(TEXT), ())
+    argv: tuple[str, ...] = key(listing(TEXT), (), "the whole command instead of package and executable")
+
+
+class Circle(Model):
+    """A body that drives on a circle, counter-clockwise."""
+
+    radius: float = key(SIZE, 1.0)
+    speed: float = key(TURN_RATE_, 0.5)
+
+
+class Simulate(Model):
+    """A stand-in for the owner: one of circle, fixed and joints."""
+
+    circle: Circle | None = key(record(Circle), None, "drives its edge on a circle")
+    fixed: Posed | None = key(record(Posed), None, "sends one pose again and again")
+    joints: dict[str, float] | None = key(
+        mapping(POSITION, short="zero"), None, "zero, or joints with positions; the others are at 0"
+    )
+    rate: float = key(RATE_, 20.0)
+
+
+class ProcessSpec(Model):
+    """What is started, or expected to run: one of run, simulate and external."""
+
+    run: Run | None = key(
+        record(Run, lambda value: {"argv": value} if isinstance(value, list) else value),
+        None,
+        "{package, executable, args}, or a command as a list",
+    )
+    simulate: Simulate | None = key(record(Simulate), None)
+    external: bool | None = key(ONLY_TRUE, None, "somebody else starts it")
+    node: str | None = key(TEXT, None, "the node's name; below ros.namespace unless it begins with /")
+    params: dict[str, Any] = key(mapping(ANYTHING), {}, "the node's parameters, passed on as they are")
+    remap: dict[str, str] = key(mapping(TEXT), {}, "topic names: from, to")
+    env: dict[str, str] = key(mapping(TEXT), {})
+    cwd: str | None = key(TEXT, None)
+    rate: float | None = key(RATE_, None, "for joints: how often joint states come")
+    restart: str = key(choice("no", "on-failure", "always"), "no")
+    after: dict[str, str] = key(
+        mapping(choice("started", "ready", "done")), {}, "what must have happened before the start"
+    )
+
+
+class DriverSpec(ProcessSpec):
+    """Keys over the preset's driver; or the name of the process that drives this sensor; or none."""
+
+    process: str | None = key(TEXT, None)
+
+
+class SensorSpec(EdgeKeys):
+    """A sensor on its mount; its frames are named after it."""
+
+    preset: str = key(TEXT, about="vendor/model", examples=("realsense/d435i", "generic/lidar2d"))
+    parent: str = key(TEXT, about="the frame that the mount hangs on", examples=("base_link",))
+    place: str | None = key(TEXT, None, "the pose is this frame's; the mount edge is solved for")
+    options: dict[str, Any] = key(mapping(ANYTHING), {}, "the preset's own choices: streams, imu, …")
+    tf: str | None = key(choice("driver", "tfcompose"), None, "who publishes the frames inside the sensor")
+    driver: DriverSpec | None = key(
+        record(DriverSpec, lambda value: {"process": value} if isinstance(value, str) else value),
+        None,
+        "keys over the preset's, the name of a process, or none",
+    )
+    frames: dict[str, FrameOverride] = key(mapping(record(FrameOverride)), {}, "this unit's own values and names")
+
+
+class AllowedEdge(Model):
+    """Edges that need no declaration; * and ? are wildcards."""
+
+    child: str = key(TEXT, "*")
+    parent: str = key(TEXT, "*")
+
+
+class GuardSpec(Model):
+    """What watches the live tree."""
+
+    mode: str = key(choice("off", "watch"), "watch")
+    unknown_edges: str = key(choice("ignore", "warn", "error"), "warn", "an edge that nobody declared")
+    on_violation: str = key(choice("report", "stop"), "report")
+    allow: tuple[AllowedEdge, ...] = key(listing(record(AllowedEdge)), ())
+
+
+class RosSpec(Model):
+    """What all processes share."""
+
+    namespace: str = key(
+        text(r"(/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?", "a namespace such as robot1 or fleet/robot1"), ""
+    )
+    domain_id: int | None = key(integer(0, 232), None, "left out: the environment's")
+    discovery: str | None = key(choice("localhost", "subnet", "off"), None, "left out: the environment's")
+    clock: str = key(choice("wall", "sim"), "wall", "one clock for the whole plan")
+
+
+class RobotSpec(Model):
+    """One robot."""
+
+    tfcompose: int = key(choice(1), about="the version of this language", examples=(1,))
+    robot: str = key(text(r"[a-z][a-z0-9_]*", "a robot's name: lower case letters, digits and _"), examples=("rover",))
+    base: str | None = key(TEXT, None, "where the URDF begins; left out: base_link, or the only root")
+    vars: dict[str, Any] = key(mapping(ANYTHING), {}, "quantities, numbers or texts, used as ${name}")
+    ros: RosSpec = key(record(RosSpec), RosSpec())
+    links: dict[str, LinkSpec] = key(mapping(record(LinkSpec, _same)), {}, "bodies")
+    joints: dict[str, JointSpec] = key(mapping(record(JointSpec)), {}, "edges between bodies")
+    frames: dict[str, FrameSpec] = key(mapping(record(FrameSpec)), {}, "bare frames: the skeleton")
+    sensors: dict[str, SensorSpec] = key(mapping(record(SensorSpec)), {})
+    processes: dict[str, ProcessSpec] = key(mapping(record(ProcessSpec)), {}, "what is started, or expected to run")
+    profiles: dict[str, Any] = key(mapping(ANYTHING), {}, "named overlays, chosen with --profile")
+    guard: GuardSpec = key(record(GuardSpec), GuardSpec())

@@ -1,0 +1,98 @@
+"""From a source to a typed spec, with everything that is wrong found in one pass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.diagnostic import Diagnostic, Note, RejectedError, finding
+from tfcompose.load.overlay import CHOICES
+from tfcompose.validate.preset import PresetSpec
+from tfcompose.validate.schema import BROKEN, Model, Problem, Problems, record
+from tfcompose.validate.spec import RobotSpec
+from tfcompose.validate.variables import compute
+
+if TYPE_CHECKING:
+    from tfcompose.load import Path, Source
+
+
+@dataclass(frozen=True, slots=True)
+class Validated:
+    """A spec without its broken parts, the findings about those, and which entries they were in.
+
+    ``broken`` holds (section, name): what is missing because of them is not reported a second time.
+    """
+
+    spec: RobotSpec
+    source: Source
+    found: tuple[Diagnostic, ...]
+    broken: frozenset[tuple[str, str]]
+
+
+def validate(source: Source) -> Validated:
+    """Return the typed spec.
+
+    Raises:
+        RejectedError: if so much is missing that no robot is left (its name, or the version).
+    """
+    problems = Problems()
+    data = compute(source.data, problems)
+    spec = _read(RobotSpec, data, problems)
+    _exclusive(source.data, problems)
+    found = (*source.found, *(_finding(problem, source) for problem in _once(problems.all)))
+    if spec is BROKEN:
+        raise RejectedError(found)
+    broken = {(str(p.path[0]), str(p.path[1])) for p in problems.all if len(p.path) > 1}
+    return Validated(spec, source, found, frozenset(broken))
+
+
+def validate_preset(source: Source) -> PresetSpec:
+    """Return the typed preset.
+
+    Raises:
+        RejectedError: with every finding, if anything is wrong with it.
+    """
+    problems = Problems()
+    preset = _read(PresetSpec, source.data, problems)
+    found = (*source.found, *(_finding(problem, source) for problem in _once(problems.all)))
+    if found:
+        raise RejectedError(found)
+    result: PresetSpec = preset
+    return result
+
+
+def _read(cls: type[Model], data: dict[str, Any], problems: Problems) -> Any:
+    return record(cls).read(data, (), problems)
+
+
+def _once(problems: list[Problem]) -> list[Problem]:
+    return list(dict.fromkeys(problems))
+
+
+def _finding(problem: Problem, source: Source) -> Diagnostic:
+    span = source.at_key(problem.path) if problem.on_key else source.at(problem.path)
+    notes = [Note("the other one", source.at_key(problem.other))] if problem.other else []
+    return finding(problem.code, problem.message, span, help=problem.help, notes=notes)
+
+
+def _exclusive(data: dict[str, Any], problems: Problems) -> None:
+    """Refuse two keys of which a mapping can hold one, wherever the language has such a choice."""
+    for pattern, choice in CHOICES:
+        for path, found in _matching(data, pattern, ()):
+            present = [key for key in found if key in choice]
+            for second in present[1:]:
+                message = f"{second} and {present[0]} exclude each other"
+                advice = f"keep one of {', '.join(present)}"
+                at, other = (*path, second), (*path, present[0])
+                problems.refuse("TF107", at, message, advice, on_key=True, other=other)
+
+
+def _matching(value: Any, pattern: tuple[str, ...], path: Path) -> list[tuple[Path, dict[str, Any]]]:
+    if isinstance(value, list):
+        return [hit for index, item in enumerate(value) for hit in _matching(item, pattern, (*path, index))]
+    if not isinstance(value, dict):
+        return []
+    if not pattern:
+        return [(path, value)]
+    steps = list(value) if pattern[0] == "*" else [pattern[0]] if pattern[0] in value else []
+    return [hit for step in steps for hit in _matching(value[step], pattern[1:], (*path, step))]

@@ -1,0 +1,89 @@
+"""``vars`` and ``${…}``: computed before the keys are read, so that a computed value is checked like a written one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.diagnostic import did_you_mean
+from tfcompose.validate.expression import ExpressionError, Value, fill
+from tfcompose.validate.quantity import Quantity, UnitError, quantity
+from tfcompose.validate.schema import Problems, shown
+
+if TYPE_CHECKING:
+    from tfcompose.load import Path
+
+
+def compute(data: dict[str, Any], problems: Problems) -> dict[str, Any]:
+    """Return the data with every ``${…}`` replaced by its value: a ``Quantity`` where it is the whole text.
+
+    What cannot be computed becomes a bare 0, and a problem.
+    """
+    variables = _Variables(data.get("vars"), problems)
+    variables.read_all()
+    filled = {key: _filled(value, (key,), variables) for key, value in data.items() if key != "vars"}
+    return filled | ({"vars": data["vars"]} if "vars" in data else {})
+
+
+def _filled(value: Any, path: Path, variables: _Variables) -> Any:
+    if isinstance(value, str):
+        return variables.fill(value, path) if "${" in value else value
+    if isinstance(value, dict):
+        return {key: _filled(item, (*path, key), variables) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_filled(item, (*path, index), variables) for index, item in enumerate(value)]
+    return value
+
+
+class _Variables:
+    def __init__(self, written: Any, problems: Problems) -> None:
+        self.written: dict[str, Any] = written if isinstance(written, dict) else {}
+        self.problems = problems
+        self.known: dict[str, Value] = {}
+        self.open: list[str] = []
+
+    def read_all(self) -> None:
+        for name in self.written:
+            if name not in self.known:
+                try:
+                    self.lookup(name)
+                except ExpressionError as error:
+                    self.problems.refuse("TF105", ("vars", name), str(error), error.advice)
+                    self.known[name] = Quantity(0.0)
+
+    def fill(self, text: str, path: Path) -> Any:
+        try:
+            return fill(text, self.lookup)
+        except ExpressionError as error:
+            self.problems.refuse("TF105", path, str(error), error.advice)
+            return 0.0
+
+    def lookup(self, name: str) -> Value:
+        if name in self.known:
+            return self.known[name]
+        if name not in self.written:
+            there = f"vars has {', '.join(self.written)}" if self.written else "the file has no vars"
+            raise ExpressionError(f"unknown variable {name}", did_you_mean(name, self.written, there))
+        if name in self.open:
+            circle = " → ".join([*self.open[self.open.index(name) :], name])
+            raise ExpressionError(f"the variable {name} needs itself: {circle}")
+        self.open.append(name)
+        try:
+            self.known[name] = self._value(name, self.written[name])
+        finally:
+            self.open.pop()
+        return self.known[name]
+
+    def _value(self, name: str, written: Any) -> Value:
+        if isinstance(written, bool) or not isinstance(written, (int, float, str)):
+            raise ExpressionError(f"the variable {name} is {shown(written)}", "a number, a quantity or a text")
+        if not isinstance(written, str):
+            return Quantity(float(written))
+        value = fill(written, self.lookup) if "${" in written else written
+        if not isinstance(value, str):
+            return value
+        try:
+            return quantity(value)
+        except UnitError as error:
+            if error.unit:
+                raise ExpressionError(f"{error} in the variable {name}", error.advice) from None
+            return value

@@ -242,6 +242,12 @@ def test_what_cannot_be_executed_is_named_and_everything_ends_with_1(tmp_path: P
     ] == "STOPPED"
 
 
+def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
+    code, told = run(tmp_path, program("a", SLEEPER, cwd="maps"))
+    (found,) = [notice.found for notice in told if isinstance(notice, FindingShown)]
+    assert (code, found.message) == (1, f"a could not be started: No such file or directory: {tmp_path}/maps")
+
+
 def test_missing_executables_are_all_reported_before_anything_is_started(tmp_path: Path) -> None:
     missing = [PlanProcess(name, "run", argv=(f"no_such_{name}",)) for name in "ab"]
     code, told = run(tmp_path, program("c", SLEEPER), *missing)

@@ -89,11 +89,13 @@ class Pipe:
     def drain(self) -> None:
         """Pass on what is left of a process that has ended, then close."""
         left = DRAIN_LIMIT
-        while left > 0 and (count := self.read()):
-            left -= count
-        for line in self._lines.end():
-            self._sink(line)
-        self.file.close()
+        try:
+            while left > 0 and (count := self.read()):
+                left -= count
+            for line in self._lines.end():
+                self._sink(line)
+        finally:
+            self.file.close()
 
 
 @dataclass(slots=True)

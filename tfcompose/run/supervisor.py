@@ -120,7 +120,7 @@ class _Supervisor:
         return self._exit_code
 
     def _sleep_s(self, end: float | None) -> float:
-        due = [time for time in (wake_time(self._state), end) if time is not None]
+        due = [at for at in (wake_time(self._state), end) if at is not None]
         return min(LONGEST_SLEEP_S, max(0.0, min(due, default=float("inf")) - time.monotonic()))
 
     def _handle(self, event: Event) -> None:

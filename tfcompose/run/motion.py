@@ -86,11 +86,10 @@ def read_positions(names: Sequence[str], positions: Sequence[float], wanted: fro
     Raises:
         ValueError: with a sentence that is the same for the same fault, if the message cannot be believed.
     """
+    if len(names) > 0 and len(positions) == 0:
+        raise ValueError("it has names and no positions")
     if len(names) != len(positions):
-        what = "fewer" if len(positions) < len(names) else "more"
-        raise ValueError(
-            f"it has {what if len(positions) else 'no'} positions{' than names' if len(positions) else ''}"
-        )
+        raise ValueError("it has another number of positions than of names")
     found: dict[str, float] = {}
     for name, position in zip(names, positions, strict=True):
         if name not in wanted:

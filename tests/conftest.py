@@ -1,0 +1,205 @@
+"""What tests that run real processes share.
+
+Files named ``test_…_ros.py`` import ROS, and are left out where there is none.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.planfile import write_plan
+from tfcompose.pose import Pose
+from tfcompose.ros.environment import missing_ros
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    from tfcompose.plan import Joint
+
+NO_ROS = missing_ros()
+collect_ignore_glob = ["*_ros.py"] if NO_ROS else []
+
+TIMEOUT_S = 15.0
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    # rclpy's generator package imports an old lark, which imports what Python 3.11 deprecates.
+    config.addinivalue_line("filterwarnings", "ignore:module 'sre_.*' is deprecated:DeprecationWarning")
+
+
+def pytest_report_header() -> str:
+    return f"ROS: none, so test_*_ros.py are left out ({NO_ROS})" if NO_ROS else "ROS: found"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if NO_ROS and item.get_closest_marker("ros"):
+            item.add_marker(pytest.mark.skip(reason=NO_ROS))
+
+
+@dataclass(frozen=True)
+class Domain:
+    """A ROS domain that nobody else on this machine uses during the test; ``environment`` is a process's."""
+
+    id: int
+    environment: Mapping[str, str]
+
+
+@pytest.fixture
+def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[Domain]:
+    """A domain of the test's own, on the loopback interface, in this process's environment too."""
+    with _reserved() as (number, _):
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
+        monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        yield Domain(number, dict(os.environ))
+
+
+class _reserved:  # noqa: N801 (read as a verb in the with statement)
+    """One of the domains 1 to 100, locked by a file so that concurrent runs do not hear each other."""
+
+    def __enter__(self) -> tuple[int, int]:
+        for number in range(1, 101):
+            path = Path(tempfile.gettempdir()) / f"tfcompose-test-domain-{number}.lock"
+            descriptor = os.open(path, os.O_CREAT | os.O_RDWR, 0o666)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                os.close(descriptor)
+                continue
+            self._descriptor = descriptor
+            return number, descriptor
+        raise RuntimeError("all ROS domains are in use by other tests")
+
+    def __exit__(self, *_: object) -> None:
+        os.close(self._descriptor)
+
+
+@dataclass
+class Started:
+    """A process under test, its standard output and error read line by line."""
+
+    process: subprocess.Popen[str]
+    lines: list[str] = field(default_factory=list)
+    errors: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        pairs = ((self.process.stdout, self.lines), (self.process.stderr, self.errors))
+        self._readers = [threading.Thread(target=lines.extend, args=(stream,)) for stream, lines in pairs if stream]
+        for reader in self._readers:
+            reader.start()
+
+    @property
+    def output(self) -> str:
+        return "".join(self.lines)
+
+    def until_says(self, text: str) -> None:
+        """Wait until a line holds ``text``."""
+        until(lambda: text in self.output or self.process.poll() is not None)
+        assert text in self.output, self.lines + self.errors
+
+    def end(self, number: int = signal.SIGINT) -> tuple[int, float]:
+        """Send the signal; return the exit code and the seconds that it took."""
+        start = time.monotonic()
+        self.process.send_signal(number)
+        code = self.process.wait(TIMEOUT_S)
+        return code, time.monotonic() - start
+
+    def close(self) -> None:
+        """End the process, whatever it does, and its readers."""
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait(TIMEOUT_S)
+        for reader in self._readers:
+            reader.join(TIMEOUT_S)
+        for stream in (self.process.stdout, self.process.stderr):
+            if stream:
+                stream.close()
+
+
+@pytest.fixture
+def start(domain: Domain) -> Iterator[Callable[..., Started]]:
+    """Start ``python -m MODULE ARGUMENT…`` in the test's domain; what still runs at the test's end is killed."""
+    running: list[Started] = []
+
+    def run(module: str, *arguments: object, **environment: str) -> Started:
+        command = [sys.executable, "-m", module, *map(str, arguments)]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        process = subprocess.Popen(command, text=True, env={**domain.environment, **environment}, **pipes)  # type: ignore[call-overload]
+        running.append(Started(process))
+        return running[-1]
+
+    yield run
+    for started in running:
+        started.close()
+
+
+@pytest.fixture
+def python() -> Callable[[str], str]:
+    """Run Python code in a process of its own, in this process's environment; return its output."""
+
+    def run(code: str) -> str:
+        command = [sys.executable, "-c", code]
+        return subprocess.run(command, check=True, capture_output=True, text=True, timeout=2 * TIMEOUT_S).stdout
+
+    return run
+
+
+def until(condition: Callable[[], object], timeout_s: float = TIMEOUT_S) -> bool:
+    """Look every few milliseconds until the condition holds; return whether it did in time."""
+    end = time.monotonic() + timeout_s
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.005)
+    return True
+
+
+@pytest.fixture(name="until")
+def _until() -> Callable[..., bool]:
+    return until
+
+
+@pytest.fixture
+def edge() -> Callable[..., PlanEdge]:
+    """Make a plan's edge from "parent child", owner and kind."""
+
+    def make(names: str, owner: str = "static", pose: Pose | None = None, joint: Joint | None = None) -> PlanEdge:
+        parent, child = names.split()
+        kind = "joint" if joint else "static" if owner == "static" else "dynamic"
+        node = f"/rover/{owner}"
+        source = ("rover.yaml", 1)
+        return PlanEdge(parent, child, kind, owner, node, pose or Pose(), None, source, joint)  # type: ignore[arg-type]
+
+    return make
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[..., Path]:
+    """Write a plan of these edges and processes, and its description, and return the plan's file."""
+
+    def make(edges: list[PlanEdge], *processes: PlanProcess, clock: str = "wall") -> Path:
+        named = tuple(p if p.nodes else _with_node(p) for p in processes)
+        plan = Plan("rover", "0", "base_link", RosSettings("/rover", clock=clock), tuple(edges), named)
+        file = tmp_path / "rover.plan.json"
+        file.write_text(write_plan(plan), encoding="utf-8")
+        (tmp_path / plan.description).write_text("<robot name='rover'/>", encoding="utf-8")
+        return file
+
+    return make
+
+
+def _with_node(process: PlanProcess) -> PlanProcess:
+    return PlanProcess(process.name, process.kind, nodes=(f"/rover/{process.name}",), simulate=process.simulate)

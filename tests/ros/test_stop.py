@@ -1,0 +1,59 @@
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+
+import pytest
+
+from tfcompose.ros.stop import Stop
+
+
+class Waker:
+    def __init__(self) -> None:
+        self.woken = threading.Event()
+
+    def trigger_guard_condition(self) -> None:
+        self.woken.set()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_sets_the_flag_and_ends_the_wait(number: int) -> None:
+    with Stop() as stop:
+        assert not stop.requested
+        threading.Timer(0.05, os.kill, (os.getpid(), number)).start()
+        start = time.monotonic()
+        assert stop.wait(5)
+        assert time.monotonic() - start < 1
+        assert stop.requested
+
+
+def test_a_signal_wakes_what_waits_elsewhere() -> None:
+    with Stop() as stop:
+        waker = Waker()
+        assert stop.waker(stop, lambda: waker) is waker
+        os.kill(os.getpid(), signal.SIGTERM)
+        assert waker.woken.wait(5)
+
+
+def test_a_waker_that_comes_after_the_signal_is_triggered_at_once() -> None:
+    stop = Stop()
+    stop.request()
+    waker = Waker()
+    stop.waker(stop, lambda: waker)
+    assert waker.woken.is_set()
+
+
+def test_the_same_owner_keeps_its_waker() -> None:
+    stop = Stop()
+    assert stop.waker(stop, Waker) is stop.waker(stop, Waker)
+
+
+def test_afterwards_signals_do_what_they_did_before() -> None:
+    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
+    threads = threading.active_count()
+    with Stop():
+        pass
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)] == before
+    assert threading.active_count() == threads

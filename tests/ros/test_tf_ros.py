@@ -1,0 +1,112 @@
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from sensor_msgs.msg import JointState
+
+from tfcompose.ros.graph import writers
+from tfcompose.ros.message import Transform, decode, encode
+from tfcompose.ros.node import JOINT_STATES, open_node
+from tfcompose.ros.stop import Stop
+from tfcompose.ros.tf import Subscription, TFPublisher, TFSubscription, wait
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
+
+ONE = Transform(1, "odom", "base", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))
+UNTIL_S = 10.0
+
+
+@pytest.fixture
+def node(domain: object) -> Iterator[Any]:
+    assert domain
+    with open_node("listens", "/test") as opened:
+        yield opened
+
+
+def test_a_message_and_the_graph_name_the_same_publisher(node: Any) -> None:
+    with open_node("one", "/rover") as first, open_node("two", "/rover") as second:
+        subscription = TFSubscription(node, static=True)
+        publishers = [TFPublisher(each, static=True) for each in (first, second)]
+        for number, publisher in enumerate(publishers):
+            publisher.publish(encode([Transform(number, "a", "b", ONE.xyz, ONE.quat_xyzw)]))
+        received = _take(node, subscription, 2)
+        named = {writer.gid: writer for writer in writers(node, "/tf_static")}
+        found = {decode(each.data)[0].stamp_ns: named[each.gid or b""].node for each in received}
+    assert found == {0: "/rover/one", 1: "/rover/two"}
+    assert {writer.durability for writer in named.values()} == {"transient_local"}
+    assert {writer.reliability for writer in named.values()} == {"reliable"}
+    assert {writer.type for writer in named.values()} == {"tf2_msgs/msg/TFMessage"}
+
+
+def test_take_returns_everything_in_order_and_then_nothing(node: Any, until: Callable[..., bool]) -> None:
+    publisher, subscription = TFPublisher(node, static=False), TFSubscription(node, static=False)
+    assert until(lambda: publisher.publisher.get_subscription_count() == 1)
+    assert subscription.take() == []
+    before = time.time_ns()
+    for stamp in range(50):
+        publisher.publish(encode([Transform(stamp, "a", "b", ONE.xyz, ONE.quat_xyzw)]))
+    received = _take(node, subscription, 50)
+    assert [decode(each.data)[0].stamp_ns for each in received] == list(range(50))
+    assert [each.sequence for each in received] == list(range(received[0].sequence, received[0].sequence + 50))
+    assert all(before <= each.source_ns <= each.received_ns <= time.time_ns() for each in received)
+    assert subscription.take() == []
+
+
+def test_other_types_are_taken_as_bytes_too(node: Any, until: Callable[..., bool]) -> None:
+    subscription = Subscription(node, JointState, "joint_states", JOINT_STATES)
+    publisher = node.create_publisher(JointState, "/test/joint_states", 10)
+    assert until(lambda: publisher.get_subscription_count() == 1)
+    publisher.publish(JointState(name=["left"], position=[1.0]))
+    assert b"left" in _take(node, subscription, 1)[0].data
+
+
+def test_a_topic_of_ones_own_keeps_away_from_tf(node: Any) -> None:
+    TFPublisher(node, static=False, topic="/private/tf")
+    assert [writers(node, topic) != [] for topic in ("/private/tf", "/tf")] == [True, False]
+
+
+def test_a_wait_without_messages_ends_in_time(node: Any) -> None:
+    subscription = TFSubscription(node, static=False)
+    start = time.monotonic()
+    wait(node, [subscription], 0.05, Stop())
+    assert 0.04 < time.monotonic() - start < 1.0
+
+
+def test_a_signal_ends_a_wait_that_has_no_timeout(node: Any) -> None:
+    subscription = TFSubscription(node, static=False)
+    with Stop() as stop:
+        threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGTERM)).start()
+        start = time.monotonic()
+        wait(node, [subscription], None, stop)
+        assert time.monotonic() - start < 0.3
+        assert stop.requested
+        wait(node, [subscription], None, stop)
+
+
+def test_a_node_leaves_no_thread_and_offers_nothing_that_it_does_not_answer(domain: object) -> None:
+    assert domain
+    with open_node("quiet", "/rover") as node:
+        assert node.get_service_names_and_types_by_node("quiet", "/rover") == []
+        assert [topic for topic, _ in node.get_topic_names_and_types()] == ["/parameter_events"]
+    threads = threading.active_count()
+    with open_node("again", "/rover"):
+        pass
+    assert threading.active_count() == threads
+
+
+def _take(node: Any, subscription: Subscription, count: int) -> list[Any]:
+    received: list[Any] = []
+    end = time.monotonic() + UNTIL_S
+    while len(received) < count and time.monotonic() < end:
+        wait(node, [subscription], 1.0, Stop())
+        received += subscription.take()
+    assert len(received) == count
+    return received

@@ -1,0 +1,81 @@
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tfcompose.ros import typesupport
+from tfcompose.ros.environment import RosError
+from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.node import open_node
+from tfcompose.ros.tf import TFPublisher
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+pytestmark = pytest.mark.ros
+
+
+def _address() -> int:
+    return typesupport.capsule_address(typesupport.own_type().__class__._TYPE_SUPPORT)
+
+
+def test_the_hash_is_that_of_the_description() -> None:
+    address = _address()
+    assert typesupport.hash_text(address) == typesupport.HASH
+    assert typesupport.type_hash(typesupport.description_json(address)) == typesupport.HASH
+
+
+def test_the_description_is_that_of_tf_message() -> None:
+    found = typesupport.description_json(_address())
+    kind = {
+        "type_id": 145,
+        "capacity": 0,
+        "string_capacity": 0,
+        "nested_type_name": "geometry_msgs/msg/TransformStamped",
+    }
+    assert found["type_description"] == {
+        "type_name": "tf2_msgs/msg/TFMessage",
+        "fields": [{"name": "transforms", "type": kind}],
+    }
+    assert [each["type_name"] for each in found["referenced_type_descriptions"]] == [
+        "builtin_interfaces/msg/Time",
+        "geometry_msgs/msg/Quaternion",
+        "geometry_msgs/msg/Transform",
+        "geometry_msgs/msg/TransformStamped",
+        "geometry_msgs/msg/Vector3",
+        "std_msgs/msg/Header",
+    ]
+
+
+def test_another_rmw_is_refused_with_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(typesupport, "get_rmw_implementation_identifier", lambda: "rmw_cyclonedds_cpp")
+    with pytest.raises(RosError, match="with rmw_cyclonedds_cpp the package tf2_msgs is needed"):
+        typesupport.own_type()
+
+
+@pytest.mark.parametrize("what", ["_FASTRTPS", "_INTROSPECTION", "_STAMPED"])
+def test_another_layout_is_refused_with_a_sentence(monkeypatch: pytest.MonkeyPatch, what: str) -> None:
+    monkeypatch.setattr(typesupport, what, type(getattr(typesupport, what))(getattr(typesupport, what)[:-1]))
+    with pytest.raises(RosError, match="not laid out as Jazzy's"):
+        typesupport.own_type()
+
+
+SEES = """
+import rclpy, sys, time
+rclpy.init(); node = rclpy.create_node("sees"); end = time.monotonic() + 10
+while time.monotonic() < end and "/tf" not in dict(node.get_topic_names_and_types()):
+    time.sleep(0.02)
+info = node.get_publishers_info_by_topic("/tf")[0]
+print(dict(node.get_topic_names_and_types())["/tf"], info.topic_type, info.topic_type_hash)
+"""
+
+
+@pytest.mark.usefixtures("domain")
+def test_another_process_sees_the_type_and_its_hash(python: Callable[[str], str]) -> None:
+    with open_node("talks", "/rover") as node:
+        publisher = TFPublisher(node, static=False)
+        publisher.publish(encode([Transform(0, "a", "b", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))]))
+        seen = python(SEES)
+    assert "['tf2_msgs/msg/TFMessage'] tf2_msgs/msg/TFMessage" in seen
+    assert typesupport.HASH in seen

@@ -21,6 +21,8 @@ BIG_ENDIAN = b"\x00\x00\x00\x00"
 
 _HEADER = 4
 _SECOND_NS = 1_000_000_000
+_POSE = struct.Struct("<7d")
+_IDENTITY = _POSE.pack(*Pose().xyz, *Pose().quat_xyzw)
 # Stamp, two empty names of 5 bytes, 56 bytes of doubles, and no padding: no transform is shorter.
 _SHORTEST = 8 + 5 + 5 + 56
 
@@ -37,24 +39,28 @@ class Transform:
 
 
 class Template:
-    """A TFMessage whose names stay: stamps and numbers are overwritten in place.
+    """A TFMessage whose names stay, while its time and its poses are set anew.
 
-    Until they are set, stamps are 0 and poses the identity.
+    Until they are set, the time is 0 and poses are the identity. All transforms have the same time: what stands between
+    two stamps is kept as one piece, and the message is the pieces joined by the stamp.
     """
 
     def __init__(self, edges: Sequence[tuple[str, str]]) -> None:
-        pose = Pose()
-        self._buffer, self._stamps, self._poses = _write(
-            [Transform(0, parent, child, pose.xyz, pose.quat_xyzw) for parent, child in edges]
-        )
+        self._head = LITTLE_ENDIAN + struct.pack("<I", len(edges))
+        self._bodies: list[bytearray] = []
+        self._stamp = _stamp(0)
+        at = len(self._head)
+        for parent, child in edges:
+            self._bodies.append(_body(at + len(self._stamp), parent, child))
+            at += len(self._stamp) + len(self._bodies[-1])
 
     def __len__(self) -> int:
-        return len(self._poses)
+        return len(self._bodies)
 
     @property
     def data(self) -> bytes:
         """The message as it stands now."""
-        return bytes(self._buffer)
+        return self._stamp.join([self._head, *self._bodies])
 
     def set_stamp(self, stamp_ns: int) -> None:
         """Give every transform this time, in nanoseconds since the epoch.
@@ -62,9 +68,7 @@ class Template:
         Raises:
             ValueError: if a message cannot hold it.
         """
-        stamp = _stamp(stamp_ns)
-        for offset in self._stamps:
-            self._buffer[offset : offset + 8] = stamp
+        self._stamp = _stamp(stamp_ns)
 
     def set_pose(self, index: int, pose: Pose) -> None:
         """Give the transform of that edge this pose of the child in the parent.
@@ -72,10 +76,8 @@ class Template:
         Raises:
             IndexError: if there is no such edge.
         """
-        _POSE.pack_into(self._buffer, self._poses[index], *pose.xyz, *pose.quat_xyzw)
-
-
-_POSE = struct.Struct("<7d")
+        body = self._bodies[index]
+        _POSE.pack_into(body, len(body) - _POSE.size, *pose.xyz, *pose.quat_xyzw)
 
 
 def encode(transforms: Sequence[Transform]) -> bytes:
@@ -84,7 +86,13 @@ def encode(transforms: Sequence[Transform]) -> bytes:
     Raises:
         ValueError: if a name holds a NUL or a lone surrogate, or a stamp does not fit.
     """
-    return bytes(_write(transforms)[0])
+    out = bytearray(LITTLE_ENDIAN + struct.pack("<I", len(transforms)))
+    for transform in transforms:
+        out += _stamp(transform.stamp_ns)
+        body = _body(len(out), transform.parent, transform.child)
+        _POSE.pack_into(body, len(body) - _POSE.size, *transform.xyz, *transform.quat_xyzw)
+        out += body
+    return bytes(out)
 
 
 def decode(data: bytes) -> list[Transform]:
@@ -111,7 +119,7 @@ class _Reader:
         self._at = _HEADER
 
     def numbers(self, kinds: str, alignment: int) -> tuple[int | float, ...]:
-        start = _aligned(self._at, alignment)
+        start = self._at + _gap(self._at, alignment)
         layout = struct.Struct(self._order + kinds)
         self._at = start + layout.size
         if self._at > len(self._data):
@@ -141,22 +149,15 @@ class _Reader:
         return Transform(stamp_ns, parent, child, (x, y, z), (qx, qy, qz, qw))
 
 
-def _write(transforms: Sequence[Transform]) -> tuple[bytearray, list[int], list[int]]:
-    """Return the message, and where each transform's stamp and numbers stand in it."""
-    out = bytearray(LITTLE_ENDIAN + struct.pack("<I", len(transforms)))
-    stamps, poses = [], []
-    for transform in transforms:
-        _pad(out, 4)
-        stamps.append(len(out))
-        out += _stamp(transform.stamp_ns)
-        for name in (transform.parent, transform.child):
-            _pad(out, 4)
-            raw = _name(name)
-            out += struct.pack("<I", len(raw)) + raw
-        _pad(out, 8)
-        poses.append(len(out))
-        out += _POSE.pack(*transform.xyz, *transform.quat_xyzw)
-    return out, stamps, poses
+def _body(at: int, parent: str, child: str) -> bytearray:
+    """Return what follows a stamp, for byte ``at`` of a message, with the identity as the last seven doubles."""
+    out = bytearray()
+    for name in (parent, child):
+        out += bytes(_gap(at + len(out), 4))
+        raw = _name(name)
+        out += struct.pack("<I", len(raw)) + raw
+    out += bytes(_gap(at + len(out), 8))
+    return out + _IDENTITY
 
 
 def _name(name: str) -> bytes:
@@ -173,9 +174,5 @@ def _stamp(stamp_ns: int) -> bytes:
         raise ValueError(f"the time {stamp_ns} ns does not fit into a message") from None
 
 
-def _aligned(at: int, alignment: int) -> int:
-    return at + (_HEADER - at) % alignment
-
-
-def _pad(out: bytearray, alignment: int) -> None:
-    out += bytes(_aligned(len(out), alignment) - len(out))
+def _gap(at: int, alignment: int) -> int:
+    return (_HEADER - at) % alignment

@@ -1,0 +1,59 @@
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.plan import PlanProcess, Simulation
+from tfcompose.run import joints, simulate, static
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    import pytest
+
+
+def _last_error(capsys: pytest.CaptureFixture[str]) -> str:
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    return error
+
+
+def test_wrong_arguments_end_with_code_2_and_the_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert static.main(["plan.json"]) == 2
+    assert "usage: python -m tfcompose.run.static PLAN_FILE PROCESS_NAME" in _last_error(capsys)
+
+
+def test_a_missing_plan_ends_with_code_2_and_its_name(capsys: pytest.CaptureFixture[str]) -> None:
+    assert joints.main(["no/such/plan.json", "joints"]) == 2
+    assert "no/such/plan.json" in _last_error(capsys)
+
+
+def test_what_is_no_plan_ends_with_code_2(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "plan.json"
+    file.write_text("{}")
+    assert static.main([str(file), "static"]) == 2
+    assert "not a plan" in _last_error(capsys)
+
+
+def test_a_process_that_the_plan_does_not_have_is_refused(
+    write: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = write([], PlanProcess("static", "static"))
+    assert static.main([str(file), "other"]) == 2
+    assert "no process other" in _last_error(capsys)
+    assert joints.main([str(file), "static"]) == 2
+    assert "process static is of kind static, not joints" in _last_error(capsys)
+
+
+def test_a_simulation_without_a_rate_is_refused(write: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
+    file = write([], PlanProcess("body", "simulate", simulate=Simulation("fixed", 0.0)))
+    assert simulate.main([str(file), "body"]) == 2
+    assert "rate above 0" in _last_error(capsys)
+
+
+def test_without_ros_it_ends_with_code_1_and_says_what_to_install(
+    write: Callable[..., Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tfcompose.run.own.missing_ros", lambda: "rclpy cannot be imported: install it")
+    assert static.main([str(write([], PlanProcess("static", "static"))), "static"]) == 1
+    assert _last_error(capsys) == "rclpy cannot be imported: install it\n"

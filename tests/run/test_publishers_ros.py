@@ -1,0 +1,294 @@
+"""The publishing processes as they run: real processes, heard by a node of the test."""
+
+from __future__ import annotations
+
+import math
+import signal
+import time
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from rclpy.serialization import deserialize_message
+from rosgraph_msgs.msg import Clock
+from scipy.spatial.transform import Rotation
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from tfcompose.plan import Joint, PlanProcess, Simulation
+from tfcompose.pose import Pose, angle_between, normalised, quat_from_rpy
+from tfcompose.ros.graph import writers
+from tfcompose.ros.message import Transform, decode
+from tfcompose.ros.node import JOINT_STATES, LATCHED, open_node
+from tfcompose.ros.stop import Stop
+from tfcompose.ros.tf import Received, Subscription, TFSubscription, wait
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+pytestmark = pytest.mark.ros
+
+UNTIL_S = 15.0
+Y = (0.0, 1.0, 0.0)
+
+
+@dataclass
+class Ears:
+    """A node of the test that hears what processes say."""
+
+    node: Any
+
+    def tf(self, count: int, *, static: bool = False) -> list[tuple[Received, list[Transform]]]:
+        """Return the next messages, at least ``count`` of them."""
+        return [(each, decode(each.data)) for each in take(self.node, TFSubscription(self.node, static=static), count)]
+
+
+def take(node: Any, subscription: Subscription, count: int) -> list[Received]:
+    received: list[Received] = []
+    end = time.monotonic() + UNTIL_S
+    while len(received) < count and time.monotonic() < end:
+        wait(node, [subscription], 1.0, Stop())
+        received += subscription.take()
+    assert len(received) >= count
+    return received
+
+
+@pytest.fixture
+def ears(domain: object) -> Iterator[Ears]:
+    assert domain
+    with open_node("ears", "/test") as node:
+        yield Ears(node)
+
+
+@pytest.fixture
+def rover(edge: Callable[..., Any], write: Callable[..., Any]) -> Any:
+    """A robot with two wheels, a mimic of the left one, and a gripper whose second finger mimics that mimic."""
+    axle = Pose((0.1, 0.2, 0.0), quat_from_rpy(0.3, 0.0, 0.0))
+    moving = [
+        edge("base finger", "joints", None, Joint("finger", "prismatic", Y, "follower", 0.01, 0.002)),
+        edge("base follower", "joints", None, Joint("follower", "continuous", Y, "left", -2.0, 0.5)),
+        edge("base left", "joints", axle, Joint("left", "continuous", Y)),
+        edge("base right", "joints", axle, Joint("right", "revolute", Y)),
+    ]
+    return write(moving, PlanProcess("joints", "joints"))
+
+
+def test_a_late_joiner_gets_all_fixed_edges_in_one_message(
+    start: Callable[..., Any], ears: Ears, edge: Callable[..., Any], write: Callable[..., Any]
+) -> None:
+    edges = [edge(f"base_link frame_{n}", "static", Pose((n, 0.0, 0.0))) for n in range(150)]
+    other = [edge("odom base_link", "wheels")]
+    process = start("tfcompose.run.static", write(edges + other, PlanProcess("static", "static")), "static")
+    process.until_says("150 edges on /tf_static")
+    ((received, transforms),) = ears.tf(1, static=True)
+    assert [(t.parent, t.child, t.xyz[0]) for t in transforms] == [("base_link", f"frame_{n}", n) for n in range(150)]
+    assert 0 <= time.time_ns() - transforms[0].stamp_ns < 60e9
+    (writer,) = writers(ears.node, "/tf_static")
+    assert (writer.gid, writer.node) == (received.gid, "/rover/static")
+    assert (writer.durability, writer.type) == ("transient_local", "tf2_msgs/msg/TFMessage")
+
+
+def test_joint_states_move_the_wheels_and_what_mimics_them(start: Callable[..., Any], ears: Ears, rover: Any) -> None:
+    start("tfcompose.run.joints", rover, "joints").until_says("4 edges on /tf, from /rover/joint_states")
+    subscription = TFSubscription(ears.node, static=False)
+    message = JointState(name=["left", "gripper", "right"], position=[0.7, math.nan, -1.2])
+    message.header.stamp.sec, message.header.stamp.nanosec = 12, 34
+    found = _answer(ears, subscription, message)
+
+    axle = Rotation.from_euler("xyz", [0.3, 0, 0])
+    turned = {"left": (axle, 0.7), "right": (axle, -1.2), "follower": (Rotation.identity(), -2.0 * 0.7 + 0.5)}
+    for name, (before, angle) in turned.items():
+        expected = (before * Rotation.from_rotvec([0, angle, 0])).as_quat()
+        assert angle_between(found[name].quat_xyzw, tuple(expected)) < 1e-7
+    assert found["left"].xyz == (0.1, 0.2, 0.0)
+    assert found["finger"].xyz == pytest.approx((0, 0.01 * (-2.0 * 0.7 + 0.5) + 0.002, 0))
+    assert {t.stamp_ns for t in found.values()} == {12_000_000_034}
+
+
+def test_joint_states_that_hold_some_joints_move_those(start: Callable[..., Any], ears: Ears, rover: Any) -> None:
+    start("tfcompose.run.joints", rover, "joints").until_says("edges")
+    subscription = TFSubscription(ears.node, static=False)
+    before = time.time_ns()
+    found = _answer(ears, subscription, JointState(name=["right"], position=[1.0]))
+    assert list(found) == ["right"]
+    assert before <= found["right"].stamp_ns <= time.time_ns(), "a message without a stamp counts from its arrival"
+
+
+def test_joint_states_that_cannot_be_believed_are_dropped_with_one_line(
+    start: Callable[..., Any], ears: Ears, rover: Any
+) -> None:
+    process = start("tfcompose.run.joints", rover, "joints")
+    process.until_says("edges")
+    publisher = ears.node.create_publisher(JointState, "/rover/joint_states", 10)
+    subscription = TFSubscription(ears.node, static=False)
+    good = JointState(name=["left"], position=[1.0])
+    _answer(ears, subscription, good, publisher)
+    for _ in range(3):
+        publisher.publish(JointState(name=["left", "right"], position=[1.0]))
+        publisher.publish(JointState(name=["left"], position=[math.nan]))
+        publisher.publish(JointState(name=["left"]))
+        publisher.publish(good)
+        take(ears.node, subscription, 1)
+    assert process.output.count("dropped a joint state") == 3
+    assert [process.output.count(what) for what in ("another number", "not finite", "no positions")] == [1, 1, 1]
+
+
+@pytest.mark.parametrize(("kind", "latches"), [("static", True), ("joints", True), ("both", False)])
+def test_the_description_is_latched_by_one_process(
+    start: Callable[..., Any], ears: Ears, write: Callable[..., Any], kind: str, *, latches: bool
+) -> None:
+    processes = [PlanProcess("static", "static"), PlanProcess("joints", "joints")]
+    name = "joints" if kind == "joints" else "static"
+    file = write([], *(processes if kind != "static" else processes[:1]))
+    start(f"tfcompose.run.{name}", file, name).until_says("edges on")
+    if latches:
+        subscription = Subscription(ears.node, String, "/rover/robot_description", LATCHED)
+        (received,) = take(ears.node, subscription, 1)
+        assert deserialize_message(received.data, String).data == "<robot name='rover'/>"
+    else:
+        assert writers(ears.node, "/rover/robot_description") == []
+        assert ears.tf(0, static=True) == []
+        assert writers(ears.node, "/rover/robot_description") == []
+
+
+def test_a_body_drives_on_a_circle(
+    start: Callable[..., Any], ears: Ears, edge: Callable[..., Any], write: Callable[..., Any]
+) -> None:
+    circle = Simulation("circle", 50.0, radius=2.0, speed=0.8)
+    file = write([edge("odom base_link", "wheels")], PlanProcess("wheels", "simulate", simulate=circle))
+    start("tfcompose.run.simulate", file, "wheels").until_says("1 edge on /tf, simulated at 50 Hz")
+    transforms = [transform for _, (transform,) in ears.tf(30)]
+    angles = []
+    for transform in transforms:
+        x, y, z = transform.xyz
+        assert math.hypot(x, y) == pytest.approx(2.0)
+        assert z == 0
+        expected = Rotation.from_euler("z", math.atan2(y, x) + math.pi / 2).as_quat()
+        assert angle_between(transform.quat_xyzw, tuple(expected)) < 1e-7
+        angles.append(math.atan2(y, x))
+    for (before, a), (after, b) in pairwise(zip(transforms, angles, strict=True)):
+        seconds = (after.stamp_ns - before.stamp_ns) / 1e9
+        assert math.remainder(b - a - 0.8 * seconds, math.tau) == pytest.approx(0, abs=1e-3)
+
+
+def test_the_rate_does_not_drift(
+    start: Callable[..., Any], ears: Ears, edge: Callable[..., Any], write: Callable[..., Any]
+) -> None:
+    pose = Pose((1.0, 2.0, 3.0), normalised((0.0, 0.0, 1.0, 1.0)))
+    process = PlanProcess("map", "simulate", simulate=Simulation("fixed", 100.0, pose=pose))
+    start("tfcompose.run.simulate", write([edge("map odom", "map")], process), "map").until_says("simulated")
+    transforms = [transform for _, (transform,) in ears.tf(101)]
+    assert {(t.parent, t.child, t.xyz, t.quat_xyzw) for t in transforms} == {("map", "odom", pose.xyz, pose.quat_xyzw)}
+    # Late ticks do not move later ones: 100 periods take 1 s, and never less than 1 s minus one late tick.
+    seconds = (transforms[100].stamp_ns - transforms[0].stamp_ns) / 1e9
+    assert seconds == pytest.approx(1.0, abs=0.1)
+
+
+def test_simulated_joint_states_are_published(start: Callable[..., Any], ears: Ears, write: Callable[..., Any]) -> None:
+    simulated = Simulation("joints", 50.0, joints={"left": 0.5, "right": -1.0})
+    file = write([], PlanProcess("wheels", "simulate", simulate=simulated))
+    start("tfcompose.run.simulate", file, "wheels").until_says("2 joints on /rover/joint_states, simulated at 50 Hz")
+    subscription = Subscription(ears.node, JointState, "/rover/joint_states", JOINT_STATES)
+    message = deserialize_message(take(ears.node, subscription, 3)[-1].data, JointState)
+    assert dict(zip(message.name, message.position, strict=True)) == {"left": 0.5, "right": -1.0}
+    assert 0 <= time.time_ns() - message.header.stamp.sec * 1e9 < 60e9
+
+
+def test_simulated_time_comes_from_the_clock_topic(
+    start: Callable[..., Any], ears: Ears, edge: Callable[..., Any], write: Callable[..., Any]
+) -> None:
+    circle = Simulation("circle", 10.0, radius=1.0, speed=1.0)
+    process = PlanProcess("wheels", "simulate", simulate=circle)
+    start("tfcompose.run.simulate", write([edge("odom base", "wheels")], process, clock="sim"), "wheels")
+    subscription = TFSubscription(ears.node, static=False)
+    clock = ears.node.create_publisher(Clock, "/clock", 10)
+    heard = []
+    for hundredths in (500, 503, 510, 530, 100, 110):  # 503 is within a period; 100 is a simulator that starts anew
+        message = Clock()
+        message.clock.sec, message.clock.nanosec = divmod(hundredths * 10_000_000, 1_000_000_000)
+        if hundredths == 503:
+            clock.publish(message)
+            assert take_for(ears.node, subscription, 0.3) == []
+            continue
+        heard.append(_repeat(ears, subscription, partial(clock.publish, message)))
+    assert [transform.stamp_ns // 10_000_000 for transform in heard] == [500, 510, 530, 100, 110]
+    assert [math.atan2(t.xyz[1], t.xyz[0]) for t in heard] == pytest.approx([0, 0.1, 0.3, 0, 0.1])
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("clock", ["wall", "sim"])
+def test_every_process_ends_at_once_and_quietly(
+    start: Callable[..., Any], edge: Callable[..., Any], write: Callable[..., Any], number: int, clock: str
+) -> None:
+    simulated = Simulation("fixed", 0.1)
+    processes = [PlanProcess(k, k, simulate=simulated) for k in ("static", "joints", "simulate")]
+    file = write([edge("map odom", "simulate"), edge("a b")], *processes, clock=clock)
+    running = [start(f"tfcompose.run.{process.kind}", file, process.name) for process in processes]
+    for each in running:
+        each.until_says("edge")
+    for each in running:
+        code, seconds = each.end(number)
+        each.close()
+        assert (code, each.errors) == (0, [])
+        assert seconds < 2.0
+
+
+def test_an_interrupt_during_the_start_ends_quietly_too(start: Callable[..., Any], write: Callable[..., Any]) -> None:
+    file = write([], PlanProcess("static", "static"))
+    process = start("tfcompose.run.static", file, "static", PYTHONVERBOSE="1")
+    end = time.monotonic() + UNTIL_S
+    while time.monotonic() < end and not any(
+        "import 'tfcompose.run.roles'" in e or "import 'rclpy'" in e for e in process.errors
+    ):
+        time.sleep(0.001)
+    code, _ = process.end(signal.SIGINT)
+    process.close()
+    assert code == 0
+    assert "Traceback" not in "".join(process.errors)
+
+
+def test_a_node_is_called_as_the_plan_says_and_its_topics_move_with_it(
+    start: Callable[..., Any],
+    ears: Ears,
+    edge: Callable[..., Any],
+    write: Callable[..., Any],
+    until: Callable[..., bool],
+) -> None:
+    process = PlanProcess("static", "static", nodes=("/fleet/r1/frames",), remap={"/tf_static": "tf_static"})
+    start("tfcompose.run.static", write([edge("a b")], process), "static", "--ros-args", "-r", "__node:=frames2")
+    assert until(lambda: [w.node for w in writers(ears.node, "/fleet/r1/tf_static")] == ["/fleet/r1/frames2"])
+
+
+def take_for(node: Any, subscription: Subscription, seconds: float) -> list[Received]:
+    received: list[Received] = []
+    end = time.monotonic() + seconds
+    while (left := end - time.monotonic()) > 0:
+        wait(node, [subscription], left, Stop())
+        received += subscription.take()
+    return received
+
+
+def _repeat(ears: Ears, subscription: Subscription, send: Callable[[], None]) -> Transform:
+    """Send until something comes on /tf: best effort may lose what is sent before everybody knows everybody."""
+    end = time.monotonic() + UNTIL_S
+    while time.monotonic() < end:
+        send()
+        wait(ears.node, [subscription], 0.2, Stop())
+        for received in subscription.take():
+            return decode(received.data)[0]
+    raise AssertionError("nothing came on /tf")
+
+
+def _answer(ears: Ears, subscription: Subscription, message: Any, publisher: Any = None) -> dict[str, Transform]:
+    """Send a joint state until it is answered on /tf; return the answer by child frame."""
+    sender = publisher or ears.node.create_publisher(JointState, "/rover/joint_states", 10)
+    end = time.monotonic() + UNTIL_S
+    while time.monotonic() < end:
+        sender.publish(message)
+        wait(ears.node, [subscription], 0.2, Stop())
+        for received in subscription.take():
+            take_for(ears.node, subscription, 0.2)
+            return {transform.child: transform for transform in decode(received.data)}
+    raise AssertionError("no answer on /tf")

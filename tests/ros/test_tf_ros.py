@@ -31,13 +31,15 @@ def node(domain: object) -> Iterator[Any]:
         yield opened
 
 
-def test_a_message_and_the_graph_name_the_same_publisher(node: Any) -> None:
+def test_a_message_and_the_graph_name_the_same_publisher(node: Any, until: Callable[..., bool]) -> None:
     with open_node("one", "/rover") as first, open_node("two", "/rover") as second:
         subscription = TFSubscription(node, static=True)
         publishers = [TFPublisher(each, static=True) for each in (first, second)]
         for number, publisher in enumerate(publishers):
             publisher.publish(encode([Transform(number, "a", "b", ONE.xyz, ONE.quat_xyzw)]))
         received = _take(node, subscription, 2)
+        names = ["/rover/one", "/rover/two"]  # known a moment after the messages
+        assert until(lambda: [writer.node for writer in writers(node, "/tf_static")] == names)
         named = {writer.gid: writer for writer in writers(node, "/tf_static")}
         found = {decode(each.data)[0].stamp_ns: named[each.gid or b""].node for each in received}
     assert found == {0: "/rover/one", 1: "/rover/two"}

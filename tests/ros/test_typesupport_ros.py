@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tfcompose.ros import typesupport
+from tfcompose.ros import rosidl, typesupport
 from tfcompose.ros.environment import RosError
 from tfcompose.ros.message import Transform, encode
 from tfcompose.ros.node import open_node
@@ -17,17 +17,17 @@ pytestmark = pytest.mark.ros
 
 
 def _address() -> int:
-    return typesupport.capsule_address(typesupport.own_type().__class__._TYPE_SUPPORT)
+    return rosidl.capsule_address(typesupport.own_type().__class__._TYPE_SUPPORT)
 
 
 def test_the_hash_is_that_of_the_description() -> None:
     address = _address()
-    assert typesupport.hash_text(address) == typesupport.HASH
-    assert typesupport.type_hash(typesupport.description_json(address)) == typesupport.HASH
+    assert rosidl.hash_text(address) == typesupport.HASH
+    assert rosidl.type_hash(rosidl.description_json(address)) == typesupport.HASH
 
 
 def test_the_description_is_that_of_tf_message() -> None:
-    found = typesupport.description_json(_address())
+    found = rosidl.description_json(_address())
     kind = {
         "type_id": 145,
         "capacity": 0,

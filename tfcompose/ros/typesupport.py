@@ -11,24 +11,21 @@ and hash. All else is borrowed from ``geometry_msgs/TransformStamped``, at run t
 - the description is made here, with those of the types that it refers to copied from TransformStamped's.
   The texts of the message files are TransformStamped's; no node of tfcompose serves them.
 
-Structures: rosidl ``message_type_support_struct.h``, ``type_hash.h``, ``type_description/*__struct.h`` and
-``message_introspection.h``; rosidl_typesupport_fastrtps ``message_type_support.h`` (Jazzy). They are checked before
-use: names are where they are expected, and both types' hashes, computed from the descriptions (REP-2016), are the ones
-that ROS knows.
+What ``rosidl`` says of the structures is checked before use: names are where they are expected, and both types' hashes,
+computed from the descriptions (REP-2016), are the ones that ROS knows.
 """
 
 from __future__ import annotations
 
 import ctypes
-import json
 from functools import cache
-from hashlib import sha256
 from importlib.util import find_spec
 from typing import Any
 
 from geometry_msgs.msg import TransformStamped
 from rclpy.utilities import get_rmw_implementation_identifier
 
+from tfcompose.ros import rosidl
 from tfcompose.ros.environment import RosError
 
 NAME = "tf2_msgs/msg/TFMessage"
@@ -42,104 +39,6 @@ _STAMPED = "geometry_msgs/msg/TransformStamped"
 _UNBOUNDED_SEQUENCE_OF_MESSAGES = 145
 # rosidl_typesupport_introspection_c ``field_types.h``.
 _ROS_TYPE_MESSAGE = 18
-# More than any message has: what a structure that is not the expected one may claim.
-_MOST = 1000
-
-_Pointer = ctypes.c_void_p
-_Handle = ctypes.CFUNCTYPE(_Pointer, _Pointer, ctypes.c_char_p)
-_Getter = ctypes.CFUNCTYPE(_Pointer, _Pointer)
-
-
-class _TypeSupport(ctypes.Structure):
-    _fields_ = (
-        ("identifier", ctypes.c_char_p),
-        ("data", _Pointer),
-        ("func", _Pointer),
-        ("get_hash", _Pointer),
-        ("get_description", _Pointer),
-        ("get_sources", _Pointer),
-    )
-
-
-class _Callbacks(ctypes.Structure):
-    _fields_ = (("namespace", ctypes.c_char_p), ("name", ctypes.c_char_p), ("functions", _Pointer * 5))
-
-
-class _Member(ctypes.Structure):
-    _fields_ = (
-        ("name", ctypes.c_char_p),
-        ("type_id", ctypes.c_uint8),
-        ("string_upper_bound", ctypes.c_size_t),
-        ("members", _Pointer),
-        ("is_key", ctypes.c_bool),
-        ("is_array", ctypes.c_bool),
-        ("array_size", ctypes.c_size_t),
-        ("is_upper_bound", ctypes.c_bool),
-        ("offset", ctypes.c_uint32),
-        ("default_value", _Pointer),
-        ("functions", _Pointer * 6),
-    )
-
-
-class _Members(ctypes.Structure):
-    _fields_ = (
-        ("namespace", ctypes.c_char_p),
-        ("name", ctypes.c_char_p),
-        ("count", ctypes.c_uint32),
-        ("size_of", ctypes.c_size_t),
-        ("has_any_key_member", ctypes.c_bool),
-        ("members", ctypes.POINTER(_Member)),
-        ("init_and_fini", _Pointer * 2),
-    )
-
-
-class _Hash(ctypes.Structure):
-    _fields_ = (("version", ctypes.c_uint8), ("value", ctypes.c_uint8 * 32))
-
-
-class _String(ctypes.Structure):
-    _fields_ = (("data", ctypes.c_char_p), ("size", ctypes.c_size_t), ("capacity", ctypes.c_size_t))
-
-    @classmethod
-    def of(cls, text: str) -> _String:
-        raw = text.encode()
-        return cls(raw, len(raw), len(raw) + 1)
-
-    @property
-    def text(self) -> str:
-        raw: bytes = self.data or b""
-        if len(raw) != self.size:
-            raise ValueError("a string is shorter or longer than it says")
-        return raw.decode()
-
-
-class _FieldType(ctypes.Structure):
-    _fields_ = (
-        ("type_id", ctypes.c_uint8),
-        ("capacity", ctypes.c_uint64),
-        ("string_capacity", ctypes.c_uint64),
-        ("nested_type_name", _String),
-    )
-
-
-class _Field(ctypes.Structure):
-    _fields_ = (("name", _String), ("type", _FieldType), ("default_value", _String))
-
-
-class _Fields(ctypes.Structure):
-    _fields_ = (("data", ctypes.POINTER(_Field)), ("size", ctypes.c_size_t), ("capacity", ctypes.c_size_t))
-
-
-class _Type(ctypes.Structure):
-    _fields_ = (("type_name", _String), ("fields", _Fields))
-
-
-class _Types(ctypes.Structure):
-    _fields_ = (("data", ctypes.POINTER(_Type)), ("size", ctypes.c_size_t), ("capacity", ctypes.c_size_t))
-
-
-class _Description(ctypes.Structure):
-    _fields_ = (("type_description", _Type), ("referenced", _Types))
 
 
 @cache
@@ -165,101 +64,72 @@ def own_type() -> Any:
     rmw = get_rmw_implementation_identifier()
     if rmw != _RMW:
         raise RosError(f"with {rmw} the package tf2_msgs is needed: install ros-jazzy-tf2-msgs, or use {_RMW}")
+    if find_spec("rclpy.type_hash") is None:  # before Iron a type support had no hash and no description
+        raise RosError("this ROS is older than Jazzy: install the package tf2_msgs")
     try:
         return _message_class(*_build())
     except (ValueError, UnicodeDecodeError) as error:
         raise RosError(f"this rosidl is not laid out as Jazzy's ({error}): install the package tf2_msgs") from None
 
 
-def type_hash(description: dict[str, Any]) -> str:
-    """Return the RIHS01 hash of a type description without default values: SHA-256 of its JSON (REP-2016)."""
-    return "RIHS01_" + sha256(json.dumps(description).encode()).hexdigest()
-
-
-def description_json(type_support: int) -> dict[str, Any]:
-    """Return what the type support at that address says of its type, ready for ``type_hash``.
-
-    Raises:
-        ValueError: if there are no such structures at that address.
-    """
-    described = _described(_TypeSupport.from_address(type_support), type_support)
-    referenced = described.referenced
-    return {
-        "type_description": _type_json(described.type_description),
-        "referenced_type_descriptions": [_type_json(each) for each in referenced.data[: _few(referenced.size)]],
-    }
-
-
-def hash_text(type_support: int) -> str:
-    """Return the hash that the type support at that address gives, in the form of REP-2016."""
-    getter = _Getter(_TypeSupport.from_address(type_support).get_hash)
-    found = _Hash.from_address(getter(type_support))
-    return f"RIHS{found.version:02}_{bytes(found.value).hex()}"
-
-
-def capsule_address(capsule: object) -> int:
-    """Return the address in one of the capsules without a name that rosidl's Python classes carry."""
-    get = ctypes.pythonapi.PyCapsule_GetPointer
-    get.restype, get.argtypes = _Pointer, (ctypes.py_object, ctypes.c_char_p)
-    return int(get(capsule, None))
-
-
-def _build() -> tuple[_TypeSupport, list[Any]]:
+def _build() -> tuple[rosidl.TypeSupport, list[Any]]:
     """Return the type support and all that it points to, which must live as long."""
     stamped = _stamped()
     fast, introspection = _other(stamped, _FASTRTPS), _other(stamped, _INTROSPECTION)
     callbacks, members = _callbacks(fast), _members(introspection)
-    description, described = _description(_described(fast, ctypes.addressof(fast)))
+    description, described = _description(rosidl.described(fast, ctypes.addressof(fast)))
     value = (ctypes.c_uint8 * 32).from_buffer_copy(bytes.fromhex(HASH.removeprefix("RIHS01_")))
-    hashed = _Hash(1, value)
+    hashed = rosidl.Hash(1, value)
     getters = [_getter(hashed), _getter(description)]
 
     answers: dict[bytes, int] = {}
-    answer = _Handle(lambda _, identifier: answers.get(identifier))
+    answer = rosidl.Handle(lambda _, identifier: answers.get(identifier))
     alive: list[Any] = [callbacks, members, description, described, hashed, getters, answer]
     for borrowed, data in ((fast, callbacks), (introspection, members)):
-        made = _TypeSupport.from_buffer_copy(borrowed)
+        made = rosidl.TypeSupport.from_buffer_copy(borrowed)
         made.data = ctypes.addressof(data)
-        made.func = ctypes.cast(answer, _Pointer)
-        made.get_hash, made.get_description = (ctypes.cast(getter, _Pointer) for getter in getters)
+        made.func = ctypes.cast(answer, rosidl.Pointer)
+        made.get_hash, made.get_description = (ctypes.cast(getter, rosidl.Pointer) for getter in getters)
         answers[made.identifier] = ctypes.addressof(made)
         alive.append(made)
-    if type_hash(description_json(ctypes.addressof(made))) != HASH:
+    if rosidl.type_hash(rosidl.description_json(ctypes.addressof(made))) != HASH:
         raise ValueError("the description made for TFMessage is not TFMessage's")
     return made, alive
 
 
-def _other(stamped: int, identifier: bytes) -> _TypeSupport:
+def _other(stamped: int, identifier: bytes) -> rosidl.TypeSupport:
     """Return TransformStamped's type support of that name."""
-    found = _Handle(_TypeSupport.from_address(stamped).func)(stamped, identifier)
-    if not found or _TypeSupport.from_address(found).identifier != identifier:
+    found = rosidl.Handle(rosidl.TypeSupport.from_address(stamped).func)(stamped, identifier)
+    if not found or rosidl.TypeSupport.from_address(found).identifier != identifier:
         raise ValueError(f"TransformStamped has no {identifier.decode()}")
-    return _TypeSupport.from_address(found)
+    return rosidl.TypeSupport.from_address(found)
 
 
-def _callbacks(fast: _TypeSupport) -> _Callbacks:
-    made = _Callbacks.from_buffer_copy(_Callbacks.from_address(fast.data))
+def _callbacks(fast: rosidl.TypeSupport) -> rosidl.Callbacks:
+    made = rosidl.Callbacks.from_buffer_copy(rosidl.Callbacks.from_address(fast.data))
     if (made.namespace, made.name) != (b"geometry_msgs::msg", b"TransformStamped"):
         raise ValueError("TransformStamped's callbacks do not start with its name")
     made.namespace, made.name = b"tf2_msgs::msg", b"TFMessage"
     return made
 
 
-def _members(introspection: _TypeSupport) -> _Members:
-    known = _Members.from_address(introspection.data)
+def _members(introspection: rosidl.TypeSupport) -> rosidl.Members:
+    known = rosidl.Members.from_address(introspection.data)
     names = (known.namespace, known.name, known.count)
     if names != (b"geometry_msgs__msg", b"TransformStamped", 3):
         raise ValueError("TransformStamped's members do not start with its name")
     if [member.name for member in known.members[:3]] != [b"header", b"child_frame_id", b"transform"]:
         raise ValueError("TransformStamped's members are not its own")
     address = ctypes.addressof(introspection)
-    member = _Member(b"transforms", _ROS_TYPE_MESSAGE, 0, address, is_key=False, is_array=True)
-    return _Members(b"tf2_msgs__msg", b"TFMessage", 1, ctypes.sizeof(_Fields), members=ctypes.pointer(member))
+    member = rosidl.Member(b"transforms", _ROS_TYPE_MESSAGE, 0, address, is_key=False, is_array=True)
+    return rosidl.Members(
+        b"tf2_msgs__msg", b"TFMessage", 1, ctypes.sizeof(rosidl.Fields), members=ctypes.pointer(member)
+    )
 
 
 def _getter(structure: ctypes.Structure) -> Any:
     where = ctypes.addressof(structure)
-    return _Getter(lambda _: where)
+    return rosidl.Getter(lambda _: where)
 
 
 def _stamped() -> int:
@@ -267,62 +137,30 @@ def _stamped() -> int:
     meta = TransformStamped.__class__
     if meta._TYPE_SUPPORT is None:  # noqa: SLF001 (rosidl's Python classes have no public name for it)
         meta.__import_type_support__()
-    stamped = capsule_address(meta._TYPE_SUPPORT)  # noqa: SLF001 (the same)
-    described = description_json(stamped)
-    if described["type_description"]["type_name"] != _STAMPED or type_hash(described) != hash_text(stamped):
+    stamped = rosidl.capsule_address(meta._TYPE_SUPPORT)  # noqa: SLF001 (the same)
+    described = rosidl.description_json(stamped)
+    if described["type_description"]["type_name"] != _STAMPED or rosidl.type_hash(described) != rosidl.hash_text(
+        stamped
+    ):
         raise ValueError("TransformStamped's description and hash do not agree")
     return stamped
 
 
-def _described(support: _TypeSupport, address: int) -> _Description:
-    where = _Getter(support.get_description)(address)
-    if not where:
-        raise ValueError("a type without a description")
-    return _Description.from_address(where)
-
-
-def _description(stamped: _Description) -> tuple[_Description, list[Any]]:
+def _description(stamped: rosidl.Description) -> tuple[rosidl.Description, list[Any]]:
     """Return TFMessage's description, and what it points to."""
-    kind = _FieldType(_UNBOUNDED_SEQUENCE_OF_MESSAGES, 0, 0, _String.of(_STAMPED))
-    field = _Field(_String.of("transforms"), kind, _String.of(""))
+    kind = rosidl.FieldType(_UNBOUNDED_SEQUENCE_OF_MESSAGES, 0, 0, rosidl.String.of(_STAMPED))
+    field = rosidl.Field(rosidl.String.of("transforms"), kind, rosidl.String.of(""))
     known = [*stamped.referenced.data[: stamped.referenced.size], stamped.type_description]
     known.sort(key=lambda each: each.type_name.text)
-    types = (_Type * len(known))(*known)
-    fields = _Fields(ctypes.pointer(field), 1, 1)
-    made = _Description(_Type(_String.of(NAME), fields), _Types(types, len(known), len(known)))
+    types = (rosidl.Type * len(known))(*known)
+    fields = rosidl.Fields(ctypes.pointer(field), 1, 1)
+    made = rosidl.Description(rosidl.Type(rosidl.String.of(NAME), fields), rosidl.Types(types, len(known), len(known)))
     return made, [field, types]
 
 
-def _type_json(described: _Type) -> dict[str, Any]:
-    fields = described.fields
-    return {
-        "type_name": described.type_name.text,
-        "fields": [_field_json(field) for field in fields.data[: _few(fields.size)]],
-    }
-
-
-def _field_json(field: _Field) -> dict[str, Any]:
-    kind = field.type
-    return {
-        "name": field.name.text,
-        "type": {
-            "type_id": kind.type_id,
-            "capacity": kind.capacity,
-            "string_capacity": kind.string_capacity,
-            "nested_type_name": kind.nested_type_name.text,
-        },
-    }
-
-
-def _few(size: int) -> int:
-    if size > _MOST:
-        raise ValueError(f"a list of {size}")
-    return size
-
-
-def _message_class(support: _TypeSupport, alive: list[Any]) -> Any:
+def _message_class(support: rosidl.TypeSupport, alive: list[Any]) -> Any:
     new = ctypes.pythonapi.PyCapsule_New
-    new.restype, new.argtypes = ctypes.py_object, (_Pointer, ctypes.c_char_p, _Pointer)
+    new.restype, new.argtypes = ctypes.py_object, (rosidl.Pointer, ctypes.c_char_p, rosidl.Pointer)
     # rclpy wants all five. The last four convert messages that are objects; they are no capsules, so that a use raises.
     converters = ("_CREATE_ROS_MESSAGE", "_CONVERT_FROM_PY", "_CONVERT_TO_PY", "_DESTROY_ROS_MESSAGE")
     attributes = {"_TYPE_SUPPORT": new(ctypes.addressof(support), None, None), "_alive": (support, alive)}

@@ -122,6 +122,7 @@ CODES = {
     "TF203": "unknown_frame",
     "TF204": "several_roots",
     "TF205": "edge_given_twice",
+    "TF206": "no_frames",
     # ownership
     "TF301": "edge_with_two_owners",
     "TF302": "unknown_owner",
@@ -131,6 +132,7 @@ CODES = {
     "TF402": "quaternion_not_unit",
     "TF403": "rotation_not_orthonormal",
     "TF404": "pose_cannot_be_solved",
+    "TF405": "placed_by_nominal_values",
     # names
     "TF501": "bad_frame_name",
     "TF502": "name_used_twice",
@@ -138,10 +140,12 @@ CODES = {
     "TF601": "unknown_preset",
     "TF602": "bad_preset",
     "TF603": "unknown_option",
+    "TF604": "driver_cannot",
     # bodies and joints
     "TF701": "mimic_without_master",
     "TF702": "mimic_loop",
-    "TF703": "body_without_frame",
+    "TF703": "unknown_joint",
+    "TF704": "joint_without_limits",
     # processes, guard, live tree
     "TF801": "foreign_publisher",
     "TF802": "second_parent_seen",
@@ -155,7 +159,7 @@ CODES = {
     "TF810": "executable_not_found",
     "TF811": "edge_never_seen",
     "TF812": "start_order_loop",
-    "TF813": "frames_without_owner",
+    "TF813": "unknown_process",
     # the environment
     "TF901": "no_ros",
     "TF902": "bad_plan",

@@ -1,1 +1,6 @@
 """Stage ``resolve``: a RobotSpec becomes a Robot with presets expanded, poses solved and owners given."""
+
+from tfcompose.resolve.presets import Library
+from tfcompose.resolve.resolve import Resolved, resolve
+
+__all__ = ["Library", "Resolved", "resolve"]

@@ -69,7 +69,12 @@ def evaluate(text: str, lookup: Callable[[str], Value]) -> Value:
 def _inserted(value: Value) -> str:
     if isinstance(value, str):
         return value
-    return repr(int(value.value)) if value.value.is_integer() and abs(value.value) < 1e15 else repr(value.value)  # noqa: PLR2004 (exact integers)
+    number = value.value
+    return str(int(number)) if number == int(number) and abs(number) < _EXACT else repr(number)
+
+
+_EXACT = 2**53
+"""Up to here every whole number is a float."""
 
 
 class _Parser:
@@ -148,7 +153,7 @@ class _Parser:
     def _value(self) -> Quantity:
         kind, word = self._next()
         if kind == "number":
-            return self._number(float(word))
+            return self._number(int(word) if word.isdigit() else float(word))
         if kind == "name":
             return self._call(word) if self._peek() == "(" else self._variable(word)
         if word != "(":

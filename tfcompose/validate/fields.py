@@ -80,21 +80,22 @@ def integer(least: int, most: int) -> Type:
 
 def read_quantity(value: Any, path: Path, problems: Problems, dimension: Dimension) -> Any:
     """Return the value in SI, or ``BROKEN``: it is no number, its unit is unknown, or it has another dimension."""
-    want = dimension_name(dimension)
+    name = dimension_name(dimension)
+    want = f"an {name}" if name[0] in "aeiou" else f"a {name}"
     if isinstance(value, str):
         try:
             value = quantity(value)
         except UnitError as error:
             code = "TF104" if error.unit else "TF103"
-            return problems.refuse(code, path, f"{error}; a {want} is expected", error.advice)
+            return problems.refuse(code, path, f"{error}; {want} is expected", error.advice)
     elif isinstance(value, bool) or not isinstance(value, (int, float, Quantity)):
-        return problems.refuse("TF103", path, f"{shown(value)} is no {want}", f"for example {example(dimension)}")
+        return problems.refuse("TF103", path, f"{shown(value)} is no {name}", f"for example {example(dimension)}")
     if not isinstance(value, Quantity):
         return float(value)
     if value.dimension not in {NUMBER, dimension}:
-        message = f"a {want} is expected, and this is a {dimension_name(value.dimension)}"
+        message = f"{want} is expected; this is of the kind {dimension_name(value.dimension)}"
         return problems.refuse("TF104", path, message, f"for example {example(dimension)}")
-    return value.value
+    return float(value.value)
 
 
 def measure(dimension: Dimension, *, positive: bool = False) -> Type:
@@ -130,7 +131,16 @@ def _has_direction(axis: Vector, path: Path, problems: Problems) -> Any:
     return problems.refuse("TF106", path, "an axis of length 0 has no direction", "for example [0, 0, 1]")
 
 
-ANYTHING = Type(lambda value, _path, _problems: value, {})
+def _plain(value: Any) -> Any:
+    """Return plain data, as it is passed on: a computed quantity is its number."""
+    if isinstance(value, Quantity):
+        return value.value
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, list) else value
+
+
+ANYTHING = Type(lambda value, _path, _problems: _plain(value), {})
 TEXT = text()
 NAME = text(r"[A-Za-z][A-Za-z0-9_]*", "a name: a letter, then letters, digits and _")
 BOOLEAN = Type(_boolean, {"type": "boolean"})

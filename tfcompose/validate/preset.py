@@ -38,6 +38,14 @@ class Body(Model):
     mass: float | None = key(MASS_, None, "where the vendor's is credible; the inertia is computed")
 
 
+class Chosen(Model):
+    """A parameter's value when a condition holds, and otherwise."""
+
+    when: Condition = key(CONDITION)
+    value: Any = key(ANYTHING)
+    otherwise: Any = key(ANYTHING)
+
+
 class PresetDriver(Model):
     """The vendor's driver: what is started, and with what."""
 
@@ -47,6 +55,7 @@ class PresetDriver(Model):
     namespace: str = key(TEXT, "")
     params: dict[str, Any] = key(mapping(ANYTHING), {})
     enable: dict[str, Condition] = key(mapping(CONDITION), {}, "boolean parameters and when they are true")
+    choose: dict[str, Chosen] = key(mapping(record(Chosen)), {}, "parameters with one of two values")
     take: dict[str, str] = key(mapping(TEXT), {}, "parameters that take an option's value, if it is given")
     switch: dict[str, Any] | None = key(mapping(ANYTHING), None, "parameters that keep it from publishing frames")
 

@@ -5,7 +5,7 @@ The descriptions and examples here are what an editor shows; ``schemas/robot.sch
 
 from __future__ import annotations
 
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.validate.fields import (
     ANYTHING,

@@ -39,7 +39,8 @@ def validate(source: Source) -> Validated:
     data = compute(source.data, problems)
     spec = _read(RobotSpec, data, problems)
     _exclusive(source.data, problems)
-    found = (*source.found, *(_finding(problem, source) for problem in _once(problems.all)))
+    said_once = [problem for problem in _once(problems.all) if not _in_a_copy(problem, source.data)]
+    found = (*source.found, *(_finding(problem, source) for problem in said_once))
     if spec is BROKEN:
         raise RejectedError(found)
     broken = {(str(p.path[0]), str(p.path[1])) for p in problems.all if len(p.path) > 1}
@@ -67,6 +68,12 @@ def _read(cls: type[Model], data: dict[str, Any], problems: Problems) -> Any:
 
 def _once(problems: list[Problem]) -> list[Problem]:
     return list(dict.fromkeys(problems))
+
+
+def _in_a_copy(problem: Problem, data: dict[str, Any]) -> bool:
+    """Whether the problem is in ``collision: same``, and so already said of ``visual``."""
+    section, name, key = (*problem.path[:3], "", "", "")[:3]
+    return section == "links" and key == "collision" and data["links"][name]["collision"] == "same"
 
 
 def _finding(problem: Problem, source: Source) -> Diagnostic:

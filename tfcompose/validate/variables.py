@@ -77,7 +77,7 @@ class _Variables:
         if isinstance(written, bool) or not isinstance(written, (int, float, str)):
             raise ExpressionError(f"the variable {name} is {shown(written)}", "a number, a quantity or a text")
         if not isinstance(written, str):
-            return Quantity(float(written))
+            return Quantity(written)
         value = fill(written, self.lookup) if "${" in written else written
         if not isinstance(value, str):
             return value

@@ -1,0 +1,34 @@
+"""TF202: cycle."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import Diagnostic, Note, finding
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model import Robot
+
+
+def cycle(robot: Robot) -> Iterator[Diagnostic]:
+    """Frames are each other's ancestors.
+
+    A transform tree has no loops: a lookup through one never ends, and URDF refuses it. One of the edges points the
+    wrong way; turn it round, or hang its child elsewhere.
+    """
+    above = {edge.child: edge for edge in reversed(robot.edges)}
+    done: set[str] = set()
+    for start in above:
+        path: list[str] = []
+        frame = start
+        while frame in above and frame not in done and frame not in path:
+            path.append(frame)
+            frame = above[frame].parent
+        if frame in path:
+            loop = path[path.index(frame) :]
+            names = " → ".join([*reversed(loop), loop[-1]])
+            notes = [Note(above[child].name, above[child].at) for child in loop[1:]]
+            yield finding("TF202", f"a cycle: {names}", above[loop[0]].at, notes=notes, help="one edge must go")
+        done.update(path)

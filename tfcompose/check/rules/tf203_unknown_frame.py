@@ -1,0 +1,28 @@
+"""TF203: unknown frame."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model import Robot
+
+
+def unknown_frame(robot: Robot) -> Iterator[Diagnostic]:
+    """An edge names a frame that nothing declares.
+
+    A frame is declared under ``frames`` or ``links``, or by a sensor. A misspelt parent would give a second tree that
+    no lookup reaches.
+    """
+    for edge in robot.edges:
+        if edge.given and edge.parent not in robot.frames:
+            advice = did_you_mean(edge.parent, robot.frames, f"declare it: frames: {{{edge.parent}: {{}}}}")
+            yield finding("TF203", f"{edge.child} hangs on {edge.parent}, which is no frame", edge.at, help=advice)
+        if edge.child not in robot.frames:
+            advice = did_you_mean(edge.child, robot.frames, f"declare it: links: {{{edge.child}: {{}}}}")
+            message = f"the joint {edge.joint_name} moves {edge.child}, which is no link"
+            yield finding("TF203", message, edge.child_at or edge.at, help=advice)

@@ -1,0 +1,25 @@
+"""TF701: mimic without master."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model import Robot
+
+
+def mimic_without_master(robot: Robot) -> Iterator[Diagnostic]:
+    """A joint follows a joint that is not there or does not move.
+
+    Its frame would never appear.
+    """
+    joints = [edge.joint for edge in robot.edges if edge.joint]
+    names = [joint.name for joint in joints]
+    for joint in joints:
+        if joint.mimic is not None and joint.mimic not in names:
+            message = f"{joint.name} follows {joint.mimic}, which is no moving joint"
+            yield finding("TF701", message, joint.at, help=did_you_mean(joint.mimic, names))

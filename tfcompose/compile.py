@@ -1,0 +1,78 @@
+"""The whole way from text to files, on one screen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tfcompose.check import check
+from tfcompose.diagnostic import Diagnostic, RejectedError, Span
+from tfcompose.load import Source, load, with_profiles
+from tfcompose.resolve import Library, resolve
+from tfcompose.validate import validate
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tfcompose.model import Robot
+    from tfcompose.validate import Validated
+
+#: Findings that say that something is not there. They are kept back while an entry is broken: it may be just that.
+_ABSENCE = frozenset({"TF203", "TF204", "TF206", "TF302", "TF404", "TF703", "TF701", "TF813"})
+
+
+@dataclass(frozen=True, slots=True)
+class Compiled:
+    """A robot and everything that was found; ``robot`` is None where the text did not get that far."""
+
+    robot: Robot | None
+    found: tuple[Diagnostic, ...]
+
+    @property
+    def errors(self) -> tuple[Diagnostic, ...]:
+        """The findings that stand in the way of a build."""
+        return tuple(found for found in self.found if found.severity == "error")
+
+
+def compile_robot(text: str, file: str, library: Library, profiles: Sequence[str] = ()) -> Compiled:
+    """Return the robot that the text describes with the profiles laid over it, and all findings, in order of place."""
+    try:
+        source = load(text, file)
+    except RejectedError as error:
+        return Compiled(None, error.diagnostics)
+    return compile_source(source, library, profiles)
+
+
+def compile_source(source: Source, library: Library, profiles: Sequence[str] = ()) -> Compiled:
+    """Return what ``compile_robot`` does, from text that has been loaded."""
+    try:
+        validated = validate(with_profiles(source, profiles))
+    except RejectedError as error:
+        return Compiled(None, error.diagnostics)
+    resolved = resolve(validated, library)
+    later = [*resolved.found, *check(resolved.robot)]
+    found = [*validated.found, *(one for one in later if _stands(one, validated))]
+    ordered = sorted(dict.fromkeys(found), key=lambda one: one.sort_key)
+    return Compiled(resolved.robot, tuple(ordered))
+
+
+def _stands(found: Diagnostic, validated: Validated) -> bool:
+    """Whether a later finding is not merely a consequence of an entry that was refused already."""
+    if not validated.broken:
+        return True
+    if found.code in _ABSENCE:
+        return False
+    at = found.span
+    spans = (validated.source.values.get(entry) for entry in validated.broken)
+    return at is None or not any(span and _holds(span, at) for span in spans)
+
+
+def _holds(span: Span, at: Span) -> bool:
+    begin, end = (span.line, span.column), (span.end_line, span.end_column)
+    return span.file == at.file and begin <= (at.line, at.column) < end
+
+
+def profiles_of(source: Source) -> list[str]:
+    """Return the names of the file's profiles."""
+    profiles = source.data.get("profiles")
+    return [name for name, value in profiles.items() if isinstance(value, dict)] if isinstance(profiles, dict) else []

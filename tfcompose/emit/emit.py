@@ -1,0 +1,39 @@
+"""From a right robot to its files, as text."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tfcompose.emit.params import params_file
+from tfcompose.emit.plan import plan_of
+from tfcompose.emit.tree import tree
+from tfcompose.emit.urdf import urdf
+from tfcompose.planfile import write_plan
+
+if TYPE_CHECKING:
+    from tfcompose.model import Robot
+
+
+@dataclass(frozen=True, slots=True)
+class File:
+    """A file to be written: its path below the output folder, and its text."""
+
+    path: str
+    text: str
+
+
+def emit(robot: Robot) -> tuple[File, ...]:
+    """Return the robot's files; the same robot gives the same bytes. There must be no errors in it."""
+    params = tuple(
+        File(f"params/{process.name}.yaml", params_file(process.node, process.params))
+        for process in robot.processes
+        if process.kind == "run" and process.params
+    )
+    return (
+        File("plan.json", write_plan(plan_of(robot))),
+        File("robot.full.urdf", urdf(robot, full=True)),
+        File("robot.urdf", urdf(robot, full=False)),
+        File("tree.txt", tree(robot)),
+        *params,
+    )

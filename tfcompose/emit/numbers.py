@@ -1,0 +1,60 @@
+"""The one writer of numbers: the shortest text that reads back the same, no −0, no noise from computing."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from tfcompose.pose import Pose
+
+if TYPE_CHECKING:
+    from tfcompose.pose import Quaternion, Vector
+
+METRE_DECIMALS = 12
+QUATERNION_DECIMALS = 14
+ANGLE_NOISE_RAD = 1e-12
+
+
+def number(value: float) -> str:
+    """Return the number as text: ``0.3``, ``1``, ``1e-05``."""
+    value = value + 0.0  # −0 becomes 0
+    return str(int(value)) if value.is_integer() and abs(value) < 2**53 else repr(value)
+
+
+def numbers(values: tuple[float, ...]) -> str:
+    """Return the numbers with spaces between them, as URDF wants them."""
+    return " ".join(number(value) for value in values)
+
+
+def clean_xyz(xyz: Vector) -> Vector:
+    """Return the lengths rounded to a picometre, which removes what adding and turning left behind."""
+    x, y, z = (round(value, METRE_DECIMALS) + 0.0 for value in xyz)
+    return (x, y, z)
+
+
+def clean_quat(quat_xyzw: Quaternion) -> Quaternion:
+    """Return the quaternion rounded to 14 decimals, w not negative, so that one rotation has one text."""
+    sign = -1.0 if quat_xyzw[3] < 0 else 1.0
+    x, y, z, w = (round(sign * value, QUATERNION_DECIMALS) + 0.0 for value in quat_xyzw)
+    return (x, y, z, w)
+
+
+def clean(pose: Pose) -> Pose:
+    """Return the pose as it is written everywhere."""
+    return Pose(clean_xyz(pose.xyz), clean_quat(pose.quat_xyzw))
+
+
+def clean_rpy(quat_xyzw: Quaternion) -> Vector:
+    """Return roll, pitch, yaw in radians; a whole degree within the noise of computing is written as just that."""
+    roll, pitch, yaw = (_whole_degree(angle) for angle in Pose((0.0, 0.0, 0.0), quat_xyzw).rpy)
+    return (roll, pitch, yaw)
+
+
+def _whole_degree(angle: float) -> float:
+    snapped = math.radians(round(math.degrees(angle)))
+    return (snapped if abs(angle - snapped) < ANGLE_NOISE_RAD else angle) + 0.0
+
+
+def clean_tensor(tensor: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the moments to 12 significant digits, which no measurement reaches."""
+    return tuple(float(f"{value:.12g}") for value in tensor)

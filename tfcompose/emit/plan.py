@@ -1,0 +1,114 @@
+"""The plan: what the robot's processes are started with, and which edges each of them owns."""
+
+from __future__ import annotations
+
+import posixpath
+from typing import TYPE_CHECKING
+
+from tfcompose.emit.numbers import clean
+from tfcompose.model import GUARD, JOINTS, STATIC
+from tfcompose.plan import Joint, Plan, PlanEdge, PlanProcess
+
+if TYPE_CHECKING:
+    from tfcompose.model import Edge, Process, Robot
+
+#: The modules behind tfcompose's own processes.
+MODULES = {
+    "static": "tfcompose.run.static",
+    "joints": "tfcompose.run.joints",
+    "simulate": "tfcompose.run.simulate",
+    "guard": "tfcompose.run.guard",
+}
+
+
+def plan_of(robot: Robot) -> Plan:
+    """Return the plan of a right robot."""
+    nodes = {process.name: process.node for process in robot.processes}
+    edges = tuple(_edge(edge, nodes[edge.owner], robot.file) for edge in robot.edges)
+    return Plan(
+        robot=robot.name,
+        spec_digest=robot.digest,
+        base=robot.base,
+        ros=robot.ros,
+        edges=edges,
+        processes=tuple(_process(process, robot, edges) for process in _needed(robot)),
+        guard=robot.guard,
+    )
+
+
+def _needed(robot: Robot) -> list[Process]:
+    """Return the processes that have something to do: ``joints`` where joints move, else ``static`` at least."""
+    owners = {edge.owner for edge in robot.edges}
+    idle = {name for name in (STATIC, JOINTS) if name not in owners}
+    if idle == {STATIC, JOINTS}:
+        idle = {JOINTS}
+    order = {STATIC: 0, JOINTS: 1, GUARD: 3}
+    return sorted((p for p in robot.processes if p.name not in idle), key=lambda process: order.get(process.name, 2))
+
+
+def _edge(edge: Edge, node: str, file: str) -> PlanEdge:
+    moving = edge.joint
+    joint = None
+    if moving:
+        joint = Joint(moving.name, moving.type, moving.axis, moving.mimic, moving.multiplier, moving.offset)
+    return PlanEdge(
+        parent=edge.parent,
+        child=edge.child,
+        kind=edge.kind,
+        owner=edge.owner,
+        node=node,
+        pose=clean(edge.pose),
+        rate=edge.rate,
+        source=(_relative(edge.at.file, file), edge.at.line),
+        joint=joint,
+    )
+
+
+def _relative(file: str, to: str) -> str:
+    """Return where ``file`` is, seen from the robot's file: the same wherever the robot's folder is."""
+    return posixpath.relpath(file, posixpath.dirname(to) or ".")
+
+
+def _process(process: Process, robot: Robot, edges: tuple[PlanEdge, ...]) -> PlanProcess:
+    has_params = process.kind == "run" and bool(process.params)
+    simulation = process.simulate
+    if simulation:
+        simulation = type(simulation)(
+            simulation.kind,
+            simulation.rate,
+            simulation.radius,
+            simulation.speed,
+            clean(simulation.pose),
+            simulation.joints,
+        )
+    return PlanProcess(
+        name=process.name,
+        kind=process.kind,
+        argv=_argv(process, robot, has_params=has_params),
+        env=process.env,
+        cwd=process.cwd,
+        params_file=f"params/{process.name}.yaml" if has_params else None,
+        remap=process.remap,
+        nodes=(process.node,),
+        restart=process.restart,
+        after=process.after,
+        owns=tuple((edge.parent, edge.child) for edge in edges if edge.owner == process.name),
+        simulate=simulation,
+    )
+
+
+def _argv(process: Process, robot: Robot, *, has_params: bool) -> tuple[str, ...]:
+    if process.kind == "external":
+        return ()
+    if process.kind != "run":
+        return ("${python}", "-m", MODULES[process.kind], "${plan}", process.name)
+    if process.package is None:
+        return process.argv
+    remaps = [word for old, new in process.remap.items() for word in ("-r", f"{old}:={new}")]
+    namespace, _, node = process.node.rpartition("/")
+    ros_args = ["--ros-args", "-r", f"__node:={node}", "-r", f"__ns:={namespace or '/'}", *remaps]
+    if robot.ros.clock == "sim":
+        ros_args += ["-p", "use_sim_time:=true"]
+    if has_params:
+        ros_args += ["--params-file", "${params_file}"]
+    return (f"${{executable:{process.package}/{process.executable}}}", *process.argv, *ros_args)

@@ -1,0 +1,48 @@
+"""The tree as text: frames, and at each edge its kind, owner and pose."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from tfcompose.emit.numbers import clean_rpy, clean_xyz, number
+
+if TYPE_CHECKING:
+    from tfcompose.model import Edge, Robot
+
+
+def tree(robot: Robot) -> str:
+    """Return the tree, one frame a line: kind, owner, rate; position in metres and rpy in degrees where not zero."""
+    children = robot.children()
+    rows: list[tuple[str, Edge | None]] = []
+    for root in robot.roots():
+        rows.append((root, None))
+        waiting = [("", edge, edge is last) for last in children.get(root, [])[-1:] for edge in children[root]][::-1]
+        while waiting:
+            indent, edge, is_last = waiting.pop()
+            rows.append((f"{indent}{'└── ' if is_last else '├── '}{edge.child}", edge))
+            below = children.get(edge.child, [])
+            deeper = indent + ("    " if is_last else "│   ")
+            waiting += [(deeper, child, child is below[-1]) for child in below][::-1]
+    width = max((len(name) for name, _ in rows), default=0)
+    owners = max((len(edge.owner) for _, edge in rows if edge), default=0)
+    return "".join(f"{_row(name, edge, width, owners)}\n" for name, edge in rows)
+
+
+def _row(name: str, edge: Edge | None, width: int, owners: int) -> str:
+    if edge is None:
+        return name
+    rate = f"{number(edge.rate)} Hz" if edge.rate else ""
+    said = f"{name:<{width}}  {edge.kind:<7}  {edge.owner:<{owners}}  {rate:<6}  {_pose(edge)}"
+    return said.rstrip()
+
+
+def _pose(edge: Edge) -> str:
+    parts = []
+    xyz = clean_xyz(edge.pose.xyz)
+    if any(xyz):
+        parts.append(f"xyz {' '.join(number(round(value, 6)) for value in xyz)}")
+    rpy = clean_rpy(edge.pose.quat_xyzw)
+    if any(rpy):
+        parts.append(f"rpy {' '.join(number(round(math.degrees(value), 4)) for value in rpy)} deg")
+    return "  ".join(parts)

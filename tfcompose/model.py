@@ -1,0 +1,172 @@
+"""The robot: frames, edges, bodies, joints and processes, with every name, pose and owner decided.
+
+A ``Robot`` can hold a wrong robot: two parents, a cycle, two owners can all be said, and a rule says so with both
+places. Lengths are metres, angles radians, rates hertz; an edge's pose is the pose of its child in its parent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+from tfcompose.plan import EdgeKind, GuardPolicy, ProcessKind, RosSettings, Simulation
+
+if TYPE_CHECKING:
+    from tfcompose.diagnostic import Span
+    from tfcompose.pose import Pose, Vector
+
+STATIC, JOINTS, GUARD = "static", "joints", "guard"
+BUILT_IN = (STATIC, JOINTS, GUARD)
+
+#: How names of optical frames end: REP-103's suffix, the spelling of newer ZED wrappers, and a short one.
+OPTICAL_ENDINGS = ("_optical_frame", "_frame_optical", "_optical")
+
+
+def is_optical(frame: str) -> bool:
+    """Return whether the frame's name says that z is its viewing direction."""
+    return frame.endswith(OPTICAL_ENDINGS)
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """A colour with a name; red, green, blue and opacity from 0 to 1."""
+
+    name: str
+    rgba: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A primitive and its pose in the link. ``size``: box x, y, z · cylinder radius, length · sphere radius."""
+
+    kind: Literal["box", "cylinder", "sphere"]
+    size: tuple[float, ...]
+    pose: Pose
+    material: Material | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Inertial:
+    """Mass in kg, the pose of the centre of mass in the link, and the tensor about it (xx, xy, xz, yy, yz, zz)."""
+
+    mass: float
+    pose: Pose
+    tensor: tuple[float, float, float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """The body on a frame."""
+
+    name: str
+    at: Span
+    visuals: tuple[Shape, ...] = ()
+    collisions: tuple[Shape, ...] = ()
+    inertial: Inertial | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """What a joint can do: rad or m, N m or N, rad/s or m/s."""
+
+    lower: float | None = None
+    upper: float | None = None
+    effort: float | None = None
+    velocity: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A joint that can move; ``axis`` is a unit vector in the child's frame."""
+
+    name: str
+    type: Literal["revolute", "continuous", "prismatic"]
+    at: Span
+    axis: Vector = (1.0, 0.0, 0.0)
+    limit: Limit | None = None
+    mimic: str | None = None
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """A frame and its parent, and who publishes where the one is in the other."""
+
+    parent: str
+    child: str
+    kind: EdgeKind
+    pose: Pose
+    owner: str
+    at: Span
+    rate: float | None = None
+    joint: Joint | None = None
+    joint_name: str = ""
+    given: bool = True
+    owner_at: Span | None = None
+    child_at: Span | None = None
+    sensor: str | None = None
+    nominal: bool = False
+
+    @property
+    def name(self) -> str:
+        """The edge as people read it."""
+        return f"{self.parent} → {self.child}"
+
+
+@dataclass(frozen=True, slots=True)
+class Process:
+    """A process of the plan, before it is a command line."""
+
+    name: str
+    kind: ProcessKind
+    at: Span
+    node: str = ""
+    package: str | None = None
+    executable: str | None = None
+    argv: tuple[str, ...] = ()
+    params: dict[str, Any] = field(default_factory=dict)
+    remap: dict[str, str] = field(default_factory=dict)
+    env: dict[str, str] = field(default_factory=dict)
+    cwd: str | None = None
+    restart: str = "no"
+    after: dict[str, str] = field(default_factory=dict)
+    simulate: Simulation | None = None
+    rate: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """One robot, resolved.
+
+    ``frames`` holds every frame that was declared, with its place; ``base`` is where the URDF begins, or None where the
+    tree has no single root; ``wanted_base`` is what the user asked for and is not there.
+    """
+
+    name: str
+    file: str
+    frames: dict[str, Span]
+    edges: tuple[Edge, ...]
+    links: dict[str, Link]
+    processes: tuple[Process, ...]
+    base: str | None
+    ros: RosSettings = field(default_factory=RosSettings)
+    guard: GuardPolicy = field(default_factory=GuardPolicy)
+    digest: str = ""
+    base_at: Span | None = None
+
+    def parent_edge(self, child: str) -> Edge | None:
+        """Return the first edge whose child is the frame, or None for a root."""
+        return next((edge for edge in self.edges if edge.child == child), None)
+
+    def roots(self) -> list[str]:
+        """Return the declared frames that no edge has as its child, in the order of declaration."""
+        children = {edge.child for edge in self.edges}
+        return [frame for frame in self.frames if frame not in children]
+
+    def children(self) -> dict[str, list[Edge]]:
+        """Return the edges of each parent, in the order of declaration."""
+        table: dict[str, list[Edge]] = {}
+        for edge in self.edges:
+            table.setdefault(edge.parent, []).append(edge)
+        return table

@@ -1,0 +1,69 @@
+"""Findings for people: the place, the line with a caret under it, notes and help."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from tfcompose.diagnostic import Diagnostic, Span
+
+RED, YELLOW, BLUE, GREEN, BOLD, PLAIN = "\033[31m", "\033[33m", "\033[34m", "\033[32m", "\033[1m", "\033[0m"
+
+_LONGEST = 160
+
+
+def render_text(found: Sequence[Diagnostic], line_of: Callable[[str, int], str | None], *, colour: bool) -> str:
+    """Return the findings as text; ``line_of`` gives a file's line (from 1), or None where it cannot be had."""
+    return "".join(_one(one, line_of, _Paint(colour=colour)) for one in found)
+
+
+class _Paint:
+    def __init__(self, *, colour: bool) -> None:
+        self.colour = colour
+
+    def __call__(self, text: str, *codes: str) -> str:
+        return f"{''.join(codes)}{text}{PLAIN}" if self.colour else text
+
+
+def _one(found: Diagnostic, line_of: Callable[[str, int], str | None], paint: _Paint) -> str:
+    shade = RED if found.severity == "error" else YELLOW
+    place = f"{found.span}: " if found.span else ""
+    head = f"{paint(place, BOLD)}{paint(f'{found.severity}[{found.code}]', shade, BOLD)} {paint(found.message, BOLD)}"
+    lines = [head]
+    if found.span:
+        lines += _excerpt(found.span, line_of, paint, shade)
+    for note in found.notes:
+        at = f"{note.span}: " if note.span else ""
+        lines.append(f"   {paint('note', BLUE)}: {at}{note.message}")
+    if found.help:
+        lines.append(f"   {paint('help', GREEN)}: {found.help}")
+    return "\n".join(lines) + "\n"
+
+
+def _excerpt(span: Span, line_of: Callable[[str, int], str | None], paint: _Paint, shade: str) -> list[str]:
+    line = line_of(span.file, span.line)
+    if line is None or not line.strip():
+        return []
+    start = span.column - 1
+    end = span.end_column - 1 if span.end_line == span.line else len(line.rstrip())
+    shown, cut = line, max(0, start - _LONGEST // 2)
+    if len(line) > _LONGEST:
+        shown = line[cut : cut + _LONGEST]
+    else:
+        cut = 0
+    width = max(1, min(end, cut + len(shown)) - start)
+    lead = "".join("\t" if character == "\t" else " " for character in shown[: start - cut])
+    return [f"{span.line:>5} | {shown.rstrip()}", f"      | {lead}{paint('^' * width, shade, BOLD)}"]
+
+
+def summary(found: Sequence[Diagnostic], files: int) -> str:
+    """Return the last line: how much was found in how many files."""
+    errors = sum(one.severity == "error" for one in found)
+    warnings = len(found) - errors
+    where = f"in {files} file{'s' if files != 1 else ''}"
+    if not found:
+        return f"no findings {where}\n"
+    parts = [f"{n} {word}{'s' if n != 1 else ''}" for n, word in ((errors, "error"), (warnings, "warning")) if n]
+    return f"{' and '.join(parts)} {where}\n"

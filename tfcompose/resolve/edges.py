@@ -1,0 +1,190 @@
+"""Edges as the user gave them: frames, links with a parent, joints and sensors; each with its owner."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.diagnostic import Diagnostic, Span, did_you_mean, finding
+from tfcompose.model import JOINTS, STATIC, Edge, Joint, Limit, Link, Process
+from tfcompose.pose import Pose, norm
+from tfcompose.resolve.bodies import inertial_of, link_of, shape_of
+from tfcompose.resolve.poses import Draft, pose_of, rotation_of
+from tfcompose.resolve.processes import driver_process
+
+if TYPE_CHECKING:
+    from tfcompose.load import Path, Source
+    from tfcompose.plan import EdgeKind
+    from tfcompose.resolve.presets import Sensor
+    from tfcompose.validate.spec import EdgeKeys, JointSpec, RobotSpec
+
+
+@dataclass(slots=True)
+class Drafts:
+    """What is known of a robot while it is resolved."""
+
+    spec: RobotSpec
+    source: Source
+    simulated: frozenset[str]
+    frames: dict[str, Span] = field(default_factory=dict)
+    edges: list[Draft] = field(default_factory=list)
+    links: dict[str, Link] = field(default_factory=dict)
+    drivers: list[Process] = field(default_factory=list)
+    found: list[Diagnostic] = field(default_factory=list)
+
+    def add_frames(self) -> None:
+        """Take the bare frames; one without a parent is a root, said so."""
+        for name, frame in self.spec.frames.items():
+            self.frames.setdefault(name, self.source.at_key(("frames", name)))
+            if frame.parent is not None:
+                self._add(("frames", name), frame.parent, name, frame)
+
+    def add_links(self) -> None:
+        """Take the bodies; one with a parent has a fixed edge."""
+        for name, link in self.spec.links.items():
+            at = self.source.at_key(("links", name))
+            self.frames.setdefault(name, at)
+            self.links[name] = link_of(name, link, at)
+            if link.parent is not None:
+                self._add(("links", name), link.parent, name, link)
+
+    def add_joints(self) -> None:
+        """Take the edges between bodies."""
+        for name, joint in self.spec.joints.items():
+            moving = _moving(name, joint, self.source)
+            self._add(("joints", name), joint.parent, joint.child, joint, joint=moving, joint_name=name)
+
+    def add_sensor(self, sensor: Sensor) -> None:
+        """Take a sensor: its mount edge, the frames inside it, its body and its driver."""
+        at: Path = ("sensors", sensor.name)
+        place, said = self.source.at_key(at), sensor.spec
+        mount = self._renamed(sensor, sensor.named(sensor.preset.mount))
+        self.frames.setdefault(mount, place)
+        self._add(at, said.parent, mount, said, sensor=sensor)
+        publisher = self._publisher(sensor)
+        for name, frame in sensor.frames().items():
+            final, own = self._renamed(sensor, name), said.frames.get(name)
+            pose = pose_of(frame, final)
+            turned = rotation_of(own, final) if own else None
+            if own:
+                pose = Pose(own.xyz or pose.xyz, turned or pose.quat_xyzw)
+            measured = bool(own and (own.xyz or turned))
+            owner = publisher if frame.driver else STATIC
+            self.frames.setdefault(final, place)
+            parent = self._renamed(sensor, sensor.named(frame.parent))
+            edge = Edge(
+                parent, final, "static", pose, owner, place,
+                given=False, sensor=sensor.name, nominal=frame.nominal and not measured,
+            )  # fmt: skip
+            self.edges.append(Draft(edge))
+        self._check_overrides(sensor, mount)
+        self._add_body(sensor)
+
+    def _add(  # noqa: PLR0913 (an edge has that many parts)
+        self,
+        at: Path,
+        parent: str,
+        child: str,
+        keys: EdgeKeys,
+        *,
+        joint: Joint | None = None,
+        joint_name: str = "",
+        sensor: Sensor | None = None,
+    ) -> None:
+        owner = keys.owner or (JOINTS if joint else STATIC)
+        place: str | None = getattr(keys, "place", None)
+        edge = Edge(
+            parent=parent,
+            child=child,
+            kind=self._kind(owner, keys, joint),
+            pose=pose_of(keys, place or child),
+            owner=owner,
+            at=self.source.at((*at, "parent")),
+            rate=keys.rate,
+            joint=joint,
+            joint_name=joint_name,
+            child_at=self.source.at((*at, "child")) if joint_name else None,
+            owner_at=self.source.at((*at, "owner")) if keys.owner else None,
+            sensor=sensor.name if sensor else None,
+        )
+        relative_at = self.source.at((*at, "relative_to"))
+        place_at = self.source.at((*at, "place"))
+        self.edges.append(Draft(edge, keys.relative_to, relative_at, place, place_at))
+
+    def _kind(self, owner: str, keys: EdgeKeys, joint: Joint | None) -> EdgeKind:
+        if owner == STATIC:
+            return "static"
+        if joint and owner == JOINTS:
+            return "joint"
+        return "static" if keys.static and owner not in self.simulated else "dynamic"
+
+    def _renamed(self, sensor: Sensor, name: str) -> str:
+        own = sensor.spec.frames.get(name)
+        return own.name if own and own.name else name
+
+    def _publisher(self, sensor: Sensor) -> str:
+        """Return who publishes the frames inside the sensor that a driver can publish; note what cannot be."""
+        said, driver = sensor.spec, sensor.preset.driver
+        place = self.source.at(("sensors", sensor.name, "tf"))
+        named = said.driver.process if said.driver else None
+        by_driver = said.tf == "driver" or (said.tf is None and driver is not None and named != "none")
+        if named == "none" or (driver is None and named is None):
+            if said.tf == "driver":
+                why = "driver is none" if named == "none" else f"{said.preset} has no driver"
+                self._refuse(f"{sensor.name}: the driver cannot publish its frames: {why}", place, "tf: tfcompose")
+            return STATIC
+        if named is not None:
+            return named if by_driver else STATIC
+        process, found = driver_process(sensor, self.spec, self.source, publishes=by_driver)
+        self.drivers.append(process)
+        self.found += found
+        if not by_driver and driver and driver.switch is None:
+            self._refuse(
+                f"{sensor.name}: the driver of {said.preset} has no switch for its frames", place, "tf: driver"
+            )
+        return sensor.name if by_driver else STATIC
+
+    def _refuse(self, message: str, place: Span, advice: str) -> None:
+        self.found.append(finding("TF604", message, place, help=advice))
+
+    def _check_overrides(self, sensor: Sensor, mount: str) -> None:
+        known = [*sensor.frames(), sensor.named(sensor.preset.mount)]
+        for name in sensor.spec.frames:
+            if name not in known:
+                place = self.source.at_key(("sensors", sensor.name, "frames", name))
+                advice = did_you_mean(name, known, f"there is {', '.join(known)}")
+                self.found.append(finding("TF203", f"{sensor.name} has no frame {name}", place, help=advice))
+        if mount in sensor.frames():
+            self._refuse(f"{mount} is a frame inside {sensor.name} already", self.frames[mount], "another name")
+
+    def _add_body(self, sensor: Sensor) -> None:
+        body = sensor.preset.body
+        if body is None:
+            return
+        frame = self._renamed(sensor, sensor.named(body.frame))
+        if frame in self.links:
+            return
+        shape = shape_of(body.shape)
+        inertial = inertial_of(body.mass, (shape,)) if body.mass else None
+        place = self.source.at_key(("sensors", sensor.name))
+        self.links[frame] = Link(frame, place, (shape,), (shape,), inertial)
+
+
+def _moving(name: str, joint: JointSpec, source: Source) -> Joint | None:
+    kind: Any = joint.type
+    if kind == "fixed":
+        return None
+    length = norm(joint.axis)
+    axis = (joint.axis[0] / length, joint.axis[1] / length, joint.axis[2] / length)
+    said, mimic = joint.limit, joint.mimic
+    limit = Limit(said.lower, said.upper, said.effort, said.velocity) if said else None
+    return Joint(
+        name,
+        kind,
+        source.at_key(("joints", name)),
+        axis,
+        limit,
+        mimic.joint if mimic else None,
+        mimic.multiplier if mimic else 1.0,
+        mimic.offset if mimic else 0.0,
+    )

@@ -1,0 +1,154 @@
+"""Poses as they were written become poses of the child in its parent.
+
+``relative_to`` gives a pose in another frame than the parent, ``place`` gives that of another frame of the sensor than
+its mount. Both are solved through fixed edges only: what moves has no pose before the robot runs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import Diagnostic, Note, did_you_mean, finding
+from tfcompose.model import is_optical
+from tfcompose.pose import IDENTITY_XYZW, OPTICAL_XYZW, Pose, multiply
+
+if TYPE_CHECKING:
+    from tfcompose.diagnostic import Span
+    from tfcompose.model import Edge
+    from tfcompose.validate.spec import Posed, Turned
+
+
+def pose_of(posed: Posed, child: str = "") -> Pose:
+    """Return the pose as it is written; ``look`` of an optical frame is where its z axis points."""
+    turned = rotation_of(posed, child)
+    return Pose(posed.xyz, turned if turned is not None else IDENTITY_XYZW)
+
+
+def rotation_of(turned: Turned, child: str = "") -> tuple[float, float, float, float] | None:
+    """Return the rotation that is written, or None if there is none."""
+    if turned.look is not None:
+        return multiply(turned.look, OPTICAL_XYZW) if is_optical(child) else turned.look
+    written = (turned.rpy, turned.quat_xyzw, turned.axis_angle, turned.matrix)
+    return next((quat for quat in written if quat is not None), None)
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """An edge whose pose may still have to be solved. Its ``pose`` is that of ``place``, in ``relative_to``."""
+
+    edge: Edge
+    relative_to: str | None = None
+    relative_at: Span | None = None
+    place: str | None = None
+    place_at: Span | None = None
+
+
+class _UnsolvableError(Exception):
+    def __init__(self, found: Diagnostic) -> None:
+        self.found = found
+        super().__init__(found.message)
+
+
+@dataclass(slots=True)
+class Solver:
+    """Solves the drafts of one robot; ``found`` holds what could not be solved."""
+
+    drafts: list[Draft]
+    frames: dict[str, Span]
+    found: list[Diagnostic] = field(default_factory=list)
+    _solved: dict[int, Edge] = field(default_factory=dict)
+    _open: list[int] = field(default_factory=list)
+    _above: dict[str, int] = field(default_factory=dict)
+
+    def solve(self) -> tuple[Edge, ...]:
+        """Return the edges in the order of the drafts; one that cannot be solved keeps the pose as written."""
+        for index, draft in enumerate(self.drafts):
+            self._above.setdefault(draft.edge.child, index)
+        return tuple(self._tried(index) for index in range(len(self.drafts)))
+
+    def _tried(self, index: int) -> Edge:
+        try:
+            return self._edge(index)
+        except _UnsolvableError as error:
+            if error.found not in self.found:
+                self.found.append(error.found)
+            self._solved[index] = self.drafts[index].edge
+            self._open.clear()
+            return self.drafts[index].edge
+
+    def _edge(self, index: int) -> Edge:
+        if index in self._solved:
+            return self._solved[index]
+        draft = self.drafts[index]
+        if index in self._open:
+            names = ", ".join(self.drafts[i].edge.name for i in self._open[self._open.index(index) :])
+            at = draft.relative_at or draft.edge.at
+            raise _UnsolvableError(finding("TF404", f"these poses are given relative to each other: {names}", at))
+        self._open.append(index)
+        pose = draft.edge.pose
+        if draft.relative_to:
+            at = draft.relative_at or draft.edge.at
+            pose = self._between(draft.edge.parent, self._known(draft.relative_to, at), at) @ pose
+        if draft.place:
+            at = draft.place_at or draft.edge.at
+            pose = pose @ self._below(draft, self._known(draft.place, at), at).inverse()
+        self._open.pop()
+        self._solved[index] = replace(draft.edge, pose=pose)
+        return self._solved[index]
+
+    def _known(self, frame: str, at: Span) -> str:
+        if frame in self.frames:
+            return frame
+        raise _UnsolvableError(finding("TF203", f"no frame {frame}", at, help=did_you_mean(frame, self.frames)))
+
+    def _chain(self, frame: str) -> list[tuple[str, int]]:
+        """Return the frame and its ancestors, each with the index of the edge to its parent (the root: −1)."""
+        chain: list[tuple[str, int]] = []
+        while frame in self._above and all(frame != seen for seen, _ in chain):
+            chain.append((frame, self._above[frame]))
+            frame = self.drafts[self._above[frame]].edge.parent
+        return [*chain, (frame, -1)]
+
+    def _between(self, a: str, b: str, at: Span) -> Pose:
+        """Return the pose of b in a, through fixed edges."""
+        up_a, up_b = self._chain(a), self._chain(b)
+        ancestors = {frame for frame, _ in up_a}
+        meeting = next((frame for frame, _ in up_b if frame in ancestors), None)
+        if meeting is None:
+            message = f"{b} and {a} are in two trees, so the pose of the one in the other is not known"
+            raise _UnsolvableError(finding("TF404", message, at))
+        return self._down(up_a, meeting, at).inverse() @ self._down(up_b, meeting, at)
+
+    def _down(self, chain: list[tuple[str, int]], top: str, at: Span) -> Pose:
+        """Return the pose of the chain's first frame in ``top``."""
+        pose = Pose()
+        for frame, index in chain:
+            if frame == top:
+                break
+            edge = self.drafts[index].edge
+            if edge.kind != "static":
+                note = Note(f"{edge.name} is published by {edge.owner}", edge.at)
+                what = f"the joint {edge.joint.name} moves" if edge.joint else f"the edge {edge.name} moves"
+                raise _UnsolvableError(finding("TF404", f"{what}, so the pose cannot be solved", at, notes=[note]))
+            pose = self._edge(index).pose @ pose
+        return pose
+
+    def _below(self, draft: Draft, place: str, at: Span) -> Pose:
+        """Return the pose of ``place`` in the draft's child, which must be above it."""
+        chain = self._chain(place)
+        names = [frame for frame, _ in chain]
+        mount = draft.edge.child
+        if mount not in names:
+            message = f"{place} is not a frame of this sensor"
+            inside = [d.edge.child for d in self.drafts if d.edge.sensor == draft.edge.sensor]
+            raise _UnsolvableError(finding("TF404", message, at, help=did_you_mean(place, inside)))
+        pose = self._down(chain, mount, at)
+        inner = [self.drafts[index].edge for _, index in chain[: names.index(mount)]]
+        nominal = [edge for edge in inner if edge.nominal and edge.owner != STATIC]
+        if nominal:
+            edge = nominal[-1]
+            message = f"{place} is placed through {edge.name}, which {edge.owner} publishes with its unit's own values"
+            advice = f"give this unit's values: sensors.{draft.edge.sensor}.frames.{edge.child}"
+            self.found.append(finding("TF405", message, at, help=advice, severity="warning"))
+        return pose

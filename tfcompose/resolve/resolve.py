@@ -1,0 +1,134 @@
+"""From what the user wrote to a robot in which every name, pose and owner is decided."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.model import Edge, Process, Robot
+from tfcompose.plan import GuardPolicy, RosSettings
+from tfcompose.resolve.edges import Drafts
+from tfcompose.resolve.poses import Solver
+from tfcompose.resolve.presets import Library, sensor_of
+from tfcompose.resolve.processes import built_in, name_clashes, unknown_names, user_process
+
+if TYPE_CHECKING:
+    from tfcompose.load import Source
+    from tfcompose.validate import Validated
+    from tfcompose.validate.spec import RobotSpec
+
+
+@dataclass(frozen=True, slots=True)
+class Resolved:
+    """The robot, right or wrong, and what was found while resolving it."""
+
+    robot: Robot
+    found: tuple[Diagnostic, ...]
+
+
+def resolve(validated: Validated, library: Library) -> Resolved:
+    """Return the robot with presets expanded, poses solved and owners given."""
+    spec, source = validated.spec, validated.source
+    found: list[Diagnostic] = []
+    processes = _processes(spec, source, found)
+    drafts = Drafts(spec, source, frozenset(p.name for p in processes if p.kind == "simulate"))
+    drafts.add_frames()
+    drafts.add_links()
+    drafts.add_joints()
+    for name, said in spec.sensors.items():
+        sensor, refused = sensor_of(name, said, library, source)
+        found += refused
+        if sensor:
+            drafts.add_sensor(sensor)
+    solver = Solver(drafts.edges, drafts.frames)
+    edges = solver.solve()
+    processes = [*processes, *drafts.drivers]
+    found += [*drafts.found, *solver.found, *name_clashes(processes), *unknown_names(processes, source)]
+    edges = tuple(_with_rate(edge, processes) for edge in edges)
+    robot = Robot(
+        name=spec.robot,
+        file=source.file,
+        frames=drafts.frames,
+        edges=edges,
+        links=drafts.links,
+        processes=tuple(_with_positions(process, edges, source, found) for process in processes),
+        base=None,
+        ros=RosSettings(spec.ros.namespace.strip("/"), spec.ros.domain_id, spec.ros.discovery, spec.ros.clock),
+        guard=_guard(spec),
+        digest=_digest(source),
+    )
+    return Resolved(replace(robot, base=_base(robot, spec, source, found)), tuple(found))
+
+
+def _processes(spec: RobotSpec, source: Source, found: list[Diagnostic]) -> list[Process]:
+    processes = built_in(spec, source)
+    for name, said in spec.processes.items():
+        process, refused = user_process(name, said, spec, source)
+        found += refused
+        if process:
+            processes.append(process)
+    return processes
+
+
+def _guard(spec: RobotSpec) -> GuardPolicy:
+    guard = spec.guard
+    allow = tuple((edge.parent, edge.child) for edge in guard.allow)
+    return GuardPolicy(
+        mode="off" if guard.mode == "off" else "watch",
+        unknown_edges="ignore"
+        if guard.unknown_edges == "ignore"
+        else "error"
+        if guard.unknown_edges == "error"
+        else "warn",
+        on_violation="stop" if guard.on_violation == "stop" else "report",
+        allow=allow,
+    )
+
+
+def _with_rate(edge: Edge, processes: list[Process]) -> Edge:
+    """Give a moving edge without a rate its process's: that of ``joints``, or of the stand-in."""
+    if edge.rate is not None or edge.kind == "static":
+        return edge
+    owner = next((process for process in processes if process.name == edge.owner), None)
+    if owner is None:
+        return edge
+    return replace(edge, rate=owner.simulate.rate if owner.simulate else owner.rate)
+
+
+def _with_positions(process: Process, edges: tuple[Edge, ...], source: Source, found: list[Diagnostic]) -> Process:
+    """Give a stand-in for joint states a position for every joint that needs one."""
+    if process.simulate is None or process.simulate.kind != "joints":
+        return process
+    joints = [edge.joint.name for edge in edges if edge.joint and edge.joint.mimic is None]
+    for name in process.simulate.joints:
+        if name not in joints:
+            place = source.at_key(("processes", process.name, "simulate", "joints", name))
+            advice = did_you_mean(name, joints, f"there is {', '.join(joints)}" if joints else "no joint moves")
+            found.append(finding("TF703", f"no moving joint {name}", place, help=advice))
+    positions = {name: process.simulate.joints.get(name, 0.0) for name in joints}
+    return replace(process, simulate=replace(process.simulate, joints=positions))
+
+
+def _base(robot: Robot, spec: RobotSpec, source: Source, found: list[Diagnostic]) -> str | None:
+    """Return where the URDF begins: as said; base_link, or a fixed base_footprint above it; else the only root."""
+    if spec.base is not None:
+        if spec.base in robot.frames:
+            return spec.base
+        advice = did_you_mean(spec.base, robot.frames)
+        found.append(finding("TF203", f"no frame {spec.base}", source.at(("base",)), help=advice))
+        return None
+    if "base_link" in robot.frames:
+        above = robot.parent_edge("base_link")
+        if above and above.kind == "static" and above.parent == "base_footprint":
+            return "base_footprint"
+        return "base_link"
+    roots = robot.roots()
+    return roots[0] if len(roots) == 1 else None
+
+
+def _digest(source: Source) -> str:
+    text = json.dumps(source.data, sort_keys=True, ensure_ascii=False)
+    return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from sensor_msgs.msg import JointState
 
+from tfcompose.ros.environment import RosError
 from tfcompose.ros.graph import writers
 from tfcompose.ros.message import Transform, decode, encode
 from tfcompose.ros.node import JOINT_STATES, open_node
@@ -94,6 +95,15 @@ def test_a_signal_ends_a_wait_and_all_later_ones(node: Any) -> None:
         assert time.monotonic() - start < 0.5
 
 
+def test_a_signal_after_the_node_has_ended_does_no_harm(domain: object) -> None:
+    assert domain
+    stop = Stop()
+    with open_node("brief", "/rover") as node:
+        wait(node, [TFSubscription(node, static=False)], 0.0, stop)
+    stop.request()
+    assert stop.requested
+
+
 def test_a_node_leaves_no_thread_and_offers_nothing_that_it_does_not_answer(domain: object) -> None:
     assert domain
     with open_node("quiet", "/rover") as node:
@@ -103,6 +113,19 @@ def test_a_node_leaves_no_thread_and_offers_nothing_that_it_does_not_answer(doma
     with open_node("again", "/rover"):
         pass
     assert threading.active_count() == threads
+
+
+@pytest.mark.parametrize(
+    ("name", "args", "variables"),
+    [("not a name", [], {}), ("fine", ["-r", "no rule"], {}), ("fine", [], {"ROS_DOMAIN_ID": "many"})],
+)
+def test_what_ros_refuses_is_said_in_one_sentence(
+    monkeypatch: pytest.MonkeyPatch, name: str, args: list[str], variables: dict[str, str]
+) -> None:
+    for variable, value in variables.items():
+        monkeypatch.setenv(variable, value)
+    with pytest.raises(RosError, match=r"^ROS cannot start a node: .+$"), open_node(name, "", args=args):
+        pass
 
 
 def _take(node: Any, subscription: Subscription, count: int) -> list[Any]:

@@ -6,11 +6,13 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, cast
 
 from rclpy.context import Context
+from rclpy.exceptions import NameValidationException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
+from tfcompose.ros.environment import RosError
 from tfcompose.ros.stop import Stop
 
 if TYPE_CHECKING:
@@ -47,27 +49,33 @@ def open_node(name: str, namespace: str, *, args: Sequence[str] = ()) -> Iterato
     follows ``--ros-args``, for example ``["-r", "/tf:=tf"]``; the process's own arguments are not looked at.
 
     Raises:
-        ValueError: if ROS does not allow that name or namespace.
+        RosError: if ROS refuses the name, the arguments or its environment.
     """
     context = Context()
-    parameter: Any = Parameter  # rclpy does not say the types of its arguments
-    context.init(args=["--ros-args", *args] if args else [], initialize_logging=False)
     try:
-        node: Any = Node(
-            name,
-            context=context,
-            namespace=namespace,
-            enable_rosout=False,
-            start_parameter_services=False,
-            parameter_overrides=[parameter("start_type_description_service", value=False)],
-        )
-        try:
-            yield node
-        finally:
-            node.destroy_node()
+        context.init(args=["--ros-args", *args] if args else [], initialize_logging=False)
+        node = _node(context, name, namespace)
+    except (RuntimeError, NameValidationException) as error:
+        context.try_shutdown()
+        raise RosError(f"ROS cannot start a node: {' '.join(str(error).split())}") from None
+    try:
+        yield node
     finally:
+        node.destroy_node()
         context.shutdown()
         context.destroy()
+
+
+def _node(context: Context, name: str, namespace: str) -> Any:
+    parameter: Any = Parameter  # rclpy does not say the types of its arguments
+    return Node(
+        name,
+        context=context,
+        namespace=namespace,
+        enable_rosout=False,
+        start_parameter_services=False,
+        parameter_overrides=[parameter("start_type_description_service", value=False)],
+    )
 
 
 def remappings(remap: Mapping[str, str]) -> list[str]:

@@ -66,11 +66,6 @@ class Stop:
                     known[1].trigger_guard_condition()
             return known[1]
 
-    def forget(self, owner: object) -> None:
-        """Drop the waker of that owner, which is about to end."""
-        with self._lock:
-            self._wakers.pop(id(owner), None)
-
     def __enter__(self) -> Self:
         self._reader, self._writer = os.pipe()
         os.set_blocking(self._writer, False)

@@ -176,6 +176,7 @@ def test_an_edge_that_is_taken_already_is_shown_and_nothing_else_is_started() ->
     history = begin(GUARD, STATIC).feed(Taken(taken), Taken(other), Clear())
     assert history.found() == [taken, other]
     assert history.killed == [("guard", SIGINT)]
+    assert history.all(Stopping) == [Stopping(taken.message)]
     assert history.feed(Exited("guard", 0)).exit_code == 1
     assert history.started == ["guard"]
 
@@ -193,6 +194,12 @@ def test_a_process_that_cannot_be_started_ends_everything_with_exit_1_and_is_nam
 def test_after_started_waits_until_the_process_runs() -> None:
     history = begin(run_process("b", after={"a": "started"}), run_process("a"))
     assert history.started == ["a", "b"]
+
+
+def test_a_process_is_started_when_the_operating_system_has_said_so() -> None:
+    state, actions = step(initial(plan_of(run_process("b", after={"a": "started"}), run_process("a"))), Begin(), 0.0)
+    assert [action for action in actions if isinstance(action, Start)] == [Start("a")]
+    assert Start("b") in step(state, Started("a", 7), 0.1)[1]
 
 
 def test_after_ready_waits_for_the_guards_word_also_for_an_external_process() -> None:
@@ -296,6 +303,7 @@ def test_on_failure_leaves_a_program_that_is_done_and_always_starts_it_again() -
 def test_a_process_that_waits_for_its_restart_is_not_started_once_everything_stops() -> None:
     history = begin(run_process("a", restart="always"), STATIC).feed(Exited("a", 1), Signalled(SIGINT)).wait(2)
     assert history.started == ["a", "static"]
+    assert history.states("a")[-1] == "STOPPED"
     assert history.feed(Exited("static", 0)).exit_code == 0
 
 
@@ -335,6 +343,10 @@ def test_missing_edges_are_named_after_5_s_and_again_only_when_there_are_others(
     assert history.all(Waiting)[1:] == [Waiting((("slam", (edge("map", "odom", "slam"),)),))]
     history.feed(Live("map", "odom", "slam", "/slam"), Complete(2)).wait(60)
     assert len(history.all(Waiting)) == 2
+
+
+def test_a_tree_that_the_guard_calls_complete_misses_nothing() -> None:
+    assert begin(GUARD, STATIC).feed(Clear(), Complete(1)).wait(60).all(Waiting) == []
 
 
 def test_two_notices_of_missing_edges_are_5_s_apart() -> None:

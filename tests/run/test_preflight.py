@@ -126,3 +126,9 @@ def test_processes_that_wait_for_each_other_are_a_finding(tmp_path: Path) -> Non
     b = PlanProcess("b", "run", argv=("true",), after={"a": "started"})
     _, (found,) = look(tmp_path, a, b, lidar("true"))
     assert (found.code, found.message) == ("TF812", "a, b wait for each other")
+
+
+def test_a_guard_is_started_first_whatever_it_is_said_to_wait_for(tmp_path: Path) -> None:
+    guard = PlanProcess("guard", "guard", argv=("true",), after={"lidar": "started"})
+    waiting = PlanProcess("lidar", "run", argv=("true",), after={"guard": "ready"})
+    assert look(tmp_path, guard, waiting)[1] == []

@@ -26,23 +26,23 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 PYTHON = ("${python}", "-I", "-S", "-c")
-SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); time.sleep(600)"
+SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); time.sleep(30)"
 #: Starts a child of its own that heeds no signal but SIGKILL, and says both process numbers.
 PARENT = """
 import os, signal, subprocess, sys, time
 ignore = "signal.signal(signal.SIGINT, signal.SIG_IGN); signal.signal(signal.SIGTERM, signal.SIG_IGN)"
-deaf = f"import signal, time; {ignore}; print('deaf', flush=True); time.sleep(600)"
+deaf = f"import signal, time; {ignore}; print('deaf', flush=True); time.sleep(30)"
 child = subprocess.Popen([sys.executable, "-I", "-S", "-c", deaf], stdout=subprocess.PIPE)
 child.stdout.readline()
 print("pids", os.getpid(), child.pid, flush=True)
-time.sleep(600)
+time.sleep(30)
 """
 DEAF = """
 import os, signal, time
 signal.signal(signal.SIGINT, signal.SIG_IGN)
 signal.signal(signal.SIGTERM, signal.SIG_IGN)
 print("pids", os.getpid(), flush=True)
-time.sleep(600)
+time.sleep(30)
 """
 #: Runs a plan file as a process of its own, and prints the notices.
 LAUNCHER = """
@@ -144,16 +144,18 @@ def test_a_signal_ends_everything_with_0_and_no_process_is_left(launch: Callable
     assert [pid for pid in below if not gone(pid)] == []
 
 
-@pytest.mark.parametrize("keeper", ["with its keeper", "and its keeper is dead already"])
+@pytest.mark.parametrize("keeper", ["with its keeper", "and its keeper was told to end", "and its keeper is dead"])
 def test_sigkill_of_the_launcher_takes_its_children_along_within_2_s(
     launch: Callable[..., Launcher], keeper: str
 ) -> None:
     launcher = launch(program("a", PARENT), program("b", DEAF))
     until(lambda: len(launcher.pids()) == 3)
     below, children = launcher.below(), launcher.below()
+    (shell,) = [pid for pid in launcher.below(recursive=False) if psutil.Process(pid).name() == "sh"]
+    if "told" in keeper:
+        os.kill(shell, SIGTERM)
     if "dead" in keeper:
         children = launcher.below(recursive=False)
-        (shell,) = [pid for pid in children if psutil.Process(pid).name() == "sh"]
         os.kill(shell, SIGKILL)
         until(lambda: gone(shell))
     launcher.popen.kill()
@@ -183,9 +185,19 @@ def test_a_child_that_heeds_neither_sigint_nor_sigterm_is_killed(tmp_path: Path)
 
 
 def test_what_a_process_leaves_in_its_group_ends_with_it(tmp_path: Path) -> None:
-    code, told = run(tmp_path, program("a", PARENT.replace("time.sleep(600)\n", "")))
+    code, told = run(tmp_path, program("a", PARENT.replace("time.sleep(30)\n", "")))
     assert code == 0
     assert gone(int(logged(told, "a")[0].split()[2]))
+
+
+def test_a_process_that_left_its_group_is_not_waited_for(tmp_path: Path) -> None:
+    code = PARENT.replace("stdout=subprocess.PIPE)", "start_new_session=True)")
+    code = code.replace("child.stdout.readline()\n", "").replace("time.sleep(30)\n", "")
+    began = time.monotonic()
+    _, told = run(tmp_path, program("a", code))
+    (said,) = [line for line in logged(told, "a") if line.startswith("pids")]
+    os.kill(int(said.split()[2]), SIGKILL)
+    assert time.monotonic() - began < 10
 
 
 def test_a_failed_process_is_named_with_its_last_lines_and_the_exit_code_is_1(tmp_path: Path) -> None:
@@ -300,12 +312,16 @@ def test_a_guard_that_dies_before_it_is_clear_ends_everything_with_1(tmp_path: P
     ]
 
 
-def test_output_that_nobody_reads_any_more_ends_everything_with_1(tmp_path: Path) -> None:
+def test_output_that_nobody_reads_any_more_ends_everything_with_1_and_nothing_more_is_told(tmp_path: Path) -> None:
+    told: list[Notice] = []
+
     def report(notice: Notice) -> None:
+        told.append(notice)
         if isinstance(notice, LogLine):
             raise BrokenPipeError
 
     assert supervise(plan_of(program("a", PARENT)), tmp_path / "plan.json", report=report) == 1
+    assert [type(notice) for notice in told] == [ProcessState, ProcessState, LogLine]
 
 
 def test_an_error_in_the_launcher_itself_leaves_no_process(tmp_path: Path) -> None:
@@ -333,6 +349,7 @@ def test_no_file_descriptor_is_left_open_and_no_handler_in_place_after_50_runs(t
         (PlanProcess("b", "run", argv=("true",)),),
         (sleeper, PlanProcess("c", "run", argv=(str(broken),))),
     ]
+    before_all = signal.signal(SIGTERM, lambda *_: None)
     handlers = [signal.getsignal(number) for number in (SIGINT, SIGTERM, SIGHUP, signal.SIGCHLD)]
     run(tmp_path, *plans[0], duration_s=0)
     before = len(list(Path("/proc/self/fd").iterdir()))
@@ -340,5 +357,6 @@ def test_no_file_descriptor_is_left_open_and_no_handler_in_place_after_50_runs(t
         run(tmp_path, *plans[i % len(plans)], duration_s=0.01)
     assert len(list(Path("/proc/self/fd").iterdir())) == before
     assert [signal.getsignal(number) for number in (SIGINT, SIGTERM, SIGHUP, signal.SIGCHLD)] == handlers
+    signal.signal(SIGTERM, before_all)
     assert signal.set_wakeup_fd(-1) == -1
     assert psutil.Process().children() == []

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, did_you_mean, finding
-from tfcompose.model import is_optical
+from tfcompose.model import STATIC, is_optical
 from tfcompose.pose import IDENTITY_XYZW, OPTICAL_XYZW, Pose, multiply
 
 if TYPE_CHECKING:

@@ -1,0 +1,40 @@
+"""``tfcompose build``: the robot's files, all of them or nothing."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.compiling import robot_or_code
+from tfcompose.cli.output import write_all
+from tfcompose.cli.terminal import UNREADABLE, complain
+from tfcompose.emit import emit
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+
+def run(arguments: Namespace) -> int:
+    """Build; exit code 0, 1 with errors in the robot, 2 where something cannot be read or written."""
+    built = build(arguments.file, arguments.profiles, arguments.output)
+    if isinstance(built, int):
+        return built
+    folder, names = built
+    sys.stdout.write(f"wrote {folder}: {', '.join(names)}\n")
+    return 0
+
+
+def build(file: str, profiles: list[str], output: str | None) -> tuple[Path, list[str]] | int:
+    """Build the robot and return the folder and the names of the files, or the exit code after saying why not."""
+    robot = robot_or_code(file, profiles)
+    if isinstance(robot, int):
+        return robot
+    written = emit(robot)
+    folder = Path(output) if output else Path("build") / robot.name
+    try:
+        write_all(folder, written)
+    except OSError as error:
+        complain(f"nothing was written to {folder}: {error.strerror}: {error.filename}")
+        return UNREADABLE
+    return folder, [file.path for file in written]

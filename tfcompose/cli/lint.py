@@ -1,0 +1,56 @@
+"""``tfcompose lint``: everything that is wrong, with places."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.compiling import library
+from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
+from tfcompose.compile import compile_source, profiles_of
+from tfcompose.diagnostic import Diagnostic, Note, RejectedError
+from tfcompose.load import load
+from tfcompose.render.json import render_json
+from tfcompose.render.text import summary
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+    from tfcompose.resolve import Library
+
+
+def run(arguments: Namespace) -> int:
+    """Lint the files; exit code 0, 1 with findings that count, 2 where a file cannot be read."""
+    presets = library()
+    found: list[Diagnostic] = []
+    for file in dict.fromkeys(arguments.files):
+        found += lint_file(file, presets, arguments.profiles)
+    if arguments.format == "json":
+        sys.stdout.write(render_json(found))
+    else:
+        print_findings(found, sys.stdout)
+        sys.stdout.write(summary(found, len(set(arguments.files))))
+    if unreadable(found):
+        return UNREADABLE
+    return int(any(one.severity == "error" or arguments.fail_on == "warning" for one in found))
+
+
+def lint_file(file: str, presets: Library, profiles: list[str]) -> list[Diagnostic]:
+    """Return the findings of one file: alone and with each of its profiles, or with the given ones only."""
+    try:
+        source = load(read_text(file), file)
+    except RejectedError as error:
+        return list(error.diagnostics)
+    if profiles:
+        return list(compile_source(source, presets, profiles).found)
+    found = list(compile_source(source, presets).found)
+    for profile in profiles_of(source):
+        note = Note(f"with --profile {profile}")
+        known = {(one.code, one.message, one.span) for one in found}
+        found += [
+            replace(one, notes=(*one.notes, note))
+            for one in compile_source(source, presets, [profile]).found
+            if (one.code, one.message, one.span) not in known
+        ]
+    return sorted(found, key=lambda one: one.sort_key)

@@ -1,0 +1,88 @@
+"""What all commands share: reading files, and printing findings."""
+
+from __future__ import annotations
+
+import os
+import sys
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
+from tfcompose.render.text import render_text
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import TextIO
+
+UNREADABLE = 2
+MOST_BYTES = 16_000_000
+
+
+def read_text(path: str) -> str:
+    """Return the file's text.
+
+    Raises:
+        RejectedError: with one TF001 or TF008 finding, if it cannot be read, is no text, or is too large.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+    except OSError as error:
+        raise RejectedError([_unreadable(path, error)]) from None
+    except ValueError:
+        raise RejectedError([finding("TF001", "a file name cannot hold a NUL byte", Span("?"))]) from None
+    if len(data) > MOST_BYTES:
+        raise RejectedError([finding("TF008", f"the file is larger than {MOST_BYTES:,} bytes", Span(path))])
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = data[: error.start]
+        line, column = before.count(b"\n") + 1, error.start - before.rfind(b"\n")
+        message = f"not a text file: byte 0x{data[error.start]:02x} is not UTF-8"
+        raise RejectedError([finding("TF001", message, Span(path, line, column, line, column + 1))]) from None
+
+
+def _unreadable(path: str, error: OSError) -> Diagnostic:
+    advice = ""
+    if isinstance(error, FileNotFoundError):
+        folder = Path(path).parent
+        there = sorted(file.name for file in folder.glob("*.yaml")) if folder.is_dir() else []
+        advice = f"in {folder} there is {', '.join(there[:8])}" if there else f"there is no YAML file in {folder}"
+    elif isinstance(error, IsADirectoryError):
+        advice = "name a file in it"
+    return finding("TF001", f"cannot be read: {error.strerror}", Span(path), help=advice)
+
+
+def unreadable(found: Sequence[Diagnostic]) -> bool:
+    """Return whether the findings say that a file cannot be read at all."""
+    return any(one.code == "TF001" for one in found)
+
+
+def print_findings(found: Sequence[Diagnostic], stream: TextIO) -> None:
+    """Print findings for people, with the lines that they are about."""
+    stream.write(render_text(found, line_of, colour=coloured(stream)))
+
+
+def coloured(stream: TextIO) -> bool:
+    """Return whether to colour: on a terminal, unless NO_COLOR is set (no-color.org)."""
+    return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
+@cache
+def _lines(file: str) -> list[str]:
+    try:
+        return read_text(file).splitlines()
+    except RejectedError:
+        return []
+
+
+def line_of(file: str, line: int) -> str | None:
+    """Return a line of a file, counted from 1, or None."""
+    lines = _lines(file)
+    return lines[line - 1] if 0 < line <= len(lines) else None
+
+
+def complain(message: str) -> None:
+    """Print one sentence about wrong use to stderr."""
+    sys.stderr.write(f"tfcompose: {message}\n")

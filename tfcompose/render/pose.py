@@ -1,0 +1,32 @@
+"""A pose for people and for programs: always "pose of B in A"."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tfcompose.pose import Pose
+
+
+def pose_text(parent: str, child: str, pose: Pose, when: str = "") -> str:
+    """Return the pose of ``child`` in ``parent``: metres, quaternion x y z w, fixed-axis angles in both units."""
+    degrees = tuple(math.degrees(angle) for angle in pose.rpy)
+    return (
+        f"pose of {child} in {parent}{when}\n"
+        f"  xyz        [{_row(pose.xyz)}] m\n"
+        f"  quat_xyzw  [{_row(pose.quat_xyzw)}]\n"
+        f"  rpy        [{_row(pose.rpy)}] rad\n"
+        f"             [{_row(degrees, 2)}] deg\n"
+    )
+
+
+def pose_json(parent: str, child: str, pose: Pose, **more: float | str) -> str:
+    """Return the pose as one line of JSON; angles in radians."""
+    row = {"parent": parent, "child": child, "xyz": pose.xyz, "quat_xyzw": pose.quat_xyzw, "rpy": pose.rpy}
+    return json.dumps(row | more, ensure_ascii=False) + "\n"
+
+
+def _row(values: tuple[float, ...], decimals: int = 4) -> str:
+    return ", ".join(f"{round(value, decimals) + 0.0:.{decimals}f}" for value in values)

@@ -197,7 +197,7 @@ def test_after_started_waits_until_the_process_runs() -> None:
 
 
 def test_a_process_is_started_when_the_operating_system_has_said_so() -> None:
-    state, actions = step(initial(plan_of(run_process("b", after={"a": "started"}), run_process("a"))), Begin(), 0.0)
+    state, actions = step(initial(plan_of(run_process("a"), run_process("b", after={"a": "started"}))), Begin(), 0.0)
     assert [action for action in actions if isinstance(action, Start)] == [Start("a")]
     assert Start("b") in step(state, Started("a", 7), 0.1)[1]
 

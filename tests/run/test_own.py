@@ -2,14 +2,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import pytest
+
+from tfcompose.diagnostic import RejectedError
 from tfcompose.plan import PlanProcess, Simulation
-from tfcompose.run import joints, simulate, static
+from tfcompose.run import joints, static
+from tfcompose.run.own import read_own
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
-
-    import pytest
 
 
 def _last_error(capsys: pytest.CaptureFixture[str]) -> str:
@@ -35,20 +37,25 @@ def test_what_is_no_plan_ends_with_code_2(capsys: pytest.CaptureFixture[str], tm
     assert "not a plan" in _last_error(capsys)
 
 
-def test_a_process_that_the_plan_does_not_have_is_refused(
-    write: Callable[..., Path], capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = write([], PlanProcess("static", "static"))
-    assert static.main([str(file), "other"]) == 2
-    assert "no process other" in _last_error(capsys)
-    assert joints.main([str(file), "static"]) == 2
-    assert "process static is of kind static, not joints" in _last_error(capsys)
+def test_a_process_that_the_plan_does_not_have_is_refused(write: Callable[..., Path]) -> None:
+    file = str(write([], PlanProcess("static", "static")))
+    with pytest.raises(RejectedError, match="no process other"):
+        read_own([file, "other"], "static")
+    with pytest.raises(RejectedError, match="process static is of kind static, not joints"):
+        read_own([file, "static"], "joints")
 
 
-def test_a_simulation_without_a_rate_is_refused(write: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
-    file = write([], PlanProcess("body", "simulate", simulate=Simulation("fixed", 0.0)))
-    assert simulate.main([str(file), "body"]) == 2
-    assert "rate above 0" in _last_error(capsys)
+def test_a_simulation_without_a_rate_is_refused(write: Callable[..., Path]) -> None:
+    file = str(write([], PlanProcess("body", "simulate", simulate=Simulation("fixed", 0.0))))
+    with pytest.raises(RejectedError, match="rate above 0"):
+        read_own([file, "body"], "simulate")
+
+
+def test_a_node_has_the_name_and_the_namespace_of_the_plan(write: Callable[..., Path]) -> None:
+    file = str(write([], PlanProcess("static", "static", nodes=("/fleet/r1/frames",))))
+    own = read_own([file, "static", "--ros-args", "-r", "/tf:=tf"], "static")
+    assert (own.namespace, own.node_name, own.ros_args) == ("/fleet/r1", "frames", ("-r", "/tf:=tf"))
+    assert own.description.parent == own.file.parent
 
 
 def test_without_ros_it_ends_with_code_1_and_says_what_to_install(

@@ -84,6 +84,11 @@ def test_a_huge_count_costs_neither_time_nor_memory() -> None:
     tracemalloc.stop()
 
 
+def test_a_name_that_is_longer_than_the_message_is_refused_as_such() -> None:
+    with pytest.raises(ValueError, match="inside a name of 4294967295 bytes"):
+        decode(encode([ONE]).replace(b"\x05\0\0\0odom", b"\xff\xff\xff\xffodom"))
+
+
 def test_a_name_that_is_not_utf8_is_refused() -> None:
     with pytest.raises(ValueError, match="UTF-8"):
         decode(encode([ONE]).replace(b"odom", b"od\xffm"))

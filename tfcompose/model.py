@@ -140,7 +140,7 @@ class Robot:
     """One robot, resolved.
 
     ``frames`` holds every frame that was declared, with its place; ``base`` is where the URDF begins, or None where the
-    tree has no single root; ``wanted_base`` is what the user asked for and is not there.
+    tree has no single root; ``written`` is the plain data that the robot was made from, profiles laid over it.
     """
 
     name: str
@@ -152,8 +152,7 @@ class Robot:
     base: str | None
     ros: RosSettings = field(default_factory=RosSettings)
     guard: GuardPolicy = field(default_factory=GuardPolicy)
-    digest: str = ""
-    base_at: Span | None = None
+    written: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     def parent_edge(self, child: str) -> Edge | None:
         """Return the first edge whose child is the frame, or None for a root."""

@@ -1,4 +1,7 @@
-"""``tfcompose build``: the robot's files, all of them or nothing."""
+"""``tfcompose build``: the robot's files, all of them or nothing.
+
+Write plan.json, robot.urdf, robot.full.urdf and tree.txt, and parameter files where there are any: all, or nothing.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import robot_or_code
+from tfcompose.cli.options import add_file, add_profiles
 from tfcompose.cli.output import write_all
 from tfcompose.cli.terminal import UNREADABLE, complain
 from tfcompose.emit import emit
 
 if TYPE_CHECKING:
-    from argparse import Namespace
+    from argparse import ArgumentParser, Namespace
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Add the command's arguments."""
+    add_file(parser)
+    add_profiles(parser, "lay this profile over the file")
+    parser.add_argument("-o", "--output", metavar="DIR", help="default: build/ROBOT")
 
 
 def run(arguments: Namespace) -> int:

@@ -1,23 +1,37 @@
-"""``tfcompose lint``: everything that is wrong, with places."""
+"""``tfcompose lint``: everything that is wrong, with places.
+
+Find everything that is wrong with robot files, with places. Each file is checked alone and with each of its profiles.
+"""
 
 from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import library
+from tfcompose.cli.options import DEFAULT_FILE, add_profiles
 from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
 from tfcompose.compile import compile_source, profiles_of
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError
 from tfcompose.load import load
-from tfcompose.render.json import render_json
 from tfcompose.render.text import summary
 
 if TYPE_CHECKING:
-    from argparse import Namespace
+    from argparse import ArgumentParser, Namespace
 
     from tfcompose.resolve import Library
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("files", nargs="*", metavar="FILE", default=[DEFAULT_FILE], help="default: robot.yaml")
+    add_profiles(parser, "check this combination only")
+    parser.add_argument("--format", choices=("text", "json"), default="text", help="default: text")
+    parser.add_argument(
+        "--fail-on", choices=("error", "warning"), default="error", help="what makes the exit code 1; default: error"
+    )
 
 
 def run(arguments: Namespace) -> int:
@@ -27,7 +41,7 @@ def run(arguments: Namespace) -> int:
     for file in dict.fromkeys(arguments.files):
         found += lint_file(file, presets, arguments.profiles)
     if arguments.format == "json":
-        sys.stdout.write(render_json(found))
+        sys.stdout.write(import_module("tfcompose.render.json").render_json(found))
     else:
         print_findings(found, sys.stdout)
         sys.stdout.write(summary(found, len(set(arguments.files))))

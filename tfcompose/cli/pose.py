@@ -1,4 +1,7 @@
-"""``tfcompose pose``: the pose of B in A, from the spec alone."""
+"""``tfcompose pose``: the pose of B in A, from the spec alone.
+
+Print the pose of B in A from the spec alone. What moves is taken at its nominal pose, a joint at 0.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import robot_or_code
+from tfcompose.cli.options import add_profiles
 from tfcompose.cli.terminal import complain
 from tfcompose.diagnostic import did_you_mean
 from tfcompose.emit.numbers import clean
@@ -13,9 +17,18 @@ from tfcompose.pose import Pose
 from tfcompose.render.pose import pose_json, pose_text
 
 if TYPE_CHECKING:
-    from argparse import Namespace
+    from argparse import ArgumentParser, Namespace
 
     from tfcompose.model import Robot
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("file", metavar="FILE")
+    parser.add_argument("a", metavar="A", help="the frame in which the pose is given")
+    parser.add_argument("b", metavar="B", help="the frame whose pose it is")
+    add_profiles(parser, "lay this profile over the file")
+    parser.add_argument("--format", choices=("text", "json"), default="text", help="default: text")
 
 
 def run(arguments: Namespace) -> int:

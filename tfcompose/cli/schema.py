@@ -1,4 +1,7 @@
-"""``tfcompose schema``: the JSON Schema of the language."""
+"""``tfcompose schema``: the JSON Schema of the language.
+
+Print the JSON Schema that editors and CI use.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,12 @@ from typing import TYPE_CHECKING
 from tfcompose.validate.json_schema import json_schema
 
 if TYPE_CHECKING:
-    from argparse import Namespace
+    from argparse import ArgumentParser, Namespace
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("language", nargs="?", choices=("robot", "preset"), default="robot", help="default: robot")
 
 
 def run(arguments: Namespace) -> int:

@@ -1,4 +1,7 @@
-"""``tfcompose tree``: the tree of a robot file, on the terminal."""
+"""``tfcompose tree``: the tree of a robot file, on the terminal.
+
+Print the tree: each frame with the kind, owner, rate and pose of its edge.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,17 @@ import sys
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import robot_or_code
+from tfcompose.cli.options import add_file, add_profiles
 from tfcompose.emit.tree import tree
 
 if TYPE_CHECKING:
-    from argparse import Namespace
+    from argparse import ArgumentParser, Namespace
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Add the command's arguments."""
+    add_file(parser)
+    add_profiles(parser, "lay this profile over the file")
 
 
 def run(arguments: Namespace) -> int:

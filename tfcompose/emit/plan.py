@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import posixpath
 from typing import TYPE_CHECKING
 
@@ -27,7 +29,7 @@ def plan_of(robot: Robot) -> Plan:
     edges = tuple(_edge(edge, nodes[edge.owner], robot.file) for edge in robot.edges)
     return Plan(
         robot=robot.name,
-        spec_digest=robot.digest,
+        spec_digest=_digest(robot),
         base=robot.base,
         ros=robot.ros,
         edges=edges,
@@ -44,6 +46,12 @@ def _needed(robot: Robot) -> list[Process]:
         idle = {JOINTS}
     order = {STATIC: 0, JOINTS: 1, GUARD: 3}
     return sorted((p for p in robot.processes if p.name not in idle), key=lambda process: order.get(process.name, 2))
+
+
+def _digest(robot: Robot) -> str:
+    """Return the digest of what was written: it changes when a key or value does, and not with layout or comments."""
+    text = json.dumps(robot.written, sort_keys=True, ensure_ascii=False)
+    return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
 
 
 def _edge(edge: Edge, node: str, file: str) -> PlanEdge:

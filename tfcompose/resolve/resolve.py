@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -58,7 +56,7 @@ def resolve(validated: Validated, library: Library) -> Resolved:
         base=None,
         ros=RosSettings(spec.ros.namespace.strip("/"), spec.ros.domain_id, spec.ros.discovery, spec.ros.clock),
         guard=_guard(spec),
-        digest=_digest(source),
+        written=source.data,
     )
     return Resolved(replace(robot, base=_base(robot, spec, source, found)), tuple(found))
 
@@ -127,8 +125,3 @@ def _base(robot: Robot, spec: RobotSpec, source: Source, found: list[Diagnostic]
         return "base_link"
     roots = robot.roots()
     return roots[0] if len(roots) == 1 else None
-
-
-def _digest(source: Source) -> str:
-    text = json.dumps(source.data, sort_keys=True, ensure_ascii=False)
-    return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"

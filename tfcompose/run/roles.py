@@ -15,6 +15,7 @@ from tfcompose.ros.node import JOINT_STATES, latch, open_node, remappings
 from tfcompose.ros.tf import Subscription, TFPublisher, wait
 from tfcompose.run.motion import Joints, circle, read_positions
 from tfcompose.run.own import say
+from tfcompose.run.watch import guard
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -82,7 +83,12 @@ def simulate(own: Own, stop: Stop) -> None:
             publish(time_s, stamp_ns)
 
 
-ROLES: dict[str, Callable[[Own, Stop], None]] = {"static": static, "joints": joints, "simulate": simulate}
+ROLES: dict[str, Callable[[Own, Stop], None]] = {
+    "static": static,
+    "joints": joints,
+    "simulate": simulate,
+    "guard": guard,
+}
 
 
 class _JointMover:

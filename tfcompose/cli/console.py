@@ -1,0 +1,122 @@
+"""What ``up`` prints: each process's log behind its name, and what the launcher has to say between."""
+
+from __future__ import annotations
+
+from functools import singledispatchmethod
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.terminal import line_of
+from tfcompose.render.text import BOLD, GREEN, PLAIN, RED, YELLOW, render_text
+from tfcompose.run.notice import (
+    EdgeLive,
+    Ended,
+    FindingShown,
+    LogLine,
+    ProcessState,
+    RecoveredShown,
+    Stopping,
+    TreeComplete,
+    Waiting,
+)
+
+if TYPE_CHECKING:
+    from typing import TextIO
+
+    from tfcompose.plan import Plan
+    from tfcompose.run.notice import Notice
+
+#: Colours that are told apart on dark and light terminals; a process keeps its own by its place in the plan.
+COLOURS = tuple(f"\033[{code}m" for code in (36, 35, 34, 32, 33, 96, 95, 94))
+OURS = "tfcompose"
+NAMED_AT_MOST = 4
+#: States that need no line of their own: the edges say more.
+QUIET = frozenset({"STARTING", "STOPPED"})
+
+
+class Console:
+    """Writes notices as lines: ``name | text``, coloured on a terminal."""
+
+    def __init__(self, plan: Plan, stream: TextIO, *, colour: bool) -> None:
+        names = [process.name for process in plan.processes]
+        self._stream = stream
+        self._colour = colour
+        self._width = max(len(name) for name in [*names, OURS])
+        self._edges = max((len(f"{edge.parent} → {edge.child}") for edge in plan.edges), default=0)
+        self._colours = {name: COLOURS[index % len(COLOURS)] for index, name in enumerate(names)}
+        self._nodes = {process.name: process.nodes for process in plan.processes}
+
+    def __call__(self, notice: Notice) -> None:
+        """Write what a notice says, at once.
+
+        Raises:
+            OSError: if nobody reads any more.
+        """
+        self._write(notice)
+        self._stream.flush()
+
+    @singledispatchmethod
+    def _write(self, notice: object) -> None:
+        raise TypeError(f"no line for {notice!r}")
+
+    @_write.register
+    def _(self, notice: LogLine) -> None:
+        self._line(notice.process, notice.text, self._colours.get(notice.process, ""))
+
+    @_write.register
+    def _(self, notice: ProcessState) -> None:
+        if notice.state in QUIET:
+            return
+        text = f"{notice.process}: {notice.state.lower()}"
+        if notice.state == "RUNNING":
+            text = f"started {notice.process} (pid {notice.pid})"
+        elif notice.state == "EXPECTED":
+            text = f"expecting {notice.process} ({', '.join(self._nodes[notice.process])}): somebody else starts it"
+        elif notice.detail:
+            text += f": {notice.detail}"
+        self._say(text)
+
+    @_write.register
+    def _(self, notice: EdgeLive) -> None:
+        edge = f"{notice.parent} → {notice.child}"
+        owner = f"{notice.owner} ({notice.node})"
+        self._say(f"{self._paint('live', GREEN)}  {edge:<{self._edges}}  {owner}  {notice.seconds:.2f} s")
+
+    @_write.register
+    def _(self, notice: TreeComplete) -> None:
+        edges = f"{notice.edges} edge{'s' if notice.edges != 1 else ''}"
+        self._say(self._paint(f"tree complete: {edges} live after {notice.seconds:.2f} s", GREEN, BOLD))
+
+    @_write.register
+    def _(self, notice: Waiting) -> None:
+        for owner, edges in notice.missing:
+            named = ", ".join(edge.name for edge in edges[:NAMED_AT_MOST])
+            more = f" and {len(edges) - NAMED_AT_MOST} more" if len(edges) > NAMED_AT_MOST else ""
+            self._say(self._paint(f"waiting for {owner} ({edges[0].node}): {named}{more}", YELLOW))
+
+    @_write.register
+    def _(self, notice: FindingShown) -> None:
+        for line in render_text([notice.found], line_of, colour=self._colour).splitlines():
+            self._say(line)
+
+    @_write.register
+    def _(self, notice: RecoveredShown) -> None:
+        self._say(f"{self._paint('over', GREEN)}  {notice.text}")
+
+    @_write.register
+    def _(self, notice: Stopping) -> None:
+        self._say(f"stopping: {notice.reason}")
+
+    @_write.register
+    def _(self, notice: Ended) -> None:
+        text = "ended" if notice.exit_code == 0 else f"ended with exit code {notice.exit_code}"
+        self._say(text if notice.exit_code == 0 else self._paint(text, RED))
+
+    def _say(self, text: str) -> None:
+        self._line(OURS, text, BOLD)
+
+    def _line(self, name: str, text: str, colour: str) -> None:
+        printable = "".join(c if c.isprintable() or c in "\t\033" else "\N{REPLACEMENT CHARACTER}" for c in text)
+        self._stream.write(f"{self._paint(f'{name:<{self._width}} |', colour)} {printable}\n")
+
+    def _paint(self, text: str, *codes: str) -> str:
+        return f"{''.join(codes)}{text}{PLAIN}" if self._colour else text

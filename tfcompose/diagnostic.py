@@ -160,6 +160,7 @@ CODES = {
     "TF811": "edge_never_seen",
     "TF812": "start_order_loop",
     "TF813": "unknown_process",
+    "TF814": "no_live_pose",
     # the environment
     "TF901": "no_ros",
     "TF902": "bad_plan",

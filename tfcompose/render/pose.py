@@ -22,7 +22,7 @@ def pose_text(parent: str, child: str, pose: Pose, when: str = "") -> str:
     )
 
 
-def pose_json(parent: str, child: str, pose: Pose, **more: float | str) -> str:
+def pose_json(parent: str, child: str, pose: Pose, **more: float | None) -> str:
     """Return the pose as one line of JSON; angles in radians."""
     row = {"parent": parent, "child": child, "xyz": pose.xyz, "quat_xyzw": pose.quat_xyzw, "rpy": pose.rpy}
     return json.dumps(row | more, ensure_ascii=False) + "\n"

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
     from tfcompose.validate import Validated
 
-#: Findings that say that something is not there. They are kept back while an entry is broken: it may be just that.
-_ABSENCE = frozenset({"TF203", "TF204", "TF206", "TF302", "TF404", "TF703", "TF701", "TF813"})
+#: Findings that follow from a pose. In an entry whose pose was refused they say nothing new.
+_FROM_A_POSE = frozenset({"TF401", "TF404", "TF405"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,10 +58,8 @@ def compile_source(source: Source, library: Library, profiles: Sequence[str] = (
 
 def _stands(found: Diagnostic, validated: Validated) -> bool:
     """Whether a later finding is not merely a consequence of an entry that was refused already."""
-    if not validated.broken:
+    if found.code not in _FROM_A_POSE:
         return True
-    if found.code in _ABSENCE:
-        return False
     at = found.span
     spans = (validated.source.values.get(entry) for entry in validated.broken)
     return at is None or not any(span and _holds(span, at) for span in spans)

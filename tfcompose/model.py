@@ -140,7 +140,8 @@ class Robot:
     """One robot, resolved.
 
     ``frames`` holds every frame that was declared, with its place; ``base`` is where the URDF begins, or None where the
-    tree has no single root; ``written`` is the plain data that the robot was made from, profiles laid over it.
+    tree has no single root; ``written`` is the plain data that the robot was made from, profiles laid over it; ``broken`` holds the
+    entries (section, name) that were refused already.
     """
 
     name: str
@@ -153,6 +154,13 @@ class Robot:
     ros: RosSettings = field(default_factory=RosSettings)
     guard: GuardPolicy = field(default_factory=GuardPolicy)
     written: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
+    broken: frozenset[tuple[str, str]] = frozenset()
+
+    def excuses(self, name: str) -> bool:
+        """Return whether a frame, process or joint may be missing only because an entry was refused already."""
+        return any(
+            name == entry or (section == "sensors" and name.startswith(f"{entry}_")) for section, entry in self.broken
+        )
 
     def parent_edge(self, child: str) -> Edge | None:
         """Return the first edge whose child is the frame, or None for a root."""

@@ -6,6 +6,7 @@ stops at a depth that no robot needs. An alias is the node that it names, so a b
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 DEEPEST = 40
+
+#: NUL, which no file name, argument or variable can hold, and halves of characters, which no file can.
+_FORBIDDEN = re.compile("[\0\ud800-\udfff]")
 
 _LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
@@ -111,6 +115,8 @@ class _Composer:
         self.stack.append(node)
 
     def _scalar(self, event: yaml.ScalarEvent) -> Node:
+        if _FORBIDDEN.search(event.value):  # written as an escape: "\\0"
+            raise RejectedError([finding("TF002", "a character that no text can hold", self._span(event))])
         plain = event.implicit[0]
         if event.tag not in {None, "!"}:
             return Node("scalar", event.tag, self._span(event), event.value)

@@ -7,26 +7,39 @@ drops the others.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, RejectedError, did_you_mean, finding
 from tfcompose.load.source import Path, Source
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
 ROTATIONS = frozenset({"rpy", "quat_xyzw", "axis_angle", "matrix", "look"})
 RUNNING = frozenset({"run", "simulate", "external"})
+COMMANDS = (frozenset({"argv", "package"}), frozenset({"argv", "executable"}), frozenset({"argv", "args"}))
 SHAPES = frozenset({"box", "cylinder", "sphere", "mesh"})
 SIMULATIONS = frozenset({"circle", "fixed", "joints"})
 
+_POSES: tuple[tuple[str, ...], ...] = (
+    ("frames", "*"),
+    ("links", "*"),
+    ("links", "*", "visual"),
+    ("links", "*", "collision"),
+    ("links", "*", "inertial"),
+    ("joints", "*"),
+    ("sensors", "*"),
+    ("sensors", "*", "frames", "*"),
+    ("processes", "*", "simulate", "fixed"),
+)
+_PROCESSES: tuple[tuple[str, ...], ...] = (("processes", "*"), ("sensors", "*", "driver"))
+
 #: Where a mapping stands (``*`` is any name), and the keys of which it can hold one.
 CHOICES: tuple[tuple[tuple[str, ...], frozenset[str]], ...] = (
-    (("frames", "*"), ROTATIONS),
-    (("links", "*"), ROTATIONS),
-    (("joints", "*"), ROTATIONS),
-    (("sensors", "*"), ROTATIONS),
-    (("processes", "*"), RUNNING),
+    *((place, ROTATIONS) for place in _POSES),
+    *(((*place, "run"), choice) for place in _PROCESSES for choice in COMMANDS),
+    *((place, RUNNING) for place in _PROCESSES),
     (("processes", "*", "simulate"), SIMULATIONS),
     (("links", "*", "visual"), SHAPES),
     (("links", "*", "collision"), SHAPES),
@@ -41,10 +54,13 @@ def with_profiles(source: Source, profiles: Sequence[str]) -> Source:
     """
     known = source.data.get("profiles")
     known = known if isinstance(known, dict) else {}
-    missing = [name for name in profiles if not isinstance(known.get(name), dict)]
-    if missing:
-        raise RejectedError([*source.found, *(_unknown_profile(source, name, list(known)) for name in missing)])
-    result = _without(source, "profiles")
+    wrong = _wrong_profiles(source)
+    missing = [name for name in dict.fromkeys(profiles) if name not in known]
+    unusable = [name for name in profiles if not isinstance(known.get(name), dict)]
+    if unusable:
+        unknown = (_unknown_profile(source, name, list(known)) for name in missing)
+        raise RejectedError([*source.found, *wrong, *unknown])
+    result = replace(_without(source, "profiles"), found=(*source.found, *wrong))
     for name in profiles:
         result = lay_over(result, source.part(("profiles", name)))
     return _without_nulls(result)
@@ -58,6 +74,8 @@ def lay_over(base: Source, overlay: Source) -> Source:
 
 
 class _Merger:
+    """Merges in time proportional to the overlay and to what it drops, not to the whole base."""
+
     def __init__(self, base: Source) -> None:
         self.data = _copy(base.data)
         self.values = dict(base.values)
@@ -67,33 +85,47 @@ class _Merger:
     def merge(self, target: dict[str, Any], data: dict[str, Any], overlay: Source, path: Path) -> None:
         for choice in _choices_at(path, data):
             for dropped in sorted(choice & (set(target) - set(data))):
-                self.forget((*path, dropped))
-                del target[dropped]
+                self.forget((*path, dropped), target.pop(dropped))
         for key, value in data.items():
             at = (*path, key)
             if value is None:
-                if key not in target:
-                    message = f"{'.'.join(map(str, at))} is removed here, but nothing is there"
-                    span = overlay.at_key(at)
-                    self.found.append(finding("TF010", message, span, severity="warning"))
-                target.pop(key, None)
-                self.forget(at)
-            elif isinstance(value, dict) and isinstance(target.get(key), dict):
+                self.remove(target, key, overlay, at)
+            elif isinstance(value, dict):
+                if not isinstance(target.get(key), dict):
+                    self.forget(at, target.get(key))
+                    target[key] = {}
+                    self.values[at] = overlay.at(at)
                 self.keys[at] = overlay.at_key(at)
                 self.merge(target[key], value, overlay, at)
             else:
-                self.forget(at)
+                self.forget(at, target.get(key))
                 target[key] = _copy(value)
-                self.remember(overlay, at)
+                self.remember(at, value, overlay)
 
-    def forget(self, path: Path) -> None:
-        for table in (self.values, self.keys):
-            for below in [known for known in table if known[: len(path)] == path]:
-                del table[below]
+    def remove(self, target: dict[str, Any], key: str, overlay: Source, path: Path) -> None:
+        if key not in target:
+            message = f"{'.'.join(map(str, path))} is removed here, but nothing is there"
+            self.found.append(finding("TF010", message, overlay.at_key(path), severity="warning"))
+        self.forget(path, target.pop(key, None))
 
-    def remember(self, overlay: Source, path: Path) -> None:
-        for table, theirs in ((self.values, overlay.values), (self.keys, overlay.keys)):
-            table.update({known: span for known, span in theirs.items() if known[: len(path)] == path})
+    def forget(self, path: Path, value: Any) -> None:
+        for below in _paths(value, path):
+            self.values.pop(below, None)
+            self.keys.pop(below, None)
+
+    def remember(self, path: Path, value: Any, overlay: Source) -> None:
+        for below in _paths(value, path):
+            for table, theirs in ((self.values, overlay.values), (self.keys, overlay.keys)):
+                if below in theirs:
+                    table[below] = theirs[below]
+
+
+def _paths(value: Any, path: Path) -> Iterator[Path]:
+    """Yield the paths of a value and of everything in it."""
+    yield path
+    steps = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for step, item in steps:
+        yield from _paths(item, (*path, step))
 
 
 def _choices_at(path: Path, data: dict[str, Any]) -> list[frozenset[str]]:
@@ -125,8 +157,12 @@ def _without_nulls(source: Source) -> Source:
 
     def clean(value: Any, path: Path) -> Any:
         if isinstance(value, list):
-            items = [clean(item, (*path, index)) for index, item in enumerate(value)]
-            return [item for item in items if item is not None]
+            for index in [index for index, item in enumerate(value) if item is None]:
+                advice = "give a value, or remove the item"
+                found.append(
+                    finding("TF006", "an item of the list has no value", source.at((*path, index)), help=advice)
+                )
+            return [clean(item, (*path, index)) for index, item in enumerate(value) if item is not None]
         if not isinstance(value, dict):
             return value
         for key in [key for key, item in value.items() if item is None]:
@@ -138,6 +174,23 @@ def _without_nulls(source: Source) -> Source:
 
     data = clean(source.data, ())
     return Source(source.file, data, source.values, source.keys, (*source.found, *found))
+
+
+def _wrong_profiles(source: Source) -> list[Diagnostic]:
+    """Return a finding for each profile that is no mapping, or that holds profiles itself."""
+    profiles = source.data.get("profiles", {})
+    if not isinstance(profiles, dict):
+        advice = "for example profiles: {demo: {…}}"
+        return [finding("TF103", "profiles is no mapping", source.at(("profiles",)), help=advice)]
+    found = []
+    for name, profile in profiles.items():
+        if not isinstance(profile, dict):
+            message, span = f"the profile {name} is no mapping", source.at_key(("profiles", name))
+            found.append(finding("TF103", message, span, help=f"for example {name}: {{sensors: {{…}}}}"))
+        elif "profiles" in profile:
+            message, span = f"the profile {name} holds profiles", source.at_key(("profiles", name, "profiles"))
+            found.append(finding("TF101", message, span, help="profiles stand side by side: --profile a --profile b"))
+    return found
 
 
 def _unknown_profile(source: Source, name: str, known: list[str]) -> Diagnostic:

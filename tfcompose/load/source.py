@@ -131,21 +131,27 @@ class _Walk:
 
     def _mapping(self, node: Node, path: Path) -> dict[str, Any]:
         data: dict[str, Any] = {}
-        for key_node, value_node in node.pairs:
-            if key_node.is_merge:
-                continue
-            key = self._key(key_node)
-            if key is None or (not path and key.startswith("x-")):
-                continue
-            at = (*path, key)
-            if key in data:
-                note = Note("it stands here first", self.keys[at])
-                self.found.append(finding("TF003", f"the key {key} is given twice", key_node.span, notes=[note]))
-                continue
-            self.keys[at] = key_node.span
-            data[key] = self.value(value_node, at)
+        self._take(node, path, data)
         self._inherit(node, path, data, len(path))
         return data
+
+    def _take(self, node: Node, path: Path, data: dict[str, Any]) -> None:
+        """Take the mapping's own keys that ``data`` does not have; report those that it gives twice."""
+        seen: dict[str, Span] = {}
+        for key_node, value_node in node.pairs:
+            key = key_node.text if key_node.is_merge else self._key(key_node)
+            if key is None:
+                continue
+            if key in seen:
+                note = Note("it stands here first", seen[key])
+                self.found.append(finding("TF003", f"the key {key} is given twice", key_node.span, notes=[note]))
+                continue
+            seen[key] = key_node.span
+            if key_node.is_merge or key in data or (not path and key.startswith("x-")):
+                continue
+            at = (*path, key)
+            self.keys[at] = key_node.span
+            data[key] = self.value(value_node, at)
 
     def _inherit(self, node: Node, path: Path, data: dict[str, Any], depth: int) -> None:
         """Take what ``<<`` names for the keys that ``data`` does not have; the first mapping that has a key wins."""
@@ -155,12 +161,7 @@ class _Walk:
             if source.kind != "mapping":
                 self.found.append(finding("TF011", "<< takes a mapping, or a list of mappings", source.span))
                 continue
-            for key_node, value_node in source.pairs:
-                if key_node.is_merge or key_node.tag != STR or key_node.text in data:
-                    continue
-                at = (*path, key_node.text)
-                self.keys[at] = key_node.span
-                data[key_node.text] = self.value(value_node, at)
+            self._take(source, path, data)
             self._inherit(source, path, data, depth + 1)
 
     def _key(self, node: Node) -> str | None:

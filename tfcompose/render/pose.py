@@ -24,7 +24,8 @@ def pose_text(parent: str, child: str, pose: Pose, when: str = "") -> str:
 
 def pose_json(parent: str, child: str, pose: Pose, **more: float | None) -> str:
     """Return the pose as one line of JSON; angles in radians."""
-    row = {"parent": parent, "child": child, "xyz": pose.xyz, "quat_xyzw": pose.quat_xyzw, "rpy": pose.rpy}
+    rpy = tuple(angle + 0.0 for angle in pose.rpy)  # −0 becomes 0
+    row = {"parent": parent, "child": child, "xyz": pose.xyz, "quat_xyzw": pose.quat_xyzw, "rpy": rpy}
     return json.dumps(row | more, ensure_ascii=False) + "\n"
 
 

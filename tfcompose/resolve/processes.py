@@ -151,7 +151,7 @@ def name_clashes(processes: list[Process]) -> list[Diagnostic]:
     return found
 
 
-def unknown_names(processes: list[Process], source: Source) -> list[Diagnostic]:
+def unknown_names(processes: list[Process], source: Source, broken: frozenset[str]) -> list[Diagnostic]:
     """Return a finding for each name under ``after`` that no process has."""
     names = [process.name for process in processes]
     found = []
@@ -159,7 +159,7 @@ def unknown_names(processes: list[Process], source: Source) -> list[Diagnostic]:
         section = "processes" if ("processes", process.name) in source.keys else "sensors"
         inside = ("after",) if section == "processes" else ("driver", "after")
         for other in process.after:
-            if other not in names:
+            if other not in names and other not in broken:
                 place = source.at_key((section, process.name, *inside, other))
                 advice = did_you_mean(other, names, f"there is {', '.join(names)}")
                 found.append(

@@ -31,6 +31,7 @@ def resolve(validated: Validated, library: Library) -> Resolved:
     """Return the robot with presets expanded, poses solved and owners given."""
     spec, source = validated.spec, validated.source
     found: list[Diagnostic] = []
+    broken = set(validated.broken)
     processes = _processes(spec, source, found)
     drafts = Drafts(spec, source, frozenset(p.name for p in processes if p.kind == "simulate"))
     drafts.add_frames()
@@ -41,10 +42,14 @@ def resolve(validated: Validated, library: Library) -> Resolved:
         found += refused
         if sensor:
             drafts.add_sensor(sensor)
+        else:
+            broken.add(("sensors", name))
     solver = Solver(drafts.edges, drafts.frames)
     edges = solver.solve()
     processes = [*processes, *drafts.drivers]
-    found += [*drafts.found, *solver.found, *name_clashes(processes), *unknown_names(processes, source)]
+    names = frozenset(name for _, name in broken)
+    found += [*drafts.found, *solver.found, *name_clashes(processes), *unknown_names(processes, source, names)]
+    found = [one for one in found if not (one.code == "TF404" and broken)]  # an edge on the way may have been refused
     edges = tuple(_with_rate(edge, processes) for edge in edges)
     robot = Robot(
         name=spec.robot,
@@ -57,6 +62,7 @@ def resolve(validated: Validated, library: Library) -> Resolved:
         ros=RosSettings(spec.ros.namespace.strip("/"), spec.ros.domain_id, spec.ros.discovery, spec.ros.clock),
         guard=_guard(spec),
         written=source.data,
+        broken=frozenset(broken),
     )
     return Resolved(replace(robot, base=_base(robot, spec, source, found)), tuple(found))
 

@@ -19,10 +19,10 @@ def unknown_frame(robot: Robot) -> Iterator[Diagnostic]:
     no lookup reaches.
     """
     for edge in robot.edges:
-        if edge.given and edge.parent not in robot.frames:
+        if edge.given and edge.parent not in robot.frames and not robot.excuses(edge.parent):
             advice = did_you_mean(edge.parent, robot.frames, f"declare it: frames: {{{edge.parent}: {{}}}}")
             yield finding("TF203", f"{edge.child} hangs on {edge.parent}, which is no frame", edge.at, help=advice)
-        if edge.child not in robot.frames:
+        if edge.child not in robot.frames and not robot.excuses(edge.child):
             advice = did_you_mean(edge.child, robot.frames, f"declare it: links: {{{edge.child}: {{}}}}")
             message = f"the joint {edge.joint_name} moves {edge.child}, which is no link"
             yield finding("TF203", message, edge.child_at or edge.at, help=advice)

@@ -18,7 +18,7 @@ def several_roots(robot: Robot) -> Iterator[Diagnostic]:
     Between frames of two trees there is no transform. Give every root but one a parent; a frame that nobody needs can
     go.
     """
-    roots = robot.roots()
+    roots = [root for root in robot.roots() if not robot.excuses(root)]
     if len(roots) > 1:
         notes = [Note(f"{root} is one", robot.frames[root]) for root in roots[:-1]]
         message = f"{len(roots)} roots: {', '.join(roots)}"

@@ -17,5 +17,5 @@ def no_frames(robot: Robot) -> Iterator[Diagnostic]:
 
     There is nothing to publish and nothing to describe. A robot has at least a ``base_link``, under ``links``.
     """
-    if not robot.frames:
+    if not robot.frames and not robot.broken:
         yield finding("TF206", f"{robot.name} has no frames", Span(robot.file), help="links: {base_link: {}}")

@@ -20,7 +20,7 @@ def unknown_owner(robot: Robot) -> Iterator[Diagnostic]:
     """
     names = [process.name for process in robot.processes]
     for edge in robot.edges:
-        if edge.owner not in names:
+        if edge.owner not in names and not robot.excuses(edge.owner):
             advice = did_you_mean(edge.owner, names, f"processes: {{{edge.owner}: {{external: true}}}}")
             message = f"the owner of {edge.name} is {edge.owner}, which is no process"
             yield finding("TF302", message, edge.owner_at or edge.at, help=advice)

@@ -20,6 +20,6 @@ def mimic_without_master(robot: Robot) -> Iterator[Diagnostic]:
     joints = [edge.joint for edge in robot.edges if edge.joint]
     names = [joint.name for joint in joints]
     for joint in joints:
-        if joint.mimic is not None and joint.mimic not in names:
+        if joint.mimic is not None and joint.mimic not in names and not robot.excuses(joint.mimic):
             message = f"{joint.name} follows {joint.mimic}, which is no moving joint"
             yield finding("TF701", message, joint.at, help=did_you_mean(joint.mimic, names))

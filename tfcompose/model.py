@@ -140,8 +140,8 @@ class Robot:
     """One robot, resolved.
 
     ``frames`` holds every frame that was declared, with its place; ``base`` is where the URDF begins, or None where the
-    tree has no single root; ``written`` is the plain data that the robot was made from, profiles laid over it; ``broken`` holds the
-    entries (section, name) that were refused already.
+    tree has no single root; ``written`` is the plain data that the robot was made from, profiles laid over it;
+    ``broken`` holds the entries (section, name) that were refused already.
     """
 
     name: str

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("file", metavar="FILE")
+    parser.add_argument("file", metavar="FILE", help="the robot file")
     parser.add_argument("a", metavar="A", help="the frame in which the pose is given")
     parser.add_argument("b", metavar="B", help="the frame whose pose it is")
     add_profiles(parser, "lay this profile over the file")

@@ -1,0 +1,88 @@
+"""The README says what the code says."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tfcompose.cli.parser import COMMANDS, parser_of
+from tfcompose.diagnostic import CODES
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+
+
+def run(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tfcompose", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=60, check=False)
+
+
+@pytest.fixture
+def rover(tmp_path: Path) -> Path:
+    (tmp_path / "rover.yaml").write_text(blocks("yaml")[0], encoding="utf-8")
+    return tmp_path
+
+
+def test_its_robot_has_no_findings(rover: Path) -> None:
+    done = run("lint", "rover.yaml", cwd=rover)
+    assert (done.returncode, done.stdout) == (0, "no findings in 1 file\n")
+
+
+def test_its_robot_gives_the_edges_and_owners_that_up_prints(rover: Path) -> None:
+    done = run("tree", "rover.yaml", cwd=rover)
+    owners = {words[0].lstrip("│├└─ "): words[2] for words in map(str.split, _edges(done.stdout))}
+    printed = re.findall(r"live  \S+ → (\S+) +(\S+) \(", blocks("console")[0])
+    assert dict(printed) == owners
+    assert f"tree complete: {len(owners)} edges" in README
+
+
+def _edges(tree: str) -> list[str]:
+    return [re.sub(r"^[│├└─ ]+", "", line) for line in tree.splitlines()[1:]]
+
+
+def test_its_lint_output_is_what_lint_prints(rover: Path) -> None:
+    shown = blocks("console")[1].removeprefix("$ tfcompose lint rover.yaml\n")
+    broken = blocks("yaml")[0].replace("owner: base_drive", "owner: base_driv").replace("15 deg}  ", "15 degr} ", 1)
+    (rover / "rover.yaml").write_text(broken, encoding="utf-8")
+    printed = run("lint", "rover.yaml", cwd=rover).stdout
+    assert [line.rstrip() for line in printed.splitlines()] == [line.rstrip() for line in shown.splitlines()]
+
+
+def test_its_table_of_commands_is_that_of_the_command_line() -> None:
+    rows = dict(re.findall(r"^\| `tfcompose (\w+)` \| (.*) \|$", README, re.MULTILINE))
+    assert rows == COMMANDS
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_each_command_says_what_it_does_and_what_its_arguments_are(command: str) -> None:
+    parser = parser_of(command)
+    assert parser.description
+    assert parser.description.strip().endswith(".")
+    for action in parser._actions:
+        assert action.help, f"{command} {action.dest} has no help"
+
+
+def test_its_codes_are_known() -> None:
+    assert set(re.findall(r"TF\d{3}", README)) <= set(CODES)
+
+
+def test_its_presets_are_those_that_come_with_it() -> None:
+    folder = ROOT / "tfcompose" / "presets"
+    known = sorted(path.relative_to(folder).with_suffix("").as_posix() for path in folder.glob("*/*.yaml"))
+    line = next(line for line in README.splitlines() if line.startswith("Presets: "))
+    assert re.findall(r"`([^`]+)`", line) == known
+
+
+def test_it_has_exactly_the_two_commands_that_ci_takes_out_of_it() -> None:
+    commands = re.findall(r"^python3 -m venv .*&&.*$", README, re.MULTILINE)
+    assert len(commands) == 2
+    assert commands[0].endswith("tfcompose up robots/autonomous_robot.yaml --profile demo")
+    assert commands[1].endswith("pytest")

@@ -46,6 +46,7 @@ def build(file: str, profiles: list[str], output: str | None) -> tuple[Path, lis
     try:
         write_all(folder, written)
     except OSError as error:
-        complain(f"nothing was written to {folder}: {error.strerror}: {error.filename}")
+        where = f": {error.filename}" if error.filename else ""
+        complain(f"nothing was written to {folder}: {error.strerror}{where}")
         return UNREADABLE
     return folder, [file.path for file in written]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import errno
+import json
 import os
 import shutil
 import tempfile
@@ -19,26 +21,65 @@ def write_all(folder: Path, files: Sequence[File]) -> None:
     """Write the files below ``folder``; a reader sees each file as it was or as it is, never half.
 
     All of them are written to a folder beside first. Only when the last byte is on the disk are they moved into place,
-    which needs no more space. Parameter files of an earlier build that are not among the files are removed.
+    which needs no more space; if one cannot be moved, those before it are put back. Parameter files of an earlier build
+    that are not among the files are removed.
 
     Raises:
-        OSError: if the files cannot be written; then nothing in ``folder`` has changed.
+        OSError: if the files cannot be written; then nothing has changed.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    staging = Path(tempfile.mkdtemp(prefix=".tfcompose-", dir=folder))
+    made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
+    before, now = _parameter_files(folder), {file.path for file in files}
     try:
-        for file in files:
-            _write(staging / file.path, file.text)
-        for file in files:
-            target = folder / file.path
+        folder.mkdir(parents=True, exist_ok=True)
+        staging = Path(tempfile.mkdtemp(prefix=".tfcompose-", dir=folder))
+        try:
+            for file in files:
+                _write(staging / "new" / file.path, file.text)
+            _move(staging, folder, [file.path for file in files])
+        finally:
+            shutil.rmtree(staging, ignore_errors=True)
+    except OSError:
+        for parent in made:
+            _remove_if_empty(parent)
+        raise
+    _remove_stale(folder, [path for path in before if path not in now])
+
+
+def _move(staging: Path, folder: Path, paths: list[str]) -> None:
+    """Move the files into place, all or none: what they replace is kept until the last one is there."""
+    made = [parent for parent in {(folder / path).parent: None for path in paths} if not parent.exists()]
+    done: list[str] = []
+    try:
+        for path in paths:
+            target, old = folder / path, staging / "old" / path
+            if target.is_dir() and not target.is_symlink():
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
             target.parent.mkdir(parents=True, exist_ok=True)
-            if target.is_dir():
-                raise IsADirectoryError(21, "is a folder", str(target))
-        for file in files:
-            (staging / file.path).replace(folder / file.path)
-        _remove_stale(folder, {file.path for file in files})
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
+            if target.exists():
+                old.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy2(target, old)
+        for path in paths:
+            (staging / "new" / path).replace(folder / path)
+            done.append(path)
+    except OSError:
+        for path in done:
+            _put_back(staging / "old" / path, folder / path)
+        for parent in reversed(made):
+            _remove_if_empty(parent)
+        raise
+
+
+def _put_back(old: Path, target: Path) -> None:
+    with contextlib.suppress(OSError):
+        if old.exists():
+            old.replace(target)
+        else:
+            target.unlink()
+
+
+def _remove_if_empty(folder: Path) -> None:
+    with contextlib.suppress(OSError):
+        folder.rmdir()
 
 
 def _write(path: Path, text: str) -> None:
@@ -49,10 +90,19 @@ def _write(path: Path, text: str) -> None:
         os.fsync(file.fileno())
 
 
-def _remove_stale(folder: Path, current: set[str]) -> None:
-    params = folder / "params"
-    for old in params.glob("*.yaml") if params.is_dir() else ():
-        if f"params/{old.name}" not in current:
-            old.unlink(missing_ok=True)
-    with contextlib.suppress(OSError):
-        params.rmdir()  # only if nothing is left in it
+def _parameter_files(folder: Path) -> list[str]:
+    """Return the parameter files that the plan in the folder names: those that an earlier build wrote."""
+    try:
+        processes = json.loads((folder / "plan.json").read_text("utf-8"))["processes"]
+        named = [process["params_file"] for process in processes]
+    except (OSError, ValueError, LookupError, TypeError):
+        return []
+    return [name for name in named if isinstance(name, str) and name.startswith("params/") and ".." not in name]
+
+
+def _remove_stale(folder: Path, stale: Sequence[str]) -> None:
+    for name in stale:
+        with contextlib.suppress(OSError):
+            (folder / name).unlink()
+        for parent in (folder / name).relative_to(folder).parents[:-1]:
+            _remove_if_empty(folder / parent)

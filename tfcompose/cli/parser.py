@@ -6,6 +6,7 @@ that it needs, is loaded when the command is used.
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from importlib import import_module
@@ -15,6 +16,7 @@ from tfcompose import __version__
 TYPE_CHECKING = False  # as type checkers know it, without loading typing
 if TYPE_CHECKING:
     from argparse import ArgumentParser, HelpFormatter
+    from typing import TextIO
 
 #: Each command is the module of its name in this package, with ``arguments`` and ``run``.
 COMMANDS = {
@@ -30,6 +32,7 @@ COMMANDS = {
 
 def main(argv: list[str] | None = None) -> int:
     """Run the command line and return the exit code: 0 clean, 1 findings or a failed process, 2 wrong use."""
+    _steady(sys.stdout, sys.stderr)
     words = sys.argv[1:] if argv is None else argv
     command = words[0] if words else ""
     if command in {"-h", "--help", "help"}:
@@ -40,7 +43,28 @@ def main(argv: list[str] | None = None) -> int:
         return 0
     if command not in COMMANDS:
         return _no_command(command)
-    return _run(command, words[1:])
+    try:
+        code = _run(command, words[1:])
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:
+        return _unwritten()
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        _unwritten()
+        sys.stderr.write(f"tfcompose: the output cannot be written: {error.strerror}\n")
+        return 2
+    return code
+
+
+def _steady(*streams: TextIO | None) -> None:
+    """Let a terminal that lacks a character, or a file name that is no text, show as an escape, not as a traceback."""
+    for stream in streams:
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure:
+            reconfigure(errors="backslashreplace")
 
 
 def help_text() -> str:
@@ -72,15 +96,14 @@ def _run(command: str, words: list[str]) -> int:
     module = import_module(f"tfcompose.cli.{command}")
     parser = parser_of(command)
     arguments = parser.parse_args(words)
-    try:
-        code: int = module.run(arguments)
-        sys.stdout.flush()
-    except KeyboardInterrupt:
-        return 130
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nobody reads: no traceback at exit either
-        return 141
+    code: int = module.run(arguments)
     return code
+
+
+def _unwritten() -> int:
+    """Return the exit code for output that nobody reads; what is still held back goes nowhere, without a traceback."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return 141
 
 
 def parser_of(command: str) -> ArgumentParser:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 import sys
 from functools import cache
 from pathlib import Path
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 UNREADABLE = 2
 MOST_BYTES = 16_000_000
 
+#: Pipes that the shell has opened. One with a name would be waited for until somebody writes to it.
+_OPEN_ALREADY = ("/dev/fd/", "/dev/stdin", "/proc/")
+
 
 def read_text(path: str) -> str:
     """Return the file's text.
@@ -26,6 +30,8 @@ def read_text(path: str) -> str:
         RejectedError: with one TF001 or TF008 finding, if it cannot be read, is no text, or is too large.
     """
     try:
+        if stat.S_ISFIFO(Path(path).stat().st_mode) and not path.startswith(_OPEN_ALREADY):
+            raise RejectedError([finding("TF001", "cannot be read: it is a pipe, not a file", Span(path))])
         with Path(path).open("rb") as file:
             data = file.read(MOST_BYTES + 1)
     except OSError as error:

@@ -33,9 +33,13 @@ def clean_xyz(xyz: Vector) -> Vector:
 
 
 def clean_quat(quat_xyzw: Quaternion) -> Quaternion:
-    """Return the quaternion rounded to 14 decimals, w not negative, so that one rotation has one text."""
-    sign = -1.0 if quat_xyzw[3] < 0 else 1.0
-    x, y, z, w = (round(sign * value, QUATERNION_DECIMALS) + 0.0 for value in quat_xyzw)
+    """Return the quaternion rounded to 14 decimals, so that one rotation has one text.
+
+    Of a quaternion and its negative the one is taken whose w is positive; where w is 0, whose first other part is.
+    """
+    x, y, z, w = (round(value, QUATERNION_DECIMALS) + 0.0 for value in quat_xyzw)
+    if next((value for value in (w, x, y, z) if value), 1.0) < 0:
+        x, y, z, w = (0.0 - value for value in (x, y, z, w))
     return (x, y, z, w)
 
 

@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
+
+#: What JSON lets stand in a text and YAML takes for the end of a line, or does not allow at all.
+_ESCAPED = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 
 
 def params_file(node: str, params: dict[str, Any]) -> str:
     """Return the file's text. Texts are always quoted, so that ROS cannot take one for a number or a bool."""
-    return "\n".join([f"{json.dumps(node)}:", "  ros__parameters:", *_mapping(params, "    "), ""])
+    return "\n".join([f"{_text(node)}:", "  ros__parameters:", *_mapping(params, "    "), ""])
 
 
 def _mapping(values: dict[str, Any], indent: str) -> list[str]:
     lines = []
     for key, value in values.items():
         if isinstance(value, dict) and value:
-            lines += [f"{indent}{json.dumps(key, ensure_ascii=False)}:", *_mapping(value, indent + "  ")]
+            lines += [f"{indent}{_text(key)}:", *_mapping(value, indent + "  ")]
         else:
-            lines.append(f"{indent}{json.dumps(key, ensure_ascii=False)}: {json.dumps(value, ensure_ascii=False)}")
+            lines.append(f"{indent}{_text(key)}: {_text(value)}")
     return lines
+
+
+def _text(value: Any) -> str:
+    """Return the value as JSON that is YAML as well."""
+    return _ESCAPED.sub(lambda found: f"\\u{ord(found[0]):04x}", json.dumps(value, ensure_ascii=False))

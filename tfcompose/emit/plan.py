@@ -26,6 +26,8 @@ MODULES = {
 def plan_of(robot: Robot) -> Plan:
     """Return the plan of a right robot."""
     nodes = {process.name: process.node for process in robot.processes}
+    needed = _needed(robot)
+    names = frozenset(process.name for process in needed)
     edges = tuple(_edge(edge, nodes[edge.owner], robot.file) for edge in robot.edges)
     return Plan(
         robot=robot.name,
@@ -33,7 +35,7 @@ def plan_of(robot: Robot) -> Plan:
         base=robot.base,
         ros=robot.ros,
         edges=edges,
-        processes=tuple(_process(process, robot, edges) for process in _needed(robot)),
+        processes=tuple(_process(process, robot, edges, names) for process in needed),
         guard=robot.guard,
     )
 
@@ -77,7 +79,7 @@ def _relative(file: str, to: str) -> str:
     return posixpath.relpath(file, posixpath.dirname(to) or ".")
 
 
-def _process(process: Process, robot: Robot, edges: tuple[PlanEdge, ...]) -> PlanProcess:
+def _process(process: Process, robot: Robot, edges: tuple[PlanEdge, ...], names: frozenset[str]) -> PlanProcess:
     has_params = process.kind == "run" and bool(process.params)
     simulation = process.simulate
     if simulation:
@@ -99,7 +101,7 @@ def _process(process: Process, robot: Robot, edges: tuple[PlanEdge, ...]) -> Pla
         remap=process.remap,
         nodes=(process.node,),
         restart=process.restart,
-        after=process.after,
+        after={name: when for name, when in process.after.items() if name in names},
         owns=tuple((edge.parent, edge.child) for edge in edges if edge.owner == process.name),
         simulate=simulation,
     )

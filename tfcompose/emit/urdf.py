@@ -32,8 +32,8 @@ def urdf(robot: Robot, *, full: bool) -> str:
     edges = list(_below(robot.base, children))
     for frame in [robot.base, *(edge.child for edge in edges)]:
         lines += _link(frame, robot.links.get(frame))
-    for edge in edges:
-        lines += _joint(edge, full=full)
+    for edge, name in zip(edges, _joint_names(edges), strict=True):
+        lines += _joint(edge, name, full=full)
     return "\n".join([*lines, "</robot>", ""])
 
 
@@ -92,12 +92,24 @@ def _origin(pose: Pose, indent: str) -> list[str]:
     return [f'{indent}<origin xyz="{numbers(clean_xyz(pose.xyz))}" rpy="{numbers(clean_rpy(pose.quat_xyzw))}"/>']
 
 
-def _joint(edge: Edge, *, full: bool) -> list[str]:
+def _joint_names(edges: list[Edge]) -> list[str]:
+    """Return a name for each edge's joint: the user's, or ``parent_to_child``, longer where that is taken."""
+    taken = {edge.joint_name for edge in edges}
+    names = []
+    for edge in edges:
+        name = edge.joint_name or f"{edge.parent}_to_{edge.child}"
+        while not edge.joint_name and name in taken:
+            name += "_"
+        taken.add(name)
+        names.append(name)
+    return names
+
+
+def _joint(edge: Edge, name: str, *, full: bool) -> list[str]:
     ours = edge.owner in {STATIC, JOINTS}
     kind: str = edge.joint.type if edge.joint else "fixed"
     if (not full and not ours) or (edge.kind == "dynamic" and not edge.joint):
         kind = "floating"
-    name = edge.joint_name or f"{edge.parent}_to_{edge.child}"
     lines = [
         f'  <joint name={quoteattr(name)} type="{kind}">',
         f"    <parent link={quoteattr(edge.parent)}/>",

@@ -115,7 +115,7 @@ class _Composer:
         self.stack.append(node)
 
     def _scalar(self, event: yaml.ScalarEvent) -> Node:
-        if _FORBIDDEN.search(event.value):  # written as an escape: "\\0"
+        if _FORBIDDEN.search(event.value):  # written as an escape
             raise RejectedError([finding("TF002", "a character that no text can hold", self._span(event))])
         plain = event.implicit[0]
         if event.tag not in {None, "!"}:

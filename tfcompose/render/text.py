@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 RED, YELLOW, BLUE, GREEN, BOLD, PLAIN = "\033[31m", "\033[33m", "\033[34m", "\033[32m", "\033[1m", "\033[0m"
 
 _LONGEST = 160
+_LONGEST_SAID = 1000
 
 
 def render_text(found: Sequence[Diagnostic], line_of: Callable[[str, int], str | None], *, colour: bool) -> str:
@@ -29,17 +30,24 @@ class _Paint:
 
 def _one(found: Diagnostic, line_of: Callable[[str, int], str | None], paint: _Paint) -> str:
     shade = RED if found.severity == "error" else YELLOW
-    place = f"{found.span}: " if found.span else ""
-    head = f"{paint(place, BOLD)}{paint(f'{found.severity}[{found.code}]', shade, BOLD)} {paint(found.message, BOLD)}"
+    place = _printable(f"{found.span}: ") if found.span else ""
+    said = _printable(found.message)
+    head = f"{paint(place, BOLD)}{paint(f'{found.severity}[{found.code}]', shade, BOLD)} {paint(said, BOLD)}"
     lines = [head]
     if found.span:
         lines += _excerpt(found.span, line_of, paint, shade)
     for note in found.notes:
         at = f"{note.span}: " if note.span else ""
-        lines.append(f"   {paint('note', BLUE)}: {at}{note.message}")
+        lines.append(f"   {paint('note', BLUE)}: {_printable(at + note.message)}")
     if found.help:
-        lines.append(f"   {paint('help', GREEN)}: {found.help}")
+        lines.append(f"   {paint('help', GREEN)}: {_printable(found.help)}")
     return "\n".join(lines) + "\n"
+
+
+def _printable(text: str) -> str:
+    """Return the text on one line of bounded length, without characters that steer a terminal."""
+    shown = text if len(text) <= _LONGEST_SAID else f"{text[:_LONGEST_SAID]}…"
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in shown)
 
 
 def _excerpt(span: Span, line_of: Callable[[str, int], str | None], paint: _Paint, shade: str) -> list[str]:
@@ -55,7 +63,8 @@ def _excerpt(span: Span, line_of: Callable[[str, int], str | None], paint: _Pain
         cut = 0
     width = max(1, min(end, cut + len(shown)) - start)
     lead = "".join("\t" if character == "\t" else " " for character in shown[: start - cut])
-    return [f"{span.line:>5} | {shown.rstrip()}", f"      | {lead}{paint('^' * width, shade, BOLD)}"]
+    shown = "".join(c if c.isprintable() or c == "\t" else "?" for c in shown.rstrip())
+    return [f"{span.line:>5} | {shown}", f"      | {lead}{paint('^' * width, shade, BOLD)}"]
 
 
 def summary(found: Sequence[Diagnostic], files: int) -> str:

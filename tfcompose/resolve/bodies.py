@@ -36,7 +36,7 @@ def kind_of(shape: spec.Shape) -> str | None:
 
 def shape_of(shape: spec.Shape) -> Shape:
     """Return the primitive; the shape must have one."""
-    material = Material(shape.material.name, shape.material.rgba) if shape.material else None
+    material = material_of(shape.material) if shape.material else None
     pose = pose_of(shape)
     if shape.box:
         return Shape("box", shape.box, pose, material)
@@ -45,6 +45,12 @@ def shape_of(shape: spec.Shape) -> Shape:
     if shape.sphere:
         return Shape("sphere", (shape.sphere.radius,), pose, material)
     raise ValueError("a shape without a shape")
+
+
+def material_of(given: spec.Material) -> Material:
+    """Return the colour with its name; one without a name is named after its parts, so that URDF keeps them apart."""
+    name = given.name or "rgba_" + "_".join(f"{part:g}".replace(".", "p").replace("-", "m") for part in given.rgba)
+    return Material(name, given.rgba)
 
 
 def _inertial(given: spec.Inertial, shapes: tuple[Shape, ...]) -> Inertial:

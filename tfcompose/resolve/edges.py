@@ -124,25 +124,26 @@ class Drafts:
 
     def _publisher(self, sensor: Sensor) -> str:
         """Return who publishes the frames inside the sensor that a driver can publish; note what cannot be."""
-        said, driver = sensor.spec, sensor.preset.driver
+        said, driver, own = sensor.spec, sensor.preset.driver, sensor.spec.driver
+        named = own.process if own else None
+        process, found = driver_process(sensor, self.spec, self.source, publishes=said.tf != "tfcompose")
+        self.found += found
+        if process:
+            self.drivers.append(process)
+        elif found:
+            return STATIC
         place = self.source.at(("sensors", sensor.name, "tf"))
-        named = said.driver.process if said.driver else None
-        by_driver = said.tf == "driver" or (said.tf is None and driver is not None and named != "none")
-        if named == "none" or (driver is None and named is None):
+        if named == "none" or driver is None:
             if said.tf == "driver":
                 why = "driver is none" if named == "none" else f"{said.preset} has no driver"
                 self._refuse(f"{sensor.name}: the driver cannot publish its frames: {why}", place, "tf: tfcompose")
             return STATIC
-        if named is not None:
-            return named if by_driver else STATIC
-        process, found = driver_process(sensor, self.spec, self.source, publishes=by_driver)
-        self.drivers.append(process)
-        self.found += found
-        if not by_driver and driver and driver.switch is None:
-            self._refuse(
-                f"{sensor.name}: the driver of {said.preset} has no switch for its frames", place, "tf: driver"
-            )
-        return sensor.name if by_driver else STATIC
+        if said.tf != "tfcompose":
+            return named or sensor.name
+        if named is None and driver.switch is None:
+            message = f"{sensor.name}: the driver of {said.preset} has no switch for its frames"
+            self._refuse(message, place, "tf: driver")
+        return STATIC
 
     def _refuse(self, message: str, place: Span, advice: str) -> None:
         self.found.append(finding("TF604", message, place, help=advice))
@@ -154,6 +155,11 @@ class Drafts:
                 place = self.source.at_key(("sensors", sensor.name, "frames", name))
                 advice = did_you_mean(name, known, f"there is {', '.join(known)}")
                 self.found.append(finding("TF203", f"{sensor.name} has no frame {name}", place, help=advice))
+        mounted = sensor.spec.frames.get(sensor.named(sensor.preset.mount))
+        if mounted and (mounted.xyz or rotation_of(mounted)):
+            place = self.source.at_key(("sensors", sensor.name, "frames", sensor.named(sensor.preset.mount)))
+            advice = f"the pose of {sensor.name} itself says where it is"
+            self.found.append(finding("TF106", f"{mount} is the mount, and has no pose inside", place, help=advice))
         if mount in sensor.frames():
             self._refuse(f"{mount} is a frame inside {sensor.name} already", self.frames[mount], "another name")
 

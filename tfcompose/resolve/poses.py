@@ -44,6 +44,18 @@ class Draft:
     place_at: Span | None = None
 
 
+#: How deep a chain of poses that are given relative to each other is followed before it is solved from its far end.
+_DEEPEST = 50
+
+
+class _DeeperError(Exception):
+    """The edge of this index must be solved first; following the chain further would end the interpreter."""
+
+    def __init__(self, index: int) -> None:
+        self.index = index
+        super().__init__(index)
+
+
 class _UnsolvableError(Exception):
     def __init__(self, found: Diagnostic) -> None:
         self.found = found
@@ -65,26 +77,35 @@ class Solver:
         """Return the edges in the order of the drafts; one that cannot be solved keeps the pose as written."""
         for index, draft in enumerate(self.drafts):
             self._above.setdefault(draft.edge.child, index)
-        return tuple(self._tried(index) for index in range(len(self.drafts)))
+        for index in range(len(self.drafts)):
+            waiting = [index]
+            while waiting:
+                try:
+                    self._edge(waiting[-1])
+                    waiting.pop()
+                except _DeeperError as deeper:
+                    if deeper.index in waiting:
+                        self._give_up(waiting.pop(), _circle([self.drafts[deeper.index]]))
+                    else:
+                        waiting.append(deeper.index)
+                except _UnsolvableError as error:
+                    self._give_up(waiting.pop(), error.found)
+                self._open.clear()
+        return tuple(self._solved[index] for index in range(len(self.drafts)))
 
-    def _tried(self, index: int) -> Edge:
-        try:
-            return self._edge(index)
-        except _UnsolvableError as error:
-            if error.found not in self.found:
-                self.found.append(error.found)
-            self._solved[index] = self.drafts[index].edge
-            self._open.clear()
-            return self.drafts[index].edge
+    def _give_up(self, index: int, found: Diagnostic) -> None:
+        if found not in self.found:
+            self.found.append(found)
+        self._solved[index] = self.drafts[index].edge
 
     def _edge(self, index: int) -> Edge:
         if index in self._solved:
             return self._solved[index]
         draft = self.drafts[index]
         if index in self._open:
-            names = ", ".join(self.drafts[i].edge.name for i in self._open[self._open.index(index) :])
-            at = draft.relative_at or draft.edge.at
-            raise _UnsolvableError(finding("TF404", f"these poses are given relative to each other: {names}", at))
+            raise _UnsolvableError(_circle([self.drafts[i] for i in self._open[self._open.index(index) :]]))
+        if len(self._open) >= _DEEPEST:
+            raise _DeeperError(index)
         self._open.append(index)
         pose = draft.edge.pose
         if draft.relative_to:
@@ -104,11 +125,11 @@ class Solver:
 
     def _chain(self, frame: str) -> list[tuple[str, int]]:
         """Return the frame and its ancestors, each with the index of the edge to its parent (the root: −1)."""
-        chain: list[tuple[str, int]] = []
-        while frame in self._above and all(frame != seen for seen, _ in chain):
-            chain.append((frame, self._above[frame]))
+        chain: dict[str, int] = {}
+        while frame in self._above and frame not in chain:
+            chain[frame] = self._above[frame]
             frame = self.drafts[self._above[frame]].edge.parent
-        return [*chain, (frame, -1)]
+        return [*chain.items(), (frame, -1)]
 
     def _between(self, a: str, b: str, at: Span) -> Pose:
         """Return the pose of b in a, through fixed edges."""
@@ -152,3 +173,9 @@ class Solver:
             advice = f"give this unit's values: sensors.{draft.edge.sensor}.frames.{edge.child}"
             self.found.append(finding("TF405", message, at, help=advice, severity="warning"))
         return pose
+
+
+def _circle(drafts: list[Draft]) -> Diagnostic:
+    names = ", ".join(draft.edge.name for draft in drafts)
+    at = next((draft.relative_at or draft.place_at or draft.edge.at for draft in drafts), None)
+    return finding("TF404", f"these poses are given relative to each other: {names}", at)

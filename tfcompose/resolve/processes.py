@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Note, did_you_mean, finding
 from tfcompose.model import BUILT_IN, GUARD, JOINTS, STATIC, Process
@@ -13,7 +13,7 @@ from tfcompose.resolve.presets import driver_parameters
 if TYPE_CHECKING:
     from tfcompose.load import Path, Source
     from tfcompose.resolve.presets import Sensor
-    from tfcompose.validate.spec import DriverSpec, ProcessSpec, RobotSpec, Simulate
+    from tfcompose.validate.spec import ProcessSpec, RobotSpec, Run, Simulate
 
 _BUILT_IN_KEYS = frozenset({"rate", "remap", "env", "after"})
 _KINDS: dict[str, ProcessKind] = {STATIC: "static", JOINTS: "joints", GUARD: "guard"}
@@ -59,7 +59,7 @@ def user_process(
         return Process(name, "external", place, node, after=said.after), []
     if said.simulate:
         return _simulated(name, said, said.simulate, node, source)
-    if said.run and (said.run.argv or (said.run.package and said.run.executable)):
+    if _starts(said.run):
         return _run(name, said, node, source), []
     if said.run:
         return None, [finding("TF102", f"{name}: run needs package and executable", source.at_key((*at, "run")))]
@@ -84,7 +84,7 @@ def _simulated(
     return Process(name, "simulate", place, node, env=said.env, after=said.after, simulate=simulation), []
 
 
-def _run(name: str, said: ProcessSpec | DriverSpec, node: str, source: Source) -> Process:
+def _run(name: str, said: ProcessSpec, node: str, source: Source) -> Process:
     run = said.run
     return Process(
         name,
@@ -105,28 +105,33 @@ def _run(name: str, said: ProcessSpec | DriverSpec, node: str, source: Source) -
 
 def driver_process(
     sensor: Sensor, spec: RobotSpec, source: Source, *, publishes: bool
-) -> tuple[Process, list[Diagnostic]]:
-    """Return the process of a sensor's driver, with the parameters that make it do what the spec says."""
+) -> tuple[Process | None, list[Diagnostic]]:
+    """Return the process of a sensor's driver, with the parameters that make it do what the spec says.
+
+    It is the preset's with the user's keys over it, the user's alone where the preset has none, or None.
+    """
     driver, said = sensor.preset.driver, sensor.spec.driver
-    if driver is None:
-        raise ValueError(f"{sensor.spec.preset} has no driver")
-    at: Path = ("sensors", sensor.name)
+    at: Path = ("sensors", sensor.name, "driver")
+    if said and said.process is not None:
+        return None, _named_driver(sensor, said.process, source)
+    if said and said.simulate:
+        advice = "driver: none, and tf: tfcompose, where there is no device"
+        return None, [finding("TF604", "a driver cannot be simulated", source.at_key((*at, "simulate")), help=advice)]
+    run, external = (said.run, bool(said.external)) if said else (None, False)
+    if driver is None and said is None:
+        return None, []
+    if not external and not _starts(run) and (run or driver is None):
+        place, advice = source.at_key((*at, "run")), "run: {package: …, executable: …}, or external: true"
+        return None, [finding("TF102", f"the driver of {sensor.name} does not say how it runs", place, help=advice)]
     computed = driver_parameters(sensor, publishes=publishes)
-    found = []
-    for key in said.params if said else ():
-        if key in computed:
-            message = f"{key} is computed by tfcompose for {sensor.spec.preset}: {computed[key]!r}"
-            place = source.at_key((*at, "driver", "params", key))
-            found.append(finding("TF604", message, place, help="remove it; options and tf set it"))
-    node = f"{sensor.named(driver.namespace)}/{sensor.named(driver.node)}".strip("/")
-    run = said.run if said else None
+    node = f"{sensor.named(driver.namespace)}/{sensor.named(driver.node)}".strip("/") if driver else sensor.name
     process = Process(
         sensor.name,
-        "external" if said and said.external else "run",
-        source.at_key(at),
+        "external" if external else "run",
+        source.at_key(at[:2]),
         full_name(spec.ros.namespace, (said.node if said else None) or node),
-        package=run.package if run else driver.package,
-        executable=run.executable if run else driver.executable,
+        package=run.package if run else driver.package if driver else None,
+        executable=run.executable if run else driver.executable if driver else None,
         argv=(run.argv or run.args) if run else (),
         params=(said.params if said else {}) | computed,
         remap=said.remap if said else {},
@@ -135,7 +140,41 @@ def driver_process(
         restart=said.restart if said else "no",
         after=said.after if said else {},
     )
-    return process, found
+    return process, _given_parameters(sensor, computed, source)
+
+
+def _starts(run: Run | None) -> bool:
+    return run is not None and bool(run.argv or (run.package and run.executable))
+
+
+def _named_driver(sensor: Sensor, name: str, source: Source) -> list[Diagnostic]:
+    """Return findings about a driver that is the name of a process: it must be one, and has its own keys."""
+    at: Path = ("sensors", sensor.name, "driver")
+    known = [*source.data.get("processes", {}), *source.data["sensors"], *BUILT_IN]
+    found = []
+    if name != "none" and name not in known:
+        advice = did_you_mean(name, known, f"processes: {{{name}: {{external: true}}}}")
+        found.append(
+            finding("TF813", f"the driver of {sensor.name} is {name}, which is no process", source.at(at), help=advice)
+        )
+    written = source.data["sensors"][sensor.name]["driver"]
+    for key in written if isinstance(written, dict) else ():
+        if key != "process":
+            place = source.at_key((*at, key))
+            advice = f"write it under processes: {name}"
+            found.append(finding("TF107", f"{key} and process exclude each other", place, help=advice))
+    return found
+
+
+def _given_parameters(sensor: Sensor, computed: dict[str, Any], source: Source) -> list[Diagnostic]:
+    """Return a finding for each parameter that the user gives and tfcompose computes."""
+    found = []
+    for key in sensor.spec.driver.params if sensor.spec.driver else ():
+        if key in computed:
+            message = f"{key} is computed by tfcompose for {sensor.spec.preset}: {computed[key]!r}"
+            place = source.at_key(("sensors", sensor.name, "driver", "params", key))
+            found.append(finding("TF604", message, place, help="remove it; options and tf set it"))
+    return found
 
 
 def name_clashes(processes: list[Process]) -> list[Diagnostic]:

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 Value = Quantity | str
 
 LONGEST = 500
+LONGEST_TEXT = 100_000
+_LONGEST_SAID = 60
 DEEPEST = 20
 
 _TOKEN = re.compile(
@@ -30,6 +32,7 @@ _TOKEN = re.compile(
     r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<sign>[-+*/()]))"
 )
 _HOLE = re.compile(r"\$\{([^{}]*)\}")
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 class ExpressionError(ValueError):
@@ -49,10 +52,16 @@ def fill(text: str, lookup: Callable[[str], Value]) -> Value:
     whole = _HOLE.fullmatch(text.strip())
     if whole:
         return evaluate(whole[1], lookup)
-    filled = _HOLE.sub(lambda hole: _inserted(evaluate(hole[1], lookup)), text)
-    if "${" in filled:
+    if "${" in _HOLE.sub("", text):
         raise ExpressionError("${ without its }", "close the expression: ${name}")
-    return filled
+    parts, length, end = [], 0, 0
+    for hole in _HOLE.finditer(text):
+        parts += [text[end : hole.start()], _inserted(evaluate(hole[1], lookup))]
+        end = hole.end()
+        length += len(parts[-1])
+        if length > LONGEST_TEXT:
+            raise ExpressionError(f"a text of more than {LONGEST_TEXT:,} characters")
+    return "".join([*parts, text[end:]])
 
 
 def evaluate(text: str, lookup: Callable[[str], Value]) -> Value:
@@ -63,7 +72,15 @@ def evaluate(text: str, lookup: Callable[[str], Value]) -> Value:
     """
     if len(text) > LONGEST:
         raise ExpressionError(f"an expression of {len(text)} characters; at most {LONGEST} are read")
-    return _Parser(text, lookup).parse()
+    try:
+        return _Parser(text, lookup).parse()
+    except OverflowError:  # from whole numbers, which Python does not bound
+        raise ExpressionError(f"${{{text[:_LONGEST_SAID]}}} is not finite") from None
+
+
+def names_in(text: str) -> list[str]:
+    """Return the names in the text's expressions, in order: variables, and also units and functions."""
+    return [name for hole in _HOLE.findall(text) for name in _NAME.findall(hole)]
 
 
 def _inserted(value: Value) -> str:
@@ -80,6 +97,7 @@ _EXACT = 2**53
 class _Parser:
     def __init__(self, text: str, lookup: Callable[[str], Value]) -> None:
         self.text = text
+        self.said = text if len(text) < _LONGEST_SAID else f"{text[:_LONGEST_SAID]}…"
         self.lookup = lookup
         self.depth = 0
         self.tokens = self._tokens()
@@ -90,7 +108,7 @@ class _Parser:
         while self.text[at:].strip():
             match = _TOKEN.match(self.text, at)
             if not match or not match.lastgroup:
-                raise ExpressionError(f"{self.text[at:].strip()[0]!r} has no meaning in ${{{self.text}}}")
+                raise ExpressionError(f"{self.text[at:].strip()[0]!r} has no meaning in ${{{self.said}}}")
             tokens.append((match.lastgroup, match[match.lastgroup]))
             at = match.end()
         return tokens
@@ -104,7 +122,7 @@ class _Parser:
         if self.index < len(self.tokens):
             self._unexpected()
         if not math.isfinite(value.value):
-            raise ExpressionError(f"${{{self.text}}} is not finite")
+            raise ExpressionError(f"${{{self.said}}} is not finite")
         return value
 
     def _peek(self) -> str:
@@ -112,12 +130,12 @@ class _Parser:
 
     def _next(self) -> tuple[str, str]:
         if self.index >= len(self.tokens):
-            raise ExpressionError(f"${{{self.text}}} ends too early")
+            raise ExpressionError(f"${{{self.said}}} ends too early")
         self.index += 1
         return self.tokens[self.index - 1]
 
     def _unexpected(self) -> NoReturn:
-        raise ExpressionError(f"{self._peek()!r} is not expected in ${{{self.text}}}")
+        raise ExpressionError(f"{self._peek()!r} is not expected in ${{{self.said}}}")
 
     def _sum(self) -> Quantity:
         value = self._product()
@@ -126,7 +144,7 @@ class _Parser:
             other = self._product()
             if NUMBER not in {value.dimension, other.dimension} and value.dimension != other.dimension:
                 names = f"{dimension_name(value.dimension)} and {dimension_name(other.dimension)}"
-                raise ExpressionError(f"{names} cannot be added in ${{{self.text}}}")
+                raise ExpressionError(f"{names} cannot be added in ${{{self.said}}}")
             dimension = value.dimension if value.dimension != NUMBER else other.dimension
             value = Quantity(value.value + sign * other.value, dimension)
         return value
@@ -137,7 +155,7 @@ class _Parser:
             sign = 1 if self._next()[1] == "*" else -1
             other = self._sign()
             if sign < 0 and other.value == 0:
-                raise ExpressionError(f"${{{self.text}}} divides by zero")
+                raise ExpressionError(f"${{{self.said}}} divides by zero")
             a, b = value.dimension, other.dimension
             dimension = (a[0] + sign * b[0], a[1] + sign * b[1], a[2] + sign * b[2], a[3] + sign * b[3])
             value = Quantity(value.value * other.value if sign > 0 else value.value / other.value, dimension)
@@ -167,7 +185,7 @@ class _Parser:
             raise ExpressionError(f"more than {DEEPEST} brackets inside each other")
         value = self._sum()
         if self._peek() != ")":
-            raise ExpressionError(f"a bracket is not closed in ${{{self.text}}}")
+            raise ExpressionError(f"a bracket is not closed in ${{{self.said}}}")
         self.index += 1
         self.depth -= 1
         return value
@@ -190,7 +208,7 @@ class _Parser:
             return Quantity(math.pi)
         value = self.lookup(name)
         if isinstance(value, str):
-            raise ExpressionError(f"{name} is a text, and ${{{self.text}}} needs a number")
+            raise ExpressionError(f"{name} is a text, and ${{{self.said}}} needs a number")
         return value
 
     def _call(self, name: str) -> Quantity:

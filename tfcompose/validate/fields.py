@@ -6,6 +6,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import did_you_mean
+from tfcompose.pose import norm
 from tfcompose.validate.quantity import (
     ANGLE,
     INERTIA,
@@ -69,6 +70,8 @@ def integer(least: int, most: int) -> Type:
     """Return the type of a whole number within bounds."""
 
     def read(value: Any, path: Path, problems: Problems) -> Any:
+        if isinstance(value, Quantity) and value.dimension == NUMBER and value.value == int(value.value):
+            value = int(value.value)
         if isinstance(value, bool) or not isinstance(value, int):
             return problems.refuse("TF103", path, f"{shown(value)} is no whole number")
         if not least <= value <= most:
@@ -90,21 +93,28 @@ def read_quantity(value: Any, path: Path, problems: Problems, dimension: Dimensi
             return problems.refuse(code, path, f"{error}; {want} is expected", error.advice)
     elif isinstance(value, bool) or not isinstance(value, (int, float, Quantity)):
         return problems.refuse("TF103", path, f"{shown(value)} is no {name}", f"for example {example(dimension)}")
-    if not isinstance(value, Quantity):
-        return float(value)
-    if value.dimension not in {NUMBER, dimension}:
-        message = f"{want} is expected; this is of the kind {dimension_name(value.dimension)}"
-        return problems.refuse("TF104", path, message, f"for example {example(dimension)}")
-    return float(value.value)
+    if isinstance(value, Quantity):
+        if value.dimension not in {NUMBER, dimension}:
+            message = f"{want} is expected; this is of the kind {dimension_name(value.dimension)}"
+            return problems.refuse("TF104", path, message, f"for example {example(dimension)}")
+        value = value.value
+    if abs(value) > LARGEST:
+        return problems.refuse("TF106", path, f"{shown(float(value))} is beyond what can be computed with")
+    return float(value)
 
 
-def measure(dimension: Dimension, *, positive: bool = False) -> Type:
-    """Return the type of a quantity, in SI."""
+#: Beyond this, and for sizes and masses below its inverse, products of four such numbers leave the range of floats.
+LARGEST = 1e30
+
+
+def measure(dimension: Dimension, least: float | None = None) -> Type:
+    """Return the type of a quantity, in SI, with the least value that it can have."""
 
     def read(value: Any, path: Path, problems: Problems) -> Any:
         number = read_quantity(value, path, problems, dimension)
-        if positive and number is not BROKEN and number <= 0:
-            return problems.refuse("TF106", path, f"{shown(value)} is not greater than 0")
+        if least is not None and number is not BROKEN and number < least:
+            what = "is not greater than 0" if number <= 0 else f"is less than {least!r}"
+            return problems.refuse("TF106", path, f"{shown(value)} {what}")
         return number
 
     about = f"a {dimension_name(dimension)}: a bare number is SI, a text may carry a unit"
@@ -126,9 +136,10 @@ def _colour_part(value: float, path: Path, problems: Problems) -> Any:
 
 
 def _has_direction(axis: Vector, path: Path, problems: Problems) -> Any:
-    if any(axis):
+    length = norm(axis)
+    if length > 1 / LARGEST:
         return axis
-    return problems.refuse("TF106", path, "an axis of length 0 has no direction", "for example [0, 0, 1]")
+    return problems.refuse("TF106", path, f"an axis of length {length:g} has no direction", "for example [0, 0, 1]")
 
 
 def _plain(value: Any) -> Any:
@@ -150,9 +161,9 @@ LENGTH_ = measure(LENGTH)
 ANGLE_ = measure(ANGLE)
 TURN_RATE_ = measure(TURN_RATE)
 INERTIA_ = measure(INERTIA)
-SIZE = measure(LENGTH, positive=True)
-MASS_ = measure(MASS, positive=True)
-RATE_ = measure(RATE, positive=True)
+SIZE = measure(LENGTH, 1 / LARGEST)
+MASS_ = measure(MASS, 1 / LARGEST)
+RATE_ = measure(RATE, 1e-3)
 POSITION = Type(_position, {"type": ["number", "string"], "description": "rad or m", "examples": ["90 deg", 0.1]})
 XYZ = listing(LENGTH_, count=3, sample="[0.2, 0, 30 cm]")
 SIZES = listing(SIZE, count=3, sample="[0.5, 0.4, 0.15]")

@@ -111,15 +111,17 @@ def in_unit(number: float, unit: str) -> Quantity:
     """Return ``number`` times the unit.
 
     Raises:
-        UnitError: if the unit is not known.
+        UnitError: if the unit is not known, or the result too large for a number.
     """
     if unit not in UNITS:
         advice = did_you_mean(unit, UNITS, f"known units: {', '.join(UNITS)}")
         raise UnitError(f"unknown unit {unit}", _SPELLINGS.get(unit, advice), unit)
     factor, dimension = UNITS[unit]
-    if unit == "deg":
-        return Quantity(math.radians(number), dimension)
-    return Quantity(number / _DIVIDE[unit] if unit in _DIVIDE else number * factor, dimension)
+    divided = number / _DIVIDE[unit] if unit in _DIVIDE else number * factor
+    value = math.radians(number) if unit == "deg" else divided
+    if not math.isfinite(value):
+        raise UnitError(f"{number!r} {unit} is not finite")
+    return Quantity(value, dimension)
 
 
 _SPELLINGS = {

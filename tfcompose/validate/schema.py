@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from tfcompose.load import Path
 
 BROKEN: Any = type("Broken", (), {"__repr__": lambda _: "BROKEN"})()
-"""Stands where a value was refused; the refusal is among the problems."""
+"""Stands where a value was refused, here or in an expression; the refusal is among the problems."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,11 +58,15 @@ class Problems:
 class Type:
     """What a value may be: ``read`` returns its meaning or ``BROKEN``; ``schema`` is its JSON Schema."""
 
-    __slots__ = ("read", "schema")
+    __slots__ = ("_read", "schema")
 
     def __init__(self, read: Callable[[Any, Path, Problems], Any], schema: Any) -> None:
-        self.read = read
+        self._read = read
         self.schema = schema
+
+    def read(self, value: Any, path: Path, problems: Problems) -> Any:
+        """Return what the value means, or ``BROKEN``."""
+        return BROKEN if value is BROKEN else self._read(value, path, problems)
 
 
 class Key:
@@ -127,8 +131,11 @@ def shown(value: Any) -> str:
     return text if len(text) < 60 else f"{text[:56]}…{text[-1]}"  # noqa: PLR2004 (a message stays one line)
 
 
-def record(cls: type[Model], normal: Callable[[Any], Any] | None = None) -> Type:
-    """Return the type of a mapping with the keys of ``cls``; ``normal`` rewrites a short form first."""
+def record(cls: type[Model], normal: Callable[[Any], Any] | None = None, short: Any = None) -> Type:
+    """Return the type of a mapping with the keys of ``cls``.
+
+    ``normal`` rewrites a short form first; ``short`` is the JSON Schema of that form.
+    """
 
     def read(value: Any, path: Path, problems: Problems) -> Any:
         value = normal(value) if normal else value
@@ -137,7 +144,7 @@ def record(cls: type[Model], normal: Callable[[Any], Any] | None = None) -> Type
             return problems.refuse("TF103", path, f"{shown(value)} is no mapping", f"its keys can be: {known}")
         return _read_model(cls, value, path, problems)
 
-    return Type(read, cls)
+    return Type(read, {"anyOf": [short, cls]} if short else cls)
 
 
 def _read_model(cls: type[Model], data: dict[str, Any], path: Path, problems: Problems) -> Any:

@@ -29,9 +29,10 @@ from tfcompose.validate.fields import (
     text,
 )
 from tfcompose.validate.rotation import AXIS_ANGLE, LOOK, MATRIX, QUAT_XYZW, RPY
-from tfcompose.validate.schema import Model, key, listing, mapping, record
+from tfcompose.validate.schema import Model, Problems, Type, key, listing, mapping, record
 
 if TYPE_CHECKING:
+    from tfcompose.load import Path
     from tfcompose.pose import Quaternion, Vector
 
 
@@ -75,9 +76,9 @@ class Sphere(Model):
 
 
 class Material(Model):
-    """A colour with a name."""
+    """A colour, and a name for it."""
 
-    name: str = key(NAME, "default", "materials of one name are one colour", ("blue",))
+    name: str | None = key(NAME, None, "left out: named after the colour", ("blue",))
     rgba: tuple[float, float, float, float] = key(RGBA, (0.5, 0.5, 0.5, 1.0), "red, green, blue, opacity: 0 to 1")
 
 
@@ -108,21 +109,41 @@ class Inertial(Posed):
     inertia: Tensor | None = key(record(Tensor), None, "about the centre of mass; computed from the shapes if left out")
 
 
-SHAPES = listing(record(Shape), single=True)
+def _shape(value: Any, path: Path, problems: Problems) -> Any:
+    """Read a shape, and refuse one that has no form."""
+    if isinstance(value, dict) and not FORMS & set(value) and set(value) <= set(Shape.KEYS):
+        problems.refuse("TF102", path, "a shape without a form", "give one of box, cylinder and sphere", on_key=True)
+    return record(Shape).read(value, path, problems)
+
+
+FORMS = frozenset({"box", "cylinder", "sphere"})
+SHAPES = listing(Type(_shape, Shape), single=True)
 
 
 class LinkSpec(EdgeKeys):
     """A body, in URDF's words. With a parent it has a fixed edge."""
 
     visual: tuple[Shape, ...] = key(SHAPES, (), "one shape, or a list")
-    collision: tuple[Shape, ...] = key(SHAPES, (), "one shape, or a list; same: those of visual", ("same",))
+    collision: tuple[Shape, ...] = key(
+        Type(SHAPES.read, {"anyOf": [{"const": "same"}, *SHAPES.schema["anyOf"]]}),
+        (),
+        "one shape, or a list; same: those of visual",
+        ("same",),
+    )
     inertial: Inertial | None = key(record(Inertial), None)
 
 
-def _same(value: Any) -> Any:
-    if isinstance(value, dict) and value.get("collision") == "same":
-        return value | {"collision": value.get("visual", [])}
-    return value
+def _link(value: Any, path: Path, problems: Problems) -> Any:
+    """Read a body; its collision can be that of its visual, and its inertia follows from its shapes."""
+    if not isinstance(value, dict):
+        return record(LinkSpec).read(value, path, problems)
+    if value.get("collision") == "same":
+        value = value | {"collision": value.get("visual", [])}
+    inertial = value.get("inertial")
+    if isinstance(inertial, dict) and "inertia" not in inertial and not (value.get("visual") or value.get("collision")):
+        at, advice = (*path, "inertial"), "give a visual or a collision shape, or inertia: {ixx, iyy, izz}"
+        problems.refuse("TF102", at, "no shape and no inertia: the mass has no distribution", advice, on_key=True)
+    return record(LinkSpec).read(value, path, problems)
 
 
 class Limit(Model):
@@ -191,20 +212,35 @@ class Simulate(Model):
     rate: float = key(RATE_, 20.0)
 
 
+def _environment(value: Any, path: Path, problems: Problems) -> Any:
+    for name in value if isinstance(value, dict) else ():
+        if not name or "=" in name:
+            problems.refuse("TF106", (*path, name), f"{name!r} cannot name a variable", on_key=True)
+    return mapping(TEXT).read(value, path, problems)
+
+
 class ProcessSpec(Model):
     """What is started, or expected to run: one of run, simulate and external."""
 
     run: Run | None = key(
-        record(Run, lambda value: {"argv": value} if isinstance(value, list) else value),
+        record(
+            Run,
+            lambda value: {"argv": value} if isinstance(value, list) else value,
+            {"type": "array", "items": {"type": "string"}, "minItems": 1},
+        ),
         None,
         "{package, executable, args}, or a command as a list",
     )
     simulate: Simulate | None = key(record(Simulate), None)
     external: bool | None = key(ONLY_TRUE, None, "somebody else starts it")
-    node: str | None = key(TEXT, None, "the node's name; below ros.namespace unless it begins with /")
+    node: str | None = key(
+        text(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*", "a node's name: letters, digits and _"),
+        None,
+        "the node's name; below ros.namespace unless it begins with /",
+    )
     params: dict[str, Any] = key(mapping(ANYTHING), {}, "the node's parameters, passed on as they are")
     remap: dict[str, str] = key(mapping(TEXT), {}, "topic names: from, to")
-    env: dict[str, str] = key(mapping(TEXT), {})
+    env: dict[str, str] = key(Type(_environment, mapping(TEXT).schema), {})
     cwd: str | None = key(TEXT, None)
     rate: float | None = key(RATE_, None, "for joints: how often joint states come")
     restart: str = key(choice("no", "on-failure", "always"), "no")
@@ -228,7 +264,11 @@ class SensorSpec(EdgeKeys):
     options: dict[str, Any] = key(mapping(ANYTHING), {}, "the preset's own choices: streams, imu, …")
     tf: str | None = key(choice("driver", "tfcompose"), None, "who publishes the frames inside the sensor")
     driver: DriverSpec | None = key(
-        record(DriverSpec, lambda value: {"process": value} if isinstance(value, str) else value),
+        record(
+            DriverSpec,
+            lambda value: {"process": value} if isinstance(value, str) else value,
+            {"type": "string"},
+        ),
         None,
         "keys over the preset's, the name of a process, or none",
     )
@@ -270,7 +310,7 @@ class RobotSpec(Model):
     base: str | None = key(TEXT, None, "where the URDF begins; left out: base_link, or the only root")
     vars: dict[str, Any] = key(mapping(ANYTHING), {}, "quantities, numbers or texts, used as ${name}")
     ros: RosSpec = key(record(RosSpec), RosSpec())
-    links: dict[str, LinkSpec] = key(mapping(record(LinkSpec, _same)), {}, "bodies")
+    links: dict[str, LinkSpec] = key(mapping(Type(_link, LinkSpec)), {}, "bodies")
     joints: dict[str, JointSpec] = key(mapping(record(JointSpec)), {}, "edges between bodies")
     frames: dict[str, FrameSpec] = key(mapping(record(FrameSpec)), {}, "bare frames: the skeleton")
     sensors: dict[str, SensorSpec] = key(mapping(record(SensorSpec)), {})

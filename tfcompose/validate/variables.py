@@ -5,18 +5,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import did_you_mean
-from tfcompose.validate.expression import ExpressionError, Value, fill
+from tfcompose.validate.expression import ExpressionError, Value, fill, names_in
 from tfcompose.validate.quantity import Quantity, UnitError, quantity
-from tfcompose.validate.schema import Problems, shown
+from tfcompose.validate.schema import BROKEN, Problems, shown
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from tfcompose.load import Path
 
 
 def compute(data: dict[str, Any], problems: Problems) -> dict[str, Any]:
     """Return the data with every ``${…}`` replaced by its value: a ``Quantity`` where it is the whole text.
 
-    What cannot be computed becomes a bare 0, and a problem.
+    What cannot be computed becomes ``BROKEN``, and a problem.
     """
     variables = _Variables(data.get("vars"), problems)
     variables.read_all()
@@ -34,6 +36,10 @@ def _filled(value: Any, path: Path, variables: _Variables) -> Any:
     return value
 
 
+class _NothingNewError(ExpressionError):
+    """A variable has been refused already; what needs it is broken too, and that is not said again."""
+
+
 class _Variables:
     def __init__(self, written: Any, problems: Problems) -> None:
         self.written: dict[str, Any] = written if isinstance(written, dict) else {}
@@ -42,36 +48,54 @@ class _Variables:
         self.open: list[str] = []
 
     def read_all(self) -> None:
-        for name in self.written:
-            if name not in self.known:
-                try:
-                    self.lookup(name)
-                except ExpressionError as error:
-                    self.problems.refuse("TF105", ("vars", name), str(error), error.advice)
-                    self.known[name] = Quantity(0.0)
+        """Compute every variable, first those that it needs; without recursion, however long the chain."""
+        for first in self.written:
+            self.open = [first]
+            waiting = [self._names_in(first)]
+            while waiting:
+                needed = next((name for name in waiting[-1] if name not in self.known and name not in self.open), None)
+                if needed is not None:
+                    self.open.append(needed)
+                    waiting.append(self._names_in(needed))
+                    continue
+                waiting.pop()
+                self._read(self.open[-1])
+                self.open.pop()
+
+    def _names_in(self, name: str) -> Iterator[str]:
+        written = self.written[name]
+        names = names_in(written) if isinstance(written, str) else []
+        return iter([other for other in names if other in self.written])
+
+    def _read(self, name: str) -> None:
+        if name in self.known:
+            return
+        try:
+            self.known[name] = self._value(name, self.written[name])
+        except ExpressionError as error:
+            self.known[name] = self._refuse(error, ("vars", name))
 
     def fill(self, text: str, path: Path) -> Any:
         try:
             return fill(text, self.lookup)
         except ExpressionError as error:
+            return self._refuse(error, path)
+
+    def _refuse(self, error: ExpressionError, path: Path) -> Any:
+        if not isinstance(error, _NothingNewError):
             self.problems.refuse("TF105", path, str(error), error.advice)
-            return 0.0
+        return BROKEN
 
     def lookup(self, name: str) -> Value:
         if name in self.known:
+            if self.known[name] is BROKEN:
+                raise _NothingNewError(name)
             return self.known[name]
-        if name not in self.written:
-            there = f"vars has {', '.join(self.written)}" if self.written else "the file has no vars"
-            raise ExpressionError(f"unknown variable {name}", did_you_mean(name, self.written, there))
         if name in self.open:
             circle = " → ".join([*self.open[self.open.index(name) :], name])
-            raise ExpressionError(f"the variable {name} needs itself: {circle}")
-        self.open.append(name)
-        try:
-            self.known[name] = self._value(name, self.written[name])
-        finally:
-            self.open.pop()
-        return self.known[name]
+            raise ExpressionError(f"the variable {self.open[-1]} needs itself: {circle}")
+        there = f"vars has {', '.join(self.written)}" if self.written else "the file has no vars"
+        raise ExpressionError(f"unknown variable {name}", did_you_mean(name, self.written, there))
 
     def _value(self, name: str, written: Any) -> Value:
         if isinstance(written, bool) or not isinstance(written, (int, float, str)):

@@ -21,13 +21,13 @@ def cycle(robot: Robot) -> Iterator[Diagnostic]:
     above = {edge.child: edge for edge in reversed(robot.edges)}
     done: set[str] = set()
     for start in above:
-        path: list[str] = []
+        path: dict[str, None] = {}  # in order, and quick to look up
         frame = start
         while frame in above and frame not in done and frame not in path:
-            path.append(frame)
+            path[frame] = None
             frame = above[frame].parent
         if frame in path:
-            loop = path[path.index(frame) :]
+            loop = list(path)[list(path).index(frame) :]
             names = " → ".join([*reversed(loop), loop[-1]])
             notes = [Note(above[child].name, above[child].at) for child in loop[1:]]
             yield finding("TF202", f"a cycle: {names}", above[loop[0]].at, notes=notes, help="one edge must go")

@@ -14,13 +14,16 @@ if TYPE_CHECKING:
 
 
 _GOOD = re.compile(r"[A-Za-z0-9_]+(/[A-Za-z0-9_]+)*")
+_PROCESS = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(/[A-Za-z0-9_][A-Za-z0-9_.-]*)*")
+_NODE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
 def bad_frame_name(robot: Robot) -> Iterator[Diagnostic]:
-    """A frame or joint has a name that tf2, URDF or a shell takes differently.
+    """A frame, joint, process or node has a name that tf2, URDF, ROS or a file system takes differently.
 
-    tf2 strips a leading slash, URDF needs names that XML holds, and spaces, quotes and ``&`` break somewhere on the
-    way. Use letters, digits and ``_``; a slash stands between a prefix and a name only.
+    tf2 strips a leading slash, URDF needs names that XML holds, a process's name is also that of its parameter file,
+    and spaces, quotes and ``&`` break somewhere on the way. Use letters, digits and ``_``; a slash stands between a
+    prefix and a name only. The parts of a node's name do not begin with a digit.
     """
     names: dict[str, Span] = dict(robot.frames)
     for edge in robot.edges:
@@ -29,6 +32,18 @@ def bad_frame_name(robot: Robot) -> Iterator[Diagnostic]:
             names.setdefault(edge.joint_name, edge.joint.at if edge.joint else edge.at)
     for name, at in names.items():
         if not _GOOD.fullmatch(name):
-            better = re.sub(r"[^A-Za-z0-9_/]+|//+", "_", name).strip("/")
-            advice = f"for example {better}" if _GOOD.fullmatch(better) else "letters, digits and _"
-            yield finding("TF501", f"{name!r} is no good name", at, help=advice)
+            yield _bad(name, at, "name")
+    for process in robot.processes:
+        if not _PROCESS.fullmatch(process.name):
+            yield _bad(process.name, process.at, "name for a process")
+        elif (process.package or process.kind != "run") and not _NODE.fullmatch(process.node):
+            yield _bad(process.node, process.at, "name for a node")
+
+
+def _bad(name: str, at: Span, what: str) -> Diagnostic:
+    better = re.sub(r"[^A-Za-z0-9_/]+|//+", "_", name).strip("/")
+    advice = f"for example {better}" if _GOOD.fullmatch(better) and better != name.strip("/") else _LETTERS
+    return finding("TF501", f"{name!r} is no good {what}", at, help=advice)
+
+
+_LETTERS = "letters, digits and _; a node's name does not begin with a digit"

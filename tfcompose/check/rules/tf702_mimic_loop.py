@@ -20,13 +20,13 @@ def mimic_loop(robot: Robot) -> Iterator[Diagnostic]:
     joints = {edge.joint.name: edge.joint for edge in robot.edges if edge.joint}
     done: set[str] = set()
     for start in joints:
-        path: list[str] = []
+        path: dict[str, None] = {}  # in order, and quick to look up
         name: str | None = start
         while name in joints and name not in done and name not in path:
-            path.append(name)
+            path[name] = None
             name = joints[name].mimic
         if name in path:
-            loop = path[path.index(name) :]
+            loop = list(path)[list(path).index(name) :]
             notes = [Note(f"{other} is one of them", joints[other].at) for other in loop[1:]]
             message = f"joints follow each other: {' → '.join([*loop, loop[0]])}"
             yield finding("TF702", message, joints[loop[0]].at, notes=notes, help="one of them must lead")

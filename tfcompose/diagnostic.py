@@ -138,7 +138,6 @@ CODES = {
     "TF502": "name_used_twice",
     # sensors
     "TF601": "unknown_preset",
-    "TF602": "bad_preset",
     "TF603": "unknown_option",
     "TF604": "driver_cannot",
     # bodies and joints

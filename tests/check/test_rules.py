@@ -1,0 +1,154 @@
+"""Marked specs: each line that should give a finding says which, and the set of lines and codes must match exactly."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tfcompose.check import RULES, check
+from tfcompose.cli.compiling import library
+from tfcompose.compile import Compiled, compile_robot
+from tfcompose.diagnostic import CODES, Diagnostic, Span
+
+
+if TYPE_CHECKING:
+    from tfcompose.check import Rule
+    from tfcompose.model import Robot
+
+SPECS = sorted((Path(__file__).parent / "specs").glob("*.yaml"))
+PACKAGE = Path(__file__).parents[2] / "tfcompose"
+MARK = re.compile(r"# expect(?:-with (?P<profile>\w+))?: (?P<codes>TF\d{3}(?: TF\d{3})*)$")
+
+#: Codes that no line of a robot file can provoke; each has a test of its own elsewhere.
+NOT_OF_A_LINE = {"TF001", "TF002", "TF008", "TF009", "TF903"}
+#: Codes of the running robot, of its plan and of its surroundings.
+LIVE = {code for code in CODES if code.startswith(("TF8", "TF9"))} - {"TF812", "TF813"}
+
+
+def marks(text: str) -> dict[str | None, set[tuple[int, str]]]:
+    """Return the expected (line, code), by the profile that they need."""
+    expected: dict[str | None, set[tuple[int, str]]] = {None: set()}
+    for number, line in enumerate(text.splitlines(), 1):
+        found = MARK.search(line)
+        if found:
+            expected.setdefault(found["profile"], set()).update((number, code) for code in found["codes"].split())
+    return expected
+
+
+def compiled(spec: Path, *profiles: str) -> Compiled:
+    return compile_robot(spec.read_text("utf-8"), spec.name, library(), profiles)
+
+
+def places(found: tuple[Diagnostic, ...]) -> set[tuple[int, str]]:
+    return {(one.span.line, one.code) for one in found if one.span}
+
+
+@pytest.mark.parametrize("spec", SPECS, ids=lambda path: path.stem)
+def test_each_marked_line_gives_its_finding_and_no_other_line_gives_one(spec: Path) -> None:
+    expected = marks(spec.read_text("utf-8"))
+    assert places(compiled(spec).found) == expected.pop(None)
+    for profile, more in expected.items():
+        assert profile
+        alone = {(one.code, one.message) for one in compiled(spec).found}
+        added = [one for one in compiled(spec, profile).found if (one.code, one.message) not in alone]
+        assert places(tuple(added)) == more
+
+
+@pytest.mark.parametrize("code", sorted(set(CODES) - NOT_OF_A_LINE - LIVE))
+def test_each_code_that_a_robot_file_can_provoke_has_a_marked_line(code: str) -> None:
+    marked = {code for spec in SPECS for found in marks(spec.read_text("utf-8")).values() for _, code in found}
+    assert code in marked
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.code)
+def test_each_rule_is_a_page_in_a_file_of_its_code_and_name(rule: Rule) -> None:
+    function, code = rule.check, rule.code
+    file = Path(inspect.getfile(function))
+    assert file.name == f"{code.lower()}_{function.__name__}.py"
+    assert CODES[code] == function.__name__
+    page = inspect.getdoc(function) or ""
+    summary, _, rest = page.partition("\n\n")
+    assert summary.endswith(".")
+    assert "\n" not in summary
+    assert len(rest.split()) >= 4, "why it is wrong, and what to do"
+    assert len(file.read_text("utf-8").splitlines()) <= 70
+
+
+def test_every_file_among_the_rules_is_in_the_list_of_rules() -> None:
+    files = {file.stem for file in (PACKAGE / "check" / "rules").glob("tf*.py")}
+    assert files == {f"{rule.code.lower()}_{rule.name}" for rule in RULES}
+    assert len({rule.code for rule in RULES}) == len(RULES)
+
+
+def test_every_code_is_used_and_every_code_that_is_used_has_a_name() -> None:
+    sources = {file: file.read_text("utf-8") for file in PACKAGE.rglob("*.py") if file.name != "diagnostic.py"}
+    used = {code for text in sources.values() for code in re.findall(r"\"(TF\d{3})\"", text)}
+    assert used == set(CODES)
+
+
+CONFLICTS = {
+    "TF003": "tree.yaml",
+    "TF201": "tree.yaml",
+    "TF202": "tree.yaml",
+    "TF204": "tree.yaml",
+    "TF205": "tree.yaml",
+    "TF301": "owners.yaml",
+    "TF502": "names.yaml",
+    "TF702": "bodies.yaml",
+    "TF107": "poses.yaml",
+    "TF812": "owners.yaml",
+} | {"TF003": "text.yaml"}
+
+
+@pytest.mark.parametrize(("code", "spec"), CONFLICTS.items())
+def test_a_conflict_shows_its_other_place_too(code: str, spec: str) -> None:
+    of_code = [one for one in compiled(SPECS[0].parent / spec).found if one.code == code]
+    shown = [one for one in of_code if any(note.span and note.span != one.span for note in one.notes)]
+    assert shown
+    alone = [one for one in of_code if one not in shown]
+    assert all("self" in one.message for one in alone), "only a frame on itself has one place"
+
+
+@pytest.mark.parametrize("spec", SPECS, ids=lambda path: path.stem)
+def test_a_message_is_one_line_and_its_place_lies_in_the_file(spec: Path) -> None:
+    lines = spec.read_text("utf-8").splitlines()
+    for one in compiled(spec).found:
+        assert one.message
+        assert "\n" not in one.message + one.help
+        span = one.span
+        assert span
+        assert span.file == spec.name
+        assert 1 <= span.line <= len(lines)
+        assert 1 <= span.column <= len(lines[span.line - 1]) + 1
+        assert (span.end_line, span.end_column) >= (span.line, span.column)
+
+
+def test_findings_come_in_the_order_of_the_file() -> None:
+    found = compiled(SPECS[0].parent / "everything.yaml").found
+    at = [(one.span.line, one.span.column) for one in found if one.span]
+    assert at == sorted(at)
+
+
+def test_the_nearest_known_name_is_the_advice() -> None:
+    help_of = {one.message: one.help for one in compiled(SPECS[0].parent / "owners.yaml").found}
+    assert "did you mean base_drive?" in help_of.values()
+    help_of = {one.message: one.help for one in compiled(SPECS[0].parent / "values.yaml").found}
+    assert help_of["unknown key gaurd"] == "did you mean guard?"
+    assert help_of["unknown variable mst"] == "did you mean mast?"
+
+
+def test_a_rule_that_crashes_is_a_finding_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    def crash(robot: Robot) -> list[Diagnostic]:
+        raise RuntimeError(robot.name)
+
+    monkeypatch.setattr(sys.modules["tfcompose.check.check"], "RULES", (type(RULES[0])("TF299", crash), *RULES))  # type: ignore[arg-type]
+    robot = compiled(SPECS[0].parent / "no_frames.yaml").robot
+    assert robot
+    found = check(robot)
+    assert {one.code for one in found} == {"TF903", "TF206"}
+    assert next(one for one in found if one.code == "TF903").span == Span("no_frames.yaml")

@@ -15,7 +15,6 @@ from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.diagnostic import CODES, Diagnostic, Span
 
-
 if TYPE_CHECKING:
     from tfcompose.check import Rule
     from tfcompose.model import Robot

@@ -176,7 +176,7 @@ def test_an_edge_that_is_taken_already_is_shown_and_nothing_else_is_started() ->
     history = begin(GUARD, STATIC).feed(Taken(taken), Taken(other), Clear())
     assert history.found() == [taken, other]
     assert history.killed == [("guard", SIGINT)]
-    assert history.all(Stopping) == [Stopping(taken.message)]
+    assert history.all(Stopping) == [Stopping("TF807 edge_taken_before_start")]
     assert history.feed(Exited("guard", 0)).exit_code == 1
     assert history.started == ["guard"]
 
@@ -240,6 +240,7 @@ def test_a_failed_process_ends_everything_with_exit_1_and_is_named(code: int, wo
     (found,) = history.found()
     assert (found.code, found.message) == ("TF808", words)
     assert [note.message for note in found.notes] == ["slam: one", "slam: two"]
+    assert history.all(Stopping) == [Stopping("TF808 process_failed")]
     assert history.killed == [("static", SIGINT)]
     assert history.feed(Exited("static", -SIGINT)).exit_code == 1
 
@@ -323,6 +324,7 @@ def test_a_violation_ends_everything_with_exit_1_where_the_policy_is_stop() -> N
     assert history.killed == []
     history.feed(Found(ERROR))
     assert history.found() == [WARNING, ERROR]
+    assert history.all(Stopping) == [Stopping("TF801 foreign_publisher")]
     assert history.feed(Exited("static", 0), Exited("guard", 0)).exit_code == 1
 
 

@@ -13,7 +13,15 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.run.events import Clear, Complete, Found, Live, OwnerReady, Recovered, Taken
-from tfcompose.run.failures import ended_by_itself, how_ended, never_clear, never_seen, not_started, signal_name
+from tfcompose.run.failures import (
+    ended_by_itself,
+    how_ended,
+    in_short,
+    never_clear,
+    never_seen,
+    not_started,
+    signal_name,
+)
 from tfcompose.run.notice import EdgeLive, RecoveredShown, TreeComplete, Waiting
 from tfcompose.run.state import (
     MAX_RESTARTS,
@@ -138,7 +146,7 @@ def _taken(turn: Turn, found: Diagnostic) -> None:
     stop = turn.state.stop
     if stop is None or stop.cause == "taken":
         turn.show(found)
-        turn.stop(Stop("taken", 1), found.message)
+        turn.stop(Stop("taken", 1), in_short(found))
 
 
 def _guard_said(turn: Turn, event: Event) -> None:
@@ -157,7 +165,7 @@ def _guard_said(turn: Turn, event: Event) -> None:
         case Found(found):
             turn.show(found)
             if found.severity == "error" and turn.state.plan.guard.on_violation == "stop":
-                turn.stop(Stop("failure", 1), found.message)
+                turn.stop(Stop("failure", 1), in_short(found))
         case Recovered(message):
             turn.tell(RecoveredShown(message, seconds))
         case _:

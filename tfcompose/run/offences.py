@@ -13,23 +13,32 @@ if TYPE_CHECKING:
     from tfcompose.plan import GuardPolicy, Plan, PlanEdge
 
 LISTED_AT_MOST = 12
+NAMELESS = "a publisher without a node name"
 
 
 @dataclass(frozen=True, slots=True)
 class Offence:
-    """One edge that was published by somebody who may not, or in a way that it may not."""
+    """One edge that was published by somebody who may not, or in a way that it may not.
+
+    ``nodes`` are those of which one did it: a single one where the rmw says who sent a message, none where the sender
+    has no name. A ``namesake`` has the owner's name and is not the owner.
+    """
 
     code: str
     parent: str
     child: str
-    node: str
+    nodes: tuple[str, ...]
     static: bool
     edge: PlanEdge | None
+    namesake: bool = False
 
     @property
-    def key(self) -> tuple[str, str, str, str]:
-        """What makes it the same case."""
-        return (self.code, self.parent, self.child, self.node)
+    def who(self) -> str:
+        """The offender, as people read it."""
+        if len(self.nodes) > 1:
+            return f"one of {', '.join(self.nodes)}"
+        name = self.nodes[0] if self.nodes else NAMELESS
+        return f"another {name}" if self.namesake else name
 
     @property
     def name(self) -> str:
@@ -39,7 +48,7 @@ class Offence:
     @property
     def over(self) -> str:
         """The sentence that says that it has ended."""
-        return f"{self.name} is no longer published by {self.node}"
+        return f"{self.name} is no longer published by {self.who}"
 
 
 def violation(offences: Sequence[Offence], guard: GuardPolicy) -> Diagnostic:
@@ -47,19 +56,22 @@ def violation(offences: Sequence[Offence], guard: GuardPolicy) -> Diagnostic:
     first = offences[0]
     severity: Severity = "warning" if first.code == "TF803" and guard.unknown_edges == "warn" else "error"
     notes = [*_others(offences), *_declared(first)]
-    return finding(first.code, _message(first, len(offences)), None, help=_help(first), notes=notes, severity=severity)
+    return finding(first.code, _message(offences), None, help=_help(first), notes=notes, severity=severity)
 
 
 def taken(offences: Sequence[Offence]) -> Diagnostic:
     """Return the finding for edges that a node published before the start."""
     first = offences[0]
-    more = f" and {len(offences) - 1} more edges" if len(offences) > 1 else ""
-    message = f"{first.name}{more}: published by {first.node} before the start"
+    message = f"{first.name}{_more(offences)}: published by {first.who} before the start"
     if first.edge and first.parent != first.edge.parent:
         message += f", and the plan hangs {first.child} on {first.edge.parent}"
     notes = [*_others(offences), *_declared(first)]
-    owner = first.edge.owner if first.edge else ""
-    advice = f"end {first.node}, or let it own the edge: processes: {{{owner}: {{external: true, node: {first.node}}}}}"
+    advice = f"end {first.who}"
+    if first.namesake:
+        advice += ": is the robot running already?"
+    elif len(first.nodes) == 1:
+        owner = f"processes: {{NAME: {{external: true, node: {first.nodes[0]}}}}}"
+        advice += f", or let it own the edge: {owner}, and owner: NAME at the edge"
     return finding("TF807", message, None, help=advice, notes=notes)
 
 
@@ -71,19 +83,27 @@ def volatile_writer(node: str, plan: Plan) -> Diagnostic:
     return finding("TF806", message, None, notes=notes, help="publish it with durability transient_local, reliable")
 
 
-def _message(first: Offence, count: int) -> str:
-    more = f" and {count - 1} more edges" if count > 1 else ""
+def _message(offences: Sequence[Offence]) -> str:
+    first = offences[0]
+    more = _more(offences)
+    verb = "are" if more else "is"
     edge = first.edge
-    verb = "are" if count > 1 else "is"
     if edge is None:
-        return f"{first.name}{more} {verb} published by {first.node}, and nobody declared {'them' if more else 'it'}"
-    owner = f"{edge.owner} ({edge.node})"
+        return f"{first.name}{more} {verb} published by {first.who}, and nobody declared {'them' if more else 'it'}"
     if first.code == "TF802":
-        return f"{first.child} has a second parent: {first.node} publishes {first.name}{more}, {owner} {edge.name}"
+        owner = f"{edge.owner} ({edge.node})"
+        return f"{first.child} has a second parent: {first.who} publishes {first.name}{more}, {owner} {edge.name}"
     if first.code == "TF809":
         topics = ("/tf_static", "/tf") if first.static else ("/tf", "/tf_static")
-        return f"{first.name}{more} {verb} published by its owner {first.node} on {topics[0]}, declared for {topics[1]}"
-    return f"{first.name}{more} {verb} published by {first.node}; the owner is {owner}"
+        return f"{first.name}{more} {verb} published by its owner {first.who} on {topics[0]}, declared for {topics[1]}"
+    owners = list(dict.fromkeys(f"{o.edge.owner} ({o.edge.node})" for o in offences if o.edge))
+    owner = f"the owner is {owners[0]}" if len(owners) == 1 else f"the owners are {', '.join(owners)}"
+    return f"{first.name}{more} {verb} published by {first.who}; {owner}"
+
+
+def _more(offences: Sequence[Offence]) -> str:
+    more = len(offences) - 1
+    return f" and {more} more edge{'s' if more > 1 else ''}" if more else ""
 
 
 def _help(first: Offence) -> str:
@@ -92,7 +112,7 @@ def _help(first: Offence) -> str:
         return f"declare it under frames, or allow it: guard: {{allow: [{allowed}]}}"
     if first.code == "TF809":
         return "static: true says that the owner sends it on /tf_static"
-    return f"end {first.node}, or switch its TF off; tf2 takes whatever came last"
+    return f"end {first.who}, or switch its TF off; tf2 takes whatever came last"
 
 
 def _others(offences: Sequence[Offence]) -> list[Note]:
@@ -104,6 +124,5 @@ def _others(offences: Sequence[Offence]) -> list[Note]:
 
 
 def _declared(first: Offence) -> list[Note]:
-    return (
-        [Note(f"{first.edge.name} is declared in {first.edge.source[0]}:{first.edge.source[1]}")] if first.edge else []
-    )
+    edge = first.edge
+    return [Note(f"{edge.name} is declared in {edge.source[0]}:{edge.source[1]}")] if edge else []

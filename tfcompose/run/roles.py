@@ -11,15 +11,15 @@ from sensor_msgs.msg import JointState
 
 from tfcompose.ros.clock import SimClock
 from tfcompose.ros.message import Template, Transform, encode
-from tfcompose.ros.node import JOINT_STATES, latch, open_node, remappings
+from tfcompose.ros.node import JOINT_STATES, latch
 from tfcompose.ros.tf import Subscription, TFPublisher, wait
+from tfcompose.run.leave import node_of
 from tfcompose.run.motion import Joints, circle, read_positions
 from tfcompose.run.own import say
 from tfcompose.run.watch import guard
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from contextlib import AbstractContextManager
 
     from rclpy.node import Node
 
@@ -38,7 +38,7 @@ def static(own: Own, stop: Stop) -> None:
     # A fixed edge holds at every time and tf2 does not look at its stamp; simulated time may not have begun.
     stamp_ns = 0 if own.plan.ros.clock == "sim" else time.time_ns()
     edges = [Transform(stamp_ns, e.parent, e.child, e.pose.xyz, e.pose.quat_xyzw) for e in own.edges]
-    with _node(own) as node:
+    with node_of(own) as node:
         publisher = TFPublisher(node, static=True)
         if edges:
             publisher.publish(encode(edges))
@@ -52,7 +52,7 @@ def static(own: Own, stop: Stop) -> None:
 
 def joints(own: Own, stop: Stop) -> None:
     """Publish the moving edges of each message on ``joint_states``, with its stamp, and latch the description."""
-    with _node(own) as node:
+    with node_of(own) as node:
         mover = _JointMover(own, node)
         latched = _latch_description(own, node)
         subscription = Subscription(node, JointState, "joint_states", JOINT_STATES)
@@ -69,7 +69,7 @@ def simulate(own: Own, stop: Stop) -> None:
     simulation = own.process.simulate
     if simulation is None:  # own.read_own has refused such a plan
         return
-    with _node(own) as node:
+    with node_of(own) as node:
         if simulation.kind == "joints":
             publish, what = _joint_states(node, simulation)
         else:
@@ -141,10 +141,6 @@ class _JointMover:
         if why not in self._said:
             self._said.add(why)
             say(f"dropped a joint state: {why} (said once)")
-
-
-def _node(own: Own) -> AbstractContextManager[Node]:
-    return open_node(own.node_name, own.namespace, args=[*remappings(own.process.remap), *own.ros_args])
 
 
 def _latch_description(own: Own, node: Node) -> Any:

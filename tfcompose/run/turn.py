@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from tfcompose.run.failures import in_short
 from tfcompose.run.notice import Ended, FindingShown, Notice, ProcessState, StateName, Stopping
 from tfcompose.run.state import Action, Finish, Start, State, Stop, Tell, Tracked
 
@@ -55,7 +56,7 @@ class Turn:
         """Show the finding and stop everything; once that is under way, further failures follow from it."""
         if self.state.stop is None:
             self.show(found)
-            self.stop(Stop("failure", 1), found.message)
+            self.stop(Stop("failure", 1), in_short(found))
 
     def stop(self, stop: Stop, reason: str) -> None:
         """Begin to stop everything, unless that is under way."""

@@ -9,59 +9,94 @@ from typing import TYPE_CHECKING
 
 from tfcompose.ros.graph import UNKNOWN_NODE, writers
 from tfcompose.ros.message import decode
-from tfcompose.ros.node import open_node, remappings
 from tfcompose.ros.tf import TFSubscription, wait
 from tfcompose.run.events import EVENTS_FD, to_line
 from tfcompose.run.judge import Judge, Message, Writer
+from tfcompose.run.leave import node_of
 from tfcompose.run.own import say
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from rclpy.node import Node
 
     from tfcompose.ros.stop import Stop
+    from tfcompose.ros.tf import Received
     from tfcompose.run.events import GuardEvent
     from tfcompose.run.own import Own
 
 SETTLE = "TFCOMPOSE_SETTLE_S"
 DEFAULT_SETTLE_S = 1.0
 LOOK_EVERY_S = 0.1
+#: A longer frame name is cut; no planned one is that long.
+LONGEST_NAME = 1024
 
 
 def guard(own: Own, stop: Stop) -> None:
     """Watch /tf and /tf_static until a signal comes."""
     settle_s = float(os.environ.get(SETTLE, DEFAULT_SETTLE_S))
     emit = _emitter()
-    with open_node(own.node_name, own.namespace, args=[*remappings(own.process.remap), *own.ros_args]) as node:
-        moving, fixed = TFSubscription(node, static=False), TFSubscription(node, static=True)
-        judge = Judge(own.plan, settle_s, time.monotonic(), time.time_ns())
+    with node_of(own) as node:
+        watch = _Watch(node, Judge(own.plan, settle_s, time.monotonic(), time.time_ns()), emit)
         say(f"watching {len(own.plan.edges)} edges")
-        looked = 0.0
-        malformed: set[bytes | None] = set()
         while not stop.requested:
-            wait(node, [moving, fixed], LOOK_EVERY_S, stop)
-            for subscription, static in ((fixed, True), (moving, False)):
-                for received in subscription.take():
-                    try:
-                        edges = [(_plain(t.parent), _plain(t.child)) for t in decode(received.data)]
-                    except ValueError as error:
-                        if received.gid not in malformed:
-                            malformed.add(received.gid)
-                            say(f"dropped a TF message: {error} (said once for each publisher)")
-                        continue
-                    message = Message(edges, static, received.gid, received.source_ns, received.sequence)
-                    _pass_on(judge.message(message, time.monotonic()), emit)
-            now = time.monotonic()
-            if now - looked >= LOOK_EVERY_S:
-                looked = now
-                _pass_on(judge.graph(_writers(node, fixed, moving), now), emit)
-                _pass_on(judge.tick(now), emit)
+            wait(node, [watch.fixed, watch.moving], LOOK_EVERY_S, stop)
+            watch.look()
+
+
+class _Watch:
+    """The judge's eyes and mouth."""
+
+    def __init__(self, node: Node, judge: Judge, emit: Callable[[GuardEvent], None]) -> None:
+        self.moving, self.fixed = TFSubscription(node, static=False), TFSubscription(node, static=True)
+        self._node = node
+        self._judge = judge
+        self._emit = emit
+        self._due = 0.0
+        self._malformed: set[bytes | None] = set()
+        self._known: set[bytes | None] = set()
+
+    def look(self) -> None:
+        """Take what has come, and from time to time the graph."""
+        received = list(self._received())
+        now = time.monotonic()
+        strangers = {each.gid for each, _ in received} - self._known
+        self._known |= strangers
+        if strangers or now >= self._due:  # who sends once and goes is in the graph for a moment only
+            self._pass_on(self._judge.graph(_writers(self._node, self.fixed, self.moving), now))
+        for each, static in received:
+            self._hear(each, now, static=static)
+        if now >= self._due:
+            self._due = now + LOOK_EVERY_S
+            self._pass_on(self._judge.tick(now))
+
+    def _received(self) -> Iterator[tuple[Received, bool]]:
+        for subscription, static in ((self.fixed, True), (self.moving, False)):
+            for each in subscription.take():
+                yield each, static
+
+    def _hear(self, received: Received, now: float, *, static: bool) -> None:
+        try:
+            edges = [(_plain(t.parent), _plain(t.child)) for t in decode(received.data)]
+        except ValueError as error:
+            if received.gid not in self._malformed:
+                self._malformed.add(received.gid)
+                say(f"dropped a TF message: {error} (said once for each publisher)")
+            return
+        message = Message(edges, static, received.gid, received.source_ns, received.sequence)
+        self._pass_on(self._judge.message(message, now))
+
+    def _pass_on(self, events: list[GuardEvent]) -> None:
+        for event in events:
+            self._emit(event)
 
 
 def _plain(frame: str) -> str:
-    """Return the frame's name as tf2 takes it: without a leading slash."""
-    return frame.removeprefix("/")
+    """Return the frame's name as tf2 takes it, without a leading slash, and as it can be shown."""
+    name = frame.removeprefix("/")
+    if not name.isprintable():
+        name = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in name)
+    return name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}…"
 
 
 def _writers(node: Node, fixed: TFSubscription, moving: TFSubscription) -> list[Writer]:
@@ -70,11 +105,6 @@ def _writers(node: Node, fixed: TFSubscription, moving: TFSubscription) -> list[
         for subscription, static in ((fixed, True), (moving, False))
         for w in writers(node, subscription.subscription.topic_name)
     ]
-
-
-def _pass_on(events: list[GuardEvent], emit: Callable[[GuardEvent], None]) -> None:
-    for event in events:
-        emit(event)
 
 
 def _emitter() -> Callable[[GuardEvent], None]:

@@ -1,0 +1,509 @@
+"""Histories replayed to the guard's judge with a clock that is set by hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.pose import Pose
+from tfcompose.run.events import Clear, Complete, Found, GuardEvent, Live, OwnerReady, Recovered, Taken
+from tfcompose.run.judge import Judge, Message, Writer
+
+if TYPE_CHECKING:
+    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.plan import EdgeKind
+
+LOOK_S = 0.1
+SETTLE_S = 1.0
+
+
+def edge(names: str, owner: str, kind: EdgeKind = "dynamic", rate: float | None = None) -> PlanEdge:
+    parent, child = names.split()
+    return PlanEdge(parent, child, kind, owner, f"/{owner}", Pose(), rate, ("rover.yaml", 7))
+
+
+EDGES = (
+    edge("map odom", "slam"),
+    edge("odom base", "drive"),
+    edge("base left", "joints", "joint"),
+    edge("base lidar", "static", "static"),
+    edge("base camera", "static", "static"),
+)
+PROCESSES = (
+    PlanProcess("static", "static"),
+    PlanProcess("joints", "joints"),
+    PlanProcess("slam", "run"),
+    PlanProcess("drive", "external"),
+    PlanProcess("guard", "guard"),
+)
+FIXED = "base lidar, base camera"
+
+
+@dataclass
+class Publisher:
+    """A publisher of the history; ``sent`` counts its messages."""
+
+    node: str | None
+    static: bool = False
+    volatile: bool = False
+    gid: bytes = b""
+    sent: int = 0
+
+
+@dataclass
+class History:
+    """A judge that looks every tenth of a second, and the publishers that it sees."""
+
+    guard: GuardPolicy = field(default_factory=GuardPolicy)
+    settle_s: float = SETTLE_S
+    gids: bool = True
+    now: float = 1000.0
+    events: list[GuardEvent] = field(default_factory=list)
+    graph: list[Publisher] = field(default_factory=list)
+    made: int = 0
+    judge: Judge = field(init=False)
+    looked: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        plan = Plan("rover", "0", "base", RosSettings(), EDGES, PROCESSES, self.guard)
+        self.judge = Judge(plan, self.settle_s, self.now, self.wall_ns())
+        self.looked = self.now
+
+    def wall_ns(self) -> int:
+        return 1_700_000_000_000_000_000 + round(self.now * 1e9)
+
+    def joins(
+        self, node: str | None, *, static: bool = False, volatile: bool = False, hidden: bool = False
+    ) -> Publisher:
+        """Let a publisher come; one that is hidden is not in the graph yet."""
+        self.made += 1
+        publisher = Publisher(node, static, volatile, bytes([self.made]) * 16)
+        if not hidden:
+            self.graph.append(publisher)
+        return publisher
+
+    def leaves(self, publisher: Publisher) -> None:
+        self.graph.remove(publisher)
+
+    def send(self, publisher: Publisher, edges: str, *, static: bool | None = None, ago: float = 0.0) -> History:
+        """Let a message arrive that was sent ``ago`` seconds before."""
+        publisher.sent += 1
+        pairs = [(names.split()[0], names.split()[1]) for names in edges.split(", ")]
+        kind = publisher.static if static is None else static
+        gid = publisher.gid if self.gids else None
+        message = Message(pairs, kind, gid, self.wall_ns() - round(ago * 1e9), publisher.sent)
+        self.events += self.judge.message(message, self.now)
+        return self
+
+    def look(self) -> History:
+        writers = [Writer(p.gid, p.node, p.static, p.volatile) for p in self.graph]
+        self.events += self.judge.graph(writers, self.now)
+        self.events += self.judge.tick(self.now)
+        return self
+
+    def wait(self, seconds: float) -> History:
+        """Let time pass, in looks."""
+        end = self.now + seconds
+        while self.now < end - 1e-9:
+            self.now = min(end, self.now + LOOK_S)
+            self.look()
+        return self
+
+    def repeat(self, publisher: Publisher, edges: str, times: int, every: float = 0.1) -> History:
+        """Let a publisher send, and the guard look, so many times."""
+        for _ in range(times):
+            self.send(publisher, edges).wait(every)
+        return self
+
+    def clear(self) -> History:
+        """Look until all is clear."""
+        self.wait(self.settle_s + LOOK_S)
+        assert Clear() in self.events
+        return self
+
+    def found(self) -> list[Diagnostic]:
+        return [event.found for event in self.events if isinstance(event, (Found, Taken))]
+
+    def said(self) -> list[str]:
+        return [
+            f"{event.found.code} {event.found.message}" for event in self.events if isinstance(event, (Found, Taken))
+        ]
+
+    def all(self, kind: type[GuardEvent]) -> list[GuardEvent]:
+        return [event for event in self.events if isinstance(event, kind)]
+
+
+@pytest.fixture
+def history() -> History:
+    return History()
+
+
+@pytest.fixture
+def running() -> History:
+    return History().clear()
+
+
+# Owners.
+
+
+def test_owners_are_live_and_nothing_is_found(running: History) -> None:
+    static, joints = running.joins("/static", static=True), running.joins("/joints")
+    slam, drive = running.joins("/slam"), running.joins("/drive")
+    running.send(static, FIXED)
+    for _ in range(40):
+        running.send(joints, "base left").send(slam, "map odom").send(drive, "odom base").wait(0.1)
+    assert [(e.child, e.owner) for e in running.all(Live) if isinstance(e, Live)] == [
+        ("lidar", "static"), ("camera", "static"), ("left", "joints"), ("odom", "slam"), ("base", "drive"),
+    ]  # fmt: skip
+    assert running.all(OwnerReady) == [OwnerReady(name) for name in ("static", "joints", "slam", "drive")]
+    assert running.all(Complete) == [Complete(5)]
+    assert running.said() == []
+
+
+def test_all_is_clear_after_the_settling_time_when_nobody_sends(history: History) -> None:
+    history.wait(SETTLE_S - 0.05)
+    assert history.events == []
+    assert history.wait(LOOK_S).events == [Clear()]
+
+
+def test_an_external_owner_that_is_there_before_the_start_is_right(history: History) -> None:
+    drive = history.joins("/drive")
+    history.repeat(drive, "odom base", 30)
+    assert history.said() == []
+    assert Live("odom", "base", "drive", "/drive") in history.events
+
+
+def test_a_restarted_owner_is_right_also_while_its_old_publisher_is_still_in_the_graph(running: History) -> None:
+    for _ in range(4):
+        running.repeat(running.joins("/slam"), "map odom", 10)
+    assert running.said() == []
+
+
+def test_an_owner_may_send_other_edges_that_are_allowed() -> None:
+    running = History(GuardPolicy(unknown_edges="error", allow=(("map", "goal_*"),))).clear()
+    running.repeat(running.joins("/slam"), "map odom, map goal_1", 5)
+    assert running.said() == []
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.sampled_from(("/static", "/joints", "/slam", "/drive")), st.floats(0, 0.3), st.floats(0, 0.65)),
+        max_size=40,
+    )
+)
+def test_rightful_messages_are_never_found_however_they_are_ordered_and_their_names_delayed(
+    sends: list[tuple[str, float, float]],
+) -> None:
+    running = History().clear()
+    edges = {"/static": FIXED, "/joints": "base left", "/slam": "map odom", "/drive": "odom base"}
+    publishers: dict[str, Publisher] = {}
+    named: list[tuple[float, Publisher, str]] = []
+    for node, pause, delay in sends:
+        if node not in publishers:
+            publishers[node] = running.joins(None, static=node == "/static")
+            named.append((running.now + delay, publishers[node], node))
+        for at, publisher, name in named:
+            publisher.node = name if running.now >= at else publisher.node
+        running.send(publishers[node], edges[node], ago=min(delay, running.now - 1000 - SETTLE_S - LOOK_S)).wait(pause)
+    for _, publisher, name in named:
+        publisher.node = name
+    running.wait(2)
+    assert running.said() == []
+    assert {e.node for e in running.all(Live) if isinstance(e, Live)} == set(publishers)
+
+
+# Foreign publishers.
+
+
+def test_a_foreign_publisher_is_named_once_and_within_a_look(running: History) -> None:
+    rogue = running.joins("/rogue")
+    running.send(rogue, "map odom").wait(LOOK_S)
+    assert running.said() == ["TF801 map → odom is published by /rogue; the owner is slam (/slam)"]
+    running.repeat(rogue, "map odom", 100)
+    assert len(running.found()) == 1
+    assert running.found()[0].severity == "error"
+    assert [note.message for note in running.found()[0].notes] == ["map → odom is declared in rover.yaml:7"]
+
+
+def test_a_foreign_publisher_that_ended_is_said_to_have_and_is_reported_when_it_comes_again(running: History) -> None:
+    rogue = running.joins("/rogue")
+    running.repeat(rogue, "map odom", 5)
+    running.leaves(rogue)
+    assert running.wait(4).all(Recovered) == [Recovered("map → odom is no longer published by /rogue")]
+    running.repeat(running.joins("/rogue"), "map odom", 5)
+    assert len(running.found()) == 2
+
+
+def test_a_foreign_publisher_that_sends_every_five_seconds_is_reported_once(running: History) -> None:
+    rogue = running.joins("/rogue")
+    running.repeat(rogue, "map odom", 10, every=5)
+    assert len(running.found()) == 1
+    assert running.all(Recovered) == []
+    assert len(running.wait(31).all(Recovered)) == 1
+
+
+def test_a_latched_offence_lasts_while_its_publisher_does(running: History) -> None:
+    rogue = running.joins("/rogue", static=True)
+    running.send(rogue, "base lidar").wait(120)
+    assert (len(running.found()), running.all(Recovered)) == (1, [])
+    running.leaves(rogue)
+    assert len(running.wait(4).all(Recovered)) == 1
+
+
+def test_many_edges_of_one_node_are_one_finding_also_when_each_comes_in_a_message_of_its_own(running: History) -> None:
+    rogue = running.joins("/rogue", static=True)
+    running.send(rogue, "base lidar").send(rogue, "base camera").wait(LOOK_S)
+    assert running.said() == [
+        "TF801 base → lidar and 1 more edge are published by /rogue; the owner is static (/static)"
+    ]
+    assert [note.message for note in running.found()[0].notes][:2] == ["base → lidar", "base → camera"]
+
+
+def test_edges_of_several_owners_are_one_finding_that_names_all_owners(running: History) -> None:
+    running.send(running.joins("/rogue"), "map odom, odom base, odom base").wait(LOOK_S)
+    assert running.said() == [
+        "TF801 map → odom and 1 more edge are published by /rogue; the owners are slam (/slam), drive (/drive)"
+    ]
+
+
+def test_edges_that_an_offender_adds_later_are_reported_too_and_those_of_a_flood_together(running: History) -> None:
+    rogue = running.joins("/rogue")
+    for n in range(100):
+        running.send(rogue, f"base thing_{n}").wait(0.02)
+    running.wait(1)
+    assert 2 <= len(running.found()) <= 6
+    assert len(running.found()[1].notes) <= 13
+    running.send(rogue, "map odom").wait(LOOK_S)
+    assert running.found()[-1].code == "TF801"
+
+
+def test_a_second_parent_is_reported_with_both_parents(running: History) -> None:
+    running.send(running.joins("/rogue"), "base_footprint base").wait(LOOK_S)
+    message = "base has a second parent: /rogue publishes base_footprint → base, drive (/drive) odom → base"
+    assert running.said() == [f"TF802 {message}"]
+
+
+def test_a_second_parent_is_reported_also_when_the_owner_itself_sends_it(running: History) -> None:
+    drive = running.joins("/drive")
+    running.repeat(drive, "odom base, map base", 10)
+    assert [found.code for found in running.found()] == ["TF802"]
+    assert "/drive publishes map → base" in running.found()[0].message
+
+
+@pytest.mark.parametrize(("policy", "severities"), [("ignore", []), ("warn", ["warning"]), ("error", ["error"])])
+def test_an_undeclared_edge_is_reported_as_the_policy_says(policy: str, severities: list[str]) -> None:
+    running = History(GuardPolicy(unknown_edges=policy)).clear()  # type: ignore[arg-type]
+    running.repeat(running.joins("/tracker"), "map person", 10)
+    assert [(found.code, found.severity) for found in running.found()] == [("TF803", one) for one in severities]
+
+
+def test_only_undeclared_edges_that_no_pattern_allows_are_reported() -> None:
+    running = History(GuardPolicy(allow=(("map", "person_*"),))).clear()
+    tracker = running.joins("/tracker")
+    running.repeat(tracker, "map person_1, odom person_2, map person", 3)
+    (found,) = running.found()
+    assert found.message.startswith("odom → person_2 and 1 more edge are published by /tracker, and nobody declared")
+    assert [note.message for note in found.notes] == ["odom → person_2", "map → person"]
+
+
+def test_an_owner_on_the_wrong_topic_is_reported(running: History) -> None:
+    running.repeat(running.joins("/slam", static=True), "map odom", 3)
+    (found,) = running.found()
+    assert (found.code, "on /tf_static, declared for /tf" in found.message) == ("TF809", True)
+
+
+def test_a_volatile_writer_of_static_edges_is_reported_once_with_what_it_owns(running: History) -> None:
+    running.joins("/static", static=True, volatile=True)
+    running.joins("/slam", volatile=True)
+    running.wait(5)
+    (found,) = running.found()
+    assert (found.code, "/static writes /tf_static with durability volatile" in found.message) == ("TF806", True)
+    assert "base → lidar" in found.notes[0].message
+
+
+# Names that come late, or never.
+
+
+def test_a_publisher_whose_name_comes_later_is_judged_when_it_is_known(running: History) -> None:
+    rogue = running.joins(None)
+    running.send(rogue, "map odom").wait(0.4)
+    assert running.said() == []
+    rogue.node = "/rogue"
+    assert "published by /rogue" in running.wait(LOOK_S).said()[0]
+
+
+def test_an_owner_whose_name_comes_after_seconds_is_not_blamed(running: History) -> None:
+    slam = running.joins(None)
+    running.repeat(slam, "map odom", 40)
+    slam.node = "/slam"
+    running.repeat(slam, "map odom", 10)
+    assert running.said() == []
+    assert Live("map", "odom", "slam", "/slam") in running.events
+
+
+def test_a_publisher_without_a_name_is_reported_within_a_second_where_the_owner_is_known(running: History) -> None:
+    slam, stranger = running.joins("/slam"), running.joins(None)
+    for _ in range(9):
+        running.send(slam, "map odom").send(stranger, "map odom").wait(0.1)
+    assert running.said() == [
+        "TF801 map → odom is published by a publisher without a node name; the owner is slam (/slam)"
+    ]
+
+
+def test_a_publisher_that_never_gets_a_name_is_reported_at_last(running: History) -> None:
+    running.repeat(running.joins(None), "map odom", 60)
+    assert [found.code for found in running.found()] == ["TF801"]
+
+
+def test_a_publisher_that_sends_once_and_leaves_is_named(running: History) -> None:
+    rogue = running.joins("/rogue")
+    running.look().leaves(rogue)
+    assert "/rogue" in running.send(rogue, "map odom").wait(LOOK_S).said()[0]
+
+
+# Who was there first.
+
+
+def test_a_planned_edge_that_is_published_before_the_start_is_taken_and_the_node_named(history: History) -> None:
+    history.repeat(history.joins("/rogue"), "map odom", 20)
+    (event,) = history.all(Taken)
+    assert history.events[0] == event
+    assert history.said() == ["TF807 map → odom: published by /rogue before the start"]
+    assert "node: /rogue" in history.found()[0].help
+
+
+def test_a_namesake_of_what_the_plan_starts_is_refused_before_the_start(history: History) -> None:
+    history.repeat(history.joins("/slam"), "map odom", 10)
+    assert history.said() == ["TF807 map → odom: published by another /slam before the start"]
+    assert "is the robot running already?" in history.found()[0].help
+    assert "external" not in history.found()[0].help
+
+
+def test_a_second_parent_before_the_start_is_taken_and_says_so(history: History) -> None:
+    history.repeat(history.joins("/rogue"), "world odom", 10)
+    assert history.said() == [
+        "TF807 world → odom: published by /rogue before the start, and the plan hangs odom on map"
+    ]
+
+
+def test_an_undeclared_edge_before_the_start_keeps_nothing_from_starting(history: History) -> None:
+    history.repeat(history.joins("/tracker"), "map person", 20)
+    assert (history.all(Taken), [found.code for found in history.found()]) == ([], ["TF803"])
+    assert Clear() in history.events
+
+
+def test_all_is_not_clear_while_a_sender_of_a_planned_edge_has_no_name(history: History) -> None:
+    drive = history.joins(None)
+    history.repeat(drive, "odom base", 30)
+    assert Clear() not in history.events
+    drive.node = "/drive"
+    assert Clear() in history.repeat(drive, "odom base", 3).events
+
+
+@pytest.mark.parametrize("hertz", [5, 10, 50, 200])
+def test_a_publisher_that_was_there_first_and_is_discovered_late_is_taken(running: History, hertz: int) -> None:
+    rogue = running.joins("/rogue")
+    rogue.sent = 5 * hertz
+    running.wait(2).repeat(rogue, "map odom", hertz, every=1 / hertz)
+    assert [type(event) for event in running.events if isinstance(event, (Found, Taken))] == [Taken]
+
+
+def test_a_latched_message_from_before_the_start_is_taken_however_late_it_comes(running: History) -> None:
+    running.wait(4).send(running.joins("/rogue", static=True), "base lidar", ago=10).wait(1)
+    assert len(running.all(Taken)) == 1
+
+
+@pytest.mark.parametrize("hertz", [5, 10, 50, 200])
+def test_a_publisher_that_began_after_the_start_is_found_within_a_second(running: History, hertz: int) -> None:
+    rogue = running.joins("/rogue")
+    rogue.sent = max(1, hertz // 5)
+    running.wait(0.5).repeat(rogue, "map odom", round(0.9 * hertz), every=1 / hertz)
+    assert [type(event) for event in running.events if isinstance(event, (Found, Taken))] == [Found]
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.sampled_from((5, 10, 50, 200)),
+    st.lists(st.floats(-0.9, 0.9), min_size=12, max_size=12),
+    st.integers(0, 11),
+    st.floats(0, 0.8),
+    st.floats(0, 0.2),
+)
+def test_jitter_and_a_hiccup_do_not_turn_a_newcomer_into_one_that_was_first(
+    hertz: int, jitter: list[float], at: int, hiccup: float, unheard_s: float
+) -> None:
+    running = History().clear()
+    rogue = running.joins("/rogue")
+    running.wait(unheard_s)
+    rogue.sent = int(unheard_s * hertz)
+    for index, part in enumerate(jitter):
+        running.send(rogue, "map odom", ago=part * 0.5 / hertz).wait(1 / hertz + (hiccup if index == at else 0))
+    running.wait(1)
+    assert running.all(Taken) == []
+    assert len(running.found()) == 1
+
+
+def test_a_publisher_is_not_taken_for_first_long_after_the_start(running: History) -> None:
+    running.wait(20).send(running.joins("/rogue", static=True), "base lidar", ago=60).wait(1)
+    assert [type(event) for event in running.events if isinstance(event, (Found, Taken))] == [Found]
+
+
+# Two of one name.
+
+
+def test_two_publishers_of_one_name_that_take_turns_are_reported_and_the_edge_is_not_silent() -> None:
+    rated = tuple(replace(one, rate=10.0) if one.owner == "slam" else one for one in EDGES)
+    running = History()
+    running.judge = Judge(
+        Plan("r", "0", "base", RosSettings(), rated, PROCESSES), SETTLE_S, running.now, running.wall_ns()
+    )
+    running.clear()
+    a, b = running.joins("/slam"), running.joins("/slam")
+    for _ in range(20):
+        running.send(a, "map odom").wait(0.1).send(b, "map odom").wait(0.1)
+    assert running.said() == ["TF801 map → odom is published by another /slam; the owner is slam (/slam)"]
+
+
+def test_a_second_static_process_is_reported_while_both_are_there_and_over_when_it_has_left(running: History) -> None:
+    first, second = (running.joins("/static", static=True) for _ in range(2))
+    running.send(first, FIXED).wait(2).send(second, FIXED).wait(10)
+    assert running.said() == [
+        "TF801 base → lidar and 1 more edge are published by another /static; the owner is static (/static)"
+    ]
+    assert running.all(Recovered) == []
+    running.leaves(second)
+    assert len(running.wait(4).all(Recovered)) == 2
+
+
+# Where the rmw does not say who sent a message.
+
+
+def test_without_ids_nobody_is_blamed_where_the_owner_may_have_sent_it() -> None:
+    running = History(gids=False).clear()
+    slam, rogue = running.joins("/slam"), running.joins("/slam_helper")
+    for _ in range(10):
+        running.send(slam, "map odom").send(rogue, "map odom").wait(0.1)
+    assert running.said() == []
+
+
+def test_without_ids_one_of_those_that_may_have_sent_it_is_blamed_once_and_nobody_was_first() -> None:
+    running = History(gids=False)
+    drive = running.joins("/drive")
+    running.repeat(drive, "odom base", 20)
+    rogue = running.joins("/rogue")
+    running.repeat(rogue, "map odom", 10)
+    assert running.said() == ["TF801 map → odom is published by one of /drive, /rogue; the owner is slam (/slam)"]
+    assert running.all(Taken) == []
+
+
+def test_a_name_that_is_part_of_the_owners_does_not_pass_for_it() -> None:
+    running = History(gids=False).clear()
+    running.joins("/slam_toolbox")
+    running.repeat(running.joins("/other"), "map odom", 10)
+    assert [found.code for found in running.found()] == ["TF801"]

@@ -1,0 +1,104 @@
+"""Who sends: the publishers by their ids, their nodes' names, and when each of them began."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from statistics import median
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+#: How many gaps between messages tell surely when a publisher began; so many at least, when time is short.
+GAPS, FEWEST_GAPS = 5, 2
+UNCOUNTED = 2**64 - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One TFMessage: its (parent, child) pairs, the topic's kind, who sent it, and when.
+
+    ``gid`` is the publisher's id, or None where the rmw gives none; ``sequence`` counts its messages from 1.
+    """
+
+    edges: Sequence[tuple[str, str]]
+    static: bool
+    gid: bytes | None
+    source_ns: int
+    sequence: int
+
+
+@dataclass(frozen=True, slots=True)
+class Writer:
+    """A publisher in the graph; ``node`` is None while its name is not known."""
+
+    gid: bytes
+    node: str | None
+    static: bool
+    volatile: bool
+
+
+@dataclass(slots=True)
+class Sender:
+    """One publisher: when it was first heard, and how fast it counts."""
+
+    first_seen: float
+    first_ns: int
+    first_sequence: int
+    last_ns: int
+    last_sequence: int
+    gaps_ns: list[float] = field(default_factory=list)
+
+    def heard(self, message: Message) -> None:
+        """Note a further message."""
+        counted = message.sequence - self.last_sequence
+        if counted > 0 and len(self.gaps_ns) < GAPS:
+            self.gaps_ns.append((message.source_ns - self.last_ns) / counted)
+        self.last_ns, self.last_sequence = message.source_ns, message.sequence
+
+    def born_ns(self, gaps: int = FEWEST_GAPS) -> float | None:
+        """Return when its first message was sent, as far as its count tells; None: not known by so many gaps."""
+        if self.first_sequence in {1, UNCOUNTED}:
+            return self.first_ns
+        if len(self.gaps_ns) < gaps:
+            return None
+        return self.first_ns - median(self.gaps_ns) * (self.first_sequence - 1)
+
+
+class Senders:
+    """All publishers that were heard, or that the graph shows."""
+
+    def __init__(self) -> None:
+        self.writers: dict[bytes, Writer] = {}
+        self._names: dict[bytes, str] = {}
+        self._heard: dict[bytes, Sender] = {}
+
+    def heard(self, message: Message, now: float) -> None:
+        """Count a message. Without ids nobody's messages can be counted."""
+        if message.gid is None:
+            return
+        sender = self._heard.get(message.gid)
+        if sender:
+            sender.heard(message)
+        else:
+            first = (message.source_ns, message.sequence)
+            self._heard[message.gid] = Sender(now, *first, *first)
+
+    def graph(self, writers: Sequence[Writer]) -> None:
+        """Take who is in the graph now; the name of one that has left is not forgotten."""
+        self.writers = {writer.gid: writer for writer in writers}
+        self._names.update({writer.gid: writer.node for writer in writers if writer.node is not None})
+
+    def sender(self, gid: bytes | None) -> Sender | None:
+        """Return what is known of that publisher's messages."""
+        return None if gid is None else self._heard.get(gid)
+
+    def nodes(self, gid: bytes | None, *, static: bool) -> tuple[str, ...]:
+        """Return the publisher's node; where the rmw gives no id, all on the topic; nothing while none is known."""
+        if gid is not None:
+            return (self._names[gid],) if gid in self._names else ()
+        return tuple(sorted({w.node for w in self.writers.values() if w.static == static and w.node is not None}))
+
+    def is_present(self, gid: bytes | None) -> bool:
+        """Whether the publisher is in the graph; one without an id is while anybody is."""
+        return bool(self.writers) if gid is None else gid in self.writers

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from tfcompose.pose import Pose
+from tfcompose.pose import Pose, multiply, quat_from_rpy, rpy_from_quat
 
 if TYPE_CHECKING:
     from tfcompose.pose import Quaternion, Vector
@@ -49,9 +49,15 @@ def clean(pose: Pose) -> Pose:
 
 
 def clean_rpy(quat_xyzw: Quaternion) -> Vector:
-    """Return roll, pitch, yaw in radians; a whole degree within the noise of computing is written as just that."""
-    roll, pitch, yaw = (_whole_degree(angle) for angle in Pose((0.0, 0.0, 0.0), quat_xyzw).rpy)
-    return (roll, pitch, yaw)
+    """Return roll, pitch, yaw in radians; a whole degree within the noise of computing is written as just that.
+
+    Near pitch ±π/2 the yaw is known to few digits only, and the roll is what then remains to be turned.
+    """
+    _, pitch, yaw = (_whole_degree(angle) for angle in rpy_from_quat(quat_xyzw))
+    x, y, z, w = quat_from_rpy(0.0, pitch, yaw)
+    turn = multiply((-x, -y, -z, w), quat_xyzw)
+    roll = 2 * (math.atan2(turn[0], turn[3]) if turn[3] >= 0 else math.atan2(-turn[0], -turn[3]))
+    return (_whole_degree(roll), pitch, yaw)
 
 
 def _whole_degree(angle: float) -> float:

@@ -1,0 +1,82 @@
+"""Golden files: what build writes for the example robots, byte for byte.
+
+After an intended change: ``TFCOMPOSE_UPDATE_GOLDEN=1 pytest tests/golden``, and read the difference.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+ROBOTS = HERE.parents[1] / "robots"
+CASES = {
+    "my_robot": ("my_robot.yaml",),
+    "autonomous_robot": ("autonomous_robot.yaml",),
+    "autonomous_robot.demo": ("autonomous_robot.yaml", "--profile", "demo"),
+}
+
+
+def build(words: tuple[str, ...], output: Path, cwd: Path, **environment: str) -> dict[str, bytes]:
+    """Build with a process of its own and return the files, by their path below the output folder."""
+    subprocess.run(
+        [sys.executable, "-m", "tfcompose", "build", *words, "-o", str(output)],
+        cwd=cwd,
+        env=os.environ | environment,
+        check=True,
+        capture_output=True,
+    )
+    return contents(output)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_build_writes_the_golden_files_byte_for_byte(case: str, tmp_path: Path) -> None:
+    file, *options = CASES[case]
+    built = build((f"robots/{file}", *options), tmp_path / "out", HERE.parents[1])
+    golden = HERE / case
+    if os.environ.get("TFCOMPOSE_UPDATE_GOLDEN"):
+        shutil.rmtree(golden, ignore_errors=True)
+        shutil.copytree(tmp_path / "out", golden)
+    assert built == contents(golden)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_files_do_not_depend_on_folder_spelling_of_the_path_or_hash_seed(case: str, tmp_path: Path) -> None:
+    file, *options = CASES[case]
+    golden = contents(HERE / case)
+    shutil.copy(ROBOTS / file, tmp_path / file)
+    assert build((file, *options), tmp_path / "a", ROBOTS, PYTHONHASHSEED="1") == golden
+    assert build((str(ROBOTS / file), *options), tmp_path / "b", tmp_path, PYTHONHASHSEED="2") == golden
+    assert build((f"../{tmp_path.name}/{file}", *options), tmp_path / "c", tmp_path) == golden
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_building_over_an_earlier_build_leaves_the_same_files(case: str, tmp_path: Path) -> None:
+    output = tmp_path / "out"
+    for other in ("autonomous_robot", "my_robot", case):  # the first has a parameter file that the others have not
+        file, *options = CASES[other]
+        built = build((f"robots/{file}", *options), output, HERE.parents[1])
+    assert built == contents(HERE / case)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_no_file_holds_an_absolute_path_or_a_date(case: str) -> None:
+    for name, data in contents(HERE / case).items():
+        text = data.decode()
+        for root in ("/home", "/tmp", "/usr", "/opt", "/root", str(ROBOTS.parent)):
+            assert root not in text, name
+        assert not re.search(r"\b20\d\d-\d\d|\b\d\d:\d\d:\d\d", text), name
+        assert text.endswith("\n")
+        assert "\r" not in text
+        assert "-0.0" not in re.sub(r"-0\.0\d*[1-9]", "", text), f"{name} holds a negative zero"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.check import check
-from tfcompose.diagnostic import Diagnostic, RejectedError, Span
+from tfcompose.check import apply, check
+from tfcompose.diagnostic import Allow, Diagnostic, RejectedError, Span
 from tfcompose.load import Source, load, with_profiles
 from tfcompose.resolve import Library, resolve
 from tfcompose.validate import validate
@@ -23,10 +23,15 @@ _FROM_A_POSE = frozenset({"TF401", "TF404", "TF405"})
 
 @dataclass(frozen=True, slots=True)
 class Compiled:
-    """A robot and everything that was found; ``robot`` is None where the text did not get that far."""
+    """A robot and everything that was found; ``robot`` is None where the text did not get that far.
+
+    ``allows`` are the comments that let findings stand, ``used`` those that did, with the code.
+    """
 
     robot: Robot | None
     found: tuple[Diagnostic, ...]
+    allows: tuple[Allow, ...] = ()
+    used: frozenset[tuple[Allow, str]] = frozenset()
 
     @property
     def errors(self) -> tuple[Diagnostic, ...]:
@@ -52,8 +57,9 @@ def compile_source(source: Source, library: Library, profiles: Sequence[str] = (
     resolved = resolve(validated, library)
     later = [*resolved.found, *check(resolved.robot)]
     found = [*validated.found, *(one for one in later if _stands(one, validated))]
-    ordered = sorted(dict.fromkeys(found), key=lambda one: one.sort_key)
-    return Compiled(resolved.robot, tuple(ordered))
+    kept, used = apply(dict.fromkeys(found), source.allows)
+    ordered = sorted(kept, key=lambda one: one.sort_key)
+    return Compiled(resolved.robot, tuple(ordered), source.allows, frozenset(used))
 
 
 def _stands(found: Diagnostic, validated: Validated) -> bool:

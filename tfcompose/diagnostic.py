@@ -61,6 +61,16 @@ class Diagnostic:
         return (at.file, at.line, at.column, self.code, self.message)
 
 
+@dataclass(frozen=True, slots=True)
+class Allow:
+    """A comment in a file that lets findings with these codes stand on ``line``, and says why."""
+
+    codes: tuple[str, ...]
+    line: int
+    reason: str
+    at: Span
+
+
 class RejectedError(Exception):
     """Raised by a stage that cannot go on; it holds everything that the stage found, in order."""
 
@@ -108,6 +118,8 @@ CODES = {
     "TF009": "unknown_profile",
     "TF010": "overlay_removes_nothing",
     "TF011": "bad_merge",
+    "TF012": "allow_allows_nothing",
+    "TF013": "allow_without_reason",
     # validate: keys, types, values
     "TF101": "unknown_key",
     "TF102": "missing_key",

@@ -10,6 +10,8 @@ from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from tfcompose import __version__
+from tfcompose.check import idle
 from tfcompose.cli.compiling import library
 from tfcompose.cli.options import DEFAULT_FILE, add_profiles
 from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
@@ -24,11 +26,14 @@ if TYPE_CHECKING:
     from tfcompose.resolve import Library
 
 
+FORMATS = ("text", "json", "sarif", "github")
+
+
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("files", nargs="*", metavar="FILE", default=[DEFAULT_FILE], help="default: robot.yaml")
     add_profiles(parser, "check this combination only")
-    parser.add_argument("--format", choices=("text", "json"), default="text", help="default: text")
+    parser.add_argument("--format", choices=FORMATS, default="text", help="default: text")
     parser.add_argument(
         "--fail-on", choices=("error", "warning"), default="error", help="what makes the exit code 1; default: error"
     )
@@ -40,14 +45,24 @@ def run(arguments: Namespace) -> int:
     found: list[Diagnostic] = []
     for file in dict.fromkeys(arguments.files):
         found += lint_file(file, presets, arguments.profiles)
-    if arguments.format == "json":
-        sys.stdout.write(import_module("tfcompose.render.json").render_json(found))
-    else:
-        print_findings(found, sys.stdout)
-        sys.stdout.write(summary(found, len(set(arguments.files))))
+    _print(found, arguments.format, len(set(arguments.files)))
     if unreadable(found):
         return UNREADABLE
     return int(any(one.severity == "error" or arguments.fail_on == "warning" for one in found))
+
+
+def _print(found: list[Diagnostic], form: str, files: int) -> None:
+    if form == "text":
+        print_findings(found, sys.stdout)
+        sys.stdout.write(summary(found, files))
+    elif form == "json":
+        sys.stdout.write(import_module("tfcompose.render.json").render_json(found))
+    elif form == "github":
+        sys.stdout.write(import_module("tfcompose.render.github").render_github(found))
+    else:
+        page = import_module("tfcompose.check.pages").page
+        pages = {one.code: page(one.code) for one in found}
+        sys.stdout.write(import_module("tfcompose.render.sarif").render_sarif(found, __version__, pages))
 
 
 def lint_file(file: str, presets: Library, profiles: list[str]) -> list[Diagnostic]:
@@ -58,13 +73,19 @@ def lint_file(file: str, presets: Library, profiles: list[str]) -> list[Diagnost
         return list(error.diagnostics)
     if profiles:
         return list(compile_source(source, presets, profiles).found)
-    found = list(compile_source(source, presets).found)
+    alone = compile_source(source, presets)
+    found, used, looked = list(alone.found), set(alone.used), alone.robot is not None
     for profile in profiles_of(source):
         note = Note(f"with --profile {profile}")
         known = {(one.code, one.message, one.span) for one in found}
+        variant = compile_source(source, presets, [profile])
+        used |= variant.used
+        looked = looked and variant.robot is not None
         found += [
             replace(one, notes=(*one.notes, note))
-            for one in compile_source(source, presets, [profile]).found
+            for one in variant.found
             if (one.code, one.message, one.span) not in known
         ]
+    if looked:  # else a comment may be about what was not looked at
+        found += idle(source.allows, used)
     return sorted(found, key=lambda one: one.sort_key)

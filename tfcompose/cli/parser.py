@@ -26,6 +26,8 @@ COMMANDS = {
     "echo": "the live pose of B in A",
     "tree": "the tree with kinds, owners and poses",
     "pose": "the pose of B in A, from the spec alone",
+    "explain": "a code's page, or the chain between two frames",
+    "diff": "what moved or changed owner between two robots",
     "schema": "the JSON Schema of the language",
 }
 

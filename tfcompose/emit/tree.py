@@ -37,6 +37,12 @@ def _row(name: str, edge: Edge | None, width: int, owners: int) -> str:
     return said.rstrip()
 
 
+def edge_facts(edge: Edge) -> str:
+    """Return kind, owner, rate and pose of an edge, in one line."""
+    rate = f"{number(edge.rate)} Hz" if edge.rate else ""
+    return "  ".join(part for part in (edge.kind, f"by {edge.owner}", rate, _pose(edge)) if part)
+
+
 def _pose(edge: Edge) -> str:
     parts = []
     xyz = clean_xyz(edge.pose.xyz)

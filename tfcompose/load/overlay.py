@@ -70,7 +70,8 @@ def lay_over(base: Source, overlay: Source) -> Source:
     """Return ``base`` with ``overlay`` merged into it; each key remembers where it is from."""
     merger = _Merger(base)
     merger.merge(merger.data, overlay.data, overlay, ())
-    return Source(base.file, merger.data, merger.values, merger.keys, (*base.found, *merger.found))
+    found, allows = (*base.found, *merger.found), (*base.allows, *overlay.allows)
+    return Source(base.file, merger.data, merger.values, merger.keys, found, allows)
 
 
 class _Merger:
@@ -148,7 +149,7 @@ def _without(source: Source, key: str) -> Source:
     data = {name: value for name, value in source.data.items() if name != key}
     values = {path: span for path, span in source.values.items() if path[:1] != (key,)}
     keys = {path: span for path, span in source.keys.items() if path[:1] != (key,)}
-    return Source(source.file, data, values, keys, source.found)
+    return replace(source, data=data, values=values, keys=keys)
 
 
 def _without_nulls(source: Source) -> Source:
@@ -173,7 +174,7 @@ def _without_nulls(source: Source) -> Source:
         return {key: clean(item, (*path, key)) for key, item in value.items() if item is not None}
 
     data = clean(source.data, ())
-    return Source(source.file, data, source.values, source.keys, (*source.found, *found))
+    return replace(source, data=data, found=(*source.found, *found))
 
 
 def _wrong_profiles(source: Source) -> list[Diagnostic]:

@@ -8,7 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, finding
+from tfcompose.diagnostic import Allow, Diagnostic, Note, RejectedError, Span, finding
+from tfcompose.load.comments import allows_in
 from tfcompose.load.nodes import DEEPEST, Node, compose
 from tfcompose.load.scalars import MAP, SCALAR_TAGS, SEQ, STR, TAG, scalar
 
@@ -30,6 +31,7 @@ class Source:
     values: dict[Path, Span]
     keys: dict[Path, Span]
     found: tuple[Diagnostic, ...] = field(default=(), compare=False)
+    allows: tuple[Allow, ...] = field(default=(), compare=False)
 
     def at(self, path: Path) -> Span:
         """Return the place of the value, or of the nearest mapping or list around it that has one."""
@@ -76,7 +78,7 @@ def load(text: str, file: str) -> Source:
         message = f"the file is {what}, not a mapping of keys and values"
         raise RejectedError([finding("TF002", message, span, help="a robot begins with: tfcompose: 1")])
     data = walk.value(node, ())
-    return Source(file, data, walk.values, walk.keys, tuple(walk.found))
+    return Source(file, data, walk.values, walk.keys, tuple(walk.found), allows_in(text, file))
 
 
 class _Walk:

@@ -1,0 +1,62 @@
+"""``# tfcompose: allow TF301 because …``: findings that a person has looked at and lets stand.
+
+The comment stands on the line that the finding is about, or alone on the line above. Findings about text and keys (TF0
+and TF1) cannot be allowed: they say that the file was not understood.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import CODES, Allow, Diagnostic, did_you_mean, finding
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+
+def can_be_allowed(code: str) -> bool:
+    """Return whether findings of the code can be let stand."""
+    return code in CODES and code[:3] not in {"TF0", "TF1"}
+
+
+def apply(found: Iterable[Diagnostic], allows: Sequence[Allow]) -> tuple[list[Diagnostic], set[tuple[Allow, str]]]:
+    """Return the findings that are not allowed, and which comments let something stand, by code."""
+    kept: list[Diagnostic] = []
+    used: set[tuple[Allow, str]] = set()
+    for one in found:
+        allowing = [allow for allow in allows if _covers(allow, one)]
+        if allowing and can_be_allowed(one.code):
+            used.update((allow, one.code) for allow in allowing)
+        else:
+            kept.append(one)
+    return kept, used
+
+
+def _covers(allow: Allow, found: Diagnostic) -> bool:
+    at = found.span
+    return at is not None and at.file == allow.at.file and at.line == allow.line and found.code in allow.codes
+
+
+def idle(allows: Sequence[Allow], used: set[tuple[Allow, str]]) -> list[Diagnostic]:
+    """Return a finding for each comment that allows nothing, cannot allow what it names, or does not say why."""
+    found = []
+    for allow in allows:
+        if not allow.codes:
+            found.append(
+                finding("TF012", "allow names no code", allow.at, help="allow TF401 because …", severity="warning")
+            )
+        for code in allow.codes:
+            message = ""
+            if code not in CODES:
+                message = f"allow {code}: there is no such code"
+            elif not can_be_allowed(code):
+                message = f"allow {code}: {CODES[code]} cannot be allowed"
+            elif (allow, code) not in used:
+                message = f"allow {code}: there is no {CODES[code]} here"
+            if message:
+                advice = did_you_mean(code, CODES, "remove it") if code not in CODES else "remove it"
+                found.append(finding("TF012", message, allow.at, help=advice, severity="warning"))
+        if allow.codes and not allow.reason:
+            message = f"allow {', '.join(allow.codes)} does not say why"
+            found.append(finding("TF013", message, allow.at, help="add: because …", severity="warning"))
+    return found

@@ -1,0 +1,161 @@
+"""What there is to say about each code: for a rule its docstring, for the others the text here.
+
+A page's first line says what is wrong; what follows says why it matters and what to do.
+"""
+
+from __future__ import annotations
+
+import inspect
+
+from tfcompose.check.check import RULES
+from tfcompose.diagnostic import CODES
+
+
+def page(code: str) -> str:
+    """Return the page of a code.
+
+    Raises:
+        KeyError: if there is no such code.
+    """
+    for rule in RULES:
+        if rule.code == code:
+            return inspect.getdoc(rule.check) or ""
+    return PAGES[code]
+
+
+def code_of(word: str) -> str | None:
+    """Return the code that a code or a name means, or None."""
+    upper = word.upper()
+    return upper if upper in CODES else next((code for code, name in CODES.items() if name == word), None)
+
+
+PAGES = {
+    "TF001": """A file cannot be read, or is no text.
+
+A robot file is UTF-8 text. Check the name, and that it is a file that you may read.""",
+    "TF002": """The file is not YAML, not one document, or not a mapping.
+
+The place is where reading stopped; the fault is there or just above. A robot file is one mapping and begins with
+tfcompose: 1.""",
+    "TF003": """A key is given twice in one mapping.
+
+YAML readers take one of the two without a word. Keep the one that is meant.""",
+    "TF004": """A key is a number, true, false, null, a list or a mapping.
+
+Names are texts. Put the key in quotes.""",
+    "TF005": """A value carries a tag that the language does not have.
+
+Tags such as !degrees are not used: a text may carry a unit instead, 15 deg.""",
+    "TF006": """A key has no value.
+
+map: says nothing; map: {} says that there is such a frame. In an overlay, null removes a key.""",
+    "TF007": """A number is not finite.
+
+Infinity and NaN have no place in a robot; tf2 drops transforms that hold one.""",
+    "TF008": """The file is larger, deeper, or by its aliases longer than a robot can be.
+
+The limits keep a mistake, or a file that is meant to do harm, from taking all memory.""",
+    "TF009": """There is no such profile.
+
+Profiles are the entries of the section profiles.""",
+    "TF010": """An overlay removes a key that is not there.
+
+Probably the key has another name, or the overlay is out of date.""",
+    "TF011": """<< does not name a mapping.
+
+<< takes an alias of a mapping, or a list of such aliases.""",
+    "TF012": """A comment allows a finding that is not there.
+
+The fault has been mended, or the code is another. Remove the comment, so that it does not hide the next fault.""",
+    "TF013": """A comment allows a finding and does not say why.
+
+Write the reason behind it: allow TF401 because the lens is turned.""",
+    "TF101": """A key is not known here.
+
+Probably it is misspelt; unknown keys are refused, because a key that is silently dropped is a frame in the wrong
+place.""",
+    "TF102": """A key is missing.
+
+Without it the entry has no meaning.""",
+    "TF103": """A value is of another kind than expected: a text for a number, a list of another length.""",
+    "TF104": """A unit is not known, or is of another kind of quantity.
+
+Bare numbers are SI: m, rad, kg, s, Hz. A text may carry a unit: 30 cm, 15 deg, 50 Hz, 200 ms.""",
+    "TF105": """An expression ${…} cannot be computed.
+
+It may hold vars, quantities, pi, + - * / ( ), and sin cos tan sqrt radians degrees.""",
+    "TF106": """A value is not one of those that are allowed here.""",
+    "TF107": """Two keys exclude each other.
+
+A rotation is written in one way, a process runs in one way, a shape has one form.""",
+    "TF402": """A quaternion does not have length 1.
+
+tf2 drops transforms whose quaternion is off, and the frame never appears. Write the digits that are missing, or check
+the order: x, y, z, w.""",
+    "TF403": """A matrix is no rotation.
+
+Its rows are not orthonormal, or it mirrors. It holds three rows; column i is the child's axis i in the parent.""",
+    "TF404": """A pose cannot be solved.
+
+relative_to and place go through fixed edges only: what moves has no pose before the robot runs.""",
+    "TF405": """A sensor is placed through values that its driver replaces.
+
+The pose is that of a frame whose edge the driver publishes with its own unit's calibration. The mount is solved with
+the nominal values, so the frame ends up off by the difference. Give this unit's values under sensors.NAME.frames.""",
+    "TF502": """One name is used for two things.
+
+Sensors and processes share one name space, because a sensor's driver is a process; joints share another.""",
+    "TF601": """There is no such preset.
+
+tfcompose schema and the README list the presets that come with it.""",
+    "TF603": """A preset does not have this option, or not this value of it.""",
+    "TF604": """A driver cannot do what is asked.
+
+It has no switch for its frames, there is no driver, or the parameter is one that tfcompose computes.""",
+    "TF703": """A stand-in names a joint that does not move or does not exist.""",
+    "TF801": """A node publishes an edge that another process owns.
+
+tf2 takes whatever came last, so the frame jumps between two values. The finding names the node. End it, or switch its
+TF off.""",
+    "TF802": """A frame was seen under a second parent.
+
+tf2 keeps the parent of the newest message: everything below the frame jumps.""",
+    "TF803": """An edge was seen that nobody declared.
+
+Declare it, or allow it under guard: allow. guard: unknown_edges says how much it matters.""",
+    "TF804": """An owner sends nothing any more, or is gone.
+
+For an edge with a rate: nothing came for four periods, and at least 0.6 s. For fixed edges: the publisher left.""",
+    "TF805": """An owner sends less often than its edge declares.
+
+Listeners interpolate over longer gaps, and lookups near now fail. Below 80 % of the declared rate over 2 s.""",
+    "TF806": """A publisher on /tf_static is volatile.
+
+Listeners ask for transient_local and DDS does not connect the two: nobody receives these frames.""",
+    "TF807": """An edge of the plan was published before the start.
+
+Starting would give it two publishers. End the node that is named, or make it the owner.""",
+    "TF808": """A process ended that should run, or could not be started.
+
+Its last lines are with the finding.""",
+    "TF809": """An owner sends its edge on the wrong topic.
+
+Fixed edges belong on /tf_static, moving ones on /tf; tf2 throws its history away when an edge changes between them.""",
+    "TF810": """An executable was not found.
+
+The finding says where it was looked for. A package's programs are found once its setup file was sourced.""",
+    "TF811": """An edge was not published while the plan ran.
+
+Its owner is named: a process that somebody else starts may not be running, or its node has another name.""",
+    "TF813": """A process waits for one that is not there.""",
+    "TF814": """There is no live pose of one frame in another.
+
+A frame is unknown, the two are in two trees, their edges have no time in common, or nothing is published at all.""",
+    "TF901": """ROS 2 is missing, or cannot be used.""",
+    "TF902": """A plan cannot be used: it is not one, not whole, or of another version.
+
+Build it again.""",
+    "TF903": """A rule crashed.
+
+The other rules went on. This is a fault of tfcompose; please report it with the robot file.""",
+}

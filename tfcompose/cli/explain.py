@@ -1,0 +1,84 @@
+"""``tfcompose explain``: a code's page, or the chain between two frames.
+
+Explain a code (TF301) or a rule's name: what is wrong, why it matters, what to do. Or, with FILE A B, show the chain
+from A to B: each edge with its owner, its pose and its place in the file.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+from tfcompose.check.pages import code_of, page
+from tfcompose.cli.compiling import robot_or_code
+from tfcompose.cli.options import add_profiles
+from tfcompose.cli.terminal import UNREADABLE, complain
+from tfcompose.diagnostic import CODES, did_you_mean
+from tfcompose.emit.tree import edge_facts
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+
+    from tfcompose.model import Edge, Robot
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument(
+        "what", nargs="+", metavar="CODE|FILE A B", help="a code, a rule's name, or a file and two frames"
+    )
+    add_profiles(parser, "lay this profile over the file")
+
+
+def run(arguments: Namespace) -> int:
+    """Print the page or the chain; exit code 1 if a frame is not there, 2 for wrong use."""
+    words = arguments.what
+    if len(words) == 1:
+        return _explain_code(words[0])
+    if len(words) != 3:  # noqa: PLR2004 (FILE A B)
+        complain("explain takes a code, or FILE A B")
+        return UNREADABLE
+    robot = robot_or_code(words[0], arguments.profiles)
+    return robot if isinstance(robot, int) else _explain_chain(robot, words[1], words[2])
+
+
+def _explain_code(word: str) -> int:
+    code = code_of(word)
+    if code is None:
+        complain(f"no code {word}; {did_you_mean(word, [*CODES, *CODES.values()], 'lint prints codes: TF301')}")
+        return UNREADABLE
+    sys.stdout.write(f"{code} {CODES[code]}\n\n{page(code)}\n")
+    return 0
+
+
+def _explain_chain(robot: Robot, a: str, b: str) -> int:
+    for frame in (a, b):
+        if frame not in robot.frames:
+            complain(f"no frame {frame}; {did_you_mean(frame, robot.frames, f'{robot.file} has other frames')}")
+            return 1
+    up, down = _ancestry(robot, a), _ancestry(robot, b)
+    shared = {id(edge) for edge in up} & {id(edge) for edge in down}
+    rising = [edge for edge in up if id(edge) not in shared]
+    falling = [edge for edge in down if id(edge) not in shared]
+    if (rising[-1].parent if rising else a) != (falling[-1].parent if falling else b):
+        complain(f"{a} and {b} are in two trees")
+        return 1
+    lines = [f"pose of {b} in {a}\n"]
+    lines += [f"  up    {_line(edge)}" for edge in rising]
+    lines += [f"  down  {_line(edge)}" for edge in reversed(falling)]
+    sys.stdout.write("".join(lines))
+    return 0
+
+
+def _ancestry(robot: Robot, frame: str) -> list[Edge]:
+    chain = []
+    while edge := robot.parent_edge(frame):
+        chain.append(edge)
+        frame = edge.parent
+    return chain
+
+
+def _line(edge: Edge) -> str:
+    facts = edge_facts(edge)
+    inside = f" (inside {edge.sensor})" if edge.sensor and not edge.given else ""
+    return f"{edge.name}\n          {facts}\n          {edge.at}{inside}\n"

@@ -1,0 +1,296 @@
+"""Bad input, with real processes: one clear finding with its place, exit 1 or 2, no traceback, nothing written."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+GOOD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
+ROBOTS = Path(__file__).parents[2] / "robots"
+
+
+def tfcompose(*words: str, cwd: Path, text: str = "", **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "tfcompose", *words],
+        cwd=cwd,
+        env=os.environ | environment,
+        input=text,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+def nested_aliases() -> str:
+    """Return 10 MB that would be 9 to the power of many values if the aliases were followed."""
+    lines = ["tfcompose: 1", "robot: r", "x-a0: &a0 [x, x, x, x, x, x, x, x, x]"]
+    lines += [f"x-a{n + 1}: &a{n + 1} [{', '.join([f'*a{n}'] * 9)}]" for n in range(190_000)]
+    return "\n".join([*lines, "links: {base_link: {visual: *a190000}}", ""])
+
+
+def small_bomb() -> str:
+    lines = ["tfcompose: 1", "robot: r", "x-a0: &a0 {a: 1, b: 1, c: 1, d: 1, e: 1, f: 1, g: 1, h: 1, i: 1}"]
+    lines += [f"x-a{n + 1}: &a{n + 1} {{{', '.join(f'{k}: *a{n}' for k in 'abcdefghi')}}}" for n in range(30)]
+    return "\n".join([*lines, "links: *a30", ""])
+
+
+BAD: dict[str, tuple[bytes, str, tuple[int, int], int]] = {  # text, code, place, exit code
+    "empty": (b"", "TF002", (1, 1), 1),
+    "only a comment": (b"# nothing\n", "TF002", (1, 1), 1),
+    "binary": (bytes(range(256)), "TF001", (2, 118), 2),
+    "a NUL": (b"tfcompose: 1\nrobot: \0\n", "TF001", (2, 1), 2),
+    "latin-1": ("tfcompose: 1\nrobot: k\xe4se\n".encode("latin-1"), "TF001", (2, 9), 2),
+    "a list": (b"- tfcompose: 1\n", "TF002", (1, 1), 1),
+    "a tab": (b"tfcompose: 1\nlinks:\n\tbase_link: {}\n", "TF002", (3, 1), 1),
+    "a bracket open": (b"tfcompose: 1\nrobot: [r\nlinks: {}\n", "TF002", (3, 6), 1),
+    "two documents": (GOOD.encode() + b"---\na: 1\n", "TF002", (4, 1), 1),
+    "aliases, 10 MB": (nested_aliases().encode(), "TF008", (1, 1), 1),
+    "aliases, small": (small_bomb().encode(), "TF008", (3, 51), 1),
+    "depth": (b"tfcompose: 1\nrobot: " + b"[" * 100_000, "TF008", (2, 47), 1),
+    "an anchor that is not there": (b"tfcompose: 1\nrobot: *r\n", "TF002", (2, 8), 1),
+    "a name with quotes": (GOOD.encode() + b"frames: {'\"q\"': {parent: base_link}}\n", "TF501", (4, 10), 1),
+    "a name with &": (GOOD.encode() + b"frames: {a&b: {parent: base_link}}\n", "TF501", (4, 10), 1),
+    "NaN": (GOOD.encode() + b"frames: {a: {parent: base_link, xyz: [.nan, 0, 0]}}\n", "TF007", (4, 39), 1),
+    "a preset that is not there": (
+        GOOD.encode() + b"sensors: {a: {parent: base_link, preset: generic/lidar}}\n",
+        "TF601",
+        (4, 42),
+        1,
+    ),
+    "a process named as a path": (
+        GOOD.encode() + b"processes: {../../x: {run: {package: a, executable: b}, params: {c: 1}}}\n",
+        "TF501",
+        (4, 13),
+        1,
+    ),
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Return a folder in a folder, so that what is written outside of it is seen too."""
+    made = tmp_path / "in" / "here"
+    made.mkdir(parents=True)
+    return made
+
+
+def everything_below(folder: Path) -> list[str]:
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*"))
+
+
+@pytest.mark.parametrize("case", BAD)
+@pytest.mark.parametrize("command", ["lint", "build", "tree"])
+def test_a_bad_file_gives_one_finding_with_its_place_and_nothing_is_written(
+    case: str, command: str, folder: Path, tmp_path: Path
+) -> None:
+    data, code, (line, column), exit_code = BAD[case]
+    (folder / "robot.yaml").write_bytes(data)
+    before = everything_below(tmp_path)
+    began = time.monotonic()
+    done = tfcompose(command, cwd=folder)
+    assert time.monotonic() - began < 20
+    said = done.stdout + done.stderr
+    assert done.returncode == exit_code, said
+    assert f"robot.yaml:{line}:{column}: error[{code}]" in said
+    assert said.count("error[") == 1
+    assert "Traceback" not in said
+    assert len(said) < 3000
+    assert everything_below(tmp_path) == before
+
+
+@pytest.mark.parametrize("command", ["lint", "build", "tree"])
+@pytest.mark.parametrize("kind", ["missing", "folder", "fifo", "a file as a folder", "unreadable"])
+def test_what_cannot_be_read_is_one_finding_and_exit_2(command: str, kind: str, folder: Path, tmp_path: Path) -> None:
+    file = folder / "robot.yaml"
+    words = [command, "robot.yaml"]
+    if kind == "folder":
+        file.mkdir()
+    elif kind == "fifo":
+        os.mkfifo(file)
+    elif kind == "a file as a folder":
+        file.write_text(GOOD)
+        words = [command, "robot.yaml/robot.yaml"]
+    elif kind == "unreadable":
+        file.write_text(GOOD)
+        file.chmod(0)
+        if os.access(file, os.R_OK):
+            pytest.skip("this user may read everything")
+    before = everything_below(tmp_path)
+    done = tfcompose(*words, cwd=folder)
+    said = done.stdout + done.stderr
+    assert done.returncode == 2
+    assert said.count("error[TF001]") == 1
+    assert "Traceback" not in said
+    assert everything_below(tmp_path) == before
+
+
+WRONG_USE = {
+    "no command": (),
+    "unknown command": ("lnit",),
+    "unknown option of no command": ("--froce",),
+    "unknown option": ("lint", "--froce"),
+    "abbreviated option": ("lint", "--form", "json"),
+    "unknown format": ("lint", "--format", "xml"),
+    "too many files": ("build", "robot.yaml", "other.yaml"),
+    "too few words": ("pose", "robot.yaml", "a"),
+    "a NUL is no name": ("lint", ""),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_USE)
+def test_wrong_use_is_exit_2_and_says_what_there_is(case: str, folder: Path, tmp_path: Path) -> None:
+    (folder / "robot.yaml").write_text(GOOD)
+    before = everything_below(tmp_path)
+    done = tfcompose(*WRONG_USE[case], cwd=folder)
+    assert done.returncode == 2
+    assert done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+    assert everything_below(tmp_path) == before
+
+
+def test_a_command_that_is_nearly_one_is_named(folder: Path) -> None:
+    assert tfcompose("lnit", cwd=folder).stderr == "tfcompose: there is no command lnit; did you mean lint?\n"
+
+
+def test_an_unknown_profile_is_named_with_the_nearest_one(folder: Path) -> None:
+    done = tfcompose("build", str(ROBOTS / "my_robot.yaml"), "--profile", "dmeo", cwd=folder)
+    assert done.returncode == 1
+    assert "error[TF009] no profile dmeo" in done.stderr
+    assert "did you mean demo?" in done.stderr
+    assert not everything_below(folder)
+
+
+def test_an_unknown_frame_is_named_with_the_nearest_one(folder: Path) -> None:
+    done = tfcompose("pose", str(ROBOTS / "my_robot.yaml"), "base_link", "laser_lnik", cwd=folder)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == "tfcompose: no frame laser_lnik; did you mean laser_link?\n"
+
+
+def test_text_that_steers_a_terminal_is_shown_and_not_obeyed(folder: Path) -> None:
+    (folder / "robot.yaml").write_text(GOOD + '"a\\e[2J\\nb": 1\n')
+    done = tfcompose("lint", cwd=folder)
+    assert "\033" not in done.stdout
+    assert "unknown key a\\x1b[2J\\nb" in done.stdout
+
+
+def test_output_that_the_terminal_cannot_show_is_escaped(folder: Path) -> None:
+    done = tfcompose("tree", str(ROBOTS / "my_robot.yaml"), cwd=folder, PYTHONIOENCODING="ascii")
+    assert done.returncode == 0
+    assert "\\u2500" in done.stdout
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+def test_output_that_cannot_be_written_is_one_sentence(folder: Path) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "tfcompose", "tree", str(ROBOTS / "my_robot.yaml")],
+            cwd=folder, stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+        )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr == "tfcompose: the output cannot be written: No space left on device\n"
+
+
+def test_a_reader_that_goes_away_causes_no_traceback(folder: Path) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer, "w") as gone:
+        done = subprocess.run(
+            [sys.executable, "-m", "tfcompose", "tree", str(ROBOTS / "autonomous_robot.yaml")],
+            cwd=folder, stdout=gone, stderr=subprocess.PIPE, text=True, check=False,
+        )  # fmt: skip
+    assert (done.returncode, done.stderr) == (141, "")
+
+
+def test_a_pipe_that_is_open_already_is_read(folder: Path) -> None:
+    done = tfcompose("lint", "/dev/stdin", cwd=folder, text=GOOD)
+    assert (done.returncode, done.stdout) == (0, "no findings in 1 file\n")
+
+
+def test_lint_in_json_is_a_list_of_findings_as_the_contract_has_them(folder: Path) -> None:
+    (folder / "robot.yaml").write_text(GOOD + "frames: {a: {parent: base_link}}\nframes: {}\ngaurd: {}\n")
+    done = tfcompose("lint", "--format", "json", cwd=folder)
+    assert done.returncode == 1
+    found = json.loads(done.stdout)
+    assert found == [
+        {
+            "code": "TF003",
+            "name": "duplicate_key",
+            "severity": "error",
+            "message": "the key frames is given twice",
+            "file": "robot.yaml",
+            "line": 5,
+            "column": 1,
+            "end_line": 5,
+            "end_column": 7,
+            "help": "",
+            "notes": [{"message": "it stands here first", "file": "robot.yaml", "line": 4, "column": 1}],
+        },
+        {
+            "code": "TF101",
+            "name": "unknown_key",
+            "severity": "error",
+            "message": "unknown key gaurd",
+            "file": "robot.yaml",
+            "line": 6,
+            "column": 1,
+            "end_line": 6,
+            "end_column": 6,
+            "help": "did you mean guard?",
+            "notes": [],
+        },
+    ]
+
+
+def test_lint_in_json_without_findings_is_an_empty_list_and_a_missing_file_is_a_finding(folder: Path) -> None:
+    (folder / "robot.yaml").write_text(GOOD)
+    assert json.loads(tfcompose("lint", "--format", "json", cwd=folder).stdout) == []
+    done = tfcompose("lint", "--format", "json", "nothing.yaml", cwd=folder)
+    assert done.returncode == 2
+    assert [(one["code"], one["file"], one["line"]) for one in json.loads(done.stdout)] == [
+        ("TF001", "nothing.yaml", 1)
+    ]
+
+
+def test_a_warning_fails_lint_only_where_it_is_asked_to(folder: Path) -> None:
+    text = GOOD + "sensors: {c: {preset: realsense/d435i, parent: base_link, place: c_color_frame}}\n"
+    (folder / "robot.yaml").write_text(text)
+    done = tfcompose("lint", cwd=folder)
+    assert done.returncode == 0
+    assert "warning[TF405]" in done.stdout
+    assert tfcompose("lint", "--fail-on", "warning", cwd=folder).returncode == 1
+
+
+def test_lint_shows_the_line_and_a_caret_under_the_place(folder: Path) -> None:
+    (folder / "robot.yaml").write_text(GOOD + "frames: {a: {parent: bas_link}}\n")
+    assert tfcompose("lint", cwd=folder).stdout == (
+        "robot.yaml:4:22: error[TF203] a hangs on bas_link, which is no frame\n"
+        "    4 | frames: {a: {parent: bas_link}}\n"
+        "      |                      ^^^^^^^^\n"
+        "   help: did you mean base_link?\n"
+        "1 error in 1 file\n"
+    )
+
+
+def test_lint_checks_a_file_with_each_of_its_profiles(folder: Path) -> None:
+    (folder / "robot.yaml").write_text(GOOD + "profiles: {one: {frames: {a: {parent: b}}}, two: {}}\n")
+    done = tfcompose("lint", cwd=folder)
+    assert done.returncode == 1
+    assert "with --profile one" in done.stdout
+    assert done.stdout.count("error[") == 1
+    assert tfcompose("lint", "--profile", "two", cwd=folder).returncode == 0
+
+
+def test_pose_in_json_is_the_pose_of_the_second_frame_in_the_first(folder: Path) -> None:
+    done = tfcompose("pose", str(ROBOTS / "my_robot.yaml"), "camera_link", "laser_link", "--format", "json", cwd=folder)
+    found = json.loads(done.stdout)
+    assert set(found) == {"parent", "child", "xyz", "quat_xyzw", "rpy"}
+    assert (found["parent"], found["child"]) == ("camera_link", "laser_link")
+    assert found["xyz"] == pytest.approx([-0.1, 0, 0.1])
+    assert found["quat_xyzw"] == [0, 0, 0, 1]

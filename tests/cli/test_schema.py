@@ -1,0 +1,96 @@
+"""The JSON Schema is fresh, takes what the compiler takes and refuses what it refuses."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from tfcompose.cli.compiling import library
+from tfcompose.cli.schema import schema_text
+from tfcompose.compile import compile_robot
+from tfcompose.load import load
+
+ROOT = Path(__file__).parents[2]
+HEAD = "tfcompose: 1\nrobot: r\n"
+LINKS = "links: {base_link: {}}\n"
+
+
+def validator(language: str) -> Any:
+    schema = json.loads(schema_text(language))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return jsonschema.Draft202012Validator(schema)
+
+
+@pytest.mark.parametrize("language", ["robot", "preset"])
+def test_the_schema_in_the_repository_is_fresh(language: str) -> None:
+    assert (ROOT / "schemas" / f"{language}.schema.json").read_text("utf-8") == schema_text(language)
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "robots").glob("*.yaml")), ids=lambda file: file.stem)
+def test_the_example_robots_are_valid(file: Path) -> None:
+    validator("robot").validate(load(file.read_text("utf-8"), file.name).data)
+    line = file.read_text("utf-8").splitlines()[0]
+    schema = re.fullmatch(r"# yaml-language-server: \$schema=(.*)", line)
+    assert schema
+    assert (file.parent / schema[1]).resolve() == ROOT / "schemas" / "robot.schema.json"
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "tfcompose/presets").rglob("*.yaml")), ids=lambda file: file.stem)
+def test_the_presets_are_valid(file: Path) -> None:
+    validator("preset").validate(load(file.read_text("utf-8"), file.name).data)
+
+
+FINE = [
+    "links: {base_link: {visual: {box: [1, 1, 30 cm]}, collision: same}}\n",
+    "links: {base_link: {visual: [{box: [1, 1, 1]}, {sphere: {radius: 1 m}, xyz: [0, 0, 1]}]}}\n",
+    LINKS + "frames: {a: {parent: base_link, look: down, static: false}}\n",
+    LINKS + "frames: {a: {parent: base_link, look: {down: 15 deg}}}\n",
+    LINKS + "sensors: {c: {preset: realsense/d435i, parent: base_link, tf: tfcompose, driver: none}}\n",
+    LINKS + "sensors: {c: {preset: realsense/d435i, parent: base_link, driver: {restart: always}}}\n",
+    LINKS + "processes: {a: {run: [python3, -m, x], restart: no}}\n",
+    LINKS + "processes: {a: {simulate: {joints: zero}}, b: {simulate: {joints: {}}}}\n",
+    "vars: {a: 30 cm}\nlinks: {base_link: {visual: {box: [1, 1, '${a}']}}}\n",
+]
+BROKEN = [
+    "gaurd: {}\n" + LINKS,
+    "links: {base_link: {visual: {box: [1, 1]}}}\n",
+    "links: {base_link: {colision: same}}\n",
+    LINKS + "frames: {a: {parent: 5}}\n",
+    LINKS + "frames: {a: {parent: base_link, look: sideways}}\n",
+    LINKS + "sensors: {c: {parent: base_link}}\n",
+    LINKS + "ros: {domain_id: 233}\n",
+    LINKS + "processes: {a: {run: [x], restart: sometimes}}\n",
+    LINKS + "guard: {mode: sleepy}\n",
+]
+
+
+@pytest.mark.parametrize("text", FINE)
+def test_what_the_compiler_takes_the_schema_takes(text: str) -> None:
+    assert not compile_robot(HEAD + text, "r.yaml", library()).errors
+    validator("robot").validate(load(HEAD + text, "r.yaml").data)
+
+
+@pytest.mark.parametrize("text", BROKEN)
+def test_what_the_compiler_refuses_by_its_form_the_schema_refuses(text: str) -> None:
+    assert compile_robot(HEAD + text, "r.yaml", library()).errors
+    assert not validator("robot").is_valid(load(HEAD + text, "r.yaml").data)
+
+
+def test_a_robot_without_its_name_or_version_is_refused() -> None:
+    assert not validator("robot").is_valid({"tfcompose": 1})
+    assert not validator("robot").is_valid({"robot": "r"})
+    assert not validator("robot").is_valid({"tfcompose": 2, "robot": "r"})
+    assert validator("robot").is_valid({"tfcompose": 1, "robot": "r", "x-mine": {"a": [1]}})
+
+
+def test_every_key_has_a_place_in_the_schema_and_every_mapping_says_what_it_is() -> None:
+    for language in ("robot", "preset"):
+        schema = json.loads(schema_text(language))
+        for definition in [schema, *schema["$defs"].values()]:
+            assert definition["description"]
+            assert definition["additionalProperties"] is False

@@ -59,8 +59,9 @@ def compose(text: str, file: str) -> Node | None:
     except yaml.MarkedYAMLError as error:
         raise RejectedError([_syntax(error, text, file)]) from None
     except yaml.reader.ReaderError as error:
-        before = text[: error.position]
-        line, column = before.count("\n") + 1, error.position - before.rfind("\n")
+        hit = yaml.reader.Reader.NON_PRINTABLE.search(text)  # the C parser's position counts bytes
+        position = hit.start() if hit else error.position
+        line, column = text.count("\n", 0, position) + 1, position - text.rfind("\n", 0, position)
         span = Span(file, line, column, line, column + 1)
         raise RejectedError([finding("TF002", "a character that YAML does not allow", span)]) from None
     except UnicodeEncodeError as error:

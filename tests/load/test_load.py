@@ -1,0 +1,299 @@
+"""YAML 1.2 with places; duplicates, merges and limits; overlays."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tfcompose.diagnostic import RejectedError, Span
+from tfcompose.load import Source, load, composed
+
+# YAML 1.2.2, section 10.3.2 (core schema). YAML 1.1 reads several of these otherwise.
+SCALARS: dict[str, Any] = {
+    "1e-3": 0.001,
+    "1E3": 1000.0,
+    "+12": 12,
+    "-0": 0,
+    "007": 7,
+    "0o17": 15,
+    "0x1F": 31,
+    "1_000": "1_000",
+    "0b11": "0b11",
+    "1:30": "1:30",
+    "1.": 1.0,
+    ".5": 0.5,
+    "-.5e1": -5.0,
+    ".": ".",
+    "1.2.3": "1.2.3",
+    "on": "on",
+    "off": "off",
+    "yes": "yes",
+    "no": "no",
+    "y": "y",
+    "true": True,
+    "False": False,
+    "tRue": "tRue",
+    "2001-12-14": "2001-12-14",
+    "=": "=",
+    "0o8": "0o8",
+    "'1'": "1",
+    '"true"': "true",
+    "!!str 1": "1",
+    "!!float 1": 1.0,
+    "30 cm": "30 cm",
+}
+
+
+@pytest.mark.parametrize("written", SCALARS)
+def test_a_scalar_is_read_as_yaml_1_2_reads_it(written: str) -> None:
+    value = load(f"a: {written}\n", "f").data["a"]
+    assert value == SCALARS[written]
+    assert type(value) is type(SCALARS[written])
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_every_float_reads_back_as_itself(value: float) -> None:
+    read = load(f"a: {value!r}\n", "f").data["a"]
+    assert math.copysign(1, read) == math.copysign(1, value)
+    assert read == value
+
+
+@given(st.integers(-(10**200), 10**200))
+def test_every_whole_number_reads_back_as_itself(value: int) -> None:
+    assert load(f"a: {value}\n", "f").data["a"] == value
+
+
+@pytest.mark.parametrize("written", [".nan", ".inf", "-.INF", "1e999", "9" * 400])
+def test_what_is_not_finite_is_a_finding_at_its_place(written: str) -> None:
+    found = load(f"a: {written}\n", "f").found
+    assert [(one.code, one.span) for one in found] == [("TF007", Span("f", 1, 4, 1, 4 + len(written)))]
+
+
+TEXT = """\
+robot: r
+links:
+  base_link: {visual: [1, 30 cm]}
+"käse": |
+  two
+  lines
+"""
+
+
+def test_keys_and_values_know_where_they_stand() -> None:
+    source = load(TEXT, "f")
+    assert source.at(("robot",)) == Span("f", 1, 8, 1, 9)
+    assert source.at_key(("robot",)) == Span("f", 1, 1, 1, 6)
+    assert source.at_key(("links", "base_link")) == Span("f", 3, 3, 3, 12)
+    assert source.at(("links", "base_link")) == Span("f", 3, 14, 3, 34)
+    assert source.at(("links", "base_link", "visual", 1)) == Span("f", 3, 27, 3, 32)
+    assert source.at_key(("käse",)) == Span("f", 4, 1, 4, 7)
+
+
+def test_what_is_not_there_has_the_place_of_what_is_around_it() -> None:
+    source = load(TEXT, "f")
+    assert source.at(("links", "base_link", "mass", "kg")) == source.at(("links", "base_link"))
+    assert source.at_key(("links", "arm")) == source.at_key(("links",))
+    assert Source("f", {}, {}, {}).at(("a",)) == Span("f")
+
+
+def test_the_first_of_two_equal_keys_counts_and_the_second_is_a_finding_that_shows_the_first() -> None:
+    source = load("a: 1\nb: 2\na: 3\n", "f")
+    assert source.data == {"a": 1, "b": 2}
+    (found,) = source.found
+    assert (found.code, found.span, found.notes[0].span) == ("TF003", Span("f", 3, 1, 3, 2), Span("f", 1, 1, 1, 2))
+
+
+MERGED = """\
+x-one: &one {a: 1, b: 1}
+x-two: &two {b: 2, c: 2}
+own: {<<: *one, b: 0}
+first: {<<: [*one, *two]}
+deep: {<<: {<<: *two, a: 3}, d: 3}
+quoted: {"<<": 1}
+"""
+
+
+def test_merges_give_what_is_missing_and_the_first_wins() -> None:
+    source = load(MERGED, "f")
+    assert not source.found
+    assert source.data == {
+        "own": {"a": 1, "b": 0},
+        "first": {"a": 1, "b": 1, "c": 2},
+        "deep": {"a": 3, "b": 2, "c": 2, "d": 3},
+        "quoted": {"<<": 1},
+    }
+    assert source.at(("own", "a")).line == 1
+    assert source.at(("own", "b")).line == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("a: {<<: 1}\n", "TF011"),
+        ("a: {<<: [{b: 1}, 2]}\n", "TF011"),
+        ("x-a: &a {b: 1, b: 2}\na: {<<: *a}\n", "TF003"),
+        ("x-a: &a {1: b}\na: {<<: *a}\n", "TF004"),
+        ("a: {<<: {b: 1}, <<: {c: 1}}\n", "TF003"),
+        ("1: a\n", "TF004"),
+        ("true: a\n", "TF004"),
+        ("[a]: b\n", "TF004"),
+        ("a: !mine b\n", "TF005"),
+        ("a: !!python/object:os.system b\n", "TF005"),
+        ("a: !!int b\n", "TF005"),
+        ("a: !!set {b, c}\n", "TF005"),
+    ],
+)
+def test_what_yaml_allows_and_a_robot_does_not_is_one_finding(text: str, code: str) -> None:
+    assert {one.code for one in load(text, "f").found} == {code}
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "line", "column"),
+    [
+        ("a: [1\nb: 2\n", "TF002", 2, 2),
+        ("a: 'b\n", "TF002", 2, 1),
+        ("\ta: 1\n", "TF002", 1, 1),
+        ("a:\n  b: 1\n c: 2\n", "TF002", 3, 2),
+        ("a: *b\n", "TF002", 1, 4),
+        ("a: 1\n--- \nb: 1\n", "TF002", 2, 1),
+        ("- 1\n", "TF002", 1, 1),
+        ("text\n", "TF002", 1, 1),
+        ("", "TF002", 1, 1),
+        ("ä: \x07\n", "TF002", 1, 4),
+        ('a: "x\\0y"\n', "TF002", 1, 4),
+        ('a: "\\ud800"\n', "TF002", 1, 7),
+        ("a: \ud800\n", "TF001", 1, 1),
+        ("a: \0\n", "TF001", 1, 1),
+    ],
+)
+def test_what_is_no_yaml_is_one_finding_with_its_place(text: str, code: str, line: int, column: int) -> None:
+    with pytest.raises(RejectedError) as rejected:
+        load(text, "f")
+    (found,) = rejected.value.diagnostics
+    assert (found.code, found.span and (found.span.line, found.span.column)) == (code, (line, column))
+
+
+def bomb(kind: str) -> str:
+    lines = ["a0: &a0 {k: 1}"]
+    for n in range(60):
+        inner = {"lists": f"[{', '.join([f'*a{n}'] * 9)}]", "maps": f"{{a: *a{n}, b: *a{n}, c: *a{n}}}"}
+        merge = f"{{<<: [*a{n}, *a{n}, *a{n}], k{n}: 1}}"
+        lines.append(f"a{n + 1}: &a{n + 1} {inner.get(kind, merge)}")
+    return "\n".join([*lines, ""])
+
+
+LARGE = {
+    "aliases in lists": bomb("lists"),
+    "aliases in mappings": bomb("maps"),
+    "aliases in merges": bomb("merges"),
+    "an alias to itself": "a: &a {b: *a, c: *a}\n",
+    "a merge of itself": "a: &a {<<: *a}\n",
+    "brackets": "a: " + "[" * 500_000,
+    "braces": "a: " + "{a: " * 200_000,
+    "indentation": "\n".join(" " * n + "a:" for n in range(2000)),
+    "values": "a: [" + "1," * 400_000 + "]\n",
+    "characters": "# " + "x" * 5_000_000,
+}
+
+
+@pytest.mark.parametrize("case", LARGE)
+def test_what_is_too_large_for_a_robot_is_refused_soon(case: str) -> None:
+    began = time.process_time()
+    with pytest.raises(RejectedError) as rejected:
+        load(LARGE[case], "f")
+    assert [one.code for one in rejected.value.diagnostics] == ["TF008"]
+    assert time.process_time() - began < 10
+
+
+def laid(text: str, *profiles: str) -> Source:
+    return composed(load(text, "f"), profiles)
+
+
+BASE = """\
+a: {b: 1, c: [1, 2], d: {e: 1}}
+frames: {f: {parent: p, rpy: [0, 0, 1]}}
+processes: {p: {run: [x], restart: always}}
+profiles:
+  merge: {a: {b: 2, g: 3}}
+  list: {a: {c: [3]}}
+  remove: {a: {d: null}}
+  nothing: {a: {x: null}}
+  within: {new: {y: {z: null}}}
+  replace: {a: {d: 5}}
+  deepen: {a: {b: {h: 1}}}
+  turn: {frames: {f: {look: down}}}
+  simulate: {processes: {p: {simulate: {joints: zero}}}}
+"""
+
+
+def test_mappings_merge_and_scalars_and_lists_replace() -> None:
+    assert laid(BASE, "merge").data["a"] == {"b": 2, "c": [1, 2], "d": {"e": 1}, "g": 3}
+    assert laid(BASE, "list").data["a"]["c"] == [3]
+    assert laid(BASE, "replace").data["a"]["d"] == 5
+    assert laid(BASE, "deepen").data["a"]["b"] == {"h": 1}
+    assert laid(BASE, "merge", "list").data["a"] == {"b": 2, "c": [3], "d": {"e": 1}, "g": 3}
+
+
+def test_null_removes_and_says_so_where_nothing_was() -> None:
+    removed = laid(BASE, "remove")
+    assert removed.data["a"] == {"b": 1, "c": [1, 2]}
+    assert not removed.found
+    for profile, name, line in (("nothing", "a.x", 8), ("within", "new.y.z", 9)):
+        (found,) = laid(BASE, profile).found
+        assert (found.code, found.severity, found.span and found.span.line) == ("TF010", "warning", line)
+        assert name in found.message
+
+
+def test_one_choice_out_of_several_drops_the_others() -> None:
+    assert laid(BASE, "turn").data["frames"]["f"] == {"parent": "p", "look": "down"}
+    assert laid(BASE, "simulate").data["processes"]["p"] == {"restart": "always", "simulate": {"joints": "zero"}}
+
+
+def test_a_key_remembers_where_it_is_from() -> None:
+    merged = laid(BASE, "merge", "list")
+    assert merged.at(("a", "b")).line == 5
+    assert merged.at(("a", "c", 0)).line == 6
+    assert merged.at(("a", "d", "e")).line == 1
+    assert ("a", "c", 1) not in merged.values
+
+
+def test_laying_a_profile_over_leaves_the_source_as_it_was() -> None:
+    source = load(BASE, "f")
+    before = (str(source.data), dict(source.values))
+    composed(source, ["merge", "remove", "turn"])
+    assert (str(source.data), source.values) == before
+
+
+def test_a_null_that_removes_nothing_is_a_finding_at_its_place_also_in_a_list() -> None:
+    source = laid("a:\nb: {c: ~}\nd: [1, null]\n")
+    assert source.data == {"b": {}, "d": [1]}
+    assert [(one.code, one.span and one.span.line) for one in source.found] == [("TF006", n) for n in (1, 2, 3)]
+
+
+@pytest.mark.parametrize("profiles", ["5", "[a]", "{a: 5}", "{a: {profiles: {b: {}}}}"])
+def test_profiles_of_a_wrong_form_are_found_without_choosing_one(profiles: str) -> None:
+    assert {one.code for one in laid(f"profiles: {profiles}\n").found} <= {"TF103", "TF101"}
+    assert laid(f"profiles: {profiles}\n").found
+
+
+def test_an_unknown_profile_is_refused_once_with_the_nearest_name() -> None:
+    with pytest.raises(RejectedError) as rejected:
+        laid(BASE, "merg", "merg")
+    (found,) = rejected.value.diagnostics
+    assert (found.code, found.help) == ("TF009", "did you mean merge?")
+
+
+def test_a_large_profile_is_laid_over_in_time_that_grows_with_its_size() -> None:
+    def seconds(count: int) -> float:
+        keys = "".join(f"  k{n}: {{a: 1}}\n" for n in range(count))
+        source = load(f"base:\n{keys}profiles:\n  p:\n    base:\n" + keys.replace("  k", "      k"), "f")
+        began = time.process_time()
+        composed(source, ["p"])
+        return time.process_time() - began
+
+    assert seconds(16_000) < 16 * max(seconds(2_000), 0.01)

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from tfcompose.check import apply, check
 from tfcompose.diagnostic import Allow, Diagnostic, RejectedError, Span
-from tfcompose.load import Source, load, with_profiles
+from tfcompose.load import Source, composed, load, with_includes
 from tfcompose.resolve import Library, resolve
 from tfcompose.validate import validate
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from tfcompose.model import Robot
     from tfcompose.validate import Validated
@@ -39,23 +39,38 @@ class Compiled:
         return tuple(found for found in self.found if found.severity == "error")
 
 
-def compile_robot(text: str, file: str, library: Library, profiles: Sequence[str] = ()) -> Compiled:
-    """Return the robot that the text describes with the profiles laid over it, and all findings, in order of place."""
+def compile_robot(  # noqa: PLR0913 (text, and what is laid over it)
+    text: str,
+    file: str,
+    library: Library,
+    profiles: Sequence[str] = (),
+    *,
+    overlays: Sequence[Source] = (),
+    read: Callable[[str], str] | None = None,
+) -> Compiled:
+    """Return the robot that the text describes with profiles and overlays laid over it, and all findings, by place.
+
+    ``read`` gives the text of a file that is included; without it nothing can be.
+    """
     try:
         source = load(text, file)
+        source = with_includes(source, read) if read else source
     except RejectedError as error:
         return Compiled(None, error.diagnostics)
-    return compile_source(source, library, profiles)
+    return compile_source(source, library, profiles, overlays)
 
 
-def compile_source(source: Source, library: Library, profiles: Sequence[str] = ()) -> Compiled:
-    """Return what ``compile_robot`` does, from text that has been loaded."""
+def compile_source(
+    source: Source, library: Library, profiles: Sequence[str] = (), overlays: Sequence[Source] = ()
+) -> Compiled:
+    """Return what ``compile_robot`` does, from text that has been loaded, with what it includes."""
     try:
-        validated = validate(with_profiles(source, profiles))
+        validated = validate(composed(source, profiles, overlays))
     except RejectedError as error:
         return Compiled(None, error.diagnostics)
     resolved = resolve(validated, library)
     later = [*resolved.found, *check(resolved.robot)]
+    source = validated.source
     found = [*validated.found, *(one for one in later if _stands(one, validated))]
     kept, used = apply(dict.fromkeys(found), source.allows)
     ordered = sorted(kept, key=lambda one: one.sort_key)

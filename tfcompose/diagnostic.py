@@ -120,6 +120,9 @@ CODES = {
     "TF011": "bad_merge",
     "TF012": "allow_allows_nothing",
     "TF013": "allow_without_reason",
+    "TF014": "overlay_changes_nothing",
+    "TF015": "include_loop",
+    "TF016": "bad_setting",
     # validate: keys, types, values
     "TF101": "unknown_key",
     "TF102": "missing_key",

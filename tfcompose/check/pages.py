@@ -70,6 +70,15 @@ The fault has been mended, or the code is another. Remove the comment, so that i
     "TF013": """A comment allows a finding and does not say why.
 
 Write the reason behind it: allow TF401 because the lens is turned.""",
+    "TF014": """An overlay sets a value that is there already.
+
+It hides that the value is no longer meant to differ, or that the overlay was meant for another key.""",
+    "TF015": """Files include each other, or are too many.
+
+A file cannot be laid over itself.""",
+    "TF016": """A setting on the command line is not PATH=VALUE.
+
+PATH has dots between its keys: sensors.camera.tf=driver.""",
     "TF101": """A key is not known here.
 
 Probably it is misspelt; unknown keys are refused, because a key that is silently dropped is a frame in the wrong

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import robot_or_code
-from tfcompose.cli.options import add_file, add_profiles
+from tfcompose.cli.options import add_file, add_variant
 from tfcompose.cli.output import write_all
 from tfcompose.cli.terminal import UNREADABLE, complain
 from tfcompose.emit import emit
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     add_file(parser)
-    add_profiles(parser, "lay this profile over the file")
+    add_variant(parser)
     parser.add_argument("-o", "--output", metavar="DIR", help="default: build/ROBOT")
 
 
 def run(arguments: Namespace) -> int:
     """Build; exit code 0, 1 with errors in the robot, 2 where something cannot be read or written."""
-    built = build(arguments.file, arguments.profiles, arguments.output)
+    built = build(arguments)
     if isinstance(built, int):
         return built
     folder, names = built
@@ -36,13 +36,13 @@ def run(arguments: Namespace) -> int:
     return 0
 
 
-def build(file: str, profiles: list[str], output: str | None) -> tuple[Path, list[str]] | int:
+def build(arguments: Namespace) -> tuple[Path, list[str]] | int:
     """Build the robot and return the folder and the names of the files, or the exit code after saying why not."""
-    robot = robot_or_code(file, profiles)
+    robot = robot_or_code(arguments.file, arguments)
     if isinstance(robot, int):
         return robot
     written = emit(robot)
-    folder = Path(output) if output else Path("build") / robot.name
+    folder = Path(arguments.output) if arguments.output else Path("build") / robot.name
     try:
         write_all(folder, written)
     except OSError as error:

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
 from tfcompose.compile import compile_robot
 from tfcompose.diagnostic import RejectedError
+from tfcompose.load import load, set_value, with_includes
 from tfcompose.resolve import Library
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from argparse import Namespace
 
+    from tfcompose.load import Source
     from tfcompose.model import Robot
 
 
@@ -26,13 +28,27 @@ def library() -> Library:
     return Library(tuple(sorted(known)), lambda name: (known[name].read_text("utf-8"), f"presets/{name}.yaml"))
 
 
-def robot_or_code(file: str, profiles: Sequence[str]) -> Robot | int:
+def overlays_of(arguments: Namespace) -> list[Source]:
+    """Return what --overlay and --set lay over a robot, in that order.
+
+    Raises:
+        RejectedError: if a file cannot be read or is not YAML, or a setting is not one.
+    """
+    files = [with_includes(load(read_text(file), file), read_text) for file in arguments.overlays]
+    return [*files, *(set_value(setting) for setting in arguments.settings)]
+
+
+def robot_or_code(file: str, arguments: Namespace) -> Robot | int:
     """Return the robot without errors in it, or the exit code after printing what is wrong. Warnings are printed."""
+    compiled = None
     try:
-        compiled = compile_robot(read_text(file), file, library(), profiles)
+        overlays = overlays_of(arguments)
+        compiled = compile_robot(
+            read_text(file), file, library(), arguments.profiles, overlays=overlays, read=read_text
+        )
         found = compiled.found
     except RejectedError as error:
-        compiled, found = None, error.diagnostics
+        found = error.diagnostics
     print_findings(found, sys.stderr)
     if compiled is None or compiled.robot is None or compiled.errors:
         return UNREADABLE if unreadable(found) else 1

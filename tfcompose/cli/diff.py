@@ -11,7 +11,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import robot_or_code
-from tfcompose.cli.options import add_profiles
+from tfcompose.cli.options import add_variant
 from tfcompose.pose import angle_between, norm
 
 if TYPE_CHECKING:
@@ -28,14 +28,14 @@ def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("old", metavar="OLD", help="a robot file")
     parser.add_argument("new", metavar="NEW", help="the same robot, changed")
-    add_profiles(parser, "lay this profile over both")
+    add_variant(parser, "lay this profile over both")
 
 
 def run(arguments: Namespace) -> int:
     """Print the differences; exit code 0 without any, 1 with some."""
     robots = []
     for file in (arguments.old, arguments.new):
-        robot = robot_or_code(file, arguments.profiles)
+        robot = robot_or_code(file, arguments)
         if isinstance(robot, int):
             return robot
         robots.append(robot)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.check.pages import code_of, page
 from tfcompose.cli.compiling import robot_or_code
-from tfcompose.cli.options import add_profiles
+from tfcompose.cli.options import add_variant
 from tfcompose.cli.terminal import UNREADABLE, complain
 from tfcompose.diagnostic import CODES, did_you_mean
 from tfcompose.emit.tree import edge_facts
@@ -27,7 +27,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "what", nargs="+", metavar="CODE|FILE A B", help="a code, a rule's name, or a file and two frames"
     )
-    add_profiles(parser, "lay this profile over the file")
+    add_variant(parser)
 
 
 def run(arguments: Namespace) -> int:
@@ -38,7 +38,7 @@ def run(arguments: Namespace) -> int:
     if len(words) != 3:  # noqa: PLR2004 (FILE A B)
         complain("explain takes a code, or FILE A B")
         return UNREADABLE
-    robot = robot_or_code(words[0], arguments.profiles)
+    robot = robot_or_code(words[0], arguments)
     return robot if isinstance(robot, int) else _explain_chain(robot, words[1], words[2])
 
 

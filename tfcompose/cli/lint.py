@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 from tfcompose import __version__
 from tfcompose.check import idle
-from tfcompose.cli.compiling import library
-from tfcompose.cli.options import DEFAULT_FILE, add_profiles
+from tfcompose.cli.compiling import library, overlays_of
+from tfcompose.cli.options import DEFAULT_FILE, add_variant
 from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
 from tfcompose.compile import compile_source, profiles_of
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError
-from tfcompose.load import load
+from tfcompose.load import load, with_includes
 from tfcompose.render.text import summary
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ FORMATS = ("text", "json", "sarif", "github")
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("files", nargs="*", metavar="FILE", default=[DEFAULT_FILE], help="default: robot.yaml")
-    add_profiles(parser, "check this combination only")
+    add_variant(parser, "check this combination only")
     parser.add_argument("--format", choices=FORMATS, default="text", help="default: text")
     parser.add_argument(
         "--fail-on", choices=("error", "warning"), default="error", help="what makes the exit code 1; default: error"
@@ -44,7 +44,7 @@ def run(arguments: Namespace) -> int:
     presets = library()
     found: list[Diagnostic] = []
     for file in dict.fromkeys(arguments.files):
-        found += lint_file(file, presets, arguments.profiles)
+        found += lint_file(file, presets, arguments)
     _print(found, arguments.format, len(set(arguments.files)))
     if unreadable(found):
         return UNREADABLE
@@ -65,14 +65,15 @@ def _print(found: list[Diagnostic], form: str, files: int) -> None:
         sys.stdout.write(import_module("tfcompose.render.sarif").render_sarif(found, __version__, pages))
 
 
-def lint_file(file: str, presets: Library, profiles: list[str]) -> list[Diagnostic]:
-    """Return the findings of one file: alone and with each of its profiles, or with the given ones only."""
+def lint_file(file: str, presets: Library, arguments: Namespace) -> list[Diagnostic]:
+    """Return the findings of one file: alone and with each of its profiles, or with what is asked for only."""
     try:
-        source = load(read_text(file), file)
+        source = with_includes(load(read_text(file), file), read_text)
+        overlays = overlays_of(arguments)
     except RejectedError as error:
         return list(error.diagnostics)
-    if profiles:
-        return list(compile_source(source, presets, profiles).found)
+    if arguments.profiles or overlays:
+        return list(compile_source(source, presets, arguments.profiles, overlays).found)
     alone = compile_source(source, presets)
     found, used, looked = list(alone.found), set(alone.used), alone.robot is not None
     for profile in profiles_of(source):

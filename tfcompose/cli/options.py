@@ -16,11 +16,19 @@ def add_file(parser: ArgumentParser) -> None:
     parser.add_argument("file", nargs="?", default=DEFAULT_FILE, metavar="FILE", help="default: robot.yaml")
 
 
-def add_profiles(parser: ArgumentParser, text: str) -> None:
-    """Add --profile, repeatable."""
+def add_variant(parser: ArgumentParser, text: str = "lay this profile over the file") -> None:
+    """Add what is laid over a robot file: --profile, then --overlay, then --set; each repeatable."""
     parser.add_argument(
         "-p", "--profile", action="append", default=[], metavar="NAME", dest="profiles", help=f"{text}; repeatable"
     )
+    parser.add_argument(
+        "-f", "--overlay", action="append", default=[], metavar="FILE", dest="overlays",
+        help="lay this file over it, after the profiles; repeatable",
+    )  # fmt: skip
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="PATH=VALUE", dest="settings",
+        help="set one value, last of all: sensors.camera.tf=driver; repeatable",
+    )  # fmt: skip
 
 
 def positive(text: str) -> float:

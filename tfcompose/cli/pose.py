@@ -9,7 +9,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import robot_or_code
-from tfcompose.cli.options import add_profiles
+from tfcompose.cli.options import add_variant
 from tfcompose.cli.terminal import complain
 from tfcompose.diagnostic import did_you_mean
 from tfcompose.emit.numbers import clean
@@ -27,13 +27,13 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="the robot file")
     parser.add_argument("a", metavar="A", help="the frame in which the pose is given")
     parser.add_argument("b", metavar="B", help="the frame whose pose it is")
-    add_profiles(parser, "lay this profile over the file")
+    add_variant(parser)
     parser.add_argument("--format", choices=("text", "json"), default="text", help="default: text")
 
 
 def run(arguments: Namespace) -> int:
     """Print the pose; exit code 1 if a frame is not there."""
-    robot = robot_or_code(arguments.file, arguments.profiles)
+    robot = robot_or_code(arguments.file, arguments)
     if isinstance(robot, int):
         return robot
     for frame in (arguments.a, arguments.b):

@@ -9,7 +9,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import robot_or_code
-from tfcompose.cli.options import add_file, add_profiles
+from tfcompose.cli.options import add_file, add_variant
 from tfcompose.emit.tree import tree
 
 if TYPE_CHECKING:
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     add_file(parser)
-    add_profiles(parser, "lay this profile over the file")
+    add_variant(parser)
 
 
 def run(arguments: Namespace) -> int:
     """Print the tree; exit code as for build."""
-    robot = robot_or_code(arguments.file, arguments.profiles)
+    robot = robot_or_code(arguments.file, arguments)
     if isinstance(robot, int):
         return robot
     sys.stdout.write(tree(robot))

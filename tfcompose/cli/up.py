@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.console import Console
-from tfcompose.cli.options import DEFAULT_FILE, add_profiles, positive
+from tfcompose.cli.options import DEFAULT_FILE, add_variant, positive
 from tfcompose.cli.terminal import UNREADABLE, coloured, complain, print_findings, read_text, unreadable
 from tfcompose.diagnostic import RejectedError, finding
 from tfcompose.planfile import read_plan
@@ -32,7 +32,7 @@ PLAN = "plan.json"
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("file", nargs="?", default=DEFAULT_FILE, metavar="FILE|PLAN", help="default: robot.yaml")
-    add_profiles(parser, "lay this profile over the file")
+    add_variant(parser)
     parser.add_argument("-o", "--output", metavar="DIR", help="where to build; default: build/ROBOT")
     parser.add_argument("--guard", choices=("off", "watch"), help="default: what the robot says")
     parser.add_argument(
@@ -47,8 +47,8 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Start the plan and return the exit code: 0 after a clean end, 1 after a failure or a finding, 2 unreadable."""
     is_plan = arguments.file.endswith(".json")
-    if is_plan and (arguments.profiles or arguments.output):
-        complain("a built plan takes no --profile and no --output: those are for building it")
+    if is_plan and (arguments.profiles or arguments.overlays or arguments.settings or arguments.output):
+        complain("a built plan takes no --profile, --overlay, --set and --output: those are for building it")
         return UNREADABLE
     missing = missing_ros()
     if missing:
@@ -69,7 +69,7 @@ def run(arguments: Namespace) -> int:
 
 def _built(arguments: Namespace) -> Path | int:
     """Build the robot and return its plan's file; the compiler is loaded only here."""
-    built = import_module("tfcompose.cli.build").build(arguments.file, arguments.profiles, arguments.output)
+    built = import_module("tfcompose.cli.build").build(arguments)
     if isinstance(built, int):
         return built
     folder: Path = built[0]

@@ -1,6 +1,7 @@
 """Stage ``load``: YAML text becomes a Source that knows where everything stands."""
 
-from tfcompose.load.overlay import with_profiles
+from tfcompose.load.include import set_value, with_includes
+from tfcompose.load.overlay import composed
 from tfcompose.load.source import Path, Source, load
 
-__all__ = ["Path", "Source", "load", "with_profiles"]
+__all__ = ["Path", "Source", "composed", "load", "set_value", "with_includes"]

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, RejectedError, did_you_mean, finding
+from tfcompose.diagnostic import Diagnostic, Note, RejectedError, did_you_mean, finding
 from tfcompose.load.source import Path, Source
 
 if TYPE_CHECKING:
@@ -46,12 +46,17 @@ CHOICES: tuple[tuple[tuple[str, ...], frozenset[str]], ...] = (
 )
 
 
-def with_profiles(source: Source, profiles: Sequence[str]) -> Source:
-    """Return the robot with its named profiles laid over it, in order, and without the section ``profiles``.
+def composed(source: Source, profiles: Sequence[str] = (), overlays: Sequence[Source] = ()) -> Source:
+    """Return the robot with its named profiles laid over it, in order, then the overlays; without ``profiles``.
+
+    An overlay may bring profiles of its own.
 
     Raises:
         RejectedError: if a profile is not there.
     """
+    for overlay in overlays:
+        if "profiles" in overlay.data:
+            source = lay_over(source, _only(overlay, "profiles"))
     known = source.data.get("profiles")
     known = known if isinstance(known, dict) else {}
     wrong = _wrong_profiles(source)
@@ -60,27 +65,35 @@ def with_profiles(source: Source, profiles: Sequence[str]) -> Source:
     if unusable:
         unknown = (_unknown_profile(source, name, list(known)) for name in missing)
         raise RejectedError([*source.found, *wrong, *unknown])
-    result = replace(_without(source, "profiles"), found=(*source.found, *wrong))
+    result = replace(without(source, "profiles"), found=(*source.found, *wrong))
     for name in profiles:
         result = lay_over(result, source.part(("profiles", name)))
+    for overlay in overlays:
+        result = lay_over(result, without(overlay, "profiles"))
     return _without_nulls(result)
 
 
-def lay_over(base: Source, overlay: Source) -> Source:
-    """Return ``base`` with ``overlay`` merged into it; each key remembers where it is from."""
-    merger = _Merger(base)
+def lay_over(base: Source, overlay: Source, *, is_overlay: bool = True) -> Source:
+    """Return ``base`` with ``overlay`` merged into it; each key remembers where it is from, and what it replaced.
+
+    With ``is_overlay`` a value that changes nothing is a finding.
+    """
+    merger = _Merger(base, is_overlay=is_overlay)
     merger.merge(merger.data, overlay.data, overlay, ())
-    found, allows = (*base.found, *merger.found), (*base.allows, *overlay.allows)
-    return Source(base.file, merger.data, merger.values, merger.keys, found, allows)
+    found = (*base.found, *overlay.found, *merger.found)
+    allows = tuple(dict.fromkeys((*base.allows, *overlay.allows)))
+    return Source(base.file, merger.data, merger.values, merger.keys, found, allows, merger.replaced)
 
 
 class _Merger:
     """Merges in time proportional to the overlay and to what it drops, not to the whole base."""
 
-    def __init__(self, base: Source) -> None:
+    def __init__(self, base: Source, *, is_overlay: bool) -> None:
+        self.is_overlay = is_overlay
         self.data = _copy(base.data)
         self.values = dict(base.values)
         self.keys = dict(base.keys)
+        self.replaced = dict(base.replaced)
         self.found: list[Diagnostic] = []
 
     def merge(self, target: dict[str, Any], data: dict[str, Any], overlay: Source, path: Path) -> None:
@@ -89,7 +102,7 @@ class _Merger:
                 self.forget((*path, dropped), target.pop(dropped))
         for key, value in data.items():
             at = (*path, key)
-            if value is None:
+            if value is None and path[:1] != ("profiles",):  # in a profile it is for later
                 self.remove(target, key, overlay, at)
             elif isinstance(value, dict):
                 if not isinstance(target.get(key), dict):
@@ -99,6 +112,8 @@ class _Merger:
                 self.keys[at] = overlay.at_key(at)
                 self.merge(target[key], value, overlay, at)
             else:
+                if key in target:
+                    self.note(target[key], value, overlay, at)
                 self.forget(at, target.get(key))
                 target[key] = _copy(value)
                 self.remember(at, value, overlay)
@@ -108,6 +123,16 @@ class _Merger:
             message = f"{'.'.join(map(str, path))} is removed here, but nothing is there"
             self.found.append(finding("TF010", message, overlay.at_key(path), severity="warning"))
         self.forget(path, target.pop(key, None))
+
+    def note(self, old: Any, new: Any, overlay: Source, path: Path) -> None:
+        """Remember what is replaced, and say so if that changes nothing."""
+        if path in self.values:
+            self.replaced[path] = self.values[path]
+        if self.is_overlay and type(old) is type(new) and old == new:
+            message = f"{'.'.join(map(str, path))} is {_shown(new)} already"
+            notes = [Note("here", self.values[path])] if path in self.values else []
+            span = overlay.at(path)
+            self.found.append(finding("TF014", message, span, notes=notes, help="remove it", severity="warning"))
 
     def forget(self, path: Path, value: Any) -> None:
         for below in _paths(value, path):
@@ -145,7 +170,16 @@ def _copy(value: Any) -> Any:
     return [_copy(item) for item in value] if isinstance(value, list) else value
 
 
-def _without(source: Source, key: str) -> Source:
+def _shown(value: Any) -> str:
+    return "that list" if isinstance(value, list) else str(value)
+
+
+def _only(source: Source, key: str) -> Source:
+    return replace(source, data={key: source.data[key]})
+
+
+def without(source: Source, key: str) -> Source:
+    """Return the source without one of its sections."""
     data = {name: value for name, value in source.data.items() if name != key}
     values = {path: span for path, span in source.values.items() if path[:1] != (key,)}
     keys = {path: span for path, span in source.keys.items() if path[:1] != (key,)}

@@ -23,7 +23,8 @@ MOST_VALUES = 300_000
 class Source:
     """A file's plain data, where each key and value stands, and what was found on the way.
 
-    ``values`` and ``keys`` map the path of a value to the places of the value and of its key.
+    ``values`` and ``keys`` map the path of a value to the places of the value and of its key; ``replaced`` has the
+    place of the value that an overlay replaced there.
     """
 
     file: str
@@ -32,6 +33,7 @@ class Source:
     keys: dict[Path, Span]
     found: tuple[Diagnostic, ...] = field(default=(), compare=False)
     allows: tuple[Allow, ...] = field(default=(), compare=False)
+    replaced: dict[Path, Span] = field(default_factory=dict, compare=False)
 
     def at(self, path: Path) -> Span:
         """Return the place of the value, or of the nearest mapping or list around it that has one."""

@@ -123,6 +123,7 @@ CODES = {
     "TF014": "overlay_changes_nothing",
     "TF015": "include_loop",
     "TF016": "bad_setting",
+    "TF017": "unknown_rule",
     # validate: keys, types, values
     "TF101": "unknown_key",
     "TF102": "missing_key",

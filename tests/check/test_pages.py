@@ -1,11 +1,14 @@
 """Every code has a page, and every rule's page is its docstring."""
 
 import inspect
+from pathlib import Path
 
 import pytest
 
-from tfcompose.check import RULES
-from tfcompose.check.pages import PAGES, code_of, page
+from tfcompose.check import RULES, code_of
+from tfcompose.check.pages import PAGES, page
+from tfcompose.cli.compiling import library
+from tfcompose.compile import compile_robot
 from tfcompose.diagnostic import CODES
 
 
@@ -26,3 +29,10 @@ def test_a_page_stands_in_one_place() -> None:
 def test_a_code_is_found_by_its_name_too() -> None:
     assert code_of("two_parents") == code_of("tf201") == "TF201"
     assert code_of("three_parents") is None
+
+
+def test_a_robot_sets_how_much_its_findings_matter() -> None:
+    spec = Path(__file__).parent / "specs" / "levels.yaml"
+    found = compile_robot(spec.read_text("utf-8"), spec.name, library()).found
+    assert {one.severity for one in found if one.code == "TF401"} == {"warning"}
+    assert {one.severity for one in found if one.code == "TF101"} == {"error"}

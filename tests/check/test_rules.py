@@ -24,7 +24,7 @@ PACKAGE = Path(__file__).parents[2] / "tfcompose"
 MARK = re.compile(r"# expect(?:-with (?P<profile>\w+))?: (?P<codes>TF\d{3}(?: TF\d{3})*)$")
 
 #: Codes that no line of a robot file can provoke; each has a test of its own elsewhere.
-NOT_OF_A_LINE = {"TF001", "TF002", "TF008", "TF009", "TF903"}
+NOT_OF_A_LINE = {"TF001", "TF002", "TF008", "TF009", "TF015", "TF016", "TF903"}
 #: Codes of the running robot, of its plan and of its surroundings.
 LIVE = {code for code in CODES if code.startswith(("TF8", "TF9"))} - {"TF812", "TF813"}
 

@@ -6,12 +6,15 @@ and TF1) cannot be allowed: they say that the file was not understood.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import CODES, Allow, Diagnostic, did_you_mean, finding
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from tfcompose.diagnostic import Span
 
 
 def can_be_allowed(code: str) -> bool:
@@ -30,6 +33,38 @@ def apply(found: Iterable[Diagnostic], allows: Sequence[Allow]) -> tuple[list[Di
         else:
             kept.append(one)
     return kept, used
+
+
+def levelled(found: Iterable[Diagnostic], rules: Mapping[str, str]) -> list[Diagnostic]:
+    """Return the findings with the severities that the robot's ``rules`` set; those that are ``off`` are left out."""
+    levels = {code_of(word): level for word, level in rules.items()}
+    result = []
+    for one in found:
+        level = levels.get(one.code) if can_be_allowed(one.code) else None
+        if level in {"error", "warning"}:
+            result.append(replace(one, severity="error" if level == "error" else "warning"))
+        elif level != "off":
+            result.append(one)
+    return result
+
+
+def unknown_rules(rules: Mapping[str, Span]) -> list[Diagnostic]:
+    """Return a finding for each entry of ``rules``, with its place, that is no code or cannot be set."""
+    found = []
+    for word, at in rules.items():
+        code = code_of(word)
+        if code is None:
+            advice = did_you_mean(word, [*CODES, *CODES.values()], "lint prints codes: TF401")
+            found.append(finding("TF017", f"rules: there is no code {word}", at, help=advice))
+        elif not can_be_allowed(code):
+            found.append(finding("TF017", f"rules: {code} {CODES[code]} cannot be set", at, help="remove it"))
+    return found
+
+
+def code_of(word: str) -> str | None:
+    """Return the code that a code or a name means, or None."""
+    upper = word.upper()
+    return upper if upper in CODES else next((code for code, name in CODES.items() if name == word), None)
 
 
 def _covers(allow: Allow, found: Diagnostic) -> bool:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import inspect
 
 from tfcompose.check.check import RULES
-from tfcompose.diagnostic import CODES
 
 
 def page(code: str) -> str:
@@ -21,12 +20,6 @@ def page(code: str) -> str:
         if rule.code == code:
             return inspect.getdoc(rule.check) or ""
     return PAGES[code]
-
-
-def code_of(word: str) -> str | None:
-    """Return the code that a code or a name means, or None."""
-    upper = word.upper()
-    return upper if upper in CODES else next((code for code, name in CODES.items() if name == word), None)
 
 
 PAGES = {
@@ -79,6 +72,9 @@ A file cannot be laid over itself.""",
     "TF016": """A setting on the command line is not PATH=VALUE.
 
 PATH has dots between its keys: sensors.camera.tf=driver.""",
+    "TF017": """An entry under rules is no code, or one that cannot be set.
+
+Findings about text and keys (TF0 and TF1) always count.""",
     "TF101": """A key is not known here.
 
 Probably it is misspelt; unknown keys are refused, because a key that is silently dropped is a frame in the wrong

@@ -9,7 +9,8 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
-from tfcompose.check.pages import code_of, page
+from tfcompose.check import code_of
+from tfcompose.check.pages import page
 from tfcompose.cli.compiling import robot_or_code
 from tfcompose.cli.options import add_variant
 from tfcompose.cli.terminal import UNREADABLE, complain

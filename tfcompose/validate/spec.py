@@ -307,6 +307,9 @@ class RobotSpec(Model):
 
     tfcompose: int = key(choice(1), about="the version of this language", examples=(1,))
     robot: str = key(text(r"[a-z][a-z0-9_]*", "a robot's name: lower case letters, digits and _"), examples=("rover",))
+    include: tuple[str, ...] = key(
+        listing(TEXT, single=True), (), "files that this one is laid over; relative to this file", (["base.yaml"],)
+    )
     base: str | None = key(TEXT, None, "where the URDF begins; left out: base_link, or the only root")
     vars: dict[str, Any] = key(mapping(ANYTHING), {}, "quantities, numbers or texts, used as ${name}")
     ros: RosSpec = key(record(RosSpec), RosSpec())
@@ -317,3 +320,6 @@ class RobotSpec(Model):
     processes: dict[str, ProcessSpec] = key(mapping(record(ProcessSpec)), {}, "what is started, or expected to run")
     profiles: dict[str, Any] = key(mapping(ANYTHING), {}, "named overlays, chosen with --profile")
     guard: GuardSpec = key(record(GuardSpec), GuardSpec())
+    rules: dict[str, str] = key(
+        mapping(choice("off", "warning", "error")), {}, "how much a finding matters, by its code", ({"TF405": "off"},)
+    )

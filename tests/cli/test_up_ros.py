@@ -1,0 +1,279 @@
+"""``tfcompose up`` as people run it: a process with children, signals, strangers, and ends."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+import psutil
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+pytestmark = pytest.mark.ros
+
+ROVER = """
+tfcompose: 1
+robot: rover
+ros: {discovery: localhost}
+frames:
+  odom: {}
+  base_link: {parent: odom, owner: drive, rate: 20 Hz}
+  lidar: {parent: base_link, xyz: [0, 0, 0.3]}
+processes:
+  drive: {simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}
+"""
+EXTERNAL = ROVER.replace("{simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}", "{external: true, node: diff_drive}")
+#: Publishes odom → base_link on /tf without end.
+ROGUE = """
+import time
+from tfcompose.ros.message import Template
+from tfcompose.ros.node import open_node
+from tfcompose.ros.tf import TFPublisher
+template = Template([("odom", "base_link")])
+with open_node("rogue", "/strange") as node:
+    publisher = TFPublisher(node, static=False)
+    print("sends", flush=True)
+    while True:
+        template.set_stamp(time.time_ns())
+        publisher.publish(template.data)
+        time.sleep(0.02)
+"""
+#: Lets nobody but rclpy, which needs it, import yaml, and nobody pydantic.
+WITHOUT_COMPILER = """
+import sys
+class Blocker:
+    def find_spec(self, name, path=None, target=None):
+        if name == "pydantic" or (name == "yaml" and "rclpy" not in sys.modules):
+            raise ImportError(name + " is not there")
+sys.meta_path.insert(0, Blocker())
+"""
+#: Takes rclpy from all that find modules.
+WITHOUT_ROS = """
+import sys
+class Hider:
+    def __init__(self, finder):
+        self.finder = finder
+    def find_spec(self, name, path=None, target=None):
+        return None if name.partition(".")[0] == "rclpy" else self.finder.find_spec(name, path, target)
+    def __getattr__(self, name):
+        return getattr(self.finder, name)
+sys.meta_path[:] = [Hider(finder) for finder in sys.meta_path]
+"""
+
+
+def until(condition: Callable[[], object], seconds: float = 20.0) -> bool:
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.005)
+    return True
+
+
+def gone(process: psutil.Process) -> bool:
+    try:
+        return bool(process.status() == psutil.STATUS_ZOMBIE)
+    except psutil.NoSuchProcess:
+        return True
+
+
+@dataclass
+class Up:
+    """A launcher that runs, and what it has printed so far."""
+
+    popen: subprocess.Popen[bytes]
+    output: Path
+
+    @property
+    def text(self) -> str:
+        return self.output.read_text(encoding="utf-8")
+
+    def says(self, words: str, within: float = 30.0) -> None:
+        assert until(lambda: words in self.text or self.popen.poll() is not None, within), self.text
+        assert words in self.text, self.text
+
+    def below(self) -> list[psutil.Process]:
+        return psutil.Process(self.popen.pid).children(recursive=True)
+
+    def child(self, name: str) -> psutil.Process:
+        return next(process for process in self.below() if name in process.cmdline()[-1:])
+
+    def ends(self, within: float = 20.0) -> int:
+        return self.popen.wait(within)
+
+
+@pytest.fixture
+def up(domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Up]]:
+    """Run ``tfcompose up`` on this text, or on these words, in a folder of the test's own."""
+    assert domain
+    monkeypatch.chdir(tmp_path)
+    running: list[Up] = []
+
+    def run(text: str | None, *words: str, **environment: str) -> Up:
+        if text is not None:
+            (tmp_path / "rover.yaml").write_text(text, encoding="utf-8")
+            words = ("rover.yaml", *words)
+        output = tmp_path / f"output{len(running)}.txt"
+        command = [sys.executable, "-m", "tfcompose", "up", *words]
+        with output.open("wb") as out:
+            popen = subprocess.Popen(command, stdout=out, stderr=out, env=os.environ | environment)
+        running.append(Up(popen, output))
+        return running[-1]
+
+    yield run
+    for one in running:
+        if one.popen.poll() is None:
+            below = one.below()
+            one.popen.kill()
+            one.popen.wait()
+            assert all(until(partial(gone, process)) for process in below)
+
+
+@pytest.fixture
+def rogue(domain: object) -> Iterator[Callable[[], subprocess.Popen[str]]]:
+    """Let somebody publish odom → base_link."""
+    assert domain
+    running: list[subprocess.Popen[str]] = []
+
+    def run() -> subprocess.Popen[str]:
+        popen = subprocess.Popen([sys.executable, "-c", ROGUE], stdout=subprocess.PIPE, text=True)
+        running.append(popen)
+        assert popen.stdout
+        assert popen.stdout.readline() == "sends\n"
+        return popen
+
+    yield run
+    for popen in running:
+        popen.kill()
+        popen.communicate()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_everything_with_0_and_leaves_no_process(up: Callable[..., Up], number: int) -> None:
+    robot = up(ROVER)
+    robot.says("tree complete: 2 edges live after ")
+    below = robot.below()
+    assert {"guard", "static", "drive"} <= {process.cmdline()[-1] for process in below}
+    robot.popen.send_signal(number)
+    assert robot.ends() == 0
+    assert [process for process in below if not gone(process)] == []
+    assert robot.text.splitlines()[-1].endswith("| ended")
+    assert "SIGTERM" not in robot.text.split("stopping: ", 1)[1].split("\n", 1)[1]
+
+
+def test_a_signal_before_the_tree_is_complete_ends_everything_with_0_too(up: Callable[..., Up]) -> None:
+    robot = up(ROVER)
+    robot.says("started guard")
+    below = robot.below()
+    robot.popen.send_signal(signal.SIGINT)
+    assert robot.ends() == 0
+    assert [process for process in below if not gone(process)] == []
+
+
+def test_sigkill_of_the_launcher_ends_everything_within_2_s(up: Callable[..., Up]) -> None:
+    robot = up(ROVER)
+    robot.says("tree complete")
+    below = robot.below()
+    assert len(below) >= 4
+    robot.popen.kill()
+    assert until(lambda: all(map(gone, below)), 2)
+
+
+def test_the_policy_stop_ends_everything_with_1_and_names_the_offender_in_full_once(
+    up: Callable[..., Up], rogue: Callable[[], object]
+) -> None:
+    robot = up(ROVER + "guard: {on_violation: stop}\n")
+    robot.says("tree complete")
+    below = robot.below()
+    rogue()
+    assert robot.ends() == 1
+    assert [process for process in below if not gone(process)] == []
+    assert robot.text.count("odom → base_link is published by /strange/rogue; the owner is drive (/drive)") == 1
+    assert "stopping: TF801 foreign_publisher\n" in robot.text
+
+
+@pytest.mark.parametrize("name", ["static", "guard"])
+def test_a_process_that_is_killed_ends_everything_with_1_and_is_named(up: Callable[..., Up], name: str) -> None:
+    robot = up(ROVER)
+    robot.says("tree complete")
+    below = robot.below()
+    robot.child(name).kill()
+    assert robot.ends() == 1
+    assert f"error[TF808] {name} was ended by SIGKILL" in robot.text
+    assert [process for process in below if not gone(process)] == []
+
+
+def test_an_edge_that_somebody_publishes_already_is_refused_with_the_nodes_name(
+    up: Callable[..., Up], rogue: Callable[[], object]
+) -> None:
+    rogue()
+    robot = up(ROVER, "--settle", "4")
+    assert robot.ends(40) == 1
+    assert "error[TF807] odom → base_link: published by /strange/rogue before the start" in robot.text
+    assert re.findall(r"started (\w+)", robot.text) == ["guard"]
+
+
+def test_the_same_robot_is_refused_a_second_time(up: Callable[..., Up]) -> None:
+    first = up(ROVER)
+    first.says("tree complete")
+    second = up(ROVER, "--settle", "4")
+    assert second.ends(40) == 1
+    assert "before the start" in second.text
+    assert "another /drive" in second.text or "another /tfcompose_static" in second.text
+    assert re.findall(r"started (\w+)", second.text) == ["guard"]
+    assert first.popen.poll() is None
+
+
+def test_two_that_start_at_the_same_time_do_not_live_on_quietly(up: Callable[..., Up]) -> None:
+    both = [up(ROVER), up(None, "rover.yaml", "-o", "other")]
+    assert until(lambda: all(one.popen.poll() is not None or "error[TF80" in one.text for one in both), 40)
+    assert all("another /" in one.text for one in both), [one.text for one in both]
+
+
+def test_an_owner_that_somebody_else_starts_is_waited_for_by_name_and_missing_at_the_end(up: Callable[..., Up]) -> None:
+    robot = up(EXTERNAL, "--for", "9")
+    robot.says("waiting for drive (/diff_drive): odom → base_link")
+    assert "expecting drive (/diff_drive): somebody else starts it" in robot.text
+    assert "live  base_link → lidar" in robot.text
+    assert robot.ends() == 1
+    assert "error[TF811] drive never published odom → base_link" in robot.text
+
+
+def test_a_built_plan_starts_where_neither_yaml_nor_pydantic_can_be_imported(
+    up: Callable[..., Up], tmp_path: Path
+) -> None:
+    (tmp_path / "rover.yaml").write_text(ROVER, encoding="utf-8")
+    subprocess.run([sys.executable, "-m", "tfcompose", "build", "rover.yaml"], check=True, capture_output=True)
+    stubs = tmp_path / "stubs"
+    stubs.mkdir()
+    (stubs / "sitecustomize.py").write_text(WITHOUT_COMPILER)
+    without = {"PYTHONPATH": str(stubs)}
+    assert up(ROVER, **without).ends() != 0
+    robot = up(None, "build/rover/plan.json", **without)
+    robot.says("tree complete")
+    robot.popen.send_signal(signal.SIGINT)
+    assert robot.ends() == 0
+
+
+def test_without_ros_it_says_in_one_sentence_what_to_install_and_writes_nothing(
+    up: Callable[..., Up], tmp_path: Path
+) -> None:
+    stubs = tmp_path / "stubs"
+    stubs.mkdir()
+    (stubs / "sitecustomize.py").write_text(WITHOUT_ROS)
+    robot = up(ROVER, PYTHONPATH=str(stubs))
+    assert robot.ends() == 1
+    (line, *rest) = robot.text.splitlines()
+    assert line.startswith("error[TF901] rclpy cannot be imported: ")
+    assert rest == []
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["output0.txt", "rover.yaml", "stubs"]

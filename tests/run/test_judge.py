@@ -356,6 +356,20 @@ def test_a_publisher_without_a_name_is_reported_within_a_second_where_the_owner_
     ]
 
 
+def test_a_publisher_that_gets_its_name_after_it_was_reported_is_named_once_and_not_said_to_have_ended(
+    running: History,
+) -> None:
+    slam, stranger = running.joins("/slam"), running.joins(None)
+    running.send(slam, "map odom").repeat(stranger, "map odom", 15)
+    stranger.node = "/rogue"
+    running.repeat(stranger, "map odom", 60)
+    assert [said.split(" is published by ")[1].split(";")[0] for said in running.said()] == [
+        "a publisher without a node name",
+        "/rogue",
+    ]
+    assert running.all(Recovered) == []
+
+
 def test_a_publisher_that_never_gets_a_name_is_reported_at_last(running: History) -> None:
     running.repeat(running.joins(None), "map odom", 60)
     assert [found.code for found in running.found()] == ["TF801"]

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 from tfcompose.run.events import Clear, Found, GuardEvent, Recovered, Taken
 from tfcompose.run.liveness import Liveness
-from tfcompose.run.offences import Offence, taken, violation, volatile_writer
-from tfcompose.run.senders import GAPS, Message, Senders, Writer
+from tfcompose.run.offences import NAMELESS, Offence, taken, violation, volatile_writer
+from tfcompose.run.senders import FEWEST_GAPS, Message, Senders, Writer
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -155,6 +155,8 @@ class Judge:
         if offence is not None:
             case = self._cases.setdefault(_key(offence, sight), _Case(offence, sight.gid, now))
             case.gid, case.last = sight.gid, now
+            if nodes:  # what was blamed on nobody has a name now
+                self._cases.pop((offence.code, sight.parent, sight.child, NAMELESS), None)
             # Of two that take turns either may be the owner; its edge is not silent.
             if not offence.namesake or sight.child not in self._owner_gids:
                 return []
@@ -226,7 +228,8 @@ class Judge:
         sender = self._senders.sender(gid)
         if sender is None or self._cleared is None or now - self._cleared > FIRST_S:
             return False
-        return sender.born_ns(GAPS) is None and now - sender.first_seen < COUNTING_S
+        began_before = sender.began_before(self._cleared_ns - FIRST_BY_NS)
+        return began_before is None and now - sender.first_seen < COUNTING_S
 
     def _was_first(self, case: _Case, now: float) -> bool:
         """Whether the offender had the edge before the plan was started."""
@@ -235,8 +238,9 @@ class Judge:
         if self._cleared is None:
             return True
         sender = self._senders.sender(case.gid)
-        born = sender.born_ns() if sender else None
-        return now - self._cleared < FIRST_S and born is not None and born < self._cleared_ns - FIRST_BY_NS
+        if sender is None or now - self._cleared >= FIRST_S:
+            return False
+        return bool(sender.began_before(self._cleared_ns - FIRST_BY_NS, FEWEST_GAPS))
 
     def _over(self, now: float) -> list[GuardEvent]:
         """Forget offences that have ended, and say so; the next of their kind is a new case."""

@@ -31,6 +31,9 @@ FAST_AGAIN_ABOVE = 0.9
 FEWEST_ARRIVALS = 4
 #: Of the time between two looks only so much counts; the guard looks ten times a second.
 LOOK_COUNTS_S = 0.25
+#: After so long without a look messages are lost, and come when the writer's next heartbeat does: 3 s in Fast DDS.
+STALLED_S = 1.0
+CATCH_UP_S = 3.5
 NAMED_AT_MOST = 6
 
 
@@ -40,13 +43,18 @@ class Watched:
 
     _seconds: float = 0.0
     _looked: float | None = None
+    _catching_up_until: float = 0.0
 
     def at(self, now: float) -> float:
         """Return the seconds until ``now``."""
-        return 0.0 if self._looked is None else self._seconds + min(max(now - self._looked, 0.0), LOOK_COUNTS_S)
+        if self._looked is None or now < self._catching_up_until:
+            return self._seconds
+        return self._seconds + min(max(now - self._looked, 0.0), LOOK_COUNTS_S)
 
     def look(self, now: float) -> float:
         """Note that the guard looks now, and return the seconds until then."""
+        if self._looked is not None and now - self._looked > STALLED_S:
+            self._catching_up_until = now + CATCH_UP_S
         self._seconds, self._looked = self.at(now), now
         return self._seconds
 

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
 
 #: How many gaps between messages tell surely when a publisher began; so many at least, when time is short.
 GAPS, FEWEST_GAPS = 5, 2
+#: A gap that was seen may be shorter than usual by this factor.
+UNSURE = 3.0
 UNCOUNTED = 2**64 - 1
 
 
@@ -56,13 +58,17 @@ class Sender:
             self.gaps_ns.append((message.source_ns - self.last_ns) / counted)
         self.last_ns, self.last_sequence = message.source_ns, message.sequence
 
-    def born_ns(self, gaps: int = FEWEST_GAPS) -> float | None:
-        """Return when its first message was sent, as far as its count tells; None: not known by so many gaps."""
+    def began_before(self, time_ns: float, gaps: int = GAPS) -> bool | None:
+        """Return whether its first message was sent before that time; None: not sure by so many gaps.
+
+        A newcomer that is far from it is recognised by its second message.
+        """
         if self.first_sequence in {1, UNCOUNTED}:
-            return self.first_ns
-        if len(self.gaps_ns) < gaps:
-            return None
-        return self.first_ns - median(self.gaps_ns) * (self.first_sequence - 1)
+            return self.first_ns < time_ns
+        before = self.first_sequence - 1
+        if self.gaps_ns and self.first_ns - UNSURE * max(self.gaps_ns) * before > time_ns:
+            return False
+        return self.first_ns - median(self.gaps_ns) * before < time_ns if len(self.gaps_ns) >= gaps else None
 
 
 class Senders:

@@ -1,0 +1,258 @@
+"""The guard as it runs: the demo robot, started once for all of these tests, and strangers that join it."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import psutil
+import pytest
+
+from tfcompose.ros.message import decode
+from tfcompose.ros.node import open_node
+from tfcompose.ros.stop import Stop
+from tfcompose.ros.tf import TFSubscription, wait
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+pytestmark = pytest.mark.ros
+
+ROBOT = Path(__file__).parents[2] / "robots" / "autonomous_robot.yaml"
+#: A stranger with stock settings: node name, topic's kind, rate, seconds, edges. It sends when there is somebody who
+#: hears it, and prints when that was.
+STRANGER = """
+import signal, sys, time
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.node import open_node, qos
+from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.typesupport import tf_message_type
+name, kind, hertz, seconds, *edges = sys.argv[1:]
+signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # leave in order: what is killed haunts the graph for 20 s
+transforms = [Transform(time.time_ns(), *edge.split(), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)) for edge in edges]
+with open_node(name, "/strange") as node:
+    if kind == "volatile":
+        profile = qos(1, DurabilityPolicy.VOLATILE, ReliabilityPolicy.RELIABLE)
+        publisher = node.create_publisher(tf_message_type(), "/tf_static", profile)
+    else:
+        publisher = TFPublisher(node, static=kind == "static")
+    raw = getattr(publisher, "publisher", publisher)
+    while kind == "moving" and not raw.get_subscription_count():
+        time.sleep(0.002)
+    publisher.publish(encode(transforms))
+    print(time.monotonic(), flush=True)
+    end = time.monotonic() + float(seconds)
+    while time.monotonic() < end:
+        time.sleep(1 / float(hertz))
+        if kind == "moving":
+            publisher.publish(encode(transforms))
+"""
+
+
+def until(condition: Callable[[], object], seconds: float = 20.0) -> bool:
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.005)
+    return True
+
+
+@dataclass
+class Robot:
+    """A robot that runs, and what it has printed so far."""
+
+    popen: subprocess.Popen[bytes]
+    output: Path
+
+    def lines(self, *words: str) -> list[str]:
+        """Return the lines that hold all the words."""
+        lines = self.output.read_text(encoding="utf-8").splitlines()
+        return [line for line in lines if all(word in line for word in words)]
+
+    def says(self, *words: str, within: float = 20.0) -> float:
+        """Wait for such a line and return when it was there, in monotonic seconds."""
+        assert until(lambda: self.lines(*words), within), (words, self.output.read_text(encoding="utf-8"))
+        return time.monotonic()
+
+    def child(self, name: str) -> psutil.Process:
+        """Return one of the robot's processes."""
+        return next(p for p in psutil.Process(self.popen.pid).children() if name in p.cmdline()[-1:])
+
+
+@pytest.fixture(scope="module")
+def domain() -> Iterator[int]:
+    """A domain as conftest's, for all tests of this module."""
+    for number in range(1, 101):
+        file = Path(tempfile.gettempdir(), f"tfcompose-test-domain-{number}.lock").open("a", encoding="utf-8")  # noqa: SIM115 (closed below)
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            file.close()
+            continue
+        with file, pytest.MonkeyPatch.context() as patch:
+            patch.setenv("ROS_DOMAIN_ID", str(number))
+            patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+            yield number
+        return
+    raise RuntimeError("all ROS domains are in use by other tests")
+
+
+def start(folder: Path, *words: str) -> Robot:
+    output = folder / "output.txt"
+    command = [sys.executable, "-m", "tfcompose", "up", *words]
+    with output.open("wb") as out:
+        return Robot(subprocess.Popen(command, cwd=folder, stdout=out, stderr=out), output)
+
+
+def end(robot: Robot) -> int:
+    robot.popen.send_signal(signal.SIGINT)
+    try:
+        return robot.popen.wait(20)
+    finally:
+        robot.popen.kill()
+
+
+@pytest.fixture(scope="module")
+def robot(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
+    """The demo robot, complete."""
+    assert domain
+    running = start(tmp_path_factory.mktemp("robot"), str(ROBOT), "--profile", "demo")
+    try:
+        running.says("tree complete", within=30)
+        yield running
+    finally:
+        code = end(running)
+    assert code == 0
+
+
+@pytest.fixture
+def stranger(domain: int) -> Iterator[Callable[..., float]]:
+    """Let a stranger send, and return when it sent its first message, in monotonic seconds."""
+    assert domain
+    running: list[subprocess.Popen[str]] = []
+
+    def join(name: str, kind: str, *edges: str, hertz: float = 20.0, seconds: float = 60.0) -> float:
+        command = [sys.executable, "-c", STRANGER, name, kind, str(hertz), str(seconds), *edges]
+        popen = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        running.append(popen)
+        assert popen.stdout
+        return float(popen.stdout.readline())
+
+    yield join
+    for popen in running:
+        popen.terminate()
+        popen.wait(20)
+        assert popen.stdout
+        popen.stdout.close()
+
+
+def test_every_edge_is_announced_with_its_owner_and_the_tree_with_the_time_it_took(robot: Robot) -> None:
+    live = robot.lines("| live ")
+    owners = {
+        "static (/tfcompose_static)": 14,
+        "joints (/tfcompose_joints)": 2,
+        "base_drive (/diff_drive_controller)": 1,
+        "slam (/slam_toolbox)": 1,
+    }
+    assert {owner: sum(owner in line for line in live) for owner in owners} == owners
+    assert len(live) == 18
+    (complete,) = robot.lines("tree complete: 18 edges live after ")
+    assert 0 < float(complete.split()[-2]) < 30
+    assert robot.lines("TF8") == []
+
+
+def test_a_listener_that_joins_late_gets_all_fixed_edges_in_one_message(robot: Robot) -> None:
+    assert robot
+    with open_node("late", "/test") as node:
+        subscription = TFSubscription(node, static=True)
+        received: list[Any] = []
+        began = time.monotonic()
+        while not received and time.monotonic() < began + 15:
+            wait(node, [subscription], 1.0, Stop())
+            received += subscription.take()
+        transforms = decode(received[0].data)
+        assert (len(received), len(transforms), len({t.child for t in transforms})) == (1, 14, 14)
+
+
+def test_a_stranger_on_an_owned_edge_is_named_within_a_second_and_once(
+    robot: Robot, stranger: Callable[..., float]
+) -> None:
+    sent = stranger("rogue_odom", "moving", "odom base_link")
+    said = robot.says("error[TF801]", "odom → base_link is published by /strange/rogue_odom; the owner is base_drive")
+    assert said - sent < 1
+    time.sleep(1)
+    assert len(robot.lines("/strange/rogue_odom; the owner")) == 1
+
+
+def test_a_stranger_that_leaves_is_said_to_have(robot: Robot, stranger: Callable[..., float]) -> None:
+    stranger("rogue_guest", "moving", "map odom", seconds=1)
+    robot.says("TF801", "/strange/rogue_guest; the owner is slam")
+    robot.says("over", "map → odom is no longer published by /strange/rogue_guest")
+
+
+def test_a_stranger_that_sends_once_and_leaves_at_once_is_named(robot: Robot, stranger: Callable[..., float]) -> None:
+    # A message that is sent before anybody is discovered reaches nobody; a latched one waits for its readers.
+    stranger("rogue_moment", "static", "base_link laser_link", "base_link imu_link", hertz=1, seconds=0.5)
+    robot.says("TF801", "base_link → laser_link and 1 more edge are published by /strange/rogue_moment")
+
+
+def test_a_second_parent_is_named_with_both_parents(robot: Robot, stranger: Callable[..., float]) -> None:
+    sent = stranger("rogue_parent", "moving", "base_footprint base_link")
+    said = robot.says("TF802", "second parent: /strange/rogue_parent publishes base_footprint → base_link, base_drive")
+    assert said - sent < 1
+
+
+def test_an_edge_that_nobody_declared_is_a_warning(robot: Robot, stranger: Callable[..., float]) -> None:
+    sent = stranger("rogue_edge", "moving", "base_link cup\x1b[31m")
+    said = robot.says("warning[TF803]", "base_link → cup\\x1b[31m is published by /strange/rogue_edge, and nobody")
+    assert said - sent < 1
+
+
+def test_a_volatile_writer_of_static_edges_is_named(robot: Robot, stranger: Callable[..., float]) -> None:
+    sent = stranger("rogue_volatile", "volatile", "base_link cup")
+    assert robot.says("TF806", "/strange/rogue_volatile writes /tf_static with durability volatile") - sent < 1
+
+
+def test_an_owner_that_falls_silent_is_named_within_a_second_and_when_it_is_back(robot: Robot) -> None:
+    drive = robot.child("base_drive")
+    drive.send_signal(signal.SIGSTOP)
+    stopped = time.monotonic()
+    try:
+        said = robot.says("TF804", "base_drive (/diff_drive_controller) fell silent: nothing on odom → base_link for")
+    finally:
+        drive.send_signal(signal.SIGCONT)
+    assert said - stopped < 1
+    robot.says("over", "odom → base_link is back after")
+
+
+def test_a_guard_that_was_stopped_for_a_while_blames_nobody(robot: Robot) -> None:
+    before = robot.lines("error[")
+    guard = robot.child("guard")
+    guard.send_signal(signal.SIGSTOP)
+    time.sleep(3)
+    guard.send_signal(signal.SIGCONT)
+    time.sleep(5)
+    assert robot.lines("error[") == before
+
+
+def test_an_owner_that_is_too_slow_is_a_warning(robot: Robot, tmp_path: Path) -> None:
+    assert robot
+    text = ROBOT.read_text(encoding="utf-8").replace("speed: 0.5 rad/s}, rate: 50 Hz", "speed: 0.5 rad/s}, rate: 20 Hz")
+    (tmp_path / "slow.yaml").write_text(text.replace("ros: {", "ros: {domain_id: 101, "), encoding="utf-8")
+    slow = start(tmp_path, "slow.yaml", "--profile", "demo")
+    try:
+        slow.says("warning[TF805]", "odom → base_link comes at", "declared are 50 Hz")
+    finally:
+        code = end(slow)
+    assert code == 0
+    assert os.environ["ROS_DOMAIN_ID"] != "101"

@@ -58,7 +58,7 @@ def read_plan(text: str, file: str) -> Plan:
         raise RejectedError([_bad(message, Span(file))])
     try:
         return _plan_from_json(data)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         what = f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)
         raise RejectedError([_bad(f"not a whole plan: {what}", Span(file))]) from None
 

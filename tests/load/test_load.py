@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tfcompose.diagnostic import RejectedError, Span
-from tfcompose.load import Source, load, composed
+from tfcompose.load import Source, composed, load
 
 # YAML 1.2.2, section 10.3.2 (core schema). YAML 1.1 reads several of these otherwise.
 SCALARS: dict[str, Any] = {

@@ -69,8 +69,19 @@ UNITS: dict[str, tuple[float, Dimension]] = {
     "kg*m^2": (1.0, INERTIA),
 }
 
-# Units that divide exactly, so that 15 deg is the double nearest to π/12 and 30 cm is 0.3.
-_DIVIDE = {"cm": 100.0, "mm": 1000.0, "um": 1e6, "g": 1000.0, "ms": 1000.0, "us": 1e6, "mrad": 1000.0}
+# Units whose size is a fraction, as numerator and denominator: 30 cm is 0.3 and 12 in are 0.3048, to the last bit.
+_FRACTIONS: dict[str, tuple[float, float]] = {
+    "cm": (1, 100),
+    "mm": (1, 1000),
+    "um": (1, 1_000_000),
+    "in": (254, 10_000),
+    "ft": (3048, 10_000),
+    "g": (1, 1000),
+    "lb": (45_359_237, 100_000_000),
+    "ms": (1, 1000),
+    "us": (1, 1_000_000),
+    "mrad": (1, 1000),
+}
 
 _QUANTITY = re.compile(r"\s*([-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?)\s*([A-Za-zµ°\"'%][^\s]*)?\s*")
 
@@ -117,8 +128,8 @@ def in_unit(number: float, unit: str) -> Quantity:
         advice = did_you_mean(unit, UNITS, f"known units: {', '.join(UNITS)}")
         raise UnitError(f"unknown unit {unit}", _SPELLINGS.get(unit, advice), unit)
     factor, dimension = UNITS[unit]
-    divided = number / _DIVIDE[unit] if unit in _DIVIDE else number * factor
-    value = math.radians(number) if unit == "deg" else divided
+    above, below = _FRACTIONS.get(unit, (factor, 1))
+    value = math.radians(number) if unit == "deg" else number * above / below
     if not math.isfinite(value):
         raise UnitError(f"{number!r} {unit} is not finite")
     return Quantity(value, dimension)

@@ -1,0 +1,52 @@
+"""What starting costs, as ratios in one run: ``python tests/benchmarks/bench_start.py``, or name the file to pytest.
+
+Whole processes; the commands that are compared take turns, so that a busy moment meets all of them; medians; compiled
+files are there before the first one that counts.
+"""
+
+from __future__ import annotations
+
+import compileall
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+RUNS = 21
+COMMANDS = {
+    "pass": ["-c", "pass"],
+    "pydantic and yaml": ["-c", "import pydantic, yaml"],
+    "lint": ["-m", "tfcompose", "lint", str(ROOT / "robots" / "autonomous_robot.yaml")],
+    "--help": ["-m", "tfcompose", "--help"],
+}
+#: Each command's limit: at most so many times what the other one costs.
+LIMITS = {"lint": (1.5, "pydantic and yaml"), "--help": (2.0, "pass")}
+
+
+def measure(runs: int = RUNS) -> dict[str, float]:
+    """Return the median seconds of each command."""
+    compileall.compile_dir(ROOT / "tfcompose", quiet=2)
+    seconds: dict[str, list[float]] = {name: [] for name in COMMANDS}
+    for turn in range(runs + 1):
+        for name, words in COMMANDS.items():
+            began = time.perf_counter()
+            subprocess.run([sys.executable, *words], check=True, stdout=subprocess.DEVNULL, cwd=ROOT)
+            if turn:  # the first turn warms the disk
+                seconds[name].append(time.perf_counter() - began)
+    return {name: statistics.median(taken) for name, taken in seconds.items()}
+
+
+def test_lint_costs_at_most_1_5_times_importing_pydantic_and_yaml_and_help_twice_nothing() -> None:
+    found = measure()
+    for name, (limit, other) in LIMITS.items():
+        assert found[name] <= limit * found[other], found
+
+
+if __name__ == "__main__":
+    medians = measure()
+    for name, seconds in medians.items():
+        limit, other = LIMITS.get(name, (0.0, name))
+        ratio = f"  {seconds / medians[other]:.2f} times {other}, at most {limit}" if limit else ""
+        sys.stdout.write(f"{name:18} {1000 * seconds:7.1f} ms{ratio}\n")

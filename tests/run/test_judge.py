@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
@@ -362,7 +362,7 @@ def test_a_publisher_that_gets_its_name_after_it_was_reported_is_named_once_and_
     slam, stranger = running.joins("/slam"), running.joins(None)
     running.send(slam, "map odom").repeat(stranger, "map odom", 15)
     stranger.node = "/rogue"
-    running.repeat(stranger, "map odom", 60)
+    running.repeat(stranger, "map odom", 350)
     assert [said.split(" is published by ")[1].split(";")[0] for said in running.said()] == [
         "a publisher without a node name",
         "/rogue",
@@ -441,7 +441,23 @@ def test_a_publisher_that_began_after_the_start_is_found_within_a_second(running
     assert [type(event) for event in running.events if isinstance(event, (Found, Taken))] == [Found]
 
 
+def test_a_publisher_that_began_just_before_the_start_is_found_and_not_taken_for_first(running: History) -> None:
+    running.send(running.joins("/rogue", static=True), "base lidar", ago=0.4).wait(1)
+    assert [type(event) for event in running.events if isinstance(event, (Found, Taken))] == [Found]
+
+
+def test_lost_messages_do_not_turn_a_newcomer_into_one_that_was_first(running: History) -> None:
+    rogue = running.joins("/rogue")
+    running.wait(0.3)
+    rogue.sent = 10
+    for _ in range(12):
+        rogue.sent += 3
+        running.send(rogue, "map odom").wait(0.08)
+    assert (running.all(Taken), len(running.found())) == ([], 1)
+
+
 @settings(max_examples=100, deadline=None)
+@example(50, [0.0] * 12, 0, 0.6, 0.2)
 @given(
     st.sampled_from((5, 10, 50, 200)),
     st.lists(st.floats(-0.9, 0.9), min_size=12, max_size=12),
@@ -495,6 +511,20 @@ def test_a_second_static_process_is_reported_while_both_are_there_and_over_when_
     assert len(running.wait(4).all(Recovered)) == 2
 
 
+def test_a_static_process_in_the_place_of_one_that_has_left_is_right(running: History) -> None:
+    first = running.joins("/static", static=True)
+    running.send(first, FIXED).wait(1).leaves(first)
+    running.send(running.joins("/static", static=True), FIXED).wait(1)
+    assert running.said() == []
+
+
+def test_a_static_owner_that_leaves_is_reported_once(running: History) -> None:
+    static = running.joins("/static", static=True)
+    running.send(static, FIXED).wait(1).leaves(static)
+    running.wait(10)
+    assert [found.code for found in running.found()] == ["TF804"]
+
+
 # Where the rmw does not say who sent a message.
 
 
@@ -511,7 +541,10 @@ def test_without_ids_one_of_those_that_may_have_sent_it_is_blamed_once_and_nobod
     drive = running.joins("/drive")
     running.repeat(drive, "odom base", 20)
     rogue = running.joins("/rogue")
+    running.joins("/static", static=True)
     running.repeat(rogue, "map odom", 10)
+    running.joins("/late")
+    running.repeat(rogue, "map odom", 20)
     assert running.said() == ["TF801 map → odom is published by one of /drive, /rogue; the owner is slam (/slam)"]
     assert running.all(Taken) == []
 

@@ -164,13 +164,15 @@ def test_a_hiccup_of_half_a_second_is_neither_silence_nor_slowness(watch: Callab
     assert history.said() == []
 
 
-@pytest.mark.parametrize("stall_s", [0.5, 2, 30])
-def test_a_guard_that_was_kept_from_looking_does_not_cry_wolf(watch: Callable[..., History], stall_s: float) -> None:
+@pytest.mark.parametrize(("stall_s", "late_s"), [(0.5, 0.2), (2, 3), (30, 3)])
+def test_a_guard_that_was_kept_from_looking_does_not_cry_wolf(
+    watch: Callable[..., History], stall_s: float, late_s: float
+) -> None:
     history = watch(edge("map odom", "slam", 10), edge("odom base", "drive", 50))
     history.steadily(3, 50, "base").steadily(3, 10, "odom", "base", "base", "base", "base", "base")
     history.now += stall_s
     history.events += history.live.judge(history.now)  # before what has come meanwhile is delivered
-    history.run(0.2)
+    history.run(late_s)
     for child in ["odom"] * 20 + ["base"] * 100:
         history.live.arrived(child, history.now)
     history.steadily(6, 10, "odom", "base", "base", "base", "base", "base")

@@ -143,6 +143,7 @@ CODES = {
     "TF301": "edge_with_two_owners",
     "TF302": "unknown_owner",
     "TF303": "owner_cannot_publish",
+    "TF304": "isolated_from_nothing",
     # poses and conventions
     "TF401": "optical_frame_not_rotated",
     "TF402": "quaternion_not_unit",

@@ -156,6 +156,10 @@ class Robot:
     written: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
     broken: frozenset[tuple[str, str]] = frozenset()
 
+    def final(self, frame: str) -> str:
+        """Return the frame's name on the live tree: with the prefix, unless it is shared."""
+        return frame if frame in self.ros.shared_frames else f"{self.ros.frame_prefix}{frame}"
+
     def excuses(self, name: str) -> bool:
         """Return whether a frame, process or joint may be missing only because an entry was refused already."""
         return any(

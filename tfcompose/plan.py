@@ -95,12 +95,14 @@ class PlanProcess:
 
 @dataclass(frozen=True, slots=True)
 class RosSettings:
-    """What every process of the plan shares."""
+    """What every process of the plan shares. ``shared_frames`` are those that do not begin with ``frame_prefix``."""
 
     namespace: str = ""
     domain_id: int | None = None
     discovery: str | None = None
     clock: str = "wall"
+    frame_prefix: str = ""
+    shared_frames: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

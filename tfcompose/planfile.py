@@ -235,6 +235,8 @@ def _plan_from_json(data: dict[str, Any]) -> Plan:
             domain_id=_optional(ros, "domain_id", int, "ros"),
             discovery=_optional(ros, "discovery", str, "ros"),
             clock=_one_of(ros, "clock", ("wall", "sim"), "ros"),
+            frame_prefix=_get(ros, "frame_prefix", str, "ros"),
+            shared_frames=tuple(str(frame) for frame in _get(ros, "shared_frames", list, "ros")),
         ),
         edges=tuple(_edge_from_json(edge) for edge in _get(data, "edges", list, "plan")),
         processes=tuple(_process_from_json(process) for process in _get(data, "processes", list, "plan")),

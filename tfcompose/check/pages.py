@@ -93,6 +93,9 @@ It may hold vars, quantities, pi, + - * / ( ), and sin cos tan sqrt radians degr
     "TF107": """Two keys exclude each other.
 
 A rotation is written in one way, a process runs in one way, a shape has one form.""",
+    "TF304": """A robot is to be isolated and has no name for it.
+
+isolate moves topics below the namespace, or makes the namespace the frames' prefix. Give ros: {namespace: robot1}.""",
     "TF402": """A quaternion does not have length 1.
 
 tf2 drops transforms whose quaternion is off, and the frame never appears. Write the digits that are missing, or check

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import robot_or_code
 from tfcompose.cli.options import add_file, add_variant
+from tfcompose.emit.final import with_final_names
 from tfcompose.emit.tree import tree
 
 if TYPE_CHECKING:
@@ -27,5 +28,5 @@ def run(arguments: Namespace) -> int:
     robot = robot_or_code(arguments.file, arguments)
     if isinstance(robot, int):
         return robot
-    sys.stdout.write(tree(robot))
+    sys.stdout.write(tree(with_final_names(robot)))
     return 0

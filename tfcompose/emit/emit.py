@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tfcompose.emit.final import with_final_names
 from tfcompose.emit.params import params_file
 from tfcompose.emit.plan import plan_of
 from tfcompose.emit.tree import tree
@@ -25,15 +26,16 @@ class File:
 
 def emit(robot: Robot) -> tuple[File, ...]:
     """Return the robot's files; the same robot gives the same bytes. There must be no errors in it."""
+    live = with_final_names(robot)
     params = tuple(
         File(f"params/{process.name}.yaml", params_file(process.node, process.params))
         for process in robot.processes
         if process.kind == "run" and process.params
     )
     return (
-        File("plan.json", write_plan(plan_of(robot))),
+        File("plan.json", write_plan(plan_of(live))),
         File("robot.full.urdf", urdf(robot, full=True)),
         File("robot.urdf", urdf(robot, full=False)),
-        File("tree.txt", tree(robot)),
+        File("tree.txt", tree(live)),
         *params,
     )

@@ -111,12 +111,16 @@ def _refusal(option: Option, key: str, value: Any, place: Span) -> Diagnostic | 
     return None
 
 
-def driver_parameters(sensor: Sensor, *, publishes: bool) -> dict[str, Any]:
-    """Return the parameters that make the driver do what the spec says; ``publishes`` leaves its TF switched on."""
+def driver_parameters(sensor: Sensor, *, publishes: bool, prefix: str = "") -> dict[str, Any]:
+    """Return the parameters that make the driver do what the spec says; ``publishes`` leaves its TF switched on.
+
+    ``prefix`` is written in front of its frames; parameters that hold it are left out where there is none.
+    """
     driver = sensor.preset.driver
     if driver is None:
         return {}
-    named = {k: sensor.named(v) if isinstance(v, str) else v for k, v in driver.params.items()}
+    written = {k: v for k, v in driver.params.items() if prefix or not (isinstance(v, str) and "{prefix}" in v)}
+    named = {k: sensor.named(v).replace("{prefix}", prefix) if isinstance(v, str) else v for k, v in written.items()}
     enabled = {name: sensor.holds(condition) for name, condition in driver.enable.items()}
     chosen = {k: c.value if sensor.holds(c.when) else c.otherwise for k, c in driver.choose.items()}
     taken = {k: sensor.options[option] for k, option in driver.take.items() if sensor.options.get(option) is not None}

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.diagnostic import Diagnostic, Note, did_you_mean, finding
 from tfcompose.model import BUILT_IN, GUARD, JOINTS, STATIC, Process
 from tfcompose.plan import ProcessKind, Simulation
+from tfcompose.resolve.isolation import settings_of
 from tfcompose.resolve.poses import pose_of
 from tfcompose.resolve.presets import driver_parameters
 
@@ -123,7 +124,7 @@ def driver_process(
     if not external and not _starts(run) and (run or driver is None):
         place, advice = source.at_key((*at, "run")), "run: {package: …, executable: …}, or external: true"
         return None, [finding("TF102", f"the driver of {sensor.name} does not say how it runs", place, help=advice)]
-    computed = driver_parameters(sensor, publishes=publishes)
+    computed = driver_parameters(sensor, publishes=publishes, prefix=settings_of(spec.ros).frame_prefix)
     node = f"{sensor.named(driver.namespace)}/{sensor.named(driver.node)}".strip("/") if driver else sensor.name
     process = Process(
         sensor.name,

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
 from tfcompose.model import Edge, Process, Robot
-from tfcompose.plan import GuardPolicy, RosSettings
+from tfcompose.plan import GuardPolicy
 from tfcompose.resolve.edges import Drafts
+from tfcompose.resolve.isolation import isolate, settings_of
 from tfcompose.resolve.poses import Solver
 from tfcompose.resolve.presets import Library, sensor_of
 from tfcompose.resolve.processes import built_in, name_clashes, unknown_names, user_process
@@ -59,12 +60,14 @@ def resolve(validated: Validated, library: Library) -> Resolved:
         links=drafts.links,
         processes=tuple(_with_positions(process, edges, source, found) for process in processes),
         base=None,
-        ros=RosSettings(spec.ros.namespace.strip("/"), spec.ros.domain_id, spec.ros.discovery, spec.ros.clock),
+        ros=settings_of(spec.ros),
         guard=_guard(spec),
         written=source.data,
         broken=frozenset(broken),
     )
-    return Resolved(replace(robot, base=_base(robot, spec, source, found)), tuple(found))
+    robot = replace(robot, base=_base(robot, spec, source, found))
+    isolated, refused = isolate(robot, spec.ros, source)
+    return Resolved(isolated, (*found, *refused))
 
 
 def _processes(spec: RobotSpec, source: Source, found: list[Diagnostic]) -> list[Process]:

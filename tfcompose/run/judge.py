@@ -198,7 +198,10 @@ class Judge:
         return (before == gid and not sight.static) or (edge.owner in _OWN and self._senders.is_present(current))
 
     def _may_be_undeclared(self, parent: str, child: str) -> bool:
-        policy = self.plan.guard
+        """Whether nobody needs to have declared the edge: by policy, or because it is another robot's."""
+        policy, ros = self.plan.guard, self.plan.ros
+        if ros.frame_prefix and not child.startswith(ros.frame_prefix) and child not in ros.shared_frames:
+            return True
         return policy.unknown_edges == "ignore" or any(
             fnmatchcase(parent, parents) and fnmatchcase(child, children) for parents, children in policy.allow
         )

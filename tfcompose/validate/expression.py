@@ -43,12 +43,22 @@ class ExpressionError(ValueError):
         self.advice = advice
 
 
-def fill(text: str, lookup: Callable[[str], Value]) -> Value:
+def fill(text: str, lookup: Callable[[str], Value], later: re.Pattern[str] | None = None) -> Value:
     """Return ``text`` with each ``${…}`` computed; one that is the whole text keeps its type.
+
+    What matches ``later`` is left as it is.
 
     Raises:
         ExpressionError: if an expression is malformed, too long or not computable.
     """
+    if later and later.search(text):
+        kept = [*later.finditer(text)]
+        pieces = [
+            text[a:b]
+            for a, b in zip([0, *(k.end() for k in kept)], [*(k.start() for k in kept), len(text)], strict=True)
+        ]
+        filled = [_inserted(fill(piece, lookup)) if "${" in piece else piece for piece in pieces]
+        return "".join(part for pair in zip(filled, [*(k[0] for k in kept), ""], strict=True) for part in pair)
     whole = _HOLE.fullmatch(text.strip())
     if whole:
         return evaluate(whole[1], lookup)

@@ -1,4 +1,7 @@
-"""A sensor's preset: its frames, body and driver as data. ``{name}`` stands for the sensor's name."""
+"""A sensor's preset: its frames, body and driver as data.
+
+``{name}`` stands for the sensor's name, and in a driver's parameters ``{prefix}`` for the robot's frame prefix.
+"""
 
 from __future__ import annotations
 

@@ -297,6 +297,13 @@ class RosSpec(Model):
     namespace: str = key(
         text(r"(/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?", "a namespace such as robot1 or fleet/robot1"), ""
     )
+    frame_prefix: str = key(TEXT, "", "written in front of every frame as it is; with its slash", ("robot1/",))
+    shared_frames: tuple[str, ...] = key(listing(TEXT), (), "frames that never get the prefix", (["map"],))
+    isolate: str = key(
+        choice("none", "topics", "frames", "both"),
+        "none",
+        "topics: /tf moves below the namespace; frames: the namespace is the prefix, unless one is given",
+    )
     domain_id: int | None = key(integer(0, 232), None, "left out: the environment's")
     discovery: str | None = key(choice("localhost", "subnet", "off"), None, "left out: the environment's")
     clock: str = key(choice("wall", "sim"), "wall", "one clock for the whole plan")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import did_you_mean
@@ -34,6 +35,14 @@ def _filled(value: Any, path: Path, variables: _Variables) -> Any:
     if isinstance(value, list):
         return [_filled(item, (*path, index), variables) for index, item in enumerate(value)]
     return value
+
+
+#: What a process is told, and what is known only when frames are named, or when it is started.
+LATER = re.compile(r"\$\{\s*(?:frame\([^(){}]*\)|params_file|build_dir)\s*\}")
+
+
+def _is_of_a_process(path: Path) -> bool:
+    return path[0] == "processes" or (path[0] == "sensors" and path[2:3] == ("driver",))
 
 
 class _NothingNewError(ExpressionError):
@@ -77,7 +86,7 @@ class _Variables:
 
     def fill(self, text: str, path: Path) -> Any:
         try:
-            return fill(text, self.lookup)
+            return fill(text, self.lookup, LATER if _is_of_a_process(path) else None)
         except ExpressionError as error:
             return self._refuse(error, path)
 

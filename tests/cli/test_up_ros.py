@@ -80,6 +80,12 @@ def until(condition: Callable[[], object], seconds: float = 20.0) -> bool:
     return True
 
 
+def first_on_the_path(folder: Path) -> dict[str, str]:
+    """Return the environment in which this folder's modules come first."""
+    before = os.environ.get("PYTHONPATH")
+    return {"PYTHONPATH": os.pathsep.join([str(folder), *([before] if before else [])])}
+
+
 def gone(process: psutil.Process) -> bool:
     try:
         return bool(process.status() == psutil.STATUS_ZOMBIE)
@@ -257,7 +263,7 @@ def test_a_built_plan_starts_where_neither_yaml_nor_pydantic_can_be_imported(
     stubs = tmp_path / "stubs"
     stubs.mkdir()
     (stubs / "sitecustomize.py").write_text(WITHOUT_COMPILER)
-    without = {"PYTHONPATH": str(stubs)}
+    without = first_on_the_path(stubs)
     assert up(ROVER, **without).ends() != 0
     robot = up(None, "build/rover/plan.json", **without)
     robot.says("tree complete")
@@ -271,7 +277,7 @@ def test_without_ros_it_says_in_one_sentence_what_to_install_and_writes_nothing(
     stubs = tmp_path / "stubs"
     stubs.mkdir()
     (stubs / "sitecustomize.py").write_text(WITHOUT_ROS)
-    robot = up(ROVER, PYTHONPATH=str(stubs))
+    robot = up(ROVER, **first_on_the_path(stubs))
     assert robot.ends() == 1
     (line, *rest) = robot.text.splitlines()
     assert line.startswith("error[TF901] rclpy cannot be imported: ")

@@ -117,6 +117,11 @@ def replaced(draw: st.DrawFn, texts: list[str]) -> Any:
         here = here[step]
 
 
+@pytest.mark.parametrize("text", PLANS)
+def test_a_plan_that_was_built_is_read(text: str) -> None:
+    assert read_plan(text, "plan.json").edges
+
+
 @given(replaced(PLANS))
 @settings(max_examples=500, deadline=None)
 def test_any_change_of_a_plan_is_read_or_refused(data: Any) -> None:

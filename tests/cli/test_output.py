@@ -124,6 +124,8 @@ def test_parameter_files_of_an_earlier_build_go_and_other_peoples_stay(tmp_path:
     assert mine.read_text() == "mine\n"
     mine.unlink()
     assert build(tmp_path, str(ROBOTS / "autonomous_robot.yaml"), "-o", "out").returncode == 0
+    assert build(tmp_path, str(ROBOTS / "autonomous_robot.yaml"), "-o", "out").returncode == 0
+    assert (tmp_path / "out" / "params" / "camera.yaml").exists()
     assert build(tmp_path, str(ROBOTS / "my_robot.yaml"), "-o", "out").returncode == 0
     assert not (tmp_path / "out" / "params").exists()
 

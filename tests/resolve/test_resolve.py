@@ -201,6 +201,13 @@ def test_a_sensors_frame_takes_the_units_own_value_and_name() -> None:
     assert angle_between(edge_of(robot, "eye_optical").pose.quat_xyzw, (-0.5, 0.5, -0.5, 0.5)) < 1e-12
 
 
+def test_a_sensors_frame_takes_the_units_own_rotation_and_keeps_the_presets_place() -> None:
+    robot = robot_of(CAMERA % "frames: {c_color_frame: {rpy: [1 deg, 2 deg, 3 deg]}}")
+    found = edge_of(robot, "c_color_frame").pose
+    assert found.xyz == (0, 0.015, 0)
+    assert_rotation(Rotation.from_quat(found.quat_xyzw), Rotation.from_euler("xyz", [1, 2, 3], degrees=True))
+
+
 def test_to_place_through_nominal_values_is_a_warning_that_the_units_own_values_silence() -> None:
     place = "place: c_color_frame"
     assert [one.code for one in compiled(CAMERA % place).found] == ["TF405"]

@@ -5,9 +5,12 @@ Find everything that is wrong with robot files, with places. Each file is checke
 
 from __future__ import annotations
 
+import os
+import re
 import sys
 from dataclasses import replace
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose import __version__
@@ -26,12 +29,20 @@ if TYPE_CHECKING:
     from tfcompose.resolve import Library
 
 
+_ROBOT = re.compile(rb"^tfcompose\s*:", re.MULTILINE)
+
 FORMATS = ("text", "json", "sarif", "github")
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("files", nargs="*", metavar="FILE", default=[DEFAULT_FILE], help="default: robot.yaml")
+    parser.add_argument(
+        "files",
+        nargs="*",
+        metavar="FILE",
+        default=[DEFAULT_FILE],
+        help="files, or folders of robot files; default: robot.yaml",
+    )
     add_variant(parser, "check this combination only")
     parser.add_argument("--format", choices=FORMATS, default="text", help="default: text")
     parser.add_argument(
@@ -43,12 +54,26 @@ def run(arguments: Namespace) -> int:
     """Lint the files; exit code 0, 1 with findings that count, 2 where a file cannot be read."""
     presets = library()
     found: list[Diagnostic] = []
-    for file in dict.fromkeys(arguments.files):
+    files = dict.fromkeys(file for name in arguments.files for file in robots_in(name))
+    for file in files:
         found += lint_file(file, presets, arguments)
-    _print(found, arguments.format, len(set(arguments.files)))
+    _print(found, arguments.format, len(files))
     if unreadable(found):
         return UNREADABLE
     return int(any(one.severity == "error" or arguments.fail_on == "warning" for one in found))
+
+
+def robots_in(name: str) -> list[str]:
+    """Return the file itself, or the robot files below a folder: YAML files with a line that begins with tfcompose:."""
+    folder = Path(name)
+    if not folder.is_dir():
+        return [name]
+    robots: list[str] = []
+    for top, folders, files in os.walk(folder):
+        folders[:] = sorted(inner for inner in folders if not inner.startswith("."))
+        paths = (Path(top) / file for file in sorted(files) if file.endswith((".yaml", ".yml")))
+        robots += [str(path) for path in paths if path.is_file() and _ROBOT.search(path.read_bytes())]
+    return robots or [name]
 
 
 def _print(found: list[Diagnostic], form: str, files: int) -> None:

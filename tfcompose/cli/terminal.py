@@ -56,7 +56,7 @@ def _unreadable(path: str, error: OSError) -> Diagnostic:
         there = sorted(file.name for file in folder.glob("*.yaml")) if folder.is_dir() else []
         advice = f"in {folder} there is {', '.join(there[:8])}" if there else f"there is no YAML file in {folder}"
     elif isinstance(error, IsADirectoryError):
-        advice = "name a file in it"
+        advice = "no robot file is in it: name one"
     return finding("TF001", f"cannot be read: {error.strerror}", Span(path), help=advice)
 
 

@@ -65,7 +65,13 @@ def test_rpy_is_about_fixed_axes_as_in_urdf(roll: float, pitch: float, yaw: floa
 
 @given(quaternions)
 def test_rpy_read_back_is_the_same_rotation(quat: Quaternion) -> None:
-    assert angle_between(quat_from_rpy(*rpy_from_quat(quat)), quat) < 1e-7
+    assert angle_between(quat_from_rpy(*rpy_from_quat(quat)), quat) < 2e-9
+
+
+@given(angles, st.floats(1e-12, 1e-3), st.sampled_from([1, -1]), angles)
+def test_near_the_pole_rpy_keeps_the_rotation_too(roll: float, short_of: float, sign: int, yaw: float) -> None:
+    quat = quat_from_rpy(roll, sign * (math.pi / 2 - short_of), yaw)
+    assert angle_between(quat_from_rpy(*rpy_from_quat(quat)), quat) < 2e-9
 
 
 @pytest.mark.parametrize("pitch", [math.pi / 2, -math.pi / 2])

@@ -102,12 +102,20 @@ def quat_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
 
 
 def rpy_from_quat(quat_xyzw: Quaternion) -> Vector:
-    """Return roll, pitch, yaw in radians about fixed axes; at pitch ±π/2 only yaw ∓ roll is defined, and roll is 0."""
-    (r00, r01, _), (r10, r11, _), (r20, r21, r22) = matrix_from_quat(quat_xyzw)
+    """Return roll, pitch, yaw in radians about fixed axes; at pitch ±π/2 only yaw ∓ roll is defined, and roll is 0.
+
+    Near there the yaw is known to few digits only; the roll is what then remains to be turned, so that the three
+    together are the rotation to the last digits.
+    """
+    (r00, r01, _), (r10, r11, _), (r20, _, _) = matrix_from_quat(quat_xyzw)
     horizontal = math.hypot(r00, r10)
     if horizontal < 1e-9:  # noqa: PLR2004 (below the rounding of a unit quaternion's matrix)
         return (0.0, math.atan2(-r20, horizontal), math.atan2(-r01, r11))
-    return (math.atan2(r21, r22), math.atan2(-r20, horizontal), math.atan2(r10, r00))
+    pitch, yaw = math.atan2(-r20, horizontal), math.atan2(r10, r00)
+    x, y, z, w = quat_from_rpy(0.0, pitch, yaw)
+    turn = multiply((-x, -y, -z, w), quat_xyzw)
+    sign = 1.0 if turn[3] >= 0 else -1.0
+    return (2 * math.atan2(sign * turn[0], sign * turn[3]), pitch, yaw)
 
 
 def quat_from_axis_angle(axis: Vector, angle: float) -> Quaternion:

@@ -66,7 +66,7 @@ def run(arguments: Namespace) -> int:
 def robots_in(name: str) -> list[str]:
     """Return the file itself, or the robot files below a folder: YAML files with a line that begins with tfcompose:."""
     folder = Path(name)
-    if not folder.is_dir():
+    if not name or not folder.is_dir():
         return [name]
     robots: list[str] = []
     for top, folders, files in os.walk(folder):

@@ -85,15 +85,9 @@ def test_every_part_of_the_package_is_in_the_table() -> None:
     assert {part_of(file) for file in FILES} == set(MAY_IMPORT)
 
 
-#: Reads joint states with rclpy itself; it belongs behind ``tfcompose.ros``.
-NOT_YET = {"run/roles.py"}
-
-
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.relative_to(PACKAGE).as_posix())
-def test_a_file_imports_only_what_its_part_may(file: Path, request: pytest.FixtureRequest) -> None:
+def test_a_file_imports_only_what_its_part_may(file: Path) -> None:
     part, allowed = part_of(file), MAY_IMPORT[part_of(file)]
-    if file.relative_to(PACKAGE).as_posix() in NOT_YET:
-        request.applymarker(pytest.mark.xfail(reason="imports rclpy beside tfcompose.ros", strict=False))
     for name in imports_of(file):
         first, _, rest = name.partition(".")
         if first == "tfcompose":

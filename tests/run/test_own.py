@@ -54,13 +54,13 @@ def test_a_simulation_without_a_rate_is_refused(write: Callable[..., Path]) -> N
 def test_a_node_has_the_name_and_the_namespace_of_the_plan(write: Callable[..., Path]) -> None:
     file = str(write([], PlanProcess("static", "static", nodes=("/fleet/r1/frames",))))
     own = read_own([file, "static", "--ros-args", "-r", "/tf:=tf"], "static")
-    assert (own.namespace, own.node_name, own.ros_args) == ("/fleet/r1", "frames", ("-r", "/tf:=tf"))
+    assert (own.namespace, own.node_name, own.ros_args) == ("/fleet/r1", "frames", ["-r", "/tf:=tf"])
     assert own.description.parent == own.file.parent
 
 
 def test_without_ros_it_ends_with_code_1_and_says_what_to_install(
     write: Callable[..., Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tfcompose.run.own.missing_ros", lambda: "rclpy cannot be imported: install it")
+    monkeypatch.setattr("tfcompose.run.begin.missing_ros", lambda: "rclpy cannot be imported: install it")
     assert static.main([str(write([], PlanProcess("static", "static"))), "static"]) == 1
     assert _last_error(capsys) == "rclpy cannot be imported: install it\n"

@@ -1,11 +1,7 @@
-"""What tfcompose's own processes share: arguments, the plan, signals, and their few lines of output.
-
-Exit codes: 0 ended by a signal, 1 ROS is missing or not usable, 2 the arguments or the plan are not.
-"""
+"""What tfcompose's own processes share: their arguments, the plan, and their few lines of output."""
 
 from __future__ import annotations
 
-import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,8 +9,6 @@ from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import RejectedError, Span, finding
 from tfcompose.planfile import read_plan
-from tfcompose.ros.environment import RosError, child_environment, missing_ros
-from tfcompose.ros.stop import Stop
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,12 +20,12 @@ _ARGUMENTS = 2
 
 @dataclass(frozen=True, slots=True)
 class Own:
-    """One of the plan's processes, as it runs. ``ros_args`` are what follows ``--ros-args``."""
+    """One of the plan's processes, as it runs. ``given`` is what follows ``--ros-args`` on its command line."""
 
     plan: Plan
     process: PlanProcess
     file: Path
-    ros_args: tuple[str, ...]
+    given: tuple[str, ...]
 
     @property
     def node_name(self) -> str:
@@ -42,6 +36,11 @@ class Own:
     def namespace(self) -> str:
         """The rest of its node's full name: empty, or with a slash in front."""
         return self._full_name.rpartition("/")[0]
+
+    @property
+    def ros_args(self) -> list[str]:
+        """What its node is told: the plan's remappings, and what is on the command line."""
+        return [*(word for old, new in self.process.remap.items() for word in ("-r", f"{old}:={new}")), *self.given]
 
     @property
     def edges(self) -> tuple[PlanEdge, ...]:
@@ -62,31 +61,6 @@ def say(line: str) -> None:
     """Write a line of output at once."""
     sys.stdout.write(f"{line}\n")
     sys.stdout.flush()
-
-
-def start(argv: Sequence[str], kind: str) -> int:
-    """Run the process that ``argv`` names until a signal comes, and return the exit code.
-
-    ``argv`` is PLAN_FILE PROCESS_NAME, and may end with ``--ros-args …``. Signals are handled before ROS is imported,
-    which takes a third of a second: whoever is interrupted then ends without a traceback too.
-    """
-    with Stop() as stop:
-        try:
-            own = read_own(argv, kind)
-        except RejectedError as error:
-            return _fail(error, 2)
-        missing = missing_ros()
-        if missing:
-            return _fail(missing, 1)
-        os.environ.update(child_environment(os.environ, own.plan.ros, own=True))
-        try:
-            from tfcompose.run import roles  # noqa: PLC0415 (it imports ROS; see above)
-
-            if not stop.requested:
-                roles.ROLES[kind](own, stop)
-        except RosError as error:
-            return _fail(error, 1)
-    return 0
 
 
 def read_own(argv: Sequence[str], kind: str) -> Own:
@@ -117,8 +91,3 @@ def read_own(argv: Sequence[str], kind: str) -> Own:
 
 def _unfit(message: str, file: str) -> RejectedError:
     return RejectedError([finding("TF902", message, Span(file) if file else None)])
-
-
-def _fail(what: object, code: int) -> int:
-    sys.stderr.write(f"{what}\n")
-    return code

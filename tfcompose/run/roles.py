@@ -6,14 +6,11 @@ import math
 import time
 from typing import TYPE_CHECKING, Any
 
-from rclpy.serialization import deserialize_message
-from sensor_msgs.msg import JointState
-
 from tfcompose.ros.clock import SimClock
+from tfcompose.ros.joint_states import JointStatePublisher, JointStateSubscription
 from tfcompose.ros.message import Template, Transform, encode
-from tfcompose.ros.node import JOINT_STATES, latch
-from tfcompose.ros.tf import Subscription, TFPublisher, wait
-from tfcompose.run.leave import node_of
+from tfcompose.ros.node import latch, open_node
+from tfcompose.ros.tf import TFPublisher, wait
 from tfcompose.run.motion import Joints, circle, read_positions
 from tfcompose.run.own import say
 from tfcompose.run.watch import guard
@@ -24,8 +21,8 @@ if TYPE_CHECKING:
     from rclpy.node import Node
 
     from tfcompose.plan import Simulation
+    from tfcompose.ros.joint_states import Positions
     from tfcompose.ros.stop import Stop
-    from tfcompose.ros.tf import Received
     from tfcompose.run.own import Own
 
 _SECOND_NS = 1_000_000_000
@@ -38,7 +35,7 @@ def static(own: Own, stop: Stop) -> None:
     # A fixed edge holds at every time and tf2 does not look at its stamp; simulated time may not have begun.
     stamp_ns = 0 if own.plan.ros.clock == "sim" else time.time_ns()
     edges = [Transform(stamp_ns, e.parent, e.child, e.pose.xyz, e.pose.quat_xyzw) for e in own.edges]
-    with node_of(own) as node:
+    with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
         publisher = TFPublisher(node, static=True)
         if edges:
             publisher.publish(encode(edges))
@@ -52,15 +49,15 @@ def static(own: Own, stop: Stop) -> None:
 
 def joints(own: Own, stop: Stop) -> None:
     """Publish the moving edges of each message on ``joint_states``, with its stamp, and latch the description."""
-    with node_of(own) as node:
+    with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
         mover = _JointMover(own, node)
         latched = _latch_description(own, node)
-        subscription = Subscription(node, JointState, "joint_states", JOINT_STATES)
-        say(f"{_count(len(mover), 'edge')} on /tf, from {subscription.subscription.topic_name}")
+        subscription = JointStateSubscription(node)
+        say(f"{_count(len(mover), 'edge')} on /tf, from {subscription.topic}")
         while not stop.requested:
             wait(node, [subscription], None, stop)
-            for received in subscription.take():
-                mover.take(received)
+            for state in subscription.take_positions():
+                mover.take(state)
         del latched
 
 
@@ -69,7 +66,7 @@ def simulate(own: Own, stop: Stop) -> None:
     simulation = own.process.simulate
     if simulation is None:  # own.read_own has refused such a plan
         return
-    with node_of(own) as node:
+    with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
         if simulation.kind == "joints":
             publish, what = _joint_states(node, simulation)
         else:
@@ -105,26 +102,25 @@ class _JointMover:
     def __len__(self) -> int:
         return len(self._edges)
 
-    def take(self, received: Received) -> None:
-        """Publish what a JointState says; one that cannot be believed is dropped, with a line the first time."""
+    def take(self, state: Positions | None) -> None:
+        """Publish what a joint state says; one that cannot be believed is dropped, with a line the first time."""
+        if state is None:
+            self._drop("its bytes are not one")
+            return
         try:
-            message = deserialize_message(received.data, JointState)
-            sent = read_positions(message.name, message.position, self._joints.names)
+            sent = read_positions(state.names, state.positions, self._joints.names)
         except ValueError as error:
             self._drop(str(error))
-        except Exception:  # noqa: BLE001 (rclpy's name for bytes that are no JointState is not public)
-            self._drop("its bytes are not one")
         else:
-            self._publish(sent, message.header.stamp, received.received_ns)
+            self._publish(sent, state.stamp_ns, state.received_ns)
 
-    def _publish(self, sent: dict[str, float], stamp: Any, received_ns: int) -> None:
+    def _publish(self, sent: dict[str, float], stamp_ns: int, received_ns: int) -> None:
         poses = self._joints.poses(sent)
         if not poses:
             return
         template = self._template(tuple(poses))
         for index, pose in enumerate(poses.values()):
             template.set_pose(index, pose)
-        stamp_ns = stamp.sec * _SECOND_NS + stamp.nanosec
         # Messages sent by hand often have no stamp, and tf2 takes only the first transform of one time.
         template.set_stamp(stamp_ns if stamp_ns or self._sim else received_ns)
         self._publisher.publish(template.data)
@@ -171,14 +167,10 @@ def _body(own: Own, node: Node, simulation: Simulation) -> tuple[Callable[[float
 
 
 def _joint_states(node: Node, simulation: Simulation) -> tuple[Callable[[float, int], None], str]:
-    publisher: Any = node.create_publisher(JointState, "joint_states", 10)
-    message = JointState(name=list(simulation.joints), position=list(simulation.joints.values()))
-
-    def publish(_: float, stamp_ns: int) -> None:
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, _SECOND_NS)
-        publisher.publish(message)
-
-    return publish, f"{_count(len(simulation.joints), 'joint')} on {publisher.topic_name}"
+    publisher = JointStatePublisher(node, simulation.joints)
+    return lambda _, stamp_ns: publisher.publish(
+        stamp_ns
+    ), f"{_count(len(simulation.joints), 'joint')} on {publisher.topic}"
 
 
 def _wall_ticks(rate: float, stop: Stop) -> Iterator[tuple[float, int]]:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
-from tfcompose.run.own import start
+from tfcompose.run.begin import start
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
 def main(argv: Sequence[str]) -> int:
-    """Run it until a signal comes and return the exit code; ``own.start`` says which."""
+    """Run it until a signal comes and return the exit code; ``begin.start`` says which."""
     return start(argv, "static")
 
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from tfcompose.ros.graph import UNKNOWN_NODE, writers
 from tfcompose.ros.message import decode
+from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFSubscription, wait
 from tfcompose.run.events import EVENTS_FD, to_line
 from tfcompose.run.judge import Judge, Message, Writer
-from tfcompose.run.leave import node_of
 from tfcompose.run.own import say
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def guard(own: Own, stop: Stop) -> None:
     """Watch /tf and /tf_static until a signal comes."""
     settle_s = float(os.environ.get(SETTLE, DEFAULT_SETTLE_S))
     emit = _emitter()
-    with node_of(own) as node:
+    with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
         watch = _Watch(node, Judge(own.plan, settle_s, time.monotonic(), time.time_ns()), emit)
         say(f"watching {len(own.plan.edges)} edges")
         while not stop.requested:

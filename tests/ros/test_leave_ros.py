@@ -8,22 +8,13 @@ import pytest
 
 pytestmark = pytest.mark.ros
 
-#: Leaves a node whose leaving takes 30 s, in C, with the interpreter's lock kept.
+#: Leaves ROS for 30 s, in C, with the interpreter's lock kept.
 STUCK = """
 import ctypes
-from contextlib import contextmanager
-from pathlib import Path
-from tfcompose.plan import Plan, PlanProcess, RosSettings
-from tfcompose.run import leave
-from tfcompose.run.own import Own
-@contextmanager
-def stuck(*_, **__):
-    yield None
+from tfcompose.ros.node import LEAVE_S, ended_unless_done
+print("in", flush=True)
+with ended_unless_done(LEAVE_S):
     ctypes.PyDLL(None).sleep(30)
-leave.open_node = stuck
-process = PlanProcess("static", "static")
-with leave.node_of(Own(Plan("r", "0", None, RosSettings(), (), (process,)), process, Path("plan.json"), ())):
-    print("in", flush=True)
 """
 
 
@@ -37,5 +28,5 @@ def test_a_process_that_ros_does_not_let_go_ends_all_the_same() -> None:
 
 
 def test_a_process_that_leaves_in_time_is_not_ended() -> None:
-    quick = STUCK.replace("sleep(30)", "sleep(0)") + "import time; time.sleep(leave.LEAVE_S + 0.5); print('on')\n"
+    quick = STUCK.replace("sleep(30)", "sleep(0)") + "import time; time.sleep(LEAVE_S + 0.5); print('on')\n"
     assert subprocess.check_output([sys.executable, "-c", quick], text=True, timeout=30) == "in\non\n"

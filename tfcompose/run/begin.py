@@ -1,0 +1,51 @@
+"""How tfcompose's own processes begin: signals, the plan, ROS, and then what they are for.
+
+Exit codes: 0 ended by a signal, 1 ROS is missing or not usable, 2 the arguments or the plan are not.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import RejectedError
+from tfcompose.ros.environment import RosError, child_environment, missing_ros
+from tfcompose.ros.stop import Stop
+from tfcompose.run.own import read_own
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+#: The module that imports ROS, which is loaded when signals are handled.
+ROLES = "tfcompose.run.roles"
+
+
+def start(argv: Sequence[str], kind: str) -> int:
+    """Run the process that ``argv`` names until a signal comes, and return the exit code.
+
+    ``argv`` is PLAN_FILE PROCESS_NAME, and may end with ``--ros-args …``. Signals are handled before ROS is imported,
+    which takes a third of a second: whoever is interrupted then ends without a traceback too.
+    """
+    with Stop() as stop:
+        try:
+            own = read_own(argv, kind)
+        except RejectedError as error:
+            return _fail(error, 2)
+        missing = missing_ros()
+        if missing:
+            return _fail(missing, 1)
+        os.environ.update(child_environment(os.environ, own.plan.ros, own=True))
+        try:
+            role = import_module(ROLES).ROLES[kind]
+            if not stop.requested:
+                role(own, stop)
+        except RosError as error:
+            return _fail(error, 1)
+    return 0
+
+
+def _fail(what: object, code: int) -> int:
+    sys.stderr.write(f"{what}\n")
+    return code

@@ -54,8 +54,21 @@ def compose(text: str, file: str) -> Node | None:
     Raises:
         RejectedError: with one finding, where the text stops being YAML or is too deep.
     """
+    return next(iter(_composed(text, file, single=True)), None)
+
+
+def compose_all(text: str, file: str) -> list[Node]:
+    """Return the roots of the text's documents.
+
+    Raises:
+        RejectedError: as ``compose`` does.
+    """
+    return _composed(text, file, single=False)
+
+
+def _composed(text: str, file: str, *, single: bool) -> list[Node]:
     try:
-        return _Composer(file).compose(text)
+        return _Composer(file, single=single).compose(text)
     except yaml.MarkedYAMLError as error:
         raise RejectedError([_syntax(error, text, file)]) from None
     except yaml.reader.ReaderError as error:
@@ -69,13 +82,14 @@ def compose(text: str, file: str) -> Node | None:
 
 
 class _Composer:
-    def __init__(self, file: str) -> None:
+    def __init__(self, file: str, *, single: bool) -> None:
         self.file = file
+        self.single = single
         self.anchors: dict[str, Node] = {}
         self.stack: list[Node] = []
-        self.root: Node | None = None
+        self.roots: list[Node] = []
 
-    def compose(self, text: str) -> Node | None:
+    def compose(self, text: str) -> list[Node]:
         for event in yaml.parse(text, Loader=_LOADER):
             if isinstance(event, yaml.ScalarEvent):
                 self._add(self._scalar(event), event)
@@ -86,10 +100,12 @@ class _Composer:
                 node.span = _until(node.span, self._span(event))
             elif isinstance(event, yaml.AliasEvent):
                 self._add(self._alias(event), None)
-            elif isinstance(event, yaml.DocumentStartEvent) and self.root:
-                message = "a second document begins here; a robot is one document"
-                raise RejectedError([finding("TF002", message, self._span(event))])
-        return self.root
+            elif isinstance(event, yaml.DocumentStartEvent):
+                self.anchors = {}
+                if self.single and self.roots:
+                    message = "a second document begins here; a robot is one document"
+                    raise RejectedError([finding("TF002", message, self._span(event))])
+        return self.roots
 
     def _span(self, event: yaml.Event) -> Span:
         start, end = event.start_mark, event.end_mark
@@ -103,7 +119,7 @@ class _Composer:
         if self.stack:
             self.stack[-1].items.append(node)
         else:
-            self.root = node
+            self.roots.append(node)
 
     def _open(self, event: yaml.CollectionStartEvent) -> None:
         span = self._span(event)

@@ -66,13 +66,8 @@ def load(text: str, file: str) -> Source:
     Raises:
         RejectedError: if the text is not YAML, not one document, not a mapping, or too large to be a robot.
     """
-    if len(text) > MOST_CHARACTERS:
-        message = f"the file has {len(text):,} characters; a robot has at most {MOST_CHARACTERS:,}"
-        raise RejectedError([finding("TF008", message, Span(file))])
-    if "\0" in text:
-        line = text.count("\n", 0, text.index("\0")) + 1
-        raise RejectedError([finding("TF001", "not a text file: it holds a NUL byte", Span(file, line))])
-    walk = _Walk(file)
+    refuse_unreadable(text, file)
+    walk = Walk(file)
     node = compose(text, file)
     if node is None or node.kind != "mapping":
         what = "empty" if node is None else "a list" if node.kind == "sequence" else "a single value"
@@ -83,7 +78,21 @@ def load(text: str, file: str) -> Source:
     return Source(file, data, walk.values, walk.keys, tuple(walk.found), allows_in(text, file))
 
 
-class _Walk:
+def refuse_unreadable(text: str, file: str) -> None:
+    """Do nothing for a text that can be a file of this language.
+
+    Raises:
+        RejectedError: if it is too large, or no text.
+    """
+    if len(text) > MOST_CHARACTERS:
+        message = f"the file has {len(text):,} characters; a robot has at most {MOST_CHARACTERS:,}"
+        raise RejectedError([finding("TF008", message, Span(file))])
+    if "\0" in text:
+        line = text.count("\n", 0, text.index("\0")) + 1
+        raise RejectedError([finding("TF001", "not a text file: it holds a NUL byte", Span(file, line))])
+
+
+class Walk:
     """One walk over a node graph: collects data, places and findings; bounded in size and depth."""
 
     def __init__(self, file: str) -> None:
@@ -94,6 +103,7 @@ class _Walk:
         self.visits = 0
 
     def value(self, node: Node, path: Path) -> Any:
+        """Return the node's plain data, and remember where all of it stands."""
         self._bound(node, len(path))
         self.values[path] = node.span
         if node.kind == "mapping":

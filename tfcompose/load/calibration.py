@@ -1,0 +1,166 @@
+"""Calibration files as plain data with places: YAML of one or several documents, rows of numbers, launch files.
+
+The bounds are those of robot files. xacro's tags ``!degrees`` and ``!radians`` are read here, on plain numbers.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from bisect import bisect_right
+from itertools import accumulate
+from typing import TYPE_CHECKING, Any, Literal
+
+from tfcompose.diagnostic import Span, finding
+from tfcompose.load.nodes import compose_all
+from tfcompose.load.scalars import FLOAT, INT, implicit_tag, scalar
+from tfcompose.load.source import Source, Walk, refuse_unreadable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.load.nodes import Node
+    from tfcompose.load.source import Path
+
+Form = Literal["yaml", "rows", "launch"]
+
+#: What one unit of each tag is, in radians.
+ANGLE_TAGS = {"!degrees": math.pi / 180, "!radians": 1.0}
+
+PUBLISHER = "static_transform_publisher"
+
+_NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+_WORD = re.compile(r"[^\s,]+")
+_XML = re.compile(r"<!--(?:.*?-->|.*)|<node\b[^<>]*>", re.DOTALL)
+_ARGS = re.compile(r"\bargs\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
+_PYTHON = re.compile(r"#[^\n]*|\"([^\"\n]*)\"|'([^'\n]*)'|[\[\]]")
+
+
+def load_calibration(text: str, file: str) -> tuple[Form, tuple[Source, ...]]:
+    """Return what the file is made of, and its documents.
+
+    Rows of numbers are one document, a list of lists; a launch file is one, a list of the words of each of its
+    ``static_transform_publisher`` nodes.
+
+    Raises:
+        RejectedError: if the text is none of these, or larger than a file here can be.
+    """
+    refuse_unreadable(text, file)
+    lines = text.splitlines()
+    written = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
+    if written and all(map(_is_row, written)):
+        return "rows", (_rows(lines, file),)
+    if PUBLISHER in text and (text.lstrip().startswith("<") or "LaunchDescription" in text):
+        return "launch", (_launch(text, file),)
+    return "yaml", tuple(_documents(text, file))
+
+
+def _is_row(line: str) -> bool:
+    words = _WORD.findall(line)
+    return len(words) > 1 and all(map(_NUMBER.fullmatch, words))
+
+
+def _documents(text: str, file: str) -> Iterator[Source]:
+    visits = 0
+    for node in compose_all(text, file):
+        if node.kind == "scalar" and not node.text.strip():  # ros2 topic echo ends with ---
+            continue
+        walk = _CalibrationWalk(file, visits)
+        data = walk.value(node, ())
+        visits = walk.visits
+        yield Source(file, data, walk.values, walk.keys, tuple(walk.found))
+
+
+class _CalibrationWalk(Walk):
+    """A walk that reads numbers with xacro's tags for angles, in radians; ``visits`` counts over all documents."""
+
+    def __init__(self, file: str, visits: int) -> None:
+        super().__init__(file)
+        self.visits = visits
+
+    def _scalar(self, node: Node) -> Any:
+        if node.tag not in ANGLE_TAGS:
+            return super()._scalar(node)
+        kind = implicit_tag(node.text.strip())
+        if kind not in {INT, FLOAT}:
+            message, advice = f"{node.tag} takes a number, not {node.text[:40]!r}", "write the number"
+            self.found.append(finding("TF005", message, node.span, help=advice))
+            return 0.0
+        try:
+            return float(scalar(kind, node.text.strip()) or 0) * ANGLE_TAGS[node.tag]
+        except OverflowError as error:
+            self.found.append(finding("TF007", str(error), node.span, help="give a finite number"))
+            return 0.0
+
+
+class _Places:
+    """Where an offset in the text stands."""
+
+    def __init__(self, text: str, file: str) -> None:
+        self.file = file
+        self.starts = [0, *accumulate(len(line) for line in text.splitlines(keepends=True))]
+
+    def span(self, start: int, end: int) -> Span:
+        first, last = bisect_right(self.starts, start) - 1, bisect_right(self.starts, end) - 1
+        begin, stop = start - self.starts[first] + 1, end - self.starts[last] + 1
+        return Span(self.file, first + 1, begin, last + 1, stop)
+
+
+def _rows(lines: list[str], file: str) -> Source:
+    values: dict[Path, Span] = {}
+    data: list[list[str]] = []
+    for number, line in enumerate(lines, 1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        row = [(m.group(), m.start() + 1, m.end() + 1) for m in _WORD.finditer(line)]
+        values[(len(data),)] = Span(file, number, row[0][1], number, row[-1][2])
+        values |= {(len(data), i): Span(file, number, a, number, b) for i, (_, a, b) in enumerate(row)}
+        data.append([word for word, _, _ in row])
+    values[()] = Span(file, values[(0,)].line, values[(0,)].column, len(lines) + 1, 1)
+    return _source(file, data, values)
+
+
+def _launch(text: str, file: str) -> Source:
+    """Return the words of each static_transform_publisher; what stands in comments is left out, nothing is run."""
+    places = _Places(text, file)
+    values: dict[Path, Span] = {(): Span(file)}
+    data: list[list[str]] = []
+    found = _in_xml(text) if text.lstrip().startswith("<") else _in_python(text)
+    for words in found:
+        if not words:
+            continue
+        at = len(data)
+        values[(at,)] = places.span(words[0][1], words[-1][2])
+        values |= {(at, index): places.span(start, end) for index, (_, start, end) in enumerate(words)}
+        data.append([word for word, _, _ in words])
+    return _source(file, data, values)
+
+
+def _in_xml(text: str) -> Iterator[list[tuple[str, int, int]]]:
+    for tag in _XML.finditer(text):
+        given = _ARGS.search(tag.group()) if PUBLISHER in tag.group() and tag.group()[1] != "!" else None
+        if given:
+            which = 1 if given[1] is not None else 2
+            begin = tag.start() + given.start(which)
+            yield [(m.group(), begin + m.start(), begin + m.end()) for m in re.finditer(r"\S+", given[which])]
+
+
+def _in_python(text: str) -> Iterator[list[tuple[str, int, int]]]:
+    """Yield the texts of the list that follows each mention of the publisher."""
+    words: list[tuple[str, int, int]] = []
+    named = inside = False
+    for token in _PYTHON.finditer(text):
+        word = token[1] if token[1] is not None else token[2]
+        if token.group() == "[":
+            inside = named
+        elif token.group() == "]" and inside:
+            yield words
+            words, named, inside = [], False, False
+        elif word is not None and inside:
+            words.append((word, token.start(), token.end()))
+        elif word == PUBLISHER:
+            named = True
+
+
+def _source(file: str, data: Any, values: dict[Path, Span]) -> Source:
+    return Source(file, data, values, {})

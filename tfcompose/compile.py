@@ -50,25 +50,29 @@ def compile_robot(  # noqa: PLR0913 (text, and what is laid over it)
 ) -> Compiled:
     """Return the robot that the text describes with profiles and overlays laid over it, and all findings, by place.
 
-    ``read`` gives the text of a file that is included; without it nothing can be.
+    ``read`` gives the text of a file that is included or holds a calibration; without it nothing can be.
     """
     try:
         source = load(text, file)
         source = with_includes(source, read) if read else source
     except RejectedError as error:
         return Compiled(None, error.diagnostics)
-    return compile_source(source, library, profiles, overlays)
+    return compile_source(source, library, profiles, overlays, read)
 
 
 def compile_source(
-    source: Source, library: Library, profiles: Sequence[str] = (), overlays: Sequence[Source] = ()
+    source: Source,
+    library: Library,
+    profiles: Sequence[str] = (),
+    overlays: Sequence[Source] = (),
+    read: Callable[[str], str] | None = None,
 ) -> Compiled:
     """Return what ``compile_robot`` does, from text that has been loaded, with what it includes."""
     try:
         validated = validate(composed(source, profiles, overlays))
     except RejectedError as error:
         return Compiled(None, error.diagnostics)
-    resolved = resolve(validated, library)
+    resolved = resolve(validated, library, read)
     later = [*resolved.found, *check(resolved.robot)]
     source = validated.source
     found = [*validated.found, *(one for one in later if _stands(one, validated))]

@@ -6,10 +6,12 @@ places. Lengths are metres, angles radians, rates hertz; an edge's pose is the p
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from tfcompose.plan import EdgeKind, GuardPolicy, ProcessKind, RosSettings, Simulation
+from tfcompose.pose import angle_between
 
 if TYPE_CHECKING:
     from tfcompose.diagnostic import Span
@@ -90,6 +92,42 @@ class Joint:
 
 
 @dataclass(frozen=True, slots=True)
+class Calibration:
+    """A pose that was measured: that of ``child`` in ``parent``, frames of the robot.
+
+    ``nominal`` is the same by the pose that is written beside it, if one is. ``named_at`` is the place in the robot
+    file, ``at`` the entry in the calibration file, ``entry`` its pose as it stands there; ``inverted`` says that it was
+    taken the other way round. The limits (m, rad) say how far from nominal is too far.
+    """
+
+    parent: str
+    child: str
+    pose: Pose
+    entry: Pose
+    at: Span
+    format: str
+    named_at: Span
+    limit_m: float
+    limit_rad: float
+    inverted: bool = False
+    nominal: Pose | None = None
+
+    @property
+    def name(self) -> str:
+        """The measurement, its direction and its source, as people read them."""
+        turned = ", inverted" if self.inverted else ""
+        source = f"from {self.at.file}:{self.at.line} ({self.format}{turned})"
+        return f"pose of {self.child} in {self.parent}, {source}"
+
+    def off(self, pose: Pose) -> tuple[float, float]:
+        """Return how far ``pose`` is from the nominal one, in metres and radians; 0 if there is none."""
+        if self.nominal is None:
+            return (0.0, 0.0)
+        far = math.dist(pose.xyz, self.nominal.xyz)
+        return (far, angle_between(pose.quat_xyzw, self.nominal.quat_xyzw))
+
+
+@dataclass(frozen=True, slots=True)
 class Edge:
     """A frame and its parent, and who publishes where the one is in the other."""
 
@@ -107,6 +145,7 @@ class Edge:
     child_at: Span | None = None
     sensor: str | None = None
     nominal: bool = False
+    calibration: Calibration | None = None
 
     @property
     def name(self) -> str:

@@ -12,6 +12,7 @@ import pytest
 
 from tfcompose.check import RULES, check, idle
 from tfcompose.cli.compiling import library
+from tfcompose.cli.terminal import read_text
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.diagnostic import CODES, Diagnostic, Span
 
@@ -40,7 +41,10 @@ def marks(text: str) -> dict[str | None, set[tuple[int, str]]]:
 
 
 def compiled(spec: Path, *profiles: str) -> Compiled:
-    return compile_robot(spec.read_text("utf-8"), spec.name, library(), profiles)
+    def read(name: str) -> str:
+        return read_text(str(spec.parent / name))
+
+    return compile_robot(spec.read_text("utf-8"), spec.name, library(), profiles, read=read)
 
 
 def places(found: tuple[Diagnostic, ...]) -> set[tuple[int, str]]:

@@ -16,6 +16,10 @@ from tfcompose.check.rules.tf302_unknown_owner import unknown_owner
 from tfcompose.check.rules.tf303_owner_cannot_publish import owner_cannot_publish
 from tfcompose.check.rules.tf401_optical_frame_not_rotated import optical_frame_not_rotated
 from tfcompose.check.rules.tf501_bad_frame_name import bad_frame_name
+from tfcompose.check.rules.tf615_calibration_probably_inverse import calibration_probably_inverse
+from tfcompose.check.rules.tf616_calibration_far_from_nominal import calibration_far_from_nominal
+from tfcompose.check.rules.tf617_calibration_all_zero import calibration_all_zero
+from tfcompose.check.rules.tf618_calibration_copied import calibration_copied
 from tfcompose.check.rules.tf701_mimic_without_master import mimic_without_master
 from tfcompose.check.rules.tf702_mimic_loop import mimic_loop
 from tfcompose.check.rules.tf704_joint_without_limits import joint_without_limits
@@ -53,6 +57,10 @@ RULES: tuple[Rule, ...] = (
     Rule("TF303", owner_cannot_publish),
     Rule("TF401", optical_frame_not_rotated),
     Rule("TF501", bad_frame_name),
+    Rule("TF615", calibration_probably_inverse),
+    Rule("TF616", calibration_far_from_nominal),
+    Rule("TF617", calibration_all_zero),
+    Rule("TF618", calibration_copied),
     Rule("TF701", mimic_without_master),
     Rule("TF702", mimic_loop),
     Rule("TF704", joint_without_limits),

@@ -120,6 +120,27 @@ tfcompose schema and the README list the presets that come with it.""",
     "TF604": """A driver cannot do what is asked.
 
 It has no switch for its frames, there is no driver, or the parameter is one that tfcompose computes.""",
+    "TF610": """A calibration file, or a value in it, cannot be read.
+
+The note shows where. An entry holds numbers: no expressions, no units; of tags only xacro's !degrees and !radians.""",
+    "TF611": """A calibration file is in no format that is known, or not in the one that is named.
+
+Formats: autoware, easy_handeye2, moveit, kalibr, matrix, transform_stamped. Left out, the format is recognised.""",
+    "TF612": """A calibration file holds no pose of this frame in its parent.
+
+The entry is that of the edge: its parent, and the frame or one of those inside the sensor. Where the file has other
+names, pick the entry with parent: and child:.""",
+    "TF613": """Several entries of calibration files fit one edge.
+
+Which one is right cannot be guessed. Pick one with parent: and child:, or remove the others.""",
+    "TF614": """A calibration is no rigid transform.
+
+A quaternion has length 1; the rows of a rotation are orthonormal; the last row of a 4×4 matrix is 0 0 0 1, and the
+position stands in its last column. Copy all digits.""",
+    "TF619": """Nothing in the robot takes an entry of a file under calibrations.
+
+It is the pose of a frame that is not there, or of one that is no mount. Its name may be misspelt, or it is out of
+date.""",
     "TF703": """A stand-in names a joint that does not move or does not exist.""",
     "TF801": """A node publishes an edge that another process owns.
 

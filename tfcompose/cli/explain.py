@@ -6,6 +6,7 @@ from A to B: each edge with its owner, its pose and its place in the file.
 
 from __future__ import annotations
 
+import math
 import sys
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,7 @@ from tfcompose.emit.tree import edge_facts
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.model import Edge, Robot
+    from tfcompose.model import Calibration, Edge, Robot
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -82,4 +83,12 @@ def _ancestry(robot: Robot, frame: str) -> list[Edge]:
 def _line(edge: Edge) -> str:
     facts = edge_facts(edge)
     inside = f" (inside {edge.sensor})" if edge.sensor and not edge.given else ""
-    return f"{edge.name}\n          {facts}\n          {edge.at}{inside}\n"
+    measured = f"          {_measured(edge.calibration)}\n" if edge.calibration else ""
+    return f"{edge.name}\n          {facts}\n{measured}          {edge.at}{inside}\n"
+
+
+def _measured(calibration: Calibration) -> str:
+    if calibration.nominal is None:
+        return f"{calibration.name}; no nominal pose is given"
+    metres, radians = calibration.off(calibration.pose)
+    return f"{calibration.name}, {metres * 1000:.3g} mm and {math.degrees(radians):.2g} deg from nominal"

@@ -98,13 +98,13 @@ def lint_file(file: str, presets: Library, arguments: Namespace) -> list[Diagnos
     except RejectedError as error:
         return list(error.diagnostics)
     if arguments.profiles or overlays:
-        return list(compile_source(source, presets, arguments.profiles, overlays).found)
-    alone = compile_source(source, presets)
+        return list(compile_source(source, presets, arguments.profiles, overlays, read_text).found)
+    alone = compile_source(source, presets, read=read_text)
     found, used, looked = list(alone.found), set(alone.used), alone.robot is not None
     for profile in profiles_of(source):
         note = Note(f"with --profile {profile}")
         known = {(one.code, one.message, one.span) for one in found}
-        variant = compile_source(source, presets, [profile])
+        variant = compile_source(source, presets, [profile], read=read_text)
         used |= variant.used
         looked = looked and variant.robot is not None
         found += [

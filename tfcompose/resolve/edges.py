@@ -109,7 +109,7 @@ class Drafts:
         )
         relative_at = self.source.at((*at, "relative_to"))
         place_at = self.source.at((*at, "place"))
-        self.edges.append(Draft(edge, keys.relative_to, relative_at, place, place_at))
+        self.edges.append(Draft(edge, keys.relative_to, relative_at, place, place_at, at))
 
     def _kind(self, owner: str, keys: EdgeKeys, joint: Joint | None) -> EdgeKind:
         if owner == STATIC:

@@ -15,7 +15,8 @@ from tfcompose.pose import IDENTITY_XYZW, OPTICAL_XYZW, Pose, multiply
 
 if TYPE_CHECKING:
     from tfcompose.diagnostic import Span
-    from tfcompose.model import Edge
+    from tfcompose.load import Path
+    from tfcompose.model import Calibration, Edge
     from tfcompose.validate.spec import Posed, Turned
 
 
@@ -35,13 +36,20 @@ def rotation_of(turned: Turned, child: str = "") -> tuple[float, float, float, f
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """An edge whose pose may still have to be solved. Its ``pose`` is that of ``place``, in ``relative_to``."""
+    """An edge whose pose may still have to be solved. Its ``pose`` is that of ``place``, in ``relative_to``.
+
+    ``at`` is where it is written. With ``measured`` the pose is that of a calibration, and the one that is written is
+    the nominal one, if ``has_nominal``.
+    """
 
     edge: Edge
     relative_to: str | None = None
     relative_at: Span | None = None
     place: str | None = None
     place_at: Span | None = None
+    at: Path = ()
+    measured: Calibration | None = None
+    has_nominal: bool = False
 
 
 #: How deep a chain of poses that are given relative to each other is followed before it is solved from its far end.
@@ -107,6 +115,15 @@ class Solver:
         if len(self._open) >= _DEEPEST:
             raise _DeeperError(index)
         self._open.append(index)
+        solved = (
+            self._measured(draft, draft.measured) if draft.measured else replace(draft.edge, pose=self._said(draft))
+        )
+        self._open.pop()
+        self._solved[index] = solved
+        return solved
+
+    def _said(self, draft: Draft) -> Pose:
+        """Return the pose of the edge's child in its parent, from the pose that is written."""
         pose = draft.edge.pose
         if draft.relative_to:
             at = draft.relative_at or draft.edge.at
@@ -114,9 +131,20 @@ class Solver:
         if draft.place:
             at = draft.place_at or draft.edge.at
             pose = pose @ self._below(draft, self._known(draft.place, at), at).inverse()
-        self._open.pop()
-        self._solved[index] = replace(draft.edge, pose=pose)
-        return self._solved[index]
+        return pose
+
+    def _measured(self, draft: Draft, measured: Calibration) -> Edge:
+        """Return the edge with the pose that follows from its calibration, and with what that would be nominally."""
+        edge, at = draft.edge, measured.named_at
+        above = below = Pose()
+        if measured.parent != edge.parent:
+            above = self._between(edge.parent, measured.parent, at)
+        if measured.child != edge.child:
+            place_at = draft.place_at if measured.child == draft.place else None
+            below = self._below(draft, measured.child, place_at or at)
+        if draft.has_nominal:
+            measured = replace(measured, nominal=above.inverse() @ self._said(draft) @ below)
+        return replace(edge, pose=above @ measured.pose @ below.inverse(), calibration=measured)
 
     def _known(self, frame: str, at: Span) -> str:
         if frame in self.frames:
@@ -161,7 +189,7 @@ class Solver:
         names = [frame for frame, _ in chain]
         mount = draft.edge.child
         if mount not in names:
-            message = f"{place} is not a frame of this sensor"
+            message = f"{place} is not a frame of this sensor" if draft.edge.sensor else f"{place} is not below {mount}"
             inside = [d.edge.child for d in self.drafts if d.edge.sensor == draft.edge.sensor]
             raise _UnsolvableError(finding("TF404", message, at, help=did_you_mean(place, inside)))
         pose = self._down(chain, mount, at)

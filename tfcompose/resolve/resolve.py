@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
 from tfcompose.model import Edge, Process, Robot
 from tfcompose.plan import GuardPolicy
+from tfcompose.resolve.calibration import calibrated
 from tfcompose.resolve.edges import Drafts
 from tfcompose.resolve.isolation import isolate, settings_of
 from tfcompose.resolve.poses import Solver
@@ -15,6 +16,8 @@ from tfcompose.resolve.presets import Library, sensor_of
 from tfcompose.resolve.processes import built_in, name_clashes, unknown_names, user_process
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from tfcompose.load import Source
     from tfcompose.validate import Validated
     from tfcompose.validate.spec import RobotSpec
@@ -28,8 +31,8 @@ class Resolved:
     found: tuple[Diagnostic, ...]
 
 
-def resolve(validated: Validated, library: Library) -> Resolved:
-    """Return the robot with presets expanded, poses solved and owners given."""
+def resolve(validated: Validated, library: Library, read: Callable[[str], str] | None = None) -> Resolved:
+    """Return the robot with presets expanded, poses solved and owners given; ``read`` gives a calibration's text."""
     spec, source = validated.spec, validated.source
     found: list[Diagnostic] = []
     broken = set(validated.broken)
@@ -45,7 +48,9 @@ def resolve(validated: Validated, library: Library) -> Resolved:
             drafts.add_sensor(sensor)
         else:
             broken.add(("sensors", name))
-    solver = Solver(drafts.edges, drafts.frames)
+    measured, refused = calibrated(drafts.edges, drafts.frames, spec, source, read)
+    found += refused
+    solver = Solver(measured, drafts.frames)
     edges = solver.solve()
     processes = [*processes, *drafts.drivers]
     names = frozenset(name for _, name in broken)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.validate.calibration import CALIBRATION, CalibrationSpec
 from tfcompose.validate.fields import (
     ANYTHING,
     AXIS,
@@ -60,6 +61,17 @@ class EdgeKeys(Posed):
     owner: str | None = key(TEXT, None, "the process that publishes this edge", ("base_drive",))
     rate: float | None = key(RATE_, None, "how often the owner sends it", ("50 Hz",))
     static: bool | None = key(BOOLEAN, None, "the foreign owner sends it on /tf_static")
+
+
+class MountKeys(EdgeKeys):
+    """What may stand where something is bolted on, and so can be measured."""
+
+    calibration: CalibrationSpec | None = key(
+        CALIBRATION,
+        None,
+        "a file with the measured pose; the pose beside it is nominal",
+        ("calibration/hand_eye.yaml",),
+    )
 
 
 class Cylinder(Model):
@@ -120,7 +132,7 @@ FORMS = frozenset({"box", "cylinder", "sphere"})
 SHAPES = listing(Type(_shape, Shape), single=True)
 
 
-class LinkSpec(EdgeKeys):
+class LinkSpec(MountKeys):
     """A body, in URDF's words. With a parent it has a fixed edge."""
 
     visual: tuple[Shape, ...] = key(SHAPES, (), "one shape, or a list")
@@ -174,7 +186,7 @@ class JointSpec(EdgeKeys):
     mimic: Mimic | None = key(record(Mimic), None)
 
 
-class FrameSpec(EdgeKeys):
+class FrameSpec(MountKeys):
     """A bare frame. Without a parent it is a root, said so."""
 
 
@@ -255,7 +267,7 @@ class DriverSpec(ProcessSpec):
     process: str | None = key(TEXT, None)
 
 
-class SensorSpec(EdgeKeys):
+class SensorSpec(MountKeys):
     """A sensor on its mount; its frames are named after it."""
 
     preset: str = key(TEXT, about="vendor/model", examples=("realsense/d435i", "generic/lidar2d"))
@@ -316,6 +328,9 @@ class RobotSpec(Model):
     robot: str = key(text(r"[a-z][a-z0-9_]*", "a robot's name: lower case letters, digits and _"), examples=("rover",))
     include: tuple[str, ...] = key(
         listing(TEXT, single=True), (), "files that this one is laid over; relative to this file", (["base.yaml"],)
+    )
+    calibrations: tuple[str, ...] = key(
+        listing(TEXT, single=True), (), "files with measured poses; every entry is applied", (["calibration/kit.yaml"],)
     )
     base: str | None = key(TEXT, None, "where the URDF begins; left out: base_link, or the only root")
     vars: dict[str, Any] = key(mapping(ANYTHING), {}, "quantities, numbers or texts, used as ${name}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.check import apply, check, levelled, unknown_rules
+from tfcompose.check import apply, check, levelled, unknown_rules, with_edits
 from tfcompose.diagnostic import Allow, Diagnostic, RejectedError, Span
 from tfcompose.load import Source, composed, load, with_includes
 from tfcompose.resolve import Library, resolve
@@ -78,6 +78,7 @@ def compile_source(
     found = [*validated.found, *(one for one in later if _stands(one, validated))]
     rules = validated.spec.rules
     found += unknown_rules({word: source.at_key(("rules", word)) for word in rules})
+    found = with_edits(found, source)
     kept, used = apply(levelled(dict.fromkeys(found), rules), source.allows)
     ordered = sorted(kept, key=lambda one: one.sort_key)
     return Compiled(resolved.robot, tuple(ordered), source.allows, frozenset(used))

@@ -39,11 +39,23 @@ class Note:
 
 
 @dataclass(frozen=True, slots=True)
+class Edit:
+    """A stretch of a file and the text that belongs there. An empty stretch inserts.
+
+    ``text`` is a scalar's value, which keeps the quotes that stand there, or YAML that is written as it is.
+    """
+
+    span: Span
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class Diagnostic:
     """One finding.
 
     ``message`` is one line with the names and values involved and holds no advice; advice is ``help``; the other
-    place of a conflict is a note. ``span`` is None for what was seen on a live tree.
+    place of a conflict is a note. ``span`` is None for what was seen on a live tree. ``edits`` together are the one
+    safe answer, where there is one.
     """
 
     code: str
@@ -53,6 +65,7 @@ class Diagnostic:
     span: Span | None = None
     notes: tuple[Note, ...] = ()
     help: str = ""
+    edits: tuple[Edit, ...] = ()
 
     @property
     def sort_key(self) -> tuple[str, int, int, str, str]:
@@ -87,15 +100,36 @@ def finding(  # noqa: PLR0913 (a finding has that many parts; all but three are 
     help: str = "",  # noqa: A002 (the field's name)
     notes: Iterable[Note] = (),
     severity: Severity = "error",
+    edits: Iterable[Edit] = (),
 ) -> Diagnostic:
     """Return the finding with the name that ``CODES`` gives its code."""
-    return Diagnostic(code, CODES[code], severity, message, span, tuple(notes), help)
+    return Diagnostic(code, CODES[code], severity, message, span, tuple(notes), help, tuple(edits))
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """Return the known word that a person most likely meant by ``word``, or None."""
     found = get_close_matches(word.lower(), {name.lower(): name for name in known}, n=1, cutoff=0.6)
     return next((name for name in known if name.lower() == found[0]), None) if found else None
+
+
+def slip_of(word: str, known: Iterable[str]) -> str | None:
+    """Return the only known word that ``word`` is a slip of the pen away from, or None.
+
+    That is: another case; or else one letter too many, too few, wrong, or changed for its neighbour.
+    """
+    others = [name for name in known if name != word]
+    cased = [name for name in others if name.lower() == word.lower()]
+    near = cased or [name for name in others if len(word) > 1 and _is_one_slip(word, name)]
+    return near[0] if len(near) == 1 else None
+
+
+def _is_one_slip(a: str, b: str) -> bool:
+    if abs(len(a) - len(b)) > 1:
+        return False
+    same = next((at for at, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
+    a, b = a[same:], b[same:]
+    swapped = a[1::-1] == b[:2] and a[2:] == b[2:] and len(a) > 1
+    return a[1:] == b[1:] or a[1:] == b or a == b[1:] or swapped
 
 
 def did_you_mean(word: str, known: Iterable[str], otherwise: str = "") -> str:

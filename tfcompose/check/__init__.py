@@ -2,5 +2,6 @@
 
 from tfcompose.check.allow import apply, code_of, idle, levelled, unknown_rules
 from tfcompose.check.check import RULES, Rule, check
+from tfcompose.check.edits import with_edits
 
-__all__ = ["RULES", "Rule", "apply", "check", "code_of", "idle", "levelled", "unknown_rules"]
+__all__ = ["RULES", "Rule", "apply", "check", "code_of", "idle", "levelled", "unknown_rules", "with_edits"]

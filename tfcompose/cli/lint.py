@@ -16,15 +16,17 @@ from typing import TYPE_CHECKING
 from tfcompose import __version__
 from tfcompose.check import idle
 from tfcompose.cli.compiling import library, overlays_of
+from tfcompose.cli.fixing import Fixer
 from tfcompose.cli.options import DEFAULT_FILE, add_variant
 from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
 from tfcompose.compile import compile_source, profiles_of
-from tfcompose.diagnostic import Diagnostic, Note, RejectedError
+from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, finding
 from tfcompose.load import load, with_includes
 from tfcompose.render.text import summary
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
+    from collections.abc import Callable
 
     from tfcompose.resolve import Library
 
@@ -45,6 +47,7 @@ def arguments(parser: ArgumentParser) -> None:
     )
     add_variant(parser, "check this combination only")
     parser.add_argument("--format", choices=FORMATS, default="text", help="default: text")
+    parser.add_argument("--fix", action="store_true", help="mend what has one safe answer, in the files that are named")
     parser.add_argument(
         "--fail-on", choices=("error", "warning"), default="error", help="what makes the exit code 1; default: error"
     )
@@ -55,12 +58,31 @@ def run(arguments: Namespace) -> int:
     presets = library()
     found: list[Diagnostic] = []
     files = dict.fromkeys(file for name in arguments.files for file in robots_in(name))
-    for file in files:
-        found += lint_file(file, presets, arguments)
+    if arguments.fix:
+        fixer = Fixer(list(files), lambda file, read: lint_file(file, presets, arguments, read))
+        found = _fixed(fixer, arguments.format)
+    else:
+        for file in files:
+            found += lint_file(file, presets, arguments)
     _print(found, arguments.format, len(files))
     if unreadable(found):
         return UNREADABLE
     return int(any(one.severity == "error" or arguments.fail_on == "warning" for one in found))
+
+
+def _fixed(fixer: Fixer, form: str) -> list[Diagnostic]:
+    """Fix the files, say what was fixed, and return what remains: everything, where a file cannot be written."""
+    found = [one for file in fixer.files for one in fixer.fix(file)]
+    try:
+        fixer.write()
+    except OSError as error:
+        message = f"cannot be fixed: {error.strerror}"
+        return [finding("TF001", message, Span(error.filename or "?"))]
+    stream = sys.stdout if form == "text" else sys.stderr
+    for one in fixer.fixed:
+        now = " … ".join(edit.text.strip(", \n") for edit in one.edits)
+        stream.write(f"{one.span}: fixed[{one.code}] {one.message}: now {now}\n")
+    return found
 
 
 def robots_in(name: str) -> list[str]:
@@ -90,10 +112,12 @@ def _print(found: list[Diagnostic], form: str, files: int) -> None:
         sys.stdout.write(import_module("tfcompose.render.sarif").render_sarif(found, __version__, pages))
 
 
-def lint_file(file: str, presets: Library, arguments: Namespace) -> list[Diagnostic]:
+def lint_file(
+    file: str, presets: Library, arguments: Namespace, read: Callable[[str], str] = read_text
+) -> list[Diagnostic]:
     """Return the findings of one file: alone and with each of its profiles, or with what is asked for only."""
     try:
-        source = with_includes(load(read_text(file), file), read_text)
+        source = with_includes(load(read(file), file), read)
         overlays = overlays_of(arguments)
     except RejectedError as error:
         return list(error.diagnostics)

@@ -21,6 +21,7 @@ from tfcompose.validate.quantity import (
     dimension_name,
     example,
     quantity,
+    respelt,
 )
 from tfcompose.validate.schema import BROKEN, Problems, Type, listing, shown, then
 
@@ -90,7 +91,8 @@ def read_quantity(value: Any, path: Path, problems: Problems, dimension: Dimensi
             value = quantity(value)
         except UnitError as error:
             code = "TF104" if error.unit else "TF103"
-            return problems.refuse(code, path, f"{error}; {want} is expected", error.advice)
+            instead = respelt(value, error.unit, dimension) if error.unit else None
+            return problems.refuse(code, path, f"{error}; {want} is expected", error.advice, instead=instead)
     elif isinstance(value, bool) or not isinstance(value, (int, float, Quantity)):
         return problems.refuse("TF103", path, f"{shown(value)} is no {name}", f"for example {example(dimension)}")
     if isinstance(value, Quantity):

@@ -9,7 +9,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from tfcompose.diagnostic import did_you_mean
+from tfcompose.diagnostic import did_you_mean, slip_of
 
 Dimension = tuple[int, int, int, int]
 
@@ -126,7 +126,7 @@ def in_unit(number: float, unit: str) -> Quantity:
     """
     if unit not in UNITS:
         advice = did_you_mean(unit, UNITS, f"known units: {', '.join(UNITS)}")
-        raise UnitError(f"unknown unit {unit}", _SPELLINGS.get(unit, advice), unit)
+        raise UnitError(f"unknown unit {unit}", f"write {_SPELLINGS[unit]}" if unit in _SPELLINGS else advice, unit)
     factor, dimension = UNITS[unit]
     above, below = _FRACTIONS.get(unit, (factor, 1))
     value = math.radians(number) if unit == "deg" else number * above / below
@@ -135,15 +135,43 @@ def in_unit(number: float, unit: str) -> Quantity:
     return Quantity(value, dimension)
 
 
+#: How else people write units, and their name here.
 _SPELLINGS = {
-    "°": "write deg",
-    "degree": "write deg",
-    "degrees": "write deg",
-    '"': "write in",
-    "inch": "write in",
-    "hz": "write Hz",
-    "µm": "write um",
+    spelling: unit
+    for unit, spellings in {
+        "m": "meter meters metre metres",
+        "cm": "centimeter centimeters centimetre centimetres",
+        "mm": "millimeter millimeters millimetre millimetres",
+        "um": "µm \u03bcm micrometer micrometers micrometre micrometres",
+        "km": "kilometer kilometers kilometre kilometres",
+        "in": '" inch inches',
+        "ft": "' foot feet",
+        "kg": "kilogram kilograms kilo kilos",
+        "g": "gram grams",
+        "lb": "lbs pound pounds",
+        "s": "sec secs second seconds",
+        "ms": "msec millisecond milliseconds",
+        "us": "µs \u03bcs microsecond microseconds",
+        "min": "minute minutes",
+        "rad": "radian radians",
+        "mrad": "milliradian milliradians",
+        "deg": "° degree degrees",
+        "Hz": "hz hertz",
+        "kHz": "khz kilohertz",
+        "m/s": "mps",
+        "deg/s": "°/s dps",
+    }.items()
+    for spelling in spellings.split()
 }
+
+
+def respelt(text: str, unit: str, dimension: Dimension) -> str | None:
+    """Return the quantity with the only unit of the dimension that can be meant by ``unit``, or None."""
+    known = [name for name, (_, its) in UNITS.items() if its == dimension]
+    meant = _SPELLINGS.get(unit) or _SPELLINGS.get(unit.lower()) or slip_of(unit, known)
+    if meant not in known or not text.rstrip().endswith(unit):
+        return None
+    return text.rstrip().removesuffix(unit) + str(meant)
 
 
 def dimension_name(dimension: Dimension) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from tfcompose.diagnostic import did_you_mean
+from tfcompose.diagnostic import did_you_mean, slip_of
 from tfcompose.validate.quantity import Quantity
 
 if TYPE_CHECKING:
@@ -24,7 +24,10 @@ BROKEN: Any = type("Broken", (), {"__repr__": lambda _: "BROKEN"})()
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One refusal. ``path`` is the place; ``on_key`` says that the key is wrong, not its value."""
+    """One refusal. ``path`` is the place; ``on_key`` says that the key is wrong, not its value.
+
+    ``instead`` is the key or the text that belongs there, where only one can be meant.
+    """
 
     code: str
     path: Path
@@ -32,6 +35,7 @@ class Problem:
     help: str = ""
     on_key: bool = False
     other: Path | None = None
+    instead: str | None = None
 
 
 @dataclass(slots=True)
@@ -49,9 +53,10 @@ class Problems:
         *,
         on_key: bool = False,
         other: Path | None = None,
+        instead: str | None = None,
     ) -> Any:
         """Note a problem and return ``BROKEN``."""
-        self.all.append(Problem(code, path, message, help, on_key, other))
+        self.all.append(Problem(code, path, message, help, on_key, other, instead))
         return BROKEN
 
 
@@ -148,10 +153,11 @@ def record(cls: type[Model], normal: Callable[[Any], Any] | None = None, short: 
 
 
 def _read_model(cls: type[Model], data: dict[str, Any], path: Path, problems: Problems) -> Any:
-    for name in data:
-        if name not in cls.KEYS:
-            advice = did_you_mean(name, cls.KEYS, f"known here: {', '.join(cls.KEYS)}")
-            problems.refuse("TF101", (*path, name), f"unknown key {name}", advice, on_key=True)
+    unknown = {name: slip_of(name, cls.KEYS) for name in data if name not in cls.KEYS}
+    for name, meant in unknown.items():
+        advice = did_you_mean(name, cls.KEYS, f"known here: {', '.join(cls.KEYS)}")
+        only = meant if meant not in data and list(unknown.values()).count(meant) == 1 else None
+        problems.refuse("TF101", (*path, name), f"unknown key {name}", advice, on_key=True, instead=only)
     values: dict[str, Any] = {}
     whole = True
     for name, described in cls.KEYS.items():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, Note, RejectedError, finding
+from tfcompose.diagnostic import Diagnostic, Edit, Note, RejectedError, finding
 from tfcompose.load.overlay import CHOICES
 from tfcompose.validate.preset import PresetSpec
 from tfcompose.validate.schema import BROKEN, Model, Problem, Problems, record
@@ -79,7 +79,8 @@ def _in_a_copy(problem: Problem, data: dict[str, Any]) -> bool:
 def _finding(problem: Problem, source: Source) -> Diagnostic:
     span = source.at_key(problem.path) if problem.on_key else source.at(problem.path)
     notes = [Note("the other one", source.at_key(problem.other))] if problem.other else []
-    return finding(problem.code, problem.message, span, help=problem.help, notes=notes)
+    edits = [Edit(span, problem.instead)] if problem.instead is not None else []
+    return finding(problem.code, problem.message, span, help=problem.help, notes=notes, edits=edits)
 
 
 def _exclusive(data: dict[str, Any], problems: Problems) -> None:

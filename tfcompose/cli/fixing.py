@@ -1,0 +1,169 @@
+"""``tfcompose lint --fix``: the one safe answer is written into the file, and nothing else changes.
+
+Edits are tried in memory first. Only those are kept that take away their finding and bring no new one.
+"""
+
+from __future__ import annotations
+
+import codecs
+import contextlib
+import os
+import re
+import stat
+import tempfile
+from collections import Counter
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.terminal import read_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from tfcompose.diagnostic import Diagnostic, Edit
+
+    Reader = Callable[[str], str]
+    Lint = Callable[[str, Reader], list[Diagnostic]]
+
+_BREAK = re.compile("\r\n|[\r\n\x85\u2028\u2029]")  # as YAML counts lines
+
+
+class ChangedError(OSError):
+    """Somebody else has changed the file since it was read."""
+
+
+@dataclass(slots=True)
+class Fixer:
+    """Fixes files that were named; ``lint`` returns a file's findings, through the reader that it is given.
+
+    ``fixed`` are the findings that are gone, with their places before; ``texts`` what the files then hold.
+    """
+
+    files: Sequence[str]
+    lint: Lint
+    fixed: list[Diagnostic] = field(default_factory=list)
+    texts: dict[str, str] = field(default_factory=dict)
+    _read: dict[str, str] = field(default_factory=dict)
+
+    def fix(self, file: str) -> list[Diagnostic]:
+        """Fix one file in memory and return the findings that remain."""
+        found = self._findings([file])
+        while True:
+            todo = [one for one in found if one.edits and all(self._may_edit(edit.span.file) for edit in one.edits)]
+            kept = self._sound(file, [], todo)
+            if not kept:
+                return self.lint(file, self.read)
+            self.texts |= self._edited(kept) or {}
+            self.fixed += kept
+            found = self._findings([file])
+
+    def write(self) -> None:
+        """Write the files that changed.
+
+        Raises:
+            OSError: if one cannot be written, or was changed meanwhile; those before it are written.
+        """
+        for path, text in self.texts.items():
+            rewrite(Path(path), self._read[path], text)
+
+    def read(self, file: str) -> str:
+        """Return the file's text as it will be; a file is read once."""
+        path = os.path.realpath(file)
+        if path not in self._read:
+            self._read[path] = read_text(file)
+        return self.texts.get(path, self._read[path])
+
+    def _may_edit(self, file: str) -> bool:
+        path = os.path.realpath(file)
+        return path in map(os.path.realpath, self.files) and Path(path).is_file()
+
+    def _findings(self, files: Iterable[str]) -> list[Diagnostic]:
+        return [one for file in files for one in self.lint(file, self.read)]
+
+    def _sound(self, file: str, kept: list[Diagnostic], todo: list[Diagnostic]) -> list[Diagnostic]:
+        """Return ``kept`` and those of ``todo`` that can be fixed with it, halving what is not sound as a whole."""
+        if not todo:
+            return kept
+        if self._is_sound(file, [*kept, *todo]):
+            return [*kept, *todo]
+        if len(todo) == 1:
+            return kept
+        half = len(todo) // 2
+        return self._sound(file, self._sound(file, kept, todo[:half]), todo[half:])
+
+    def _is_sound(self, file: str, fixed: list[Diagnostic]) -> bool:
+        """Whether with these edits the findings are gone, and no others have come."""
+        files = dict.fromkeys([file, *(edit.span.file for one in fixed for edit in one.edits)])
+        before, texts = _counted(self._findings(files)), self._edited(fixed)
+        if texts is None:
+            return False
+        self.texts, old = self.texts | texts, self.texts
+        after = _counted(self._findings(files))
+        self.texts = old
+        return not after - before and not _counted(fixed) - (before - after)
+
+    def _edited(self, fixed: list[Diagnostic]) -> dict[str, str] | None:
+        """Return the new texts by file, or None where edits meet."""
+        by_file: dict[str, dict[Edit, None]] = {}
+        for edit in (edit for one in fixed for edit in one.edits):
+            by_file.setdefault(edit.span.file, {})[edit] = None
+        texts = {os.path.realpath(file): edited(self.read(file), list(edits)) for file, edits in by_file.items()}
+        whole = {file: text for file, text in texts.items() if text is not None}
+        return whole if len(whole) == len(texts) == len(by_file) else None
+
+
+def _counted(found: Iterable[Diagnostic]) -> Counter[tuple[str, str]]:
+    return Counter((one.code, one.message) for one in found)
+
+
+def edited(text: str, edits: Sequence[Edit]) -> str | None:
+    """Return the text with the edits in it, or None where two of them meet or one lies outside."""
+    starts = [0, *(found.end() for found in _BREAK.finditer(text))]
+    newline = "\r\n" if "\r\n" in text else "\n"
+    pieces: list[tuple[int, int, str]] = []
+    for edit in edits:
+        at, new = edit.span, edit.text.replace("\n", newline)
+        if at.line == len(starts) + 1 and at.column == 1:  # behind a last line that does not end
+            pieces.append((len(text), len(text), newline + new.removesuffix(newline)))
+            continue
+        if at.end_line > len(starts):
+            return None
+        begin, end = starts[at.line - 1] + at.column - 1, starts[at.end_line - 1] + at.end_column - 1
+        quote = text[begin : begin + 1] if end - begin > 1 and text[begin] == text[end - 1] else ""
+        pieces.append((begin, end, f"{quote}{new}{quote}" if quote in {"'", '"'} else new))
+    pieces.sort()
+    if any(end > begin for (_, end, _), (begin, _, _) in pairwise(pieces)):
+        return None
+    for begin, end, new in reversed(pieces):
+        text = text[:begin] + new + text[end:]
+    return text
+
+
+def rewrite(path: Path, old: str, new: str) -> None:
+    """Put the new text into the file, whole or not at all; its mode, owner and byte order mark stay.
+
+    Raises:
+        OSError: if the file cannot be written; it is as it was.
+    """
+    if not os.access(path, os.W_OK):
+        raise PermissionError(13, "Permission denied", str(path))
+    data, mode = path.read_bytes(), path.stat()
+    mark = codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b""
+    if data != mark + old.encode():
+        raise ChangedError(0, "it has changed meanwhile", str(path))
+    descriptor, name = tempfile.mkstemp(prefix=".tfcompose-", dir=path.parent)
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(mark + new.encode())
+            file.flush()
+            os.fsync(file.fileno())
+            with contextlib.suppress(PermissionError):  # another's file, in a folder of ours
+                os.fchown(file.fileno(), mode.st_uid, mode.st_gid)
+            os.fchmod(file.fileno(), stat.S_IMODE(mode.st_mode))
+        Path(name).replace(path)
+    except OSError:
+        with contextlib.suppress(OSError):
+            Path(name).unlink()
+        raise

@@ -18,7 +18,10 @@ if TYPE_CHECKING:
     from tfcompose.validate import Validated
 
 #: Findings that follow from a pose. In an entry whose pose was refused they say nothing new.
-_FROM_A_POSE = frozenset({"TF401", "TF404", "TF405"})
+_FROM_A_POSE = frozenset({"TF401", "TF404", "TF405", "TF413", "TF414", "TF621", "TF622"})
+
+#: Findings that something has no use. What a profile or an overlay has no use for, the robot without it may need.
+_IDLE = frozenset({"TF504", "TF619", "TF815"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,13 +72,14 @@ def compile_source(
 ) -> Compiled:
     """Return what ``compile_robot`` does, from text that has been loaded, with what it includes."""
     try:
-        validated = validate(composed(source, profiles, overlays))
+        validated = validate(composed(source, profiles, overlays), source.data.get("profiles"))
     except RejectedError as error:
         return Compiled(None, error.diagnostics)
     resolved = resolve(validated, library, read)
     later = [*resolved.found, *check(resolved.robot)]
     source = validated.source
-    found = [*validated.found, *(one for one in later if _stands(one, validated))]
+    plain = not (profiles or overlays)
+    found = [*validated.found, *(one for one in later if _stands(one, validated) and (plain or one.code not in _IDLE))]
     rules = validated.spec.rules
     found += unknown_rules({word: source.at_key(("rules", word)) for word in rules})
     found = with_edits(found, source)

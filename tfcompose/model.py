@@ -49,11 +49,17 @@ class Shape:
 
 @dataclass(frozen=True, slots=True)
 class Inertial:
-    """Mass in kg, the pose of the centre of mass in the link, and the tensor about it (xx, xy, xz, yy, yz, zz)."""
+    """Mass in kg, the pose of the centre of mass in the link, and the tensor about it (xx, xy, xz, yy, yz, zz).
+
+    ``of_shapes`` holds, where the tensor was given, the traces of those that the visual and the collision shapes would
+    have at one density. The trace is the same in all axes.
+    """
 
     mass: float
     pose: Pose
     tensor: tuple[float, float, float, float, float, float]
+    of_shapes: tuple[float, ...] = ()
+    at: Span | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +95,56 @@ class Joint:
     mimic: str | None = None
     multiplier: float = 1.0
     offset: float = 0.0
+    axis_length: float = 1.0  # as it was written
+
+
+@dataclass(frozen=True, slots=True)
+class MountedSensor:
+    """A sensor as the rules see it: the frames that it brings, and its driver.
+
+    ``driver`` is the name of the driver's process, empty without one; ``switch`` holds the parameters that keep the
+    driver from publishing frames (None: there are none), ``publishes`` says that it may. ``serial_option`` is the
+    preset's option for a serial number, empty where it has none, and ``serial_parameter`` what the driver calls it.
+    """
+
+    name: str
+    preset: str
+    kind: str
+    at: Span
+    mount: str
+    frames: tuple[str, ...] = ()
+    driver_frames: tuple[str, ...] = ()
+    driver: str = ""
+    switch: dict[str, Any] | None = None
+    publishes: bool = False
+    serial_option: str = ""
+    serial_parameter: str = ""
+    serial: str | None = None
+    tf_at: Span | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class AsWritten:
+    """The numbers of one value of a pose or joint limit as the file has them, in SI, each with its place.
+
+    ``path`` leads to the value (``sensors``, ``camera``, ``rpy``); ``with_unit`` says of each number whether it stands
+    there with a unit.
+    """
+
+    path: tuple[str | int, ...]
+    numbers: tuple[float, ...]
+    with_unit: tuple[bool, ...]
+    places: tuple[Span, ...]
+
+    @property
+    def key(self) -> str:
+        """The value's key: ``xyz``, ``rpy``, ``look``, …."""
+        return str(self.path[-1])
+
+    @property
+    def entry(self) -> str:
+        """The name of the frame, link, joint, sensor or process that the value belongs to."""
+        return str(self.path[1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +201,7 @@ class Edge:
     child_at: Span | None = None
     sensor: str | None = None
     nominal: bool = False
+    rate_at: Span | None = None
     calibration: Calibration | None = None
 
     @property
@@ -179,8 +236,9 @@ class Robot:
     """One robot, resolved.
 
     ``frames`` holds every frame that was declared, with its place; ``base`` is where the URDF begins, or None where the
-    tree has no single root; ``written`` is the plain data that the robot was made from, profiles laid over it;
-    ``broken`` holds the entries (section, name) that were refused already.
+    tree has no single root; ``sensors`` are those with a known preset, ``as_written`` the numbers of poses and limits
+    before they became poses, ``unused`` the variables that nothing uses; ``written`` is the plain data that the robot
+    was made from, profiles laid over it; ``broken`` holds the entries (section, name) that were refused already.
     """
 
     name: str
@@ -192,6 +250,9 @@ class Robot:
     base: str | None
     ros: RosSettings = field(default_factory=RosSettings)
     guard: GuardPolicy = field(default_factory=GuardPolicy)
+    sensors: tuple[MountedSensor, ...] = ()
+    as_written: tuple[AsWritten, ...] = field(default=(), compare=False, repr=False)
+    unused: dict[str, Span] = field(default_factory=dict, compare=False)
     written: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
     broken: frozenset[tuple[str, str]] = frozenset()
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tfcompose.check import RULES, code_of
-from tfcompose.check.pages import PAGES, page
+from tfcompose.check.pages import PAGES, page, rule_table
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.diagnostic import CODES
@@ -36,3 +36,18 @@ def test_a_robot_sets_how_much_its_findings_matter() -> None:
     found = compile_robot(spec.read_text("utf-8"), spec.name, library()).found
     assert {one.severity for one in found if one.code == "TF401"} == {"warning"}
     assert {one.severity for one in found if one.code == "TF101"} == {"error"}
+
+
+def test_the_table_of_rules_in_the_readme_is_the_one_that_explain_prints() -> None:
+    readme = (Path(__file__).parents[2] / "README.md").read_text("utf-8")
+    _, _, rest = readme.partition("<!-- rules -->\n")
+    shown, mark, _ = rest.partition("<!-- /rules -->")
+    assert mark
+    assert shown == rule_table(), "python -m tfcompose explain --table"
+
+
+@pytest.mark.parametrize("spec", sorted((Path(__file__).parent / "specs").glob("*.yaml")), ids=lambda path: path.stem)
+def test_a_finding_of_a_rule_is_at_most_as_severe_as_the_table_says(spec: Path) -> None:
+    warnings = {rule.code for rule in RULES if rule.severity == "warning"}
+    found = compile_robot(spec.read_text("utf-8"), spec.name, library()).found
+    assert not [one for one in found if one.severity == "error" and one.code in warnings]

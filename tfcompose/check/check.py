@@ -11,25 +11,55 @@ from tfcompose.check.rules.tf203_unknown_frame import unknown_frame
 from tfcompose.check.rules.tf204_several_roots import several_roots
 from tfcompose.check.rules.tf205_edge_given_twice import edge_given_twice
 from tfcompose.check.rules.tf206_no_frames import no_frames
+from tfcompose.check.rules.tf207_wrong_chain_order import wrong_chain_order
+from tfcompose.check.rules.tf208_base_footprint_below_base_link import base_footprint_below_base_link
 from tfcompose.check.rules.tf301_edge_with_two_owners import edge_with_two_owners
 from tfcompose.check.rules.tf302_unknown_owner import unknown_owner
 from tfcompose.check.rules.tf303_owner_cannot_publish import owner_cannot_publish
+from tfcompose.check.rules.tf305_static_edge_with_rate import static_edge_with_rate
+from tfcompose.check.rules.tf306_one_node_two_levels import one_node_two_levels
+from tfcompose.check.rules.tf307_rate_too_low import rate_too_low
+from tfcompose.check.rules.tf308_driver_publishes_too import driver_publishes_too
 from tfcompose.check.rules.tf401_optical_frame_not_rotated import optical_frame_not_rotated
+from tfcompose.check.rules.tf410_degrees_as_radians import degrees_as_radians
+from tfcompose.check.rules.tf411_rounded_right_angle import rounded_right_angle
+from tfcompose.check.rules.tf412_quaternion_w_first import quaternion_w_first
+from tfcompose.check.rules.tf413_camera_looks_away import camera_looks_away
+from tfcompose.check.rules.tf414_far_from_the_robot import far_from_the_robot
 from tfcompose.check.rules.tf501_bad_frame_name import bad_frame_name
+from tfcompose.check.rules.tf503_upper_case_name import upper_case_name
+from tfcompose.check.rules.tf504_unused_variable import unused_variable
 from tfcompose.check.rules.tf615_calibration_probably_inverse import calibration_probably_inverse
 from tfcompose.check.rules.tf616_calibration_far_from_nominal import calibration_far_from_nominal
 from tfcompose.check.rules.tf617_calibration_all_zero import calibration_all_zero
 from tfcompose.check.rules.tf618_calibration_copied import calibration_copied
+from tfcompose.check.rules.tf620_camera_without_optical_frame import camera_without_optical_frame
+from tfcompose.check.rules.tf621_sensors_at_one_pose import sensors_at_one_pose
+from tfcompose.check.rules.tf622_mount_copied import mount_copied
+from tfcompose.check.rules.tf623_serial_missing import serial_missing
+from tfcompose.check.rules.tf624_serial_used_twice import serial_used_twice
 from tfcompose.check.rules.tf701_mimic_without_master import mimic_without_master
 from tfcompose.check.rules.tf702_mimic_loop import mimic_loop
 from tfcompose.check.rules.tf704_joint_without_limits import joint_without_limits
+from tfcompose.check.rules.tf705_inverted_limits import inverted_limits
+from tfcompose.check.rules.tf706_zero_limit import zero_limit
+from tfcompose.check.rules.tf707_axis_not_unit import axis_not_unit
+from tfcompose.check.rules.tf708_mimic_chain import mimic_chain
+from tfcompose.check.rules.tf709_inertia_missing import inertia_missing
+from tfcompose.check.rules.tf710_impossible_inertia import impossible_inertia
+from tfcompose.check.rules.tf711_inertia_off_from_shape import inertia_off_from_shape
+from tfcompose.check.rules.tf712_root_link_with_inertia import root_link_with_inertia
 from tfcompose.check.rules.tf812_start_order_loop import start_order_loop
-from tfcompose.diagnostic import Diagnostic, Span, finding
+from tfcompose.check.rules.tf815_process_without_role import process_without_role
+from tfcompose.diagnostic import Diagnostic, Severity, Span, finding
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from tfcompose.model import Robot
+
+
+WARNING: Severity = "warning"
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +68,7 @@ class Rule:
 
     code: str
     check: Callable[[Robot], Iterator[Diagnostic]]
+    severity: Severity = "error"
 
     @property
     def name(self) -> str:
@@ -52,19 +83,46 @@ RULES: tuple[Rule, ...] = (
     Rule("TF204", several_roots),
     Rule("TF205", edge_given_twice),
     Rule("TF206", no_frames),
+    Rule("TF207", wrong_chain_order, WARNING),
+    Rule("TF208", base_footprint_below_base_link, WARNING),
     Rule("TF301", edge_with_two_owners),
     Rule("TF302", unknown_owner),
     Rule("TF303", owner_cannot_publish),
+    Rule("TF305", static_edge_with_rate, WARNING),
+    Rule("TF306", one_node_two_levels, WARNING),
+    Rule("TF307", rate_too_low, WARNING),
+    Rule("TF308", driver_publishes_too, WARNING),
     Rule("TF401", optical_frame_not_rotated),
+    Rule("TF410", degrees_as_radians, WARNING),
+    Rule("TF411", rounded_right_angle, WARNING),
+    Rule("TF412", quaternion_w_first, WARNING),
+    Rule("TF413", camera_looks_away, WARNING),
+    Rule("TF414", far_from_the_robot, WARNING),
     Rule("TF501", bad_frame_name),
+    Rule("TF503", upper_case_name, WARNING),
+    Rule("TF504", unused_variable, WARNING),
     Rule("TF615", calibration_probably_inverse),
-    Rule("TF616", calibration_far_from_nominal),
+    Rule("TF616", calibration_far_from_nominal, WARNING),
     Rule("TF617", calibration_all_zero),
-    Rule("TF618", calibration_copied),
+    Rule("TF618", calibration_copied, WARNING),
+    Rule("TF620", camera_without_optical_frame, WARNING),
+    Rule("TF621", sensors_at_one_pose, WARNING),
+    Rule("TF622", mount_copied, WARNING),
+    Rule("TF623", serial_missing, WARNING),
+    Rule("TF624", serial_used_twice),
     Rule("TF701", mimic_without_master),
     Rule("TF702", mimic_loop),
     Rule("TF704", joint_without_limits),
+    Rule("TF705", inverted_limits),
+    Rule("TF706", zero_limit, WARNING),
+    Rule("TF707", axis_not_unit, WARNING),
+    Rule("TF708", mimic_chain, WARNING),
+    Rule("TF709", inertia_missing, WARNING),
+    Rule("TF710", impossible_inertia, WARNING),
+    Rule("TF711", inertia_off_from_shape, WARNING),
+    Rule("TF712", root_link_with_inertia, WARNING),
     Rule("TF812", start_order_loop),
+    Rule("TF815", process_without_role, WARNING),
 )
 
 

@@ -22,6 +22,15 @@ def page(code: str) -> str:
     return PAGES[code]
 
 
+def rule_table() -> str:
+    """Return the rules as a table in Markdown: code, name, severity, and the first line of the page."""
+    rows = ["| code | name | severity | what is wrong |", "|---|---|---|---|"]
+    for rule in sorted(RULES, key=lambda rule: rule.code):
+        first = page(rule.code).partition("\n")[0]
+        rows.append(f"| {rule.code} | {rule.name} | {rule.severity} | {first} |")
+    return "\n".join(rows) + "\n"
+
+
 PAGES = {
     "TF001": """A file cannot be read, or is no text.
 

@@ -11,7 +11,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from tfcompose.check import code_of
-from tfcompose.check.pages import page
+from tfcompose.check.pages import page, rule_table
 from tfcompose.cli.compiling import robot_or_code
 from tfcompose.cli.options import add_variant
 from tfcompose.cli.terminal import UNREADABLE, complain
@@ -27,14 +27,18 @@ if TYPE_CHECKING:
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument(
-        "what", nargs="+", metavar="CODE|FILE A B", help="a code, a rule's name, or a file and two frames"
+        "what", nargs="*", metavar="CODE|FILE A B", help="a code, a rule's name, or a file and two frames"
     )
+    parser.add_argument("--table", action="store_true", help="print all rules as a table in Markdown")
     add_variant(parser)
 
 
 def run(arguments: Namespace) -> int:
     """Print the page or the chain; exit code 1 if a frame is not there, 2 for wrong use."""
     words = arguments.what
+    if arguments.table and not words:
+        sys.stdout.write(rule_table())
+        return 0
     if len(words) == 1:
         return _explain_code(words[0])
     if len(words) != 3:  # noqa: PLR2004 (FILE A B)

@@ -25,7 +25,7 @@ def link_of(name: str, body: spec.LinkSpec, at: Span) -> Link:
     """Return the link with its shapes and, where it has a mass, its inertia."""
     visuals = tuple(shape_of(shape) for shape in body.visual if kind_of(shape))
     collisions = tuple(shape_of(shape) for shape in body.collision if kind_of(shape))
-    inertial = _inertial(body.inertial, collisions or visuals) if body.inertial else None
+    inertial = _inertial(body.inertial, visuals, collisions, at) if body.inertial else None
     return Link(name, at, visuals, collisions, inertial)
 
 
@@ -53,11 +53,12 @@ def material_of(given: spec.Material) -> Material:
     return Material(name, given.rgba)
 
 
-def _inertial(given: spec.Inertial, shapes: tuple[Shape, ...]) -> Inertial:
-    pose = pose_of(given)
+def _inertial(given: spec.Inertial, visuals: tuple[Shape, ...], collisions: tuple[Shape, ...], at: Span) -> Inertial:
+    pose, shapes = pose_of(given), collisions or visuals
     if given.inertia:
         i = given.inertia
-        return Inertial(given.mass, pose, (i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz))
+        of_shapes = tuple(_trace(inertial_of(given.mass, some).tensor) for some in (visuals, collisions) if some)
+        return Inertial(given.mass, pose, (i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz), of_shapes, at)
     if not shapes:
         return Inertial(given.mass, pose, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     return inertial_of(given.mass, shapes)
@@ -75,6 +76,10 @@ def inertial_of(mass: float, shapes: tuple[Shape, ...]) -> Inertial:
     parts = [_about(m, shape, centre) for m, shape in zip(masses, shapes, strict=True)]
     xx, xy, xz, yy, yz, zz = (math.fsum(values) for values in zip(*parts, strict=True))
     return Inertial(mass, Pose(centre), (xx, xy, xz, yy, yz, zz))
+
+
+def _trace(tensor: Tensor) -> float:
+    return tensor[0] + tensor[3] + tensor[5]
 
 
 def _volume(shape: Shape) -> float:

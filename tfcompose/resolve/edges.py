@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Span, did_you_mean, finding
-from tfcompose.model import JOINTS, STATIC, Edge, Joint, Limit, Link, Process
+from tfcompose.model import JOINTS, STATIC, Edge, Joint, Limit, Link, MountedSensor, Process
 from tfcompose.pose import Pose, norm
 from tfcompose.resolve.bodies import inertial_of, link_of, shape_of
 from tfcompose.resolve.poses import Draft, pose_of, rotation_of
@@ -30,6 +30,7 @@ class Drafts:
     edges: list[Draft] = field(default_factory=list)
     links: dict[str, Link] = field(default_factory=dict)
     drivers: list[Process] = field(default_factory=list)
+    sensors: list[MountedSensor] = field(default_factory=list)
     found: list[Diagnostic] = field(default_factory=list)
 
     def add_frames(self) -> None:
@@ -79,6 +80,7 @@ class Drafts:
             self.edges.append(Draft(edge))
         self._check_overrides(sensor, mount)
         self._add_body(sensor)
+        self.sensors.append(self._mounted(sensor, mount))
 
     def _add(  # noqa: PLR0913 (an edge has that many parts)
         self,
@@ -106,6 +108,7 @@ class Drafts:
             child_at=self.source.at((*at, "child")) if joint_name else None,
             owner_at=self.source.at((*at, "owner")) if keys.owner else None,
             sensor=sensor.name if sensor else None,
+            rate_at=self.source.at((*at, "rate")) if keys.rate else None,
         )
         relative_at = self.source.at((*at, "relative_to"))
         place_at = self.source.at((*at, "place"))
@@ -144,6 +147,31 @@ class Drafts:
             message = f"{sensor.name}: the driver of {said.preset} has no switch for its frames"
             self._refuse(message, place, "tf: driver")
         return STATIC
+
+    def _mounted(self, sensor: Sensor, mount: str) -> MountedSensor:
+        """Return what the rules see of the sensor."""
+        said, preset, driver = sensor.spec, sensor.preset, sensor.preset.driver
+        inside = sensor.frames()
+        named = said.driver.process if said.driver else None
+        own = sensor.name if any(process.name == sensor.name for process in self.drivers) else ""
+        serial = next((option for option in ("serial", "serial_number") if option in preset.options), "")
+        taken = driver.take if driver else {}
+        return MountedSensor(
+            sensor.name,
+            said.preset,
+            preset.kind,
+            self.source.at_key(("sensors", sensor.name)),
+            mount,
+            tuple(self._renamed(sensor, name) for name in inside),
+            tuple(self._renamed(sensor, name) for name, frame in inside.items() if frame.driver),
+            "" if named == "none" else named or own,
+            driver.switch if driver else None,
+            said.tf != "tfcompose",
+            serial,
+            next((parameter for parameter, option in taken.items() if option == serial), ""),
+            sensor.options.get(serial) if serial else None,
+            self.source.at(("sensors", sensor.name, "tf")),
+        )
 
     def _refuse(self, message: str, place: Span, advice: str) -> None:
         self.found.append(finding("TF604", message, place, help=advice))
@@ -193,4 +221,5 @@ def _moving(name: str, joint: JointSpec, source: Source) -> Joint | None:
         mimic.joint if mimic else None,
         mimic.multiplier if mimic else 1.0,
         mimic.offset if mimic else 0.0,
+        length,
     )

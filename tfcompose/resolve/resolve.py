@@ -14,6 +14,7 @@ from tfcompose.resolve.isolation import isolate, settings_of
 from tfcompose.resolve.poses import Solver
 from tfcompose.resolve.presets import Library, sensor_of
 from tfcompose.resolve.processes import built_in, name_clashes, unknown_names, user_process
+from tfcompose.resolve.written import as_written
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -67,6 +68,9 @@ def resolve(validated: Validated, library: Library, read: Callable[[str], str] |
         base=None,
         ros=settings_of(spec.ros),
         guard=_guard(spec),
+        sensors=tuple(drafts.sensors),
+        as_written=as_written(validated.data, source),
+        unused={name: source.at_key(("vars", name)) for name in validated.unused},
         written=source.data,
         broken=frozenset(broken),
     )

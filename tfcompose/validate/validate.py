@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Edit, Note, RejectedError, finding
@@ -10,7 +10,7 @@ from tfcompose.load.overlay import CHOICES
 from tfcompose.validate.preset import PresetSpec
 from tfcompose.validate.schema import BROKEN, Model, Problem, Problems, record
 from tfcompose.validate.spec import RobotSpec
-from tfcompose.validate.variables import compute
+from tfcompose.validate.variables import compute, unused
 
 if TYPE_CHECKING:
     from tfcompose.load import Path, Source
@@ -20,17 +20,20 @@ if TYPE_CHECKING:
 class Validated:
     """A spec without its broken parts, the findings about those, and which entries they were in.
 
-    ``broken`` holds (section, name): what is missing because of them is not reported a second time.
+    ``broken`` holds (section, name): what is missing because of them is not reported a second time. ``data`` is what
+    was written, with every ``${…}`` computed; ``unused`` are the variables that nothing uses.
     """
 
     spec: RobotSpec
     source: Source
     found: tuple[Diagnostic, ...]
     broken: frozenset[tuple[str, str]]
+    data: dict[str, Any] = field(default_factory=dict)
+    unused: tuple[str, ...] = ()
 
 
-def validate(source: Source) -> Validated:
-    """Return the typed spec.
+def validate(source: Source, aside: Any = None) -> Validated:
+    """Return the typed spec; ``aside`` is data that is not laid over it now, and may use its variables too.
 
     Raises:
         RejectedError: if so much is missing that no robot is left (its name, or the version).
@@ -44,7 +47,7 @@ def validate(source: Source) -> Validated:
     if spec is BROKEN:
         raise RejectedError(found)
     broken = {(str(p.path[0]), str(p.path[1])) for p in problems.all if len(p.path) > 1}
-    return Validated(spec, source, found, frozenset(broken))
+    return Validated(spec, source, found, frozenset(broken), data, unused(source.data, aside))
 
 
 def validate_preset(source: Source) -> PresetSpec:

@@ -27,6 +27,21 @@ def compute(data: dict[str, Any], problems: Problems) -> dict[str, Any]:
     return filled | ({"vars": data["vars"]} if "vars" in data else {})
 
 
+def unused(data: dict[str, Any], aside: Any = None) -> tuple[str, ...]:
+    """Return the variables that no ``${…}`` names, in ``data`` or in ``aside``."""
+    written = data.get("vars")
+    used = set(_names(data)) | set(_names(aside)) if isinstance(written, dict) and written else set()
+    return tuple(name for name in written if name not in used) if isinstance(written, dict) else ()
+
+
+def _names(value: Any) -> Iterator[str]:
+    if isinstance(value, str) and "${" in value:
+        yield from names_in(value)
+    elif isinstance(value, (dict, list)):
+        for item in value.values() if isinstance(value, dict) else value:
+            yield from _names(item)
+
+
 def _filled(value: Any, path: Path, variables: _Variables) -> Any:
     if isinstance(value, str):
         return variables.fill(value, path) if "${" in value else value

@@ -56,6 +56,17 @@ def test_its_lint_output_is_what_lint_prints(rover: Path) -> None:
     assert [line.rstrip() for line in printed.splitlines()] == [line.rstrip() for line in shown.splitlines()]
 
 
+def test_its_calibrated_robot_is_linted_and_explained_as_printed(tmp_path: Path) -> None:
+    section = README.partition("## Calibration files\n")[2].partition("\n## ")[0]
+    robot, measured = re.findall(r"^```yaml\n(.*?)^```", section, re.MULTILINE | re.DOTALL)
+    (tmp_path / "cell.yaml").write_text(robot, encoding="utf-8")
+    (tmp_path / "camera.calib").write_text(measured, encoding="utf-8")
+    done = run("lint", "cell.yaml", "--fail-on", "warning", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (0, "no findings in 1 file\n")
+    command, _, printed = re.findall(r"^```console\n(.*?)^```", section, re.MULTILINE | re.DOTALL)[0].partition("\n")
+    assert run(*command.removeprefix("$ tfcompose ").split(), cwd=tmp_path).stdout == printed
+
+
 def test_its_table_of_commands_is_that_of_the_command_line() -> None:
     rows = dict(re.findall(r"^\| `tfcompose (\w+)` \| (.*) \|$", README, re.MULTILINE))
     assert rows == COMMANDS

@@ -122,13 +122,13 @@ def lint_file(
     except RejectedError as error:
         return list(error.diagnostics)
     if arguments.profiles or overlays:
-        return list(compile_source(source, presets, arguments.profiles, overlays, read_text).found)
-    alone = compile_source(source, presets, read=read_text)
+        return list(compile_source(source, presets, arguments.profiles, overlays, read).found)
+    alone = compile_source(source, presets, read=read)
     found, used, looked = list(alone.found), set(alone.used), alone.robot is not None
     for profile in profiles_of(source):
         note = Note(f"with --profile {profile}")
         known = {(one.code, one.message, one.span) for one in found}
-        variant = compile_source(source, presets, [profile], read=read_text)
+        variant = compile_source(source, presets, [profile], read=read)
         used |= variant.used
         looked = looked and variant.robot is not None
         found += [

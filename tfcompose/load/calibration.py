@@ -29,6 +29,9 @@ ANGLE_TAGS = {"!degrees": math.pi / 180, "!radians": 1.0}
 
 PUBLISHER = "static_transform_publisher"
 
+#: A matrix has four rows; what is much larger is none, and is not looked at as one.
+MOST_ROWS, LONGEST_ROW = 64, 1000
+
 _NUMBER = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _WORD = re.compile(r"[^\s,]+")
 _XML = re.compile(r"<!--(?:.*?-->|.*)|<node\b[^<>]*>", re.DOTALL)
@@ -48,7 +51,7 @@ def load_calibration(text: str, file: str) -> tuple[Form, tuple[Source, ...]]:
     refuse_unreadable(text, file)
     lines = text.splitlines()
     written = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
-    if written and all(map(_is_row, written)):
+    if 0 < len(written) <= MOST_ROWS and all(map(_is_row, written)):
         return "rows", (_rows(lines, file),)
     if PUBLISHER in text and (text.lstrip().startswith("<") or "LaunchDescription" in text):
         return "launch", (_launch(text, file),)
@@ -56,7 +59,7 @@ def load_calibration(text: str, file: str) -> tuple[Form, tuple[Source, ...]]:
 
 
 def _is_row(line: str) -> bool:
-    words = _WORD.findall(line)
+    words = _WORD.findall(line) if len(line) < LONGEST_ROW else []
     return len(words) > 1 and all(map(_NUMBER.fullmatch, words))
 
 

@@ -208,8 +208,9 @@ class _Work:
         if not draft.at or draft.at[0] not in _MEASURABLE or not draft.edge.given:
             return []
         own, inside = self._around(draft)
+        elsewhere = [one for one in file.entries if one.parent in self.frames and one.parent not in inside]
         return _matches(file.entries, own, inside) or [
-            match for match in _matches(file.entries, self.frames - inside, inside) if not match.inverted
+            _Match(one, inverted=False) for one in elsewhere if one.child in inside
         ]
 
     def _unused(self, file: CalibrationFile, at: Span) -> None:

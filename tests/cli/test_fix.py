@@ -15,9 +15,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tfcompose.cli.compiling import library
-from tfcompose.cli.fixing import Fixer, rewrite
+from tfcompose.cli.fixing import Fixer, edited, rewrite
 from tfcompose.compile import compile_robot
-from tfcompose.diagnostic import RejectedError, slip_of
+from tfcompose.diagnostic import Edit, RejectedError, Span, finding, slip_of
 from tfcompose.load import load, with_includes
 
 if TYPE_CHECKING:
@@ -52,6 +52,7 @@ def run(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
 PAIR = "links: {a: {}, b: {parent: a, "
 LINK = "links: {base_link: {}, camera_link: {parent: base_link}}\nframes:\n"
 OPTICAL = f"{LINK}  camera_optical_frame"
+SHARED = f"{LINK}  p: {{parent: base_link}}\n  camera_optical_frame"
 EXAMPLES = {
     "a key": ("links: {a: {}, b: {parnet: a}} # c\n", "links: {a: {}, b: {parent: a}} # c\n"),
     "a key in quotes": ("links: {a: {}, b: {'parnet' : a}}\n", "links: {a: {}, b: {'parent' : a}}\n"),
@@ -98,6 +99,14 @@ EXAMPLES = {
     "an optical frame that looks back": (
         f"{OPTICAL}: {{parent: camera_link, look: backward}}\n",
         f"{OPTICAL}: {{parent: camera_link, look: forward}}\n",
+    ),
+    "an optical frame of which one angle is right, and shared": (
+        f"{SHARED}: {{parent: camera_link, rpy: [-90 deg, &z 0, -1.5]}}\n  q: {{parent: p, rpy: [*z, 1, 1]}}\n",
+        f"{SHARED}: {{parent: camera_link, rpy: [-90 deg, &z 0, -90 deg]}}\n  q: {{parent: p, rpy: [*z, 1, 1]}}\n",
+    ),
+    "what is safe beside what is not": (
+        "links: {a: {}, b: {parnet: c}, d: {parnet: a}, e: {parnet: f}, g: {parnet: a}}\n",
+        "links: {a: {}, b: {parnet: c}, d: {parent: a}, e: {parnet: f}, g: {parent: a}}\n",
     ),
     "what can be fixed beside what cannot": (
         "links: {a: {}, b: {paent: a, xyz: [0, 0, 1 zorkmid]}}\n",
@@ -223,6 +232,22 @@ def test_a_file_that_cannot_be_written_is_one_sentence_and_exit_2(tmp_path: Path
     assert "fixed[" not in done.stdout
     assert (tmp_path / "r.yaml").read_text() == text
     assert [one.name for one in tmp_path.iterdir()] == ["r.yaml"]
+
+
+def test_an_edit_that_takes_nothing_away_is_not_kept(tmp_path: Path) -> None:
+    file = tmp_path / "r.yaml"
+    file.write_text("word")
+    span = Span(str(file), 1, 1, 1, 5)
+    fixer = Fixer([str(file)], lambda *_: [finding("TF101", "still here", span, edits=[Edit(span, "other")])])
+    assert [one.message for one in fixer.fix(str(file))] == ["still here"]
+    assert (fixer.texts, fixer.fixed) == ({}, [])
+
+
+def test_edits_that_meet_are_none() -> None:
+    one, other = Edit(Span("r", 1, 1, 1, 4), "x"), Edit(Span("r", 1, 3, 1, 6), "y")
+    assert edited("abcdefg", [one]) == "xdefg"
+    assert edited("abcdefg", [one, other]) is None
+    assert edited("abcdefg", [Edit(Span("r", 3, 1, 3, 1), "y")]) is None
 
 
 def test_a_file_that_changed_meanwhile_is_left_alone(tmp_path: Path) -> None:

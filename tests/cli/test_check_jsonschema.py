@@ -1,0 +1,58 @@
+"""The schema as users run it: ``check-jsonschema --schemafile schemas/robot.schema.json robot.yaml``."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+ROBOTS = sorted((ROOT / "robots").glob("*.yaml"))
+HEAD = "tfcompose: 1\nrobot: r\n"
+LINKS = "links: {base_link: {}}\n"
+
+#: What is wrong, and what check-jsonschema names.
+BROKEN = {
+    "unknown section": (HEAD + LINKS + "gaurd: {mode: watch}\n", "gaurd"),
+    "unknown key": (HEAD + "links: {base_link: {}, a: {parnet: base_link}}\n", "parnet"),
+    "two numbers": (HEAD + "links: {base_link: {}, a: {parent: base_link, xyz: [0, 1]}}\n", "$.links.a"),
+    "no name": ("tfcompose: 1\n" + LINKS, "robot"),
+    "another version": ("tfcompose: 2\nrobot: r\n" + LINKS, "$.tfcompose"),
+    "a joint of no type": (
+        HEAD + LINKS + "joints: {j: {type: hinge, parent: base_link, child: a}}\n",
+        "$.joints.j.type",
+    ),
+    "a list for a mapping": (HEAD + "links: [base_link]\n", "$.links"),
+}
+
+
+def check(*files: Path) -> subprocess.CompletedProcess[str]:
+    schema = ROOT / "schemas" / "robot.schema.json"
+    command = [sys.executable, "-m", "check_jsonschema", "--schemafile", str(schema), *map(str, files)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+
+
+def test_the_example_robots_pass() -> None:
+    done = check(*ROBOTS)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_each_broken_robot_is_refused_and_the_wrong_part_named(tmp_path: Path) -> None:
+    for name, (text, _) in BROKEN.items():
+        (tmp_path / f"{name}.yaml").write_text(text, encoding="utf-8")
+    files = {name: tmp_path / f"{name}.yaml" for name in BROKEN}
+    done = check(*files.values())
+    assert done.returncode == 1
+    for name, (_, part) in BROKEN.items():
+        said = [line for line in done.stdout.splitlines() if str(files[name]) in line]
+        assert said, f"{name} is let through"
+        assert any(part in line for line in said), said
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.stem)
+def test_a_robot_in_which_one_word_is_changed_is_refused(robot: Path, tmp_path: Path) -> None:
+    broken = tmp_path / "robot.yaml"
+    broken.write_text(robot.read_text("utf-8").replace("links:", "lnks:", 1), encoding="utf-8")
+    assert check(broken).returncode == 1

@@ -14,6 +14,7 @@ from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.diagnostic import RejectedError, Span, finding
 from tfcompose.pose import Pose, angle_between
+from tfcompose.validate.calibration import read_calibration
 
 if TYPE_CHECKING:
     from tfcompose.model import Edge
@@ -262,7 +263,7 @@ PROBLEMS = {
         "base_link: {lens: {x: 1}}\n",
         "a: [\n",
         "- [1, 2]\n",
-        "\0",
+        "a\n\0",
         "transforms: 5\n",
         "1 2\n3 4\n",
         "a: 1\na: 2\n",
@@ -341,6 +342,37 @@ def test_an_inverse_is_suspected_by_the_nominal_pose_or_by_the_robots_bodies() -
     outside = compile_robot(head + mast + robot % "", "r.yaml", library(), read=lambda _: text).found
     assert [(one.code, one.severity) for one in outside] == [("TF615", "warning")]
     assert not compiled(robot % "", c_yaml=autoware()).found
+
+
+def test_the_robots_bodies_are_found_above_and_below_the_measured_frame() -> None:
+    robot = "frames: {kit: {parent: base_link, xyz: [5, 0, 0], look: left}, lens: {parent: kit, calibration: c.yaml}}\n"
+    text = "kit: {lens: {x: 0.0, y: 4.9, z: 0, roll: 0, pitch: 0, yaw: 0}}\n"
+    assert not compiled(robot, c_yaml=text.replace("4.9", "5.1")).found, "kit's y points to the rear"
+    assert [one.code for one in compiled(robot, c_yaml=text.replace("4.9", "-4.9")).found] == ["TF615"]
+
+
+def test_comments_in_launch_files_are_no_entries_and_each_publisher_is_one() -> None:
+    assert [one.name for one in read_calibration(moveit_launch(), "c.launch").entries] == ["base_link → lens"]
+    two = moveit_launch().replace("</launch>", moveit_launch().partition("-->")[2].replace("lens", "other"))
+    assert [one.child for one in read_calibration(two, "c.launch").entries] == ["lens", "other"]
+    angles = '<launch><node type="static_transform_publisher" args="1 2 3 0 0 0.5 a b"/></launch>'
+    assert [one.code for one in read_calibration(angles, "c.launch").found] == ["TF610"]
+
+
+def test_a_profile_takes_another_file_and_a_missing_one_has_no_place() -> None:
+    robot = "frames: {lens: {parent: base_link, calibration: c.yaml}}\n"
+    robot += "profiles: {night: {frames: {lens: {calibration: {file: d.yaml}}}}}\n"
+    texts = {"c.yaml": autoware(), "d.yaml": autoware().replace("0.12", "0.2")}
+    night = compile_robot(HEAD + robot, "r.yaml", library(), ["night"], read=texts.__getitem__)
+    assert edge_of(night, "lens").pose.xyz[0] == 0.2
+    missing = compiled(robot).found
+    assert [(one.code, one.notes) for one in missing] == [("TF610", ())]
+
+
+def test_a_lens_that_the_driver_places_is_a_finding_at_the_calibration() -> None:
+    robot = "sensors:\n  camera:\n    preset: realsense/d435i\n    parent: base_link\n    calibration: c.yaml\n"
+    found = compiled(robot, c_yaml=autoware(child=OPTICAL)).found
+    assert [(one.code, one.span.line) for one in found if one.span] == [("TF405", 8)]
 
 
 TEXTS = [*STRAIGHT.values(), KALIBR.format(ROWS)]

@@ -11,7 +11,7 @@ import posixpath
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, Note, RejectedError, did_you_mean, finding, nearest
+from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, did_you_mean, finding, nearest
 from tfcompose.load.overlay import ROTATIONS
 from tfcompose.model import Calibration
 from tfcompose.validate.calibration import CalibrationFile, CalibrationLimit, CalibrationSpec, read_calibration
@@ -19,7 +19,6 @@ from tfcompose.validate.calibration import CalibrationFile, CalibrationLimit, Ca
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
-    from tfcompose.diagnostic import Span
     from tfcompose.load import Source
     from tfcompose.resolve.poses import Draft
     from tfcompose.validate.entries import Entry
@@ -75,7 +74,9 @@ class _Files:
             loaded = read_calibration(self.read(path), path, form)
             wrong = loaded.found
         except RejectedError as error:
-            wrong = tuple(replace(one, code="TF610") for one in error.diagnostics)
+            whole = Span(path)  # no place in it
+            found = error.diagnostics
+            wrong = tuple(replace(one, code="TF610", span=None if one.span == whole else one.span) for one in found)
             loaded = CalibrationFile(path, form, (), wrong)
         for one in wrong:
             notes = [Note("it stands here", one.span), *one.notes] if one.span else one.notes

@@ -12,8 +12,9 @@ from tfcompose.model import AsWritten
 from tfcompose.validate.quantity import NUMBER, Quantity, UnitError, quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable
 
+    from tfcompose.diagnostic import Span
     from tfcompose.load import Path, Source
 
 _SECTIONS = ("frames", "links", "joints", "sensors", "processes")
@@ -35,35 +36,41 @@ def as_written(data: dict[str, Any], source: Source) -> tuple[AsWritten, ...]:
     for section in _SECTIONS:
         entries = data.get(section)
         for name, entry in entries.items() if isinstance(entries, dict) else ():
-            found += _walk(entry, (section, name), source)
+            _walk(entry, (section, name), source, found)
     return tuple(found)
 
 
-def _walk(value: Any, path: Path, source: Source) -> Iterator[AsWritten]:
+def _walk(value: Any, path: Path, source: Source, found: list[AsWritten]) -> None:
     for key, item in value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ():
-        at = (*path, key)
-        steps: tuple[str | int, ...] = ()
+        if not isinstance(item, (dict, list)):
+            continue
         if key in _LISTS and isinstance(item, list):
-            steps = tuple(range(len(item)))
+            _take(item, range(len(item)), (*path, key), source, found)
         elif key in _MAPPINGS and isinstance(item, dict):
-            steps = tuple(step for step in _MAPPINGS[str(key)] if step in item)
-        numbers = [(step, number) for step in steps if (number := _number(item[step]))]
-        if numbers:
-            values, units = zip(*(number for _, number in numbers), strict=True)
-            yield AsWritten(at, values, units, tuple(source.at((*at, step)) for step, _ in numbers))
-        elif key not in _OPAQUE and isinstance(item, (dict, list)):
-            yield from _walk(item, at, source)
+            _take(item, [step for step in _MAPPINGS[str(key)] if step in item], (*path, key), source, found)
+        elif key not in _OPAQUE:
+            _walk(item, (*path, key), source, found)
 
 
-def _number(value: Any) -> tuple[float, bool] | None:
-    """Return the number in SI and whether it has a unit, or None where it is none."""
-    if isinstance(value, str):
-        try:
-            value = quantity(value)
-        except UnitError:
-            return None
-    if isinstance(value, Quantity):
-        return value.value, value.dimension != NUMBER
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return None
-    return float(value), False
+def _take(item: Any, steps: Iterable[str | int], path: Path, source: Source, found: list[AsWritten]) -> None:
+    """Take the numbers at the steps of a list or mapping."""
+    numbers: list[float] = []
+    units: list[bool] = []
+    places: list[Span] = []
+    for step in steps:
+        number: Any = item[step]
+        with_unit = False
+        if isinstance(number, str):
+            try:
+                number = quantity(number)
+            except UnitError:
+                continue
+        if isinstance(number, Quantity):
+            number, with_unit = number.value, number.dimension != NUMBER
+        if isinstance(number, (int, float)) and not isinstance(number, bool):
+            at = (*path, step)
+            numbers.append(float(number))
+            units.append(with_unit)
+            places.append(source.values.get(at) or source.at(at))
+    if numbers:
+        found.append(AsWritten(path, tuple(numbers), tuple(units), tuple(places)))

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 #: From the world inwards, as REP-105 orders them. base_footprint and base_link are one level: TF208 is about the two.
 LEVELS = {"earth": 0, "map": 1, "odom": 2, "base_footprint": 3, "base_link": 3}
 
+#: No more edges are followed upwards than this.
+FARTHEST = 100
+
 
 def wrong_chain_order(robot: Robot) -> Iterator[Diagnostic]:
     """The frames earth, map, odom and base_link hang on each other in another order than REP-105 gives.
@@ -27,7 +30,7 @@ def wrong_chain_order(robot: Robot) -> Iterator[Diagnostic]:
     for edge in robot.edges:
         prefix, level = _level(edge.child)
         seen, parent = {edge.child}, edge.parent
-        while level is not None and parent not in seen:
+        while level is not None and parent not in seen and len(seen) < FARTHEST:
             seen.add(parent)
             other_prefix, other = _level(parent)
             if other is not None and other > level and other_prefix in {prefix, ""}:

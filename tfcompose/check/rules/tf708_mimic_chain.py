@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from tfcompose.model import Joint, Robot
 
 
+#: No more joints are followed than this.
+LONGEST = 100
+
+
 def mimic_chain(robot: Robot) -> Iterator[Diagnostic]:
     """A joint follows a joint that follows another one.
 
@@ -36,8 +40,9 @@ def mimic_chain(robot: Robot) -> Iterator[Diagnostic]:
 
 
 def _loops(joints: dict[str, Joint], name: str) -> bool:
+    """Whether the joint follows itself in the end; that is TF702."""
     seen: set[str] = set()
-    while name in joints and name not in seen:
+    while name in joints and name not in seen and len(seen) < LONGEST:
         seen.add(name)
         name = joints[name].mimic or ""
     return name in seen

@@ -34,7 +34,7 @@ def rounded_right_angle(robot: Robot) -> Iterator[Diagnostic]:
             quarters = round(number / (math.pi / 2))
             sign = "-" if number < 0 else ""
             off = math.degrees(abs(number - quarters * math.pi / 2))
-            said = " and ".join(dict.fromkeys(f"{n:g}" for n, _ in rounded))
+            said = ", ".join(dict.fromkeys(f"{n:g}" for n, _ in rounded))
             message = f"{value.entry}: {value.key} has {said}, {off:.2g} deg off {quarters * 90} deg"
             advice = f'write {quarters * 90} deg, or "${{{sign}{QUARTERS[abs(quarters)]}}}"'
             yield finding("TF411", message, at, help=advice, severity="warning")

@@ -32,18 +32,16 @@ def quaternion_w_first(robot: Robot) -> Iterator[Diagnostic]:
         identity = abs(first) == 1 and not (second or third or fourth)
         small = SMALL_TURN_W < abs(first) < 1 and second == 0 and (third == 0) != (fourth == 0)
         if identity or small:
-            message = (
-                f"{value.entry}: quat_xyzw {_shown(value.numbers)} is {_turn(first, fourth)} about x, or has w first"
-            )
+            ways = f"a turn of {_degrees(fourth)} deg, and with w first one of {_degrees(first)} deg"
+            message = f"{value.entry}: quat_xyzw {_shown(value.numbers)} is {ways}"
             advice = f"x, y, z, w: {_shown((second, third, fourth, first))}"
             if identity:
                 advice += "; if the half turn is meant, rpy: [180 deg, 0, 0]"
             yield finding("TF412", message, value.places[0], help=advice, severity="warning")
 
 
-def _turn(x: float, w: float) -> str:
-    angle = math.degrees(2 * math.atan2(abs(x), abs(w)))
-    return "a half turn" if w == 0 else f"a turn of {angle:.0f} deg"
+def _degrees(w: float) -> str:
+    return f"{math.degrees(2 * math.acos(min(1.0, abs(w)))):.0f}"
 
 
 def _shown(numbers: tuple[float, ...]) -> str:

@@ -23,13 +23,14 @@ def sensors_at_one_pose(robot: Robot) -> Iterator[Diagnostic]:
     """Two sensors are mounted at exactly one pose.
 
     Two bodies cannot be in one place: a mount was copied, and its numbers not changed. Measure the second one. An IMU
-    or GNSS receiver may sit inside another sensor, and sensors without any pose yet are left alone.
+    or GNSS receiver may sit inside another sensor, and sensors without any pose yet are left alone; about calibrations
+    that were copied is TF618.
     """
     kinds = {sensor.name: sensor.kind for sensor in robot.sensors}
     mounts = [edge for edge in robot.edges if edge.given and edge.sensor in kinds and edge.pose != Pose()]
     first: dict[tuple[object, ...], Edge] = {}
     for edge in mounts:
-        if kinds[edge.sensor or ""] in BUILT_IN_KINDS:
+        if edge.calibration or kinds[edge.sensor or ""] in BUILT_IN_KINDS:
             continue
         place = (edge.parent, *(round(part / NEAR_M) for part in edge.pose.xyz))
         other = first.setdefault(place, edge)

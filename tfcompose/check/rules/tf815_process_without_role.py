@@ -36,6 +36,8 @@ def process_without_role(robot: Robot) -> Iterator[Diagnostic]:
         if process.simulate and process.simulate.kind == "joints" and moving:
             continue
         what = "no joint moves" if process.simulate and process.simulate.kind == "joints" else "it owns no edge"
-        advice = f"owner: {process.name} at the edge that it publishes, or remove it"
+        advice = "remove it"
+        if "edge" in what:
+            advice = f"owner: {process.name} at the edge that it publishes, or remove it"
         message = f"{process.name} has nothing to do here: {what}"
         yield finding("TF815", message, process.at, help=advice, severity="warning")

@@ -104,7 +104,7 @@ class MountedSensor:
 
     ``driver`` is the name of the driver's process, empty without one; ``switch`` holds the parameters that keep the
     driver from publishing frames (None: there are none), ``publishes`` says that it may. ``serial_option`` is the
-    preset's option for a serial number, empty where it has none, and ``serial_parameter`` what the driver calls it.
+    preset's option for a serial number, empty where it has none.
     """
 
     name: str
@@ -118,7 +118,6 @@ class MountedSensor:
     switch: dict[str, Any] | None = None
     publishes: bool = False
     serial_option: str = ""
-    serial_parameter: str = ""
     serial: str | None = None
     tf_at: Span | None = None
 

@@ -155,7 +155,6 @@ class Drafts:
         named = said.driver.process if said.driver else None
         own = sensor.name if any(process.name == sensor.name for process in self.drivers) else ""
         serial = next((option for option in ("serial", "serial_number") if option in preset.options), "")
-        taken = driver.take if driver else {}
         return MountedSensor(
             sensor.name,
             said.preset,
@@ -168,7 +167,6 @@ class Drafts:
             driver.switch if driver else None,
             said.tf != "tfcompose",
             serial,
-            next((parameter for parameter, option in taken.items() if option == serial), ""),
             sensor.options.get(serial) if serial else None,
             self.source.at(("sensors", sensor.name, "tf")),
         )

@@ -22,7 +22,7 @@ def serial_missing(robot: Robot) -> Iterator[Diagnostic]:
 
     Each driver takes the first device that it finds, so after the next start left and right may be exchanged, or both
     drivers fight for one. Give each its serial number: ``options: {serial: "123456789012"}``. Another parameter that
-    names the device (``usb_port_id``, ``device_type``) counts too, and so do drivers on other hosts' commands.
+    names the device (``usb_port_id``, ``device_type``) counts too. Drivers that somebody else starts are left alone.
     """
     processes = {process.name: process for process in robot.processes if process.kind == "run" and process.package}
     groups: dict[tuple[str | None, str | None, str | None], list[MountedSensor]] = {}

@@ -40,6 +40,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 #: Packages from elsewhere, and the only parts that may import them.
 ONLY_IN: dict[str, set[str]] = {
     "yaml": {"load"},
+    "xacro": {"cli"},
     "rclpy": {"ros"},
     "tf2_msgs": {"ros"},
     "geometry_msgs": {"ros"},

@@ -74,7 +74,7 @@ def poses(draw: st.DrawFn) -> tuple[dict[str, Any], Any]:
     return {"xyz": xyz, **written}, matrix
 
 
-def joint(draw: st.DrawFn, name: str, masters: list[str]) -> tuple[dict[str, Any], dict[str, Any]]:
+def joint(draw: Any, name: str, masters: list[str]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return a moving joint's own keys, and what the URDF must say of it."""
     kind = draw(st.sampled_from(["revolute", "continuous", "prismatic"]))
     axis = draw(axes)
@@ -99,7 +99,7 @@ def robots(draw: st.DrawFn) -> tuple[dict[str, Any], list[Wanted]]:
         wanted.append(Wanted("odom", "base_link", matrix, "drive", "dynamic"))
     for index in range(draw(st.integers(0, 10))):
         parent, (pose, matrix) = draw(st.sampled_from(names)), draw(poses())
-        kind = draw(st.sampled_from(["frames", "links", "joints", "fixed", "sensors", "foreign"]))
+        kind = draw(st.sampled_from(["frames", "links", "joints", "fixed", "sensors", "foreign", "foreign_fixed"]))
         name, said = f"{kind}_{index}", {"parent": parent} | pose
         edge = Wanted(parent, name, matrix, "static", "static")
         if kind in {"frames", "links"}:
@@ -107,6 +107,9 @@ def robots(draw: st.DrawFn) -> tuple[dict[str, Any], list[Wanted]]:
         elif kind == "foreign":
             spec["frames"][name] = said | {"owner": "drive", "rate": "5 Hz"}
             edge.owner, edge.kind, edge.joint = "drive", "dynamic", "floating"
+        elif kind == "foreign_fixed":
+            spec["frames"][name] = said | {"owner": "drive", "static": True}
+            edge.owner = "drive"
         elif kind == "sensors":
             spec["sensors"][name] = said | {"preset": "generic/imu", "driver": "none"}
             edge.child = f"{name}_link"

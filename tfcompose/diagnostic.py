@@ -158,6 +158,7 @@ CODES = {
     "TF015": "include_loop",
     "TF016": "bad_setting",
     "TF017": "unknown_rule",
+    "TF018": "bad_xml",
     # validate: keys, types, values
     "TF101": "unknown_key",
     "TF102": "missing_key",
@@ -232,6 +233,12 @@ CODES = {
     "TF710": "impossible_inertia",
     "TF711": "inertia_off_from_shape",
     "TF712": "root_link_with_inertia",
+    # a URDF that somebody else wrote
+    "TF720": "unknown_urdf_word",
+    "TF721": "bad_urdf_value",
+    "TF722": "urdf_name_twice",
+    "TF723": "mesh_not_found",
+    "TF724": "package_not_found",
     # processes, guard, live tree
     "TF801": "foreign_publisher",
     "TF802": "second_parent_seen",
@@ -252,4 +259,5 @@ CODES = {
     "TF901": "no_ros",
     "TF902": "bad_plan",
     "TF903": "rule_crashed",
+    "TF904": "no_xacro",
 }

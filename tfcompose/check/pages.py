@@ -84,6 +84,9 @@ PATH has dots between its keys: sensors.camera.tf=driver.""",
     "TF017": """An entry under rules is no code, or one that cannot be set.
 
 Findings about text and keys (TF0 and TF1) always count.""",
+    "TF018": """A file is not XML, not a robot, or declares entities.
+
+The place is where reading stopped. A URDF is one <robot>; with xacro the message is xacro's own.""",
     "TF101": """A key is not known here.
 
 Probably it is misspelt; unknown keys are refused, because a key that is silently dropped is a frame in the wrong
@@ -151,6 +154,22 @@ position stands in its last column. Copy all digits.""",
 It is the pose of a frame that is not there, or of one that is no mount. Its name may be misspelt, or it is out of
 date.""",
     "TF703": """A stand-in names a joint that does not move or does not exist.""",
+    "TF720": """An element or an attribute is not one of URDF's.
+
+Readers pass over it without a word: with <orign> a joint is at its parent's origin. An error where a known name is near;
+else it may be somebody's extension.""",
+    "TF721": """A value of a URDF is missing, or is none.
+
+Numbers are SI: m, rad, kg. Readers refuse the robot, take a default without a word, or compute with what is there.""",
+    "TF722": """Two links or two joints of a URDF have one name.
+
+Readers refuse the robot or keep one of the two. Often a xacro macro was used twice with one prefix.""",
+    "TF723": """A mesh file is not there.
+
+The body does not appear, and the collision with it is not checked.""",
+    "TF724": """A mesh's package is not installed here.
+
+It was looked for in share/PACKAGE of each folder in AMENT_PREFIX_PATH. Source the workspace's setup file first.""",
     "TF801": """A node publishes an edge that another process owns.
 
 tf2 takes whatever came last, so the frame jumps between two values. The finding names the node. End it, or switch its
@@ -193,6 +212,9 @@ A frame is unknown, the two are in two trees, their edges have no time in common
     "TF902": """A plan cannot be used: it is not one, not whole, or of another version.
 
 Build it again.""",
+    "TF904": """A xacro file is to be read, and xacro is not installed.
+
+It comes with ROS, and from PyPI: pip install xacro.""",
     "TF903": """A rule crashed.
 
 The other rules went on. This is a fault of tfcompose; please report it with the robot file.""",

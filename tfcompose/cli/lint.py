@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 _ROBOT = re.compile(rb"^tfcompose\s*:", re.MULTILINE)
 
+URDF_ENDINGS = (".urdf", ".xacro")
 FORMATS = ("text", "json", "sarif", "github")
 
 
@@ -42,9 +43,13 @@ def arguments(parser: ArgumentParser) -> None:
         "files",
         nargs="*",
         metavar="FILE",
-        default=[DEFAULT_FILE],
-        help="files, or folders of robot files; default: robot.yaml",
+        default=[],
+        help="files, or folders of robot files, or .urdf and .xacro files; default: robot.yaml",
     )
+    parser.add_argument(
+        "--urdf", action="append", default=[], metavar="FILE", dest="urdfs",
+        help="a URDF or xacro file that somebody else wrote, whatever its name; repeatable",
+    )  # fmt: skip
     add_variant(parser, "check this combination only")
     parser.add_argument("--format", choices=FORMATS, default="text", help="default: text")
     parser.add_argument("--fix", action="store_true", help="mend what has one safe answer, in the files that are named")
@@ -57,14 +62,19 @@ def run(arguments: Namespace) -> int:
     """Lint the files; exit code 0, 1 with findings that count, 2 where a file cannot be read."""
     presets = library()
     found: list[Diagnostic] = []
-    files = dict.fromkeys(file for name in arguments.files for file in robots_in(name))
+    names = arguments.files or ([] if arguments.urdfs else [DEFAULT_FILE])
+    files = dict.fromkeys(file for name in names for file in robots_in(name))
+    urdfs = dict.fromkeys([*arguments.urdfs, *(file for file in files if file.endswith(URDF_ENDINGS))])
+    files = {file: None for file in files if file not in urdfs}
     if arguments.fix:
         fixer = Fixer(list(files), lambda file, read: lint_file(file, presets, arguments, read))
         found = _fixed(fixer, arguments.format)
     else:
         for file in files:
             found += lint_file(file, presets, arguments)
-    _print(found, arguments.format, len(files))
+    for file in urdfs:
+        found += import_module("tfcompose.cli.urdf").lint_urdf(file)
+    _print(found, arguments.format, len(files) + len(urdfs))
     if unreadable(found):
         return UNREADABLE
     return int(any(one.severity == "error" or arguments.fail_on == "warning" for one in found))

@@ -4,5 +4,6 @@ from tfcompose.load.calibration import Form, load_calibration
 from tfcompose.load.include import set_value, with_includes
 from tfcompose.load.overlay import composed
 from tfcompose.load.source import Path, Source, load
+from tfcompose.load.urdf import Element, load_xml
 
-__all__ = ["Form", "Path", "Source", "composed", "load", "load_calibration", "set_value", "with_includes"]
+__all__ = ["Element", "Form", "Path", "Source", "composed", "load", "load_calibration", "load_xml", "set_value", "with_includes"]

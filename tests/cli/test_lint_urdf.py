@@ -1,0 +1,230 @@
+"""A URDF that somebody else wrote is judged with the lines of that file."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tfcompose.cli import urdf
+from tfcompose.cli.compiling import library
+from tfcompose.cli.urdf import CODES, lint_urdf
+from tfcompose.compile import compile_robot
+from tfcompose.diagnostic import Diagnostic, RejectedError
+from tfcompose.emit import emit
+from tfcompose.load import load_xml
+from tfcompose.resolve import robot_of_urdf
+
+ROOT = Path(__file__).parents[2]
+FILES = sorted((Path(__file__).parent / "urdfs").glob("*.urdf"))
+MARK = re.compile(r"<!-- expect: (TF\d{3}(?: TF\d{3})*) -->")
+FINE = '<robot name="r"><link name="base_link"/></robot>'
+
+
+def marks(text: str) -> list[tuple[int, str]]:
+    lines = enumerate(text.splitlines(), 1)
+    return sorted((number, code) for number, line in lines for hit in MARK.findall(line) for code in hit.split())
+
+
+def lint_text(text: str) -> tuple[Diagnostic, ...]:
+    try:
+        return robot_of_urdf(load_xml(text, "r.urdf"), "r.urdf", lambda _: None)[1]
+    except RejectedError as error:
+        return error.diagnostics
+
+
+def run(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tfcompose", "lint", *words]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=60)
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_each_marked_line_gives_its_findings_and_no_other_line_gives_one(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("AMENT_PREFIX_PATH", "/nowhere")
+    found = lint_urdf(str(file))
+    assert [(one.span.line, one.code) for one in found if one.span] == marks(file.read_text("utf-8"))
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_each_finding_points_at_the_word_that_is_wrong(file: Path) -> None:
+    lines = file.read_text("utf-8").splitlines()
+    for one in lint_urdf(str(file)):
+        assert one.span
+        written = lines[one.span.line - 1][one.span.column - 1 : one.span.end_column - 1]
+        assert one.span.line == one.span.end_line
+        assert written.startswith("<") or written in re.findall(r"\"([^\"]+)\"", lines[one.span.line - 1])
+
+
+def test_the_nearest_name_is_the_advice() -> None:
+    advice = {one.message: one.help for file in FILES for one in lint_urdf(str(file))}
+    assert advice["unknown element <orign> in <joint>"] == "did you mean origin?"
+    assert advice["unknown attribute xzy of <origin>"] == "did you mean xyz?"
+    assert advice["twice hangs on base_lnk, which is no frame"] == "did you mean base_link?"
+    assert next(said for message, said in advice.items() if "no_limt" in message) == "did you mean no_limit?"
+
+
+@pytest.mark.parametrize("robot", ["my_robot", "autonomous_robot"])
+def test_what_build_writes_has_no_findings(robot: str, tmp_path: Path) -> None:
+    text = (ROOT / "robots" / f"{robot}.yaml").read_text("utf-8")
+    compiled = compile_robot(text, "r.yaml", library())
+    assert compiled.robot
+    for file in emit(compiled.robot):
+        if file.path.endswith(".urdf"):
+            (tmp_path / file.path).write_text(file.text, encoding="utf-8")
+            assert lint_urdf(str(tmp_path / file.path)) == []
+
+
+BOMB = (
+    '<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa">' + "".join(f'<!ENTITY b{n} "&a;&a;&a;">' for n in range(9)) + "]>"
+    '<robot name="&b1;"/>'
+)
+REFUSED = {
+    "an entity bomb": (BOMB, "document type"),
+    "an external entity": ('<!DOCTYPE r [<!ENTITY a SYSTEM "file:///etc/passwd">]><robot>&a;</robot>', "document type"),
+    "an external type": ('<!DOCTYPE robot SYSTEM "http://localhost/x.dtd"><robot/>', "document type"),
+    "a tag that is not closed": ('<robot name="r">\n<link name="a">\n</robot>', "mismatched tag"),
+    "nothing": ("", "no element found"),
+    "another document": ("<sdf/>", "not <robot>"),
+    "too deep": ("<a>" * 2000 + "</a>" * 2000, "deeper than"),
+    "a NUL byte": ("<robot\0/>", "NUL"),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_is_no_urdf_or_could_do_harm_is_one_finding(what: str) -> None:
+    text, said = REFUSED[what]
+    (found,) = lint_text(text)
+    assert said in found.message
+
+
+def test_where_a_tag_does_not_match_is_said() -> None:
+    (found,) = lint_text(REFUSED["a tag that is not closed"][0])
+    assert found.code == "TF018"
+    assert found.span
+    assert found.span.line == 3
+
+
+def test_the_command_line_knows_a_urdf_by_its_name_or_by_its_option(tmp_path: Path) -> None:
+    text = (FILES[0].parent / "tree.urdf").read_text("utf-8")
+    (tmp_path / "a.urdf").write_text(text, encoding="utf-8")
+    (tmp_path / "b.xml").write_text(text, encoding="utf-8")
+    by_name = json.loads(run(tmp_path, "a.urdf", "--format", "json").stdout)
+    by_option = json.loads(run(tmp_path, "--urdf", "b.xml", "--format", "json").stdout)
+    assert [one | {"file": ""} for one in by_name] != []
+    assert [(one["code"], one["line"]) for one in by_name] == [(one["code"], one["line"]) for one in by_option]
+    done = run(tmp_path, "a.urdf")
+    assert done.returncode == 1
+    assert "a.urdf:12:48: error[TF201] tool has two parents: base_link and other_root" in done.stdout
+    (tmp_path / "fine.urdf").write_text(FINE)
+    assert (run(tmp_path, "fine.urdf").returncode, run(tmp_path, "none.urdf").returncode) == (0, 2)
+
+
+def test_a_package_is_looked_for_where_ros_looks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = tmp_path / "share" / "mine" / "meshes" / "a.stl"
+    mesh.parent.mkdir(parents=True)
+    mesh.touch()
+    monkeypatch.setenv("AMENT_PREFIX_PATH", f"/nowhere:{tmp_path}")
+    assert urdf.missing_mesh("package://mine/meshes/a.stl", tmp_path) is None
+    missing = urdf.missing_mesh("package://mine/b.stl", tmp_path)
+    assert missing
+    assert (missing[0], str(tmp_path / "share/mine/b.stl") in missing[2]) == ("TF723", True)
+    other = urdf.missing_mesh("package://other/b.stl", tmp_path)
+    assert other
+    assert (other[0], "/nowhere/share/other" in other[2]) == ("TF724", True)
+    monkeypatch.delenv("AMENT_PREFIX_PATH")
+    unset = urdf.missing_mesh("package://mine/meshes/a.stl", tmp_path)
+    assert unset
+    assert "AMENT_PREFIX_PATH is empty" in unset[2]
+
+
+XACRO = """<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">
+  <xacro:macro name="leg" params="n"><link name="leg_${n}"/>
+    <joint name="j_${n}" type="fixed"><parent link="base_lnk"/><child link="leg_${n}"/></joint></xacro:macro>
+  <link name="base_link"/>
+  <xacro:leg n="1"/>
+</robot>
+"""
+
+
+@pytest.mark.skipif(not find_spec("xacro"), reason="needs xacro")
+def test_a_xacro_file_is_expanded_and_places_are_those_of_the_expanded_text(tmp_path: Path) -> None:
+    file = tmp_path / "r.urdf.xacro"
+    file.write_text(XACRO)
+    found = lint_urdf(str(file))
+    assert [one.code for one in found] == ["TF203"]
+    assert found[0].span
+    assert found[0].span.file == f"{file} (expanded)"
+    file.write_text(XACRO.replace("${n}", "${m}", 1))
+    (refused,) = lint_urdf(str(file))
+    assert refused.code == "TF018"
+    assert "'m' is not defined" in refused.message
+
+
+def test_without_xacro_that_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "xacro", None)
+    (tmp_path / "r.xacro").write_text(XACRO)
+    assert [one.code for one in lint_urdf(str(tmp_path / "r.xacro"))] == ["TF904"]
+    assert [one.code for one in lint_urdf(str(tmp_path / "none.xacro"))] == ["TF001"]
+
+
+TEXTS = [file.read_text("utf-8") for file in FILES]
+ODD = [
+    "",
+    "<",
+    ">",
+    '"',
+    "&amp;",
+    "&x;",
+    "1e999",
+    "nan",
+    "-1",
+    "<robot>",
+    "</link>",
+    "\x01",
+    "]]>",
+    "<!--",
+    "1e200",
+    "ä",
+]
+
+
+@st.composite
+def mutated(draw: st.DrawFn) -> str:
+    text = draw(st.sampled_from(TEXTS))
+    for _ in range(draw(st.integers(1, 5))):
+        words = re.split(r"(\s+|\"|=)", text)
+        at = draw(st.integers(0, len(words) - 1))
+        words[at] = draw(st.sampled_from(ODD) | st.sampled_from(words) | st.text(max_size=3))
+        text = "".join(words)
+    return text
+
+
+@given(mutated() | st.text())
+@settings(max_examples=400, deadline=None)
+def test_any_text_gives_findings_or_a_robot(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
+    file = tmp_path_factory.getbasetemp() / "any.urdf"
+    file.write_bytes(text.encode("utf-8", "surrogatepass"))
+    for one in lint_urdf(str(file)):
+        assert one.code != "TF903", one.message
+        assert one.span
+        assert one.span.line >= 1
+        assert one.span.column >= 1
+
+
+def test_the_rules_that_are_named_are_known() -> None:
+    assert {one.code for file in FILES for one in lint_urdf(str(file))} >= CODES - {
+        "TF206",
+        "TF503",
+        "TF702",
+        "TF708",
+        "TF709",
+    }

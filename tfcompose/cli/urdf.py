@@ -1,0 +1,100 @@
+"""Lint a URDF, or a xacro file, that tfcompose did not write; places are those of that file."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+from urllib.parse import unquote, urlparse
+
+from tfcompose.check import check
+from tfcompose.cli.terminal import read_text
+from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
+from tfcompose.load import load_xml
+from tfcompose.resolve import robot_of_urdf
+
+if TYPE_CHECKING:
+    from typing import Any
+
+#: The rules that make sense without owners, sensors and processes.
+CODES = frozenset(
+    {"TF201", "TF202", "TF203", "TF204", "TF205", "TF206", "TF401", "TF501", "TF503"}
+    | {"TF701", "TF702", "TF704", "TF705", "TF706", "TF707", "TF708", "TF709", "TF710", "TF711"}
+)
+
+#: What to do, in URDF's words, where a rule speaks of YAML. Advice that names a near word is kept.
+_HELP = {
+    "TF203": 'add <link name="…"/>',
+    "TF206": 'add <link name="base_link"/>',
+    "TF401": 'an optical frame has <origin rpy="-1.5707963267948966 0 -1.5707963267948966"/> in its camera\'s frame',
+    "TF704": '<limit lower="-1.57" upper="1.57" effort="10" velocity="1"/>; without an end it is continuous',
+    "TF709": 'add <inertial> with <mass value="…"/> and <inertia …/>',
+    "TF710": "take the tensor from CAD: in kg m², about the centre of mass",
+    "TF711": "give it in kg m², about the centre of mass",
+}
+
+
+def lint_urdf(file: str) -> list[Diagnostic]:
+    """Return what is wrong with the file, by place. A xacro file is expanded, and places are those of the result."""
+    try:
+        name, text = (f"{file} (expanded)", expanded(file)) if file.endswith(".xacro") else (file, read_text(file))
+        robot, found = robot_of_urdf(load_xml(text, name), name, lambda mesh: missing_mesh(mesh, Path(file).parent))
+    except RejectedError as error:
+        return list(error.diagnostics)
+    every = [*found, *(_said(one) for one in check(robot, CODES))]
+    return sorted(dict.fromkeys(every), key=lambda one: one.sort_key)
+
+
+def _said(found: Diagnostic) -> Diagnostic:
+    """Return the finding with its advice in URDF's words."""
+    keeps = found.help.startswith("did you mean")
+    return found if keeps else replace(found, help=_HELP.get(found.code, found.help))
+
+
+def expanded(file: str) -> str:
+    """Return the URDF that xacro makes of the file.
+
+    Raises:
+        RejectedError: if xacro is not installed, or refuses the file.
+    """
+    read_text(file)  # what cannot be read is said as everywhere
+    try:
+        xacro: Any = import_module("xacro")
+    except ImportError:
+        advice = "pip install xacro, or lint the expanded file"
+        message = "xacro is not installed"
+        raise RejectedError([finding("TF904", message, Span(file), help=advice)]) from None
+    try:
+        text: str = xacro.process_file(file).toprettyxml(indent="  ")
+    except Exception as error:  # noqa: BLE001 (xacro evaluates Python: anything can come out of it)
+        said = " ".join(str(error).split()) or type(error).__name__
+        raise RejectedError([finding("TF018", f"xacro: {said}", Span(file))]) from None
+    return text
+
+
+def missing_mesh(name: str, folder: Path) -> tuple[str, str, str] | None:
+    """Return code, message and advice about a mesh file that is not there, or None."""
+    parsed = urlparse(name)
+    if parsed.scheme == "package":
+        return _missing_in_package(parsed.netloc, unquote(parsed.path).lstrip("/"))
+    if parsed.scheme not in {"", "file"}:
+        return None  # model:// and http:// are for others to resolve
+    path = Path(unquote(parsed.path) if parsed.scheme else name)
+    where = path if path.is_absolute() else folder / path
+    if "\0" in name or not where.is_file():
+        return "TF723", f"no mesh {name}", f"looked for {where}"
+    return None
+
+
+def _missing_in_package(package: str, rest: str) -> tuple[str, str, str] | None:
+    prefixes = [prefix for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix]
+    folders = [Path(prefix) / "share" / package for prefix in prefixes]
+    found = next((folder for folder in folders if folder.is_dir()), None)
+    if found is None:
+        looked = f"looked in {', '.join(map(str, folders))}" if folders else "AMENT_PREFIX_PATH is empty"
+        return "TF724", f"no package {package}", f"{looked}; source the workspace's setup file"
+    if not (found / rest).is_file():
+        return "TF723", f"no mesh {rest} in {package}", f"looked for {found / rest}"
+    return None

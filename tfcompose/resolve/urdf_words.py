@@ -1,0 +1,73 @@
+"""The elements and attributes of URDF, and a finding for each that is none.
+
+Source: the URDF XML specification of ROS (link, joint, robot). What stands in transmissions, Gazebo and ros2_control
+blocks is not looked at.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import Diagnostic, finding, nearest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.load import Element
+
+#: Each element with its attributes and the elements in it.
+WORDS: dict[str, tuple[str, str]] = {
+    "robot": ("name version", "link joint material transmission gazebo ros2_control sensor"),
+    "link": ("name type", "inertial visual collision"),
+    "inertial": ("", "origin mass inertia"),
+    "visual": ("name", "origin geometry material"),
+    "collision": ("name", "origin geometry"),
+    "geometry": ("", "box cylinder sphere mesh capsule"),
+    "material": ("name", "color texture"),
+    "joint": ("name type", "origin parent child axis limit mimic dynamics calibration safety_controller"),
+    "origin": ("xyz rpy quat_xyzw", ""),
+    "mass": ("value", ""),
+    "inertia": ("ixx ixy ixz iyy iyz izz", ""),
+    "box": ("size", ""),
+    "cylinder": ("radius length", ""),
+    "capsule": ("radius length", ""),
+    "sphere": ("radius", ""),
+    "mesh": ("filename scale", ""),
+    "color": ("rgba", ""),
+    "texture": ("filename", ""),
+    "parent": ("link", ""),
+    "child": ("link", ""),
+    "axis": ("xyz", ""),
+    "limit": ("lower upper effort velocity acceleration jerk deceleration", ""),
+    "mimic": ("joint multiplier offset", ""),
+    "dynamics": ("damping friction", ""),
+    "calibration": ("rising falling reference_position", ""),
+    "safety_controller": ("soft_lower_limit soft_upper_limit k_position k_velocity", ""),
+}
+OPAQUE = frozenset({"transmission", "gazebo", "ros2_control", "sensor"})
+
+
+def unknown_words(root: Element) -> Iterator[Diagnostic]:
+    """Yield a finding for each element and attribute that URDF does not have: an error where a known one is near.
+
+    Others may be somebody's extension, and are warnings; beside links and joints they are let through.
+    """
+    waiting = [root]
+    while waiting:
+        element = waiting.pop()
+        attributes, inside = (words.split() for words in WORDS[element.tag])
+        for name in element.attributes:
+            if name not in attributes and ":" not in name and name != "xmlns":
+                yield _unknown(f"attribute {name} of <{element.tag}>", name, attributes, element, name)
+        for child in element.children:
+            if child.tag in inside:
+                waiting += [child] if child.tag not in OPAQUE else []
+            elif ":" not in child.tag and (element is not root or nearest(child.tag, inside)):
+                yield _unknown(f"element <{child.tag}> in <{element.tag}>", child.tag, inside, child)
+
+
+def _unknown(what: str, word: str, known: list[str], at: Element, attribute: str = "") -> Diagnostic:
+    near = nearest(word, known)
+    advice = f"did you mean {near}?" if near else f"known here: {', '.join(known)}" if known else "nothing stands here"
+    place = at.place(attribute) if attribute else at.at
+    return finding("TF720", f"unknown {what}", place, help=advice, severity="error" if near else "warning")

@@ -9,11 +9,14 @@ from tfcompose.diagnostic import did_you_mean
 from tfcompose.pose import norm
 from tfcompose.validate.quantity import (
     ANGLE,
+    FORCE,
     INERTIA,
     LENGTH,
     MASS,
     NUMBER,
     RATE,
+    SPEED,
+    TORQUE,
     TURN_RATE,
     Dimension,
     Quantity,
@@ -123,11 +126,16 @@ def measure(dimension: Dimension, least: float | None = None) -> Type:
     return Type(read, {"type": ["number", "string"], "description": about, "examples": [example(dimension)]})
 
 
-def _position(value: Any, path: Path, problems: Problems) -> Any:
-    """Return a joint's position: radians for a turning joint, metres for a sliding one."""
-    attempt = Problems()
-    number = read_quantity(value, path, attempt, ANGLE)
-    return number if number is not BROKEN else read_quantity(value, path, problems, LENGTH)
+def either(turning: Dimension, sliding: Dimension) -> Type:
+    """Return the type of what is one quantity for a turning joint and another for a sliding one, in SI."""
+
+    def read(value: Any, path: Path, problems: Problems) -> Any:
+        number = read_quantity(value, path, Problems(), turning)
+        return number if number is not BROKEN else read_quantity(value, path, problems, sliding)
+
+    about = f"a {dimension_name(turning)} for a turning joint, a {dimension_name(sliding)} for a sliding one"
+    examples = [example(turning), example(sliding)]
+    return Type(read, {"type": ["number", "string"], "description": about, "examples": examples})
 
 
 def _colour_part(value: float, path: Path, problems: Problems) -> Any:
@@ -166,7 +174,9 @@ INERTIA_ = measure(INERTIA)
 SIZE = measure(LENGTH, 1 / LARGEST)
 MASS_ = measure(MASS, 1 / LARGEST)
 RATE_ = measure(RATE, 1e-3)
-POSITION = Type(_position, {"type": ["number", "string"], "description": "rad or m", "examples": ["90 deg", 0.1]})
+POSITION = either(ANGLE, LENGTH)
+JOINT_SPEED = either(TURN_RATE, SPEED)
+JOINT_EFFORT = either(TORQUE, FORCE)
 XYZ = listing(LENGTH_, count=3, sample="[0.2, 0, 30 cm]")
 SIZES = listing(SIZE, count=3, sample="[0.5, 0.4, 0.15]")
 NUMBERS = listing(NUMBER_, count=3, sample="[0, 0, 1]")

@@ -187,6 +187,8 @@ def example(dimension: Dimension) -> str:
 
 
 _EXAMPLES = {
+    FORCE: "20 N",
+    TORQUE: "2 Nm",
     LENGTH: "30 cm",
     MASS: "10 kg",
     TIME: "200 ms",

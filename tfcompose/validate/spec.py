@@ -13,6 +13,8 @@ from tfcompose.validate.fields import (
     AXIS,
     BOOLEAN,
     INERTIA_,
+    JOINT_EFFORT,
+    JOINT_SPEED,
     MASS_,
     NAME,
     NUMBER_,
@@ -163,8 +165,8 @@ class Limit(Model):
 
     lower: float | None = key(POSITION, None)
     upper: float | None = key(POSITION, None)
-    effort: float | None = key(NUMBER_, None, "N m, or N")
-    velocity: float | None = key(NUMBER_, None, "rad/s, or m/s")
+    effort: float | None = key(JOINT_EFFORT, None, "N m, or N")
+    velocity: float | None = key(JOINT_SPEED, None, "rad/s, or m/s")
 
 
 class Mimic(Model):

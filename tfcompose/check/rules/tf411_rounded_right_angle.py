@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-EXACT_RAD, ROUNDED_RAD = 1e-6, 2e-3
+#: 1.5708 is good enough: 0.0002 degrees off, less than any mount is true to.
+GOOD_RAD, ROUNDED_RAD, NOISE = 5e-6, 2e-3, 2e-9
 QUARTERS = {1: "pi/2", 2: "pi", 3: "3*pi/2", 4: "2*pi"}
 MOST_DECIMALS = 6
 
@@ -44,10 +45,10 @@ def _is_rounded(number: float) -> bool:
     """Whether the number is a rounding, up or down, of a multiple of π/2, and not that multiple itself."""
     quarters = round(number / (math.pi / 2))
     exact = quarters * math.pi / 2
-    if abs(quarters) not in QUARTERS or not EXACT_RAD < abs(number - exact) < ROUNDED_RAD * abs(quarters):
+    if abs(quarters) not in QUARTERS or not GOOD_RAD < abs(number - exact) / max(1, abs(quarters)) < ROUNDED_RAD:
         return False
     return any(
-        abs(number * 10**decimals - whole(exact * 10**decimals)) < ROUNDED_RAD * EXACT_RAD
+        abs(number * 10**decimals - whole(exact * 10**decimals)) < NOISE
         for decimals in range(2, MOST_DECIMALS)
         for whole in (math.floor, math.ceil)
     )

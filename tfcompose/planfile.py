@@ -91,7 +91,7 @@ def _edge_to_json(edge: PlanEdge) -> dict[str, Any]:
         "source": {"file": file, "line": line},
     }
     if edge.joint:
-        row["joint"] = asdict(edge.joint)
+        row["joint"] = {name: getattr(edge.joint, name) for name in Joint.__slots__}
     return row
 
 

@@ -70,7 +70,7 @@ def rotate(quat_xyzw: Quaternion, xyz: Vector) -> Vector:
 
 def norm(values: tuple[float, ...]) -> float:
     """Return the Euclidean length."""
-    return math.sqrt(math.fsum(value * value for value in values))
+    return math.hypot(*values)
 
 
 def normalised(quat_xyzw: Quaternion) -> Quaternion:

@@ -28,8 +28,6 @@ MARK = re.compile(r"# expect(?:-with (?P<profile>\w+))?: (?P<codes>TF\d{3}(?: TF
 NOT_OF_A_LINE = {"TF001", "TF002", "TF008", "TF009", "TF015", "TF016", "TF903"}
 #: Codes of a URDF that somebody else wrote: tests/cli/test_lint_urdf.py.
 NOT_OF_A_LINE |= {"TF018", "TF720", "TF721", "TF722", "TF723", "TF724"}
-#: Codes of a URDF that somebody else wrote: tests/cli/test_lint_urdf.py.
-NOT_OF_A_LINE |= {"TF018", "TF720", "TF721", "TF722", "TF723", "TF724"}
 #: Codes of the running robot, of its plan and of its surroundings.
 LIVE = {code for code in CODES if code.startswith(("TF8", "TF9"))} - {"TF812", "TF813"}
 

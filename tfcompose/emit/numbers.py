@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from tfcompose.pose import Pose, multiply, quat_from_rpy, rpy_from_quat
@@ -15,6 +16,7 @@ QUATERNION_DECIMALS = 14
 ANGLE_NOISE_RAD = 1e-12
 
 
+@lru_cache(maxsize=8192)
 def number(value: float) -> str:
     """Return the number as text: ``0.3``, ``1``, ``1e-05``."""
     value = value + 0.0  # −0 becomes 0

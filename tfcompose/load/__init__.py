@@ -6,4 +6,15 @@ from tfcompose.load.overlay import composed
 from tfcompose.load.source import Path, Source, load
 from tfcompose.load.urdf import Element, load_xml
 
-__all__ = ["Element", "Form", "Path", "Source", "composed", "load", "load_calibration", "load_xml", "set_value", "with_includes"]
+__all__ = [
+    "Element",
+    "Form",
+    "Path",
+    "Source",
+    "composed",
+    "load",
+    "load_calibration",
+    "load_xml",
+    "set_value",
+    "with_includes",
+]

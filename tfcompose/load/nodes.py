@@ -23,6 +23,9 @@ DEEPEST = 40
 #: NUL, which no file name, argument or variable can hold, and halves of characters, which no file can.
 _FORBIDDEN = re.compile("[\0\ud800-\udfff]")
 
+#: A scalar's items; one for all of them.
+_NOTHING: list[Node] = []
+
 _LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
 
@@ -91,7 +94,7 @@ class _Composer:
 
     def compose(self, text: str) -> list[Node]:
         for event in yaml.parse(text, Loader=_LOADER):
-            if isinstance(event, yaml.ScalarEvent):
+            if type(event) is yaml.ScalarEvent:  # most of them are: asked first, and without a search
                 self._add(self._scalar(event), event)
             elif isinstance(event, yaml.CollectionStartEvent):
                 self._open(event)
@@ -132,13 +135,13 @@ class _Composer:
         self.stack.append(node)
 
     def _scalar(self, event: yaml.ScalarEvent) -> Node:
-        if _FORBIDDEN.search(event.value):  # written as an escape
-            raise RejectedError([finding("TF002", "a character that no text can hold", self._span(event))])
-        plain = event.implicit[0]
-        if event.tag not in {None, "!"}:
-            return Node("scalar", event.tag, self._span(event), event.value)
+        span, plain = self._span(event), event.implicit[0]
+        if not plain and _FORBIDDEN.search(event.value):  # written as an escape
+            raise RejectedError([finding("TF002", "a character that no text can hold", span)])
+        if event.tag is not None and event.tag != "!":
+            return Node("scalar", event.tag, span, event.value, False, _NOTHING)  # noqa: FBT003 (by place: there are many)
         tag = implicit_tag(event.value) if plain else STR
-        return Node("scalar", tag, self._span(event), event.value, plain=plain)
+        return Node("scalar", tag, span, event.value, plain, _NOTHING)
 
     def _alias(self, event: yaml.AliasEvent) -> Node:
         if event.anchor not in self.anchors:

@@ -180,6 +180,8 @@ def _only(source: Source, key: str) -> Source:
 
 def without(source: Source, key: str) -> Source:
     """Return the source without one of its sections."""
+    if key not in source.data and (key,) not in source.values:
+        return source
     data = {name: value for name, value in source.data.items() if name != key}
     values = {path: span for path, span in source.values.items() if path[:1] != (key,)}
     keys = {path: span for path, span in source.keys.items() if path[:1] != (key,)}

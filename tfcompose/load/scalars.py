@@ -26,6 +26,9 @@ IMPLICIT = (
     ),
 )
 
+_PATTERNS = {tag: pattern for tag, pattern, _ in IMPLICIT}
+_FIRST = "nN~tTfF-+.0123456789"
+
 SCALAR_TAGS = frozenset((STR, *(tag for tag, _, _ in IMPLICIT)))
 
 _MOST_DIGITS = 300
@@ -33,6 +36,8 @@ _MOST_DIGITS = 300
 
 def implicit_tag(text: str) -> str:
     """Return the tag of a plain scalar."""
+    if text[:1] not in _FIRST:
+        return STR
     for tag, pattern, first in IMPLICIT:
         if text[:1] in first and pattern.match(text):
             return tag
@@ -47,8 +52,7 @@ def scalar(tag: str, text: str) -> str | bool | int | float | None:
     """
     if tag == STR:
         return text
-    pattern = next(pattern for known, pattern, _ in IMPLICIT if known == tag)
-    if not pattern.match(text):
+    if not _PATTERNS[tag].match(text):
         raise ValueError(f"{text!r} is no {tag.removeprefix(TAG)}")
     if tag == NULL:
         return None

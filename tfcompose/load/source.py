@@ -16,7 +16,7 @@ from tfcompose.load.scalars import MAP, SCALAR_TAGS, SEQ, STR, TAG, scalar
 Path = tuple[str | int, ...]
 
 MOST_CHARACTERS = 4_000_000
-MOST_VALUES = 300_000
+MOST_VALUES = 400_000
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,128 @@
+"""What building costs, beside xacro: ``python tests/benchmarks/bench_compile.py``, or name the file to pytest.
+
+The same robot is written for both: bodies on moving joints, for xacro as calls of a macro. Whole
+processes take turns; the least time of each counts; compiled files are there before the first one.
+"""
+
+from __future__ import annotations
+
+import compileall
+import importlib.util
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+RUNS = 3
+#: Frames, and how many times faster than xacro building must be.
+TIMES_FASTER = {1_000: 3.0, 5_000: 10.0}
+MOST_GROWTH = 12.0  # from 1,000 frames to 10,000
+MOST_MB = 1_000.0
+
+XACRO = """<robot name="bench" xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <xacro:macro name="segment" params="name parent length angle">
+    <link name="${name}">
+      <inertial>
+        <mass value="1.5"/>
+        <inertia ixx="${1.5 / 12 * 0.02}" ixy="0" ixz="0" iyy="${1.5 / 12 * (length * length + 0.01)}" iyz="0"
+          izz="${1.5 / 12 * (length * length + 0.01)}"/>
+      </inertial>
+      <visual><geometry><box size="${length} 0.1 0.1"/></geometry></visual>
+      <collision><geometry><box size="${length} 0.1 0.1"/></geometry></collision>
+    </link>
+    <joint name="${name}_joint" type="revolute">
+      <parent link="${parent}"/><child link="${name}"/>
+      <origin xyz="${length / 2} 0 0.1" rpy="0 0 ${radians(angle)}"/>
+      <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="10" velocity="1"/>
+    </joint>
+  </xacro:macro>
+  <link name="base_link"/>
+"""
+
+
+def names(frames: int) -> list[tuple[str, str, int]]:
+    """Return each frame with its parent, ten to a branch, and its number."""
+    return [(f"l{n}", f"l{n - 1}" if n % 10 else "base_link", n) for n in range(frames)]
+
+
+def xacro_of(frames: int) -> str:
+    """Return the robot as calls of the macro."""
+    calls = (
+        f'  <xacro:segment name="{name}" parent="{parent}" length="0.{1 + n % 9}" angle="{n % 90}"/>\n'
+        for name, parent, n in names(frames)
+    )
+    return XACRO + "".join(calls) + "</robot>\n"
+
+
+def spec_of(frames: int) -> str:
+    """Return the same robot as a spec."""
+    lines = ["tfcompose: 1", "robot: bench", "x-bodies:"]
+    lines += [
+        f"  - &body{n} {{visual: {{box: [0.{n}, 0.1, 0.1]}}, collision: same, inertial: {{mass: 1.5 kg}}}}"
+        for n in range(1, 10)
+    ]
+    lines += ["links:", "  base_link: {}", *(f"  {name}: *body{1 + n % 9}" for name, _, n in names(frames)), "joints:"]
+    lines += [
+        f"  {name}_joint: {{type: revolute, parent: {parent}, child: {name}, "
+        f'xyz: ["${{0.{1 + n % 9} / 2}}", 0, 0.1], rpy: [0, 0, {n % 90} deg], axis: [0, 0, 1], limit: '
+        + ("&limit {lower: -1, upper: 1, effort: 10, velocity: 1}}" if n == 0 else "*limit }")
+        for name, parent, n in names(frames)
+    ]
+    return "\n".join([*lines, ""])
+
+
+def cost(words: list[str], folder: Path) -> tuple[float, float]:
+    """Return the seconds and the greatest resident size, in MB, of a whole process."""
+    began = time.perf_counter()
+    process = subprocess.Popen([sys.executable, *words], cwd=folder, stdout=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    seconds = time.perf_counter() - began
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise RuntimeError(f"{words} ended with {process.returncode}")
+    return seconds, usage.ru_maxrss / 1000
+
+
+def measure(runs: int = RUNS) -> dict[str, tuple[float, float]]:
+    """Return the least seconds and the most megabytes of each command; those that are compared take turns."""
+    compileall.compile_dir(ROOT / "tfcompose", quiet=2)
+    found = importlib.util.find_spec("xacro")
+    if found is None or found.origin is None:
+        raise RuntimeError("xacro is not installed: pip install xacro")
+    compileall.compile_dir(Path(found.origin).parent, quiet=2)
+    taken: dict[str, list[tuple[float, float]]] = {}
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for frames in (*TIMES_FASTER, 10_000):
+            (folder / f"{frames}.yaml").write_text(spec_of(frames), encoding="utf-8")
+            (folder / f"{frames}.xacro").write_text(xacro_of(frames), encoding="utf-8")
+        for turn in range(runs):
+            for frames in (*TIMES_FASTER, 10_000):
+                build = ["-m", "tfcompose", "build", f"{frames}.yaml", "-o", f"out{frames}"]
+                taken.setdefault(f"tfcompose {frames}", []).append(cost(build, folder))
+                if frames in TIMES_FASTER and (turn == 0 or frames == 1_000):
+                    run = ["-c", f"import xacro; open('x.urdf', 'w').write(xacro.process('{frames}.xacro'))"]
+                    taken.setdefault(f"xacro {frames}", []).append(cost(run, folder))
+    return {name: (min(t for t, _ in costs), max(m for _, m in costs)) for name, costs in taken.items()}
+
+
+def test_building_is_3_and_10_times_faster_than_xacro_and_grows_with_the_robot() -> None:
+    found = measure()
+    for frames, times in TIMES_FASTER.items():
+        assert found[f"xacro {frames}"][0] >= times * found[f"tfcompose {frames}"][0], found
+    assert found["tfcompose 10000"][0] <= MOST_GROWTH * found["tfcompose 1000"][0], found
+    assert found["tfcompose 10000"][1] <= MOST_MB, found
+
+
+if __name__ == "__main__":
+    figures = measure()
+    for name, (seconds, megabytes) in figures.items():
+        sys.stdout.write(f"{name:16} {seconds:7.2f} s {megabytes:6.0f} MB\n")
+    for frames, times in TIMES_FASTER.items():
+        ratio = figures[f"xacro {frames}"][0] / figures[f"tfcompose {frames}"][0]
+        sys.stdout.write(f"{frames} frames: {ratio:.1f} times faster than xacro, at least {times:g}\n")
+    growth = figures["tfcompose 10000"][0] / figures["tfcompose 1000"][0]
+    sys.stdout.write(f"10,000 frames cost {growth:.1f} times 1,000, at most {MOST_GROWTH:g}\n")

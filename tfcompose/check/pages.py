@@ -156,8 +156,8 @@ date.""",
     "TF703": """A stand-in names a joint that does not move or does not exist.""",
     "TF720": """An element or an attribute is not one of URDF's.
 
-Readers pass over it without a word: with <orign> a joint is at its parent's origin. An error where a known name is near;
-else it may be somebody's extension.""",
+Readers pass over it without a word: with <orign> a joint is at its parent's origin. An error where a known name is
+near; else it may be somebody's extension.""",
     "TF721": """A value of a URDF is missing, or is none.
 
 Numbers are SI: m, rad, kg. Readers refuse the robot, take a default without a word, or compute with what is there.""",

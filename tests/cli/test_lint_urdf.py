@@ -19,8 +19,8 @@ from tfcompose.cli.urdf import CODES, lint_urdf
 from tfcompose.compile import compile_robot
 from tfcompose.diagnostic import Diagnostic, RejectedError
 from tfcompose.emit import emit
-from tfcompose.load import load_xml
-from tfcompose.resolve import robot_of_urdf
+from tfcompose.load.urdf import load_xml
+from tfcompose.resolve.urdf import robot_of_urdf
 
 ROOT = Path(__file__).parents[2]
 FILES = sorted((Path(__file__).parent / "urdfs").glob("*.urdf"))

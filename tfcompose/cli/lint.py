@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 from tfcompose import __version__
 from tfcompose.check import idle
 from tfcompose.cli.compiling import library, overlays_of
-from tfcompose.cli.fixing import Fixer
 from tfcompose.cli.options import DEFAULT_FILE, add_variant
 from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
 from tfcompose.compile import compile_source, profiles_of
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from collections.abc import Callable
 
+    from tfcompose.cli.fixing import Fixer
     from tfcompose.resolve import Library
 
 
@@ -67,7 +67,9 @@ def run(arguments: Namespace) -> int:
     urdfs = dict.fromkeys([*arguments.urdfs, *(file for file in files if file.endswith(URDF_ENDINGS))])
     files = {file: None for file in files if file not in urdfs}
     if arguments.fix:
-        fixer = Fixer(list(files), lambda file, read: lint_file(file, presets, arguments, read))
+        fixer = import_module("tfcompose.cli.fixing").Fixer(
+            list(files), lambda file, read: lint_file(file, presets, arguments, read)
+        )
         found = _fixed(fixer, arguments.format)
     else:
         for file in files:

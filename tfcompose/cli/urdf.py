@@ -12,8 +12,8 @@ from urllib.parse import unquote, urlparse
 from tfcompose.check import check
 from tfcompose.cli.terminal import read_text
 from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
-from tfcompose.load import load_xml
-from tfcompose.resolve import robot_of_urdf
+from tfcompose.load.urdf import load_xml
+from tfcompose.resolve.urdf import robot_of_urdf
 
 if TYPE_CHECKING:
     from typing import Any

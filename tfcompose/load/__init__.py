@@ -1,20 +1,10 @@
-"""Stage ``load``: YAML text becomes a Source that knows where everything stands."""
+"""Stage ``load``: YAML text becomes a Source that knows where everything stands.
 
-from tfcompose.load.calibration import Form, load_calibration
+Calibration files and URDF are read by modules of their own, which are loaded where they are used.
+"""
+
 from tfcompose.load.include import set_value, with_includes
 from tfcompose.load.overlay import composed
 from tfcompose.load.source import Path, Source, load
-from tfcompose.load.urdf import Element, load_xml
 
-__all__ = [
-    "Element",
-    "Form",
-    "Path",
-    "Source",
-    "composed",
-    "load",
-    "load_calibration",
-    "load_xml",
-    "set_value",
-    "with_includes",
-]
+__all__ = ["Path", "Source", "composed", "load", "set_value", "with_includes"]

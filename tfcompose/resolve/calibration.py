@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, did_you_mean, finding, nearest
 from tfcompose.load.overlay import ROTATIONS
 from tfcompose.model import Calibration
-from tfcompose.validate.calibration import CalibrationFile, CalibrationLimit, CalibrationSpec, read_calibration
+from tfcompose.validate.calibration import CalibrationLimit, CalibrationSpec
+from tfcompose.validate.calibration_file import CalibrationFile, read_calibration
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence

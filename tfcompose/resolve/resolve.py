@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
 from tfcompose.model import Edge, Process, Robot
 from tfcompose.plan import GuardPolicy
-from tfcompose.resolve.calibration import calibrated
 from tfcompose.resolve.edges import Drafts
 from tfcompose.resolve.isolation import isolate, settings_of
 from tfcompose.resolve.poses import Solver
@@ -49,8 +49,11 @@ def resolve(validated: Validated, library: Library, read: Callable[[str], str] |
             drafts.add_sensor(sensor)
         else:
             broken.add(("sensors", name))
-    measured, refused = calibrated(drafts.edges, drafts.frames, spec, source, read)
-    found += refused
+    measured = drafts.edges
+    if _has_calibrations(spec):  # few robots do, and what reads them is loaded only then
+        calibrated = import_module("tfcompose.resolve.calibration").calibrated
+        measured, refused = calibrated(drafts.edges, drafts.frames, spec, source, read)
+        found += refused
     solver = Solver(measured, drafts.frames)
     edges = solver.solve()
     processes = [*processes, *drafts.drivers]
@@ -77,6 +80,11 @@ def resolve(validated: Validated, library: Library, read: Callable[[str], str] |
     robot = replace(robot, base=_base(robot, spec, source, found))
     isolated, refused = isolate(robot, spec.ros, source)
     return Resolved(isolated, (*found, *refused))
+
+
+def _has_calibrations(spec: RobotSpec) -> bool:
+    entries = (*spec.frames.values(), *spec.links.values(), *spec.sensors.values())
+    return bool(spec.calibrations) or any(entry.calibration for entry in entries)
 
 
 def _processes(spec: RobotSpec, source: Source, found: list[Diagnostic]) -> list[Process]:

@@ -13,7 +13,7 @@ from tfcompose.resolve.urdf_bodies import Bodies
 from tfcompose.resolve.urdf_words import unknown_words
 
 if TYPE_CHECKING:
-    from tfcompose.load import Element
+    from tfcompose.load.urdf import Element
     from tfcompose.pose import Vector
     from tfcompose.resolve.urdf_bodies import Finder
 

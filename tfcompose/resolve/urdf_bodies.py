@@ -12,7 +12,7 @@ from tfcompose.resolve.bodies import inertial_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tfcompose.load import Element
+    from tfcompose.load.urdf import Element
     from tfcompose.resolve.urdf import Values
 
     #: Takes a mesh's file name; returns a code with what is wrong and where it looked, or None.

@@ -13,7 +13,7 @@ from tfcompose.diagnostic import Diagnostic, finding, nearest
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.load import Element
+    from tfcompose.load.urdf import Element
 
 #: Each element with its attributes and the elements in it.
 WORDS: dict[str, tuple[str, str]] = {

@@ -11,9 +11,8 @@ from tfcompose.validate.entries import Entries, RefusedError
 from tfcompose.validate.schema import shown
 
 if TYPE_CHECKING:
-    from tfcompose.load import Form, Path, Source
-
-FORMATS = ("autoware", "easy_handeye2", "moveit", "kalibr", "matrix", "transform_stamped")
+    from tfcompose.load import Path, Source
+    from tfcompose.load.calibration import Form
 
 AUTOWARE_KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
 _CAMERA = re.compile(r"cam(\d+)\Z")

@@ -7,7 +7,7 @@ was seen read alike. A code is never used again for something else.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from difflib import get_close_matches
+from importlib import import_module
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
@@ -108,7 +108,8 @@ def finding(  # noqa: PLR0913 (a finding has that many parts; all but three are 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """Return the known word that a person most likely meant by ``word``, or None."""
-    found = get_close_matches(word.lower(), {name.lower(): name for name in known}, n=1, cutoff=0.6)
+    find = import_module("difflib").get_close_matches  # loaded when a word is wrong
+    found = find(word.lower(), {name.lower(): name for name in known}, n=1, cutoff=0.6)
     return next((name for name in known if name.lower() == found[0]), None) if found else None
 
 

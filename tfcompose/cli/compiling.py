@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import gc
+import os
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
@@ -20,18 +19,15 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-PRESETS = Path(__file__).parent.parent / "presets"
+PRESETS = os.path.join(os.path.dirname(os.path.dirname(__file__)), "presets")
 
 
 def library() -> Library:
     """Return the presets that come with tfcompose."""
-    known = {preset.relative_to(PRESETS).with_suffix("").as_posix(): preset for preset in PRESETS.glob("*/*.yaml")}
-    return Library(tuple(sorted(known)), lambda name: (known[name].read_text("utf-8"), f"presets/{name}.yaml"))
-
-
-def unhurried() -> None:
-    """Let Python look for circles of garbage rarely: a compiler makes none, and looking costs a tenth of its time."""
-    gc.set_threshold(200_000, 50, 1000)
+    vendors = [vendor.path for vendor in os.scandir(PRESETS) if vendor.is_dir()]
+    files = [file.path for vendor in vendors for file in os.scandir(vendor) if file.name.endswith(".yaml")]
+    known = {os.path.relpath(file, PRESETS).replace(os.sep, "/").removesuffix(".yaml"): file for file in files}
+    return Library(tuple(sorted(known)), lambda name: (read_text(known[name]), f"presets/{name}.yaml"))
 
 
 def overlays_of(arguments: Namespace) -> list[Source]:
@@ -47,7 +43,6 @@ def overlays_of(arguments: Namespace) -> list[Source]:
 def robot_or_code(file: str, arguments: Namespace) -> Robot | int:
     """Return the robot without errors in it, or the exit code after printing what is wrong. Warnings are printed."""
     compiled = None
-    unhurried()
     try:
         overlays = overlays_of(arguments)
         compiled = compile_robot(

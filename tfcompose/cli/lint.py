@@ -10,7 +10,6 @@ import re
 import sys
 from dataclasses import replace
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose import __version__
@@ -99,15 +98,19 @@ def _fixed(fixer: Fixer, form: str) -> list[Diagnostic]:
 
 def robots_in(name: str) -> list[str]:
     """Return the file itself, or the robot files below a folder: YAML files with a line that begins with tfcompose:."""
-    folder = Path(name)
-    if not name or not folder.is_dir():
+    if not os.path.isdir(name):
         return [name]
     robots: list[str] = []
-    for top, folders, files in os.walk(folder):
+    for top, folders, files in os.walk(name):
         folders[:] = sorted(inner for inner in folders if not inner.startswith("."))
-        paths = (Path(top) / file for file in sorted(files) if file.endswith((".yaml", ".yml")))
-        robots += [str(path) for path in paths if path.is_file() and _ROBOT.search(path.read_bytes())]
+        paths = [os.path.join(top, file) for file in sorted(files) if file.endswith((".yaml", ".yml"))]
+        robots += [os.path.normpath(path) for path in paths if os.path.isfile(path) and _is_robot(path)]
     return robots or [name]
+
+
+def _is_robot(path: str) -> bool:
+    with open(path, "rb") as file:
+        return bool(_ROBOT.search(file.read()))
 
 
 def _print(found: list[Diagnostic], form: str, files: int) -> None:

@@ -6,7 +6,7 @@ import os
 import stat
 import sys
 from functools import cache
-from pathlib import Path
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
@@ -30,9 +30,9 @@ def read_text(path: str) -> str:
         RejectedError: with one TF001 or TF008 finding, if it cannot be read, is no text, or is too large.
     """
     try:
-        if stat.S_ISFIFO(Path(path).stat().st_mode) and not path.startswith(_OPEN_ALREADY):
+        if stat.S_ISFIFO(os.stat(path).st_mode) and not path.startswith(_OPEN_ALREADY):
             raise RejectedError([finding("TF001", "cannot be read: it is a pipe, not a file", Span(path))])
-        with Path(path).open("rb") as file:
+        with open(path, "rb") as file:
             data = file.read(MOST_BYTES + 1)
     except OSError as error:
         raise RejectedError([_unreadable(path, error)]) from None
@@ -52,7 +52,7 @@ def read_text(path: str) -> str:
 def _unreadable(path: str, error: OSError) -> Diagnostic:
     advice = ""
     if isinstance(error, FileNotFoundError):
-        folder = Path(path).parent
+        folder = import_module("pathlib").Path(path).parent
         there = sorted(file.name for file in folder.glob("*.yaml")) if folder.is_dir() else []
         advice = f"in {folder} there is {', '.join(there[:8])}" if there else f"there is no YAML file in {folder}"
     elif isinstance(error, IsADirectoryError):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from statistics import median
 from typing import TYPE_CHECKING
 
 from tfcompose.check.geometry import placed
@@ -38,7 +37,10 @@ def far_from_the_robot(robot: Robot) -> Iterator[Diagnostic]:
     body = max((size for size in sizes if size <= LARGEST_M), default=0.0)
     below = placed(robot, moving=True)
     mounts = [norm(edge.pose.xyz) for edge in robot.edges if edge.given and edge.child in below and any(edge.pose.xyz)]
-    limit = min(max(USUAL_M, TIMES * body, TIMES * median(mounts) if mounts else 0.0), max(LARGEST_M, TIMES * body))
+    limit = min(
+        max(USUAL_M, TIMES * body, TIMES * sorted(mounts)[len(mounts) // 2] if mounts else 0.0),
+        max(LARGEST_M, TIMES * body),
+    )
     moved = {edge.joint_name: edge.child for edge in robot.edges if edge.joint_name}
     mounted = {sensor.name: sensor.mount for sensor in robot.sensors}
     for value in robot.as_written:

@@ -47,6 +47,14 @@ def test_a_moving_edge_gives_the_pose_its_time() -> None:
     assert stamp == 5 * S
 
 
+def test_the_edge_that_is_behind_is_named() -> None:
+    buffer = rover()
+    buffer.set("map", "odom", at(0), 4 * S, static=False)
+    assert buffer.behind("map", "laser") == "map → odom"
+    assert buffer.behind("odom", "laser") == "odom → base_link"
+    assert buffer.behind("laser", "camera") is None
+
+
 def test_a_frame_in_itself_is_the_identity() -> None:
     assert rover().latest("laser", "laser") == (Pose(), None)
 

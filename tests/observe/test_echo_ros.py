@@ -17,6 +17,16 @@ from tfcompose.pose import Pose, quat_from_rpy
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
+    from typing import Protocol
+
+    from tfcompose.plan import PlanEdge
+
+    class Started(Protocol):
+        """A process under test, as conftest starts it."""
+
+        def until_says(self, text: str) -> None: ...
+        def end(self) -> tuple[int, float]: ...
+
 
 pytestmark = pytest.mark.ros
 
@@ -24,14 +34,14 @@ DOWN_15 = Pose((0.2, 0.0, 0.1), quat_from_rpy(0, math.radians(15), 0))
 
 
 @pytest.fixture
-def rover(write: Callable[..., Path], start: Callable[..., object], edge: Callable[..., object]) -> None:
+def rover(write: Callable[..., Path], start: Callable[..., Started], edge: Callable[..., PlanEdge]) -> None:
     """A base that stands at x = 2 in odom, with a camera that looks down 15 degrees, and a tree of its own beside."""
     edges = [edge("odom base_link", "drive"), edge("base_link camera", pose=DOWN_15), edge("world table")]
     drive = PlanProcess("drive", "simulate", simulate=Simulation("fixed", 50.0, pose=Pose((2.0, 0.0, 0.0))))
     plan = write(edges, PlanProcess("static", "static"), drive)
     for module, name in (("static", "static"), ("simulate", "drive")):
         started = start(f"tfcompose.run.{module}", plan, name)
-        started.until_says("edge")  # type: ignore[attr-defined]
+        started.until_says("edge")
 
 
 def echo(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -80,6 +90,21 @@ def test_a_miss_says_why_and_ends_with_exit_code_1(a: str, b: str, why: str) -> 
     assert done.stdout == ""
     assert f"no pose of {b} in {a}: " in done.stderr
     assert why in done.stderr
+
+
+def test_when_the_owner_falls_silent_it_says_so_and_ends(
+    write: Callable[..., Path], start: Callable[..., Started], edge: Callable[..., PlanEdge]
+) -> None:
+    drive = PlanProcess("drive", "simulate", simulate=Simulation("fixed", 50.0))
+    owner = start("tfcompose.run.simulate", write([edge("odom base_link", "drive")], drive), "drive")
+    command = [sys.executable, "-m", "tfcompose", "echo", "odom", "base_link", "--rate", "20", "--timeout", "1"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout
+        assert process.stdout.readline().startswith("pose of base_link in odom")
+        owner.end()
+        _, errors = process.communicate(timeout=20)
+    assert process.returncode == 1
+    assert "nothing new came on odom → base_link for 1." in errors
 
 
 @pytest.mark.usefixtures("domain")

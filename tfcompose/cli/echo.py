@@ -37,7 +37,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument("b", metavar="B", help="the frame whose pose it is")
     parser.add_argument("--once", action="store_true", help="print one pose and end")
     parser.add_argument(
-        "--timeout", type=positive, default=5.0, metavar="S", help="end after S seconds without a pose; default: 5"
+        "--timeout", type=positive, default=5.0, metavar="S", help="end after S seconds without a new pose; default: 5"
     )
     parser.add_argument("--rate", type=positive, default=1.0, metavar="HZ", help="poses a second; default: 1")
     parser.add_argument("--namespace", default="", metavar="NS", help="listen to /NS/tf and /NS/tf_static")

@@ -105,7 +105,26 @@ class Buffer:
             ConnectivityError: if they are in two trees.
             ExtrapolationError: if the edges have no time in common.
         """
-        a, b = a.removeprefix("/"), b.removeprefix("/")
+        up, down = self._path(a.removeprefix("/"), b.removeprefix("/"))
+        stamp = self._common_time([*up, *down])
+        return self._down(up, stamp).inverse() @ self._down(down, stamp), stamp
+
+    def behind(self, a: str, b: str) -> str | None:
+        """Return the name of the moving edge between the two whose newest sample is the oldest, or None.
+
+        Raises:
+            LookupError: if a frame is not known.
+            ConnectivityError: if they are in two trees.
+        """
+        up, down = self._path(a.removeprefix("/"), b.removeprefix("/"))
+        moving = [child for child in (*up, *down) if not self._edges[child].static]
+        if not moving:
+            return None
+        child = min(moving, key=lambda frame: self._edges[frame].stamps[-1])
+        return f"{self._edges[child].parent} → {child}"
+
+    def _path(self, a: str, b: str) -> tuple[list[str], list[str]]:
+        """Return the frames from ``a`` up to below where the two meet, and those from ``b``."""
         for frame in (a, b):
             if frame not in self._frames:
                 raise LookupError(self._unknown(frame))
@@ -113,9 +132,7 @@ class Buffer:
         meeting = next((frame for frame in up_b if frame in up_a), None)
         if meeting is None:
             raise ConnectivityError(f"{a} and {b} are in two trees: one begins at {up_a[-1]}, the other at {up_b[-1]}")
-        path = up_a[: up_a.index(meeting)], up_b[: up_b.index(meeting)]
-        stamp = self._common_time([*path[0], *path[1]])
-        return self._down(path[0], stamp).inverse() @ self._down(path[1], stamp), stamp
+        return up_a[: up_a.index(meeting)], up_b[: up_b.index(meeting)]
 
     def _unknown(self, frame: str) -> str:
         near = nearest(frame, sorted(self._frames))

@@ -40,7 +40,8 @@ class Missed:
 def echo(asked: Asked, say: Callable[[Pose, int | None], None], stop: Stop) -> Missed | None:
     """Give each pose, with its time in nanoseconds (None: all edges are fixed), to ``say``.
 
-    Return None after one pose with ``once``, or when ``stop`` is requested; else why there was none for so long.
+    A pose whose time is that of the last one is not new and not given again. Return None after one pose with ``once``,
+    or when ``stop`` is requested; else why there was no new one for so long.
     """
     buffer = Buffer()
     prefix = f"/{asked.namespace.strip('/')}" if asked.namespace else ""
@@ -49,6 +50,7 @@ def echo(asked: Asked, say: Callable[[Pose, int | None], None], stop: Stop) -> M
         subscriptions = [(TFSubscription(node, static=static, topic=topic), static) for static, topic in topics]
         begun = last = time.monotonic()
         next_at, messages, reason = begun, 0, ""
+        said_ns: int | None = None
         while not stop.requested:
             wait(node, [subscription for subscription, _ in subscriptions], 0.05, stop)
             messages += sum(_take(buffer, subscription, static=static) for subscription, static in subscriptions)
@@ -60,11 +62,13 @@ def echo(asked: Asked, say: Callable[[Pose, int | None], None], stop: Stop) -> M
             except TransformError as error:
                 reason = str(error)
             else:
-                say(pose, stamp_ns)
-                if asked.once:
-                    return None
-                last, next_at = now, now + 1 / asked.rate
-                continue
+                if stamp_ns is None or stamp_ns != said_ns:
+                    say(pose, stamp_ns)
+                    if asked.once:
+                        return None
+                    said_ns, last, next_at = stamp_ns, now, now + 1 / asked.rate
+                    continue
+                reason = f"nothing new came on {buffer.behind(asked.a, asked.b)} for {now - last:.1f} s"
             if now - last > asked.timeout_s:
                 return Missed(_why(reason, messages, now - begun))
     return None

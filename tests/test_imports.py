@@ -167,6 +167,7 @@ def test_commands_before_the_plan_load_yaml_and_nothing_else_from_elsewhere(
     loaded = loaded_by(command(words[0], robot, *words[1:], *more))
     assert foreign(loaded, bare) - {"cython_runtime"} == {"yaml"}
     assert not loaded & {"tfcompose.ros", "tfcompose.run", "tfcompose.observe"}
+    assert not (loaded - bare) & {"urllib.request", "http.client", "email", "ssl", "xml.sax"}  # slow to load
 
 
 def test_reading_and_supervising_a_plan_loads_nothing_from_elsewhere_and_no_compiler(bare: set[str]) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict
 from typing import Any, TypeVar
 
 from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
@@ -31,7 +30,7 @@ def write_plan(plan: Plan) -> str:
         "spec_digest": plan.spec_digest,
         "description": plan.description,
         "base": plan.base,
-        "ros": asdict(plan.ros),
+        "ros": _fields(plan.ros),
     }
     lines = [f"  {_json(key)}: {_json(value)}" for key, value in head.items()]
     lines.append(_block("edges", [_edge_to_json(edge) for edge in plan.edges]))
@@ -67,14 +66,17 @@ def _bad(message: str, span: Span) -> Diagnostic:
     return finding("TF902", message, span, help="build it again: tfcompose build robot.yaml")
 
 
-def _json(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+_json = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
 
 
 def _block(key: str, rows: list[dict[str, Any]]) -> str:
     if not rows:
         return f'  "{key}": []'
     return f'  "{key}": [\n' + ",\n".join(f"    {_json(row)}" for row in rows) + "\n  ]"
+
+
+def _fields(value: Joint | GuardPolicy | PlanProcess | RosSettings | Simulation) -> dict[str, Any]:
+    return {name: getattr(value, name) for name in value.__slots__}
 
 
 def _edge_to_json(edge: PlanEdge) -> dict[str, Any]:
@@ -91,21 +93,22 @@ def _edge_to_json(edge: PlanEdge) -> dict[str, Any]:
         "source": {"file": file, "line": line},
     }
     if edge.joint:
-        row["joint"] = {name: getattr(edge.joint, name) for name in Joint.__slots__}
+        row["joint"] = _fields(edge.joint)
     return row
 
 
 def _process_to_json(process: PlanProcess) -> dict[str, Any]:
-    row = asdict(process)
+    row = _fields(process)
     simulation = row.pop("simulate")
     if simulation:
-        pose = simulation.pop("pose")
-        row["simulate"] = simulation | {"xyz": pose["xyz"], "quat_xyzw": pose["quat_xyzw"]}
+        row["simulate"] = _fields(simulation)
+        pose = row["simulate"].pop("pose")
+        row["simulate"] |= {"xyz": pose.xyz, "quat_xyzw": pose.quat_xyzw}
     return row
 
 
 def _guard_to_json(guard: GuardPolicy) -> dict[str, Any]:
-    return asdict(guard) | {"allow": [{"parent": parent, "child": child} for parent, child in guard.allow]}
+    return _fields(guard) | {"allow": [{"parent": parent, "child": child} for parent, child in guard.allow]}
 
 
 T = TypeVar("T")

@@ -9,6 +9,7 @@ import random
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import quoteattr
 
 import pytest
 import yourdfpy
@@ -19,6 +20,7 @@ from scipy.spatial.transform import Rotation
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
+from tfcompose.emit.markup import quoted
 from tfcompose.emit.numbers import clean_quat, clean_rpy, number
 from tfcompose.emit.urdf import urdf
 from tfcompose.model import JOINTS, STATIC
@@ -246,3 +248,13 @@ def test_noise_does_not_turn_the_sign_of_a_half_turn(quat: Quaternion) -> None:
 def test_a_number_reads_back_the_same_and_has_no_negative_zero(value: float) -> None:
     assert float(number(value)) == value
     assert not number(value).startswith("-0") or value != 0
+
+
+@given(st.text() | st.text(st.sampled_from("a_1é &<>\"'\t\r\n")))
+def test_a_text_is_quoted_as_the_standard_library_does(text: str) -> None:
+    assert quoted(text) == quoteattr(text)
+
+
+def test_rotations_that_differ_in_the_sign_of_a_zero_are_written_alike() -> None:
+    turns = [(0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 1.0, -0.0), (-0.0, 0.0, 1.0, -0.0)]
+    assert len({clean_rpy(turn) for turn in turns}) == 1

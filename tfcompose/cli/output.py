@@ -92,6 +92,8 @@ def _write(path: Path, text: str) -> None:
 
 def _parameter_files(folder: Path) -> list[str]:
     """Return the parameter files that the plan in the folder names: those that an earlier build wrote."""
+    if not (folder / "params").is_dir():
+        return []
     try:
         processes = json.loads((folder / "plan.json").read_text("utf-8"))["processes"]
         named = [process["params_file"] for process in processes]

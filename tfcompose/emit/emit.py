@@ -9,7 +9,7 @@ from tfcompose.emit.final import with_final_names
 from tfcompose.emit.params import params_file
 from tfcompose.emit.plan import plan_of
 from tfcompose.emit.tree import tree
-from tfcompose.emit.urdf import urdf
+from tfcompose.emit.urdf import urdfs
 from tfcompose.planfile import write_plan
 
 if TYPE_CHECKING:
@@ -32,10 +32,11 @@ def emit(robot: Robot) -> tuple[File, ...]:
         for process in robot.processes
         if process.kind == "run" and process.params
     )
+    whole, stock = urdfs(robot)
     return (
         File("plan.json", write_plan(plan_of(live))),
-        File("robot.full.urdf", urdf(robot, full=True)),
-        File("robot.urdf", urdf(robot, full=False)),
+        File("robot.full.urdf", whole),
+        File("robot.urdf", stock),
         File("tree.txt", tree(live)),
         *params,
     )

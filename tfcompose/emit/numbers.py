@@ -16,7 +16,11 @@ QUATERNION_DECIMALS = 14
 ANGLE_NOISE_RAD = 1e-12
 
 
-@lru_cache(maxsize=8192)
+#: Numbers and rotations repeat, in one file and from file to file.
+_REMEMBERED = 1 << 16
+
+
+@lru_cache(maxsize=_REMEMBERED)
 def number(value: float) -> str:
     """Return the number as text: ``0.3``, ``1``, ``1e-05``."""
     value = value + 0.0  # −0 becomes 0
@@ -25,13 +29,13 @@ def number(value: float) -> str:
 
 def numbers(values: tuple[float, ...]) -> str:
     """Return the numbers with spaces between them, as URDF wants them."""
-    return " ".join(number(value) for value in values)
+    return " ".join(map(number, values))
 
 
 def clean_xyz(xyz: Vector) -> Vector:
     """Return the lengths rounded to a picometre, which removes what adding and turning left behind."""
-    x, y, z = (round(value, METRE_DECIMALS) + 0.0 for value in xyz)
-    return (x, y, z)
+    x, y, z = xyz
+    return (round(x, METRE_DECIMALS) + 0.0, round(y, METRE_DECIMALS) + 0.0, round(z, METRE_DECIMALS) + 0.0)
 
 
 def clean_quat(quat_xyzw: Quaternion) -> Quaternion:
@@ -55,6 +59,12 @@ def clean_rpy(quat_xyzw: Quaternion) -> Vector:
 
     Near pitch ±π/2 the yaw is known to few digits only, and the roll is what then remains to be turned.
     """
+    x, y, z, w = quat_xyzw
+    return _clean_rpy((x + 0.0, y + 0.0, z + 0.0, w + 0.0))  # −0 becomes 0: what is remembered cannot tell them apart
+
+
+@lru_cache(maxsize=_REMEMBERED)
+def _clean_rpy(quat_xyzw: Quaternion) -> Vector:
     _, pitch, yaw = (_whole_degree(angle) for angle in rpy_from_quat(quat_xyzw))
     x, y, z, w = quat_from_rpy(0.0, pitch, yaw)
     turn = multiply((-x, -y, -z, w), quat_xyzw)
@@ -69,4 +79,4 @@ def _whole_degree(angle: float) -> float:
 
 def clean_tensor(tensor: tuple[float, ...]) -> tuple[float, ...]:
     """Return the moments to 12 significant digits, which no measurement reaches."""
-    return tuple(float(f"{value:.12g}") for value in tensor)
+    return tuple([float(f"{value:.12g}") for value in tensor])

@@ -28,14 +28,18 @@ def plan_of(robot: Robot) -> Plan:
     nodes = {process.name: process.node for process in robot.processes}
     needed = _needed(robot)
     names = frozenset(process.name for process in needed)
-    edges = tuple(_edge(edge, nodes[edge.owner], robot.file) for edge in robot.edges)
+    relative = {file: _relative(file, robot.file) for file in {edge.at.file for edge in robot.edges}}
+    edges = tuple([_edge(edge, nodes[edge.owner], relative[edge.at.file]) for edge in robot.edges])
+    owned: dict[str, list[tuple[str, str]]] = {}
+    for edge in edges:
+        owned.setdefault(edge.owner, []).append((edge.parent, edge.child))
     return Plan(
         robot=robot.name,
         spec_digest=_digest(robot),
         base=robot.base,
         ros=robot.ros,
         edges=edges,
-        processes=tuple(_process(process, robot, edges, names) for process in needed),
+        processes=tuple(_process(process, robot, owned.get(process.name, []), names) for process in needed),
         guard=robot.guard,
     )
 
@@ -69,7 +73,7 @@ def _edge(edge: Edge, node: str, file: str) -> PlanEdge:
         node=node,
         pose=clean(edge.pose),
         rate=edge.rate,
-        source=(_relative(edge.at.file, file), edge.at.line),
+        source=(file, edge.at.line),
         joint=joint,
     )
 
@@ -79,7 +83,7 @@ def _relative(file: str, to: str) -> str:
     return posixpath.relpath(file, posixpath.dirname(to) or ".")
 
 
-def _process(process: Process, robot: Robot, edges: tuple[PlanEdge, ...], names: frozenset[str]) -> PlanProcess:
+def _process(process: Process, robot: Robot, owned: list[tuple[str, str]], names: frozenset[str]) -> PlanProcess:
     has_params = process.kind == "run" and bool(process.params)
     simulation = process.simulate
     if simulation:
@@ -102,7 +106,7 @@ def _process(process: Process, robot: Robot, edges: tuple[PlanEdge, ...], names:
         nodes=(process.node,),
         restart=process.restart,
         after={name: when for name, when in process.after.items() if name in names},
-        owns=tuple((edge.parent, edge.child) for edge in edges if edge.owner == process.name),
+        owns=tuple(owned),
         simulate=simulation,
     )
 

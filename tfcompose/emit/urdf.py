@@ -7,8 +7,8 @@ are fixed-axis angles, an axis is given in the joint's frame.
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
-from xml.sax.saxutils import quoteattr
 
+from tfcompose.emit.markup import quoted
 from tfcompose.emit.numbers import clean_rpy, clean_tensor, clean_xyz, number, numbers
 from tfcompose.model import JOINTS, STATIC
 from tfcompose.pose import Pose
@@ -25,16 +25,25 @@ def urdf(robot: Robot, *, full: bool) -> str:
     With ``full`` it holds every edge as it is, whoever publishes it. Without, it is for a stock robot_state_publisher:
     edges of other owners are floating joints, which that node leaves alone.
     """
+    whole, stock = urdfs(robot)
+    return whole if full else stock
+
+
+def urdfs(robot: Robot) -> tuple[str, str]:
+    """Return both: with every edge as it is, and for a stock robot_state_publisher. They differ in few joints."""
     if robot.base is None:
         raise ValueError(f"{robot.name} has no base")
-    lines = ['<?xml version="1.0"?>', f"<robot name={quoteattr(robot.name)}>"]
-    children = robot.children()
-    edges = list(_below(robot.base, children))
+    edges = list(_below(robot.base, robot.children()))
+    links = ['<?xml version="1.0"?>', f"<robot name={quoted(robot.name)}>"]
     for frame in [robot.base, *(edge.child for edge in edges)]:
-        lines += _link(frame, robot.links.get(frame))
+        links += _link(frame, robot.links.get(frame))
+    whole, stock = list(links), links
     for edge, name in zip(edges, _joint_names(edges), strict=True):
-        lines += _joint(edge, name, full=full)
-    return "\n".join([*lines, "</robot>", ""])
+        joint = _joint(edge, name, _kind(edge))
+        whole += joint
+        stock += joint if edge.owner in {STATIC, JOINTS} else _joint(edge, name, "floating")
+    end = ["</robot>", ""]
+    return "\n".join([*whole, *end]), "\n".join([*stock, *end])
 
 
 def _below(root: str, children: dict[str, list[Edge]]) -> Iterator[Edge]:
@@ -55,8 +64,8 @@ def _link(name: str, link: Link | None) -> list[str]:
     for shape in link.collisions if link else ():
         body += _shape("collision", shape)
     if not body:
-        return [f"  <link name={quoteattr(name)}/>"]
-    return [f"  <link name={quoteattr(name)}>", *body, "  </link>"]
+        return [f"  <link name={quoted(name)}/>"]
+    return [f"  <link name={quoted(name)}>", *body, "  </link>"]
 
 
 def _inertial(inertial: Inertial) -> list[str]:
@@ -81,15 +90,18 @@ def _shape(tag: str, shape: Shape) -> list[str]:
     material = []
     if shape.material and tag == "visual":
         colour = f'<color rgba="{numbers(shape.material.rgba)}"/>'
-        material = [f"      <material name={quoteattr(shape.material.name)}>{colour}</material>"]
+        material = [f"      <material name={quoted(shape.material.name)}>{colour}</material>"]
     origin = _origin(shape.pose, "      ")
     return [f"    <{tag}>", *origin, f"      <geometry>{geometry}</geometry>", *material, f"    </{tag}>"]
 
 
 def _origin(pose: Pose, indent: str) -> list[str]:
-    if pose == Pose():
+    if pose == _AT_HOME:
         return []
     return [f'{indent}<origin xyz="{numbers(clean_xyz(pose.xyz))}" rpy="{numbers(clean_rpy(pose.quat_xyzw))}"/>']
+
+
+_AT_HOME = Pose()
 
 
 def _joint_names(edges: list[Edge]) -> list[str]:
@@ -105,15 +117,17 @@ def _joint_names(edges: list[Edge]) -> list[str]:
     return names
 
 
-def _joint(edge: Edge, name: str, *, full: bool) -> list[str]:
-    ours = edge.owner in {STATIC, JOINTS}
-    kind: str = edge.joint.type if edge.joint else "fixed"
-    if (not full and not ours) or (edge.kind == "dynamic" and not edge.joint):
-        kind = "floating"
+def _kind(edge: Edge) -> str:
+    if edge.joint:
+        return edge.joint.type
+    return "floating" if edge.kind == "dynamic" else "fixed"
+
+
+def _joint(edge: Edge, name: str, kind: str) -> list[str]:
     lines = [
-        f'  <joint name={quoteattr(name)} type="{kind}">',
-        f"    <parent link={quoteattr(edge.parent)}/>",
-        f"    <child link={quoteattr(edge.child)}/>",
+        f'  <joint name={quoted(name)} type="{kind}">',
+        f"    <parent link={quoted(edge.parent)}/>",
+        f"    <child link={quoted(edge.child)}/>",
         *_origin(edge.pose, "    "),
     ]
     if edge.joint and kind != "floating":
@@ -135,5 +149,5 @@ def _motion(joint: Joint) -> list[str]:
         lines.append(f"    <limit {values}/>")
     if joint.mimic is not None:
         multiplier, offset = number(joint.multiplier), number(joint.offset)
-        lines.append(f'    <mimic joint={quoteattr(joint.mimic)} multiplier="{multiplier}" offset="{offset}"/>')
+        lines.append(f'    <mimic joint={quoted(joint.mimic)} multiplier="{multiplier}" offset="{offset}"/>')
     return lines

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from tfcompose.plan import EdgeKind, GuardPolicy, ProcessKind, RosSettings, Simulation
+from tfcompose.plan import EdgeKind, GuardPolicy, ProcessKind, Ready, RosSettings, Simulation, StopRule
 from tfcompose.pose import angle_between
 
 if TYPE_CHECKING:
@@ -210,24 +210,58 @@ class Edge:
 
 
 @dataclass(frozen=True, slots=True)
+class Node:
+    """One ROS node of a process, by its full name; ``lifecycle`` is the state that it is brought into.
+
+    ``path`` leads to the mapping that holds its ``params``.
+    """
+
+    name: str
+    at: Span
+    path: tuple[str | int, ...] = ()
+    params: dict[str, Any] = field(default_factory=dict)
+    lifecycle: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Process:
-    """A process of the plan, before it is a command line."""
+    """A process of the plan, before it is a command line.
+
+    It runs a ``package``'s ``executable``, a ``launch`` file (``package/file``), or else the command ``argv``, which
+    for the others holds the arguments.
+    """
 
     name: str
     kind: ProcessKind
     at: Span
-    node: str = ""
+    nodes: tuple[Node, ...] = ()
     package: str | None = None
     executable: str | None = None
+    launch: str | None = None
     argv: tuple[str, ...] = ()
-    params: dict[str, Any] = field(default_factory=dict)
     remap: dict[str, str] = field(default_factory=dict)
     env: dict[str, str] = field(default_factory=dict)
     cwd: str | None = None
+    log_level: str | None = None
+    host: str | None = None
+    required: bool = False
     restart: str = "no"
+    max_restarts: int | None = None
+    stop: StopRule = field(default_factory=StopRule)
+    ready: Ready | None = None
     after: dict[str, str] = field(default_factory=dict)
     simulate: Simulation | None = None
     rate: float | None = None
+
+    @property
+    def node(self) -> str:
+        """The full name of the first node, which is the only one of most processes."""
+        return self.nodes[0].name if self.nodes else ""
+
+    @property
+    def params(self) -> dict[str, Any]:
+        """The parameters of the first node."""
+        return self.nodes[0].params if self.nodes else {}
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,11 +18,19 @@ EdgeKind = Literal["static", "joint", "dynamic"]
 ProcessKind = Literal["static", "joints", "guard", "simulate", "external", "run"]
 GuardMode = Literal["off", "watch", "strict"]
 
-#: What stands in an ``argv`` for values that only the starting machine knows.
+ReadyKind = Literal["edges", "topic", "service", "lifecycle", "log", "exit", "time"]
+
+#: What stands in an ``argv`` for values that only the starting machine knows. As its first word
+#: ``${executable:PACKAGE/NAME}`` is a package's program, and ``${launch:PACKAGE/FILE}`` a package's launch file; the
+#: words after that are the launch file's arguments, ``name:=value``.
 PLACEHOLDERS = ("${python}", "${plan}", "${build_dir}", "${params_file}")
 
 EDGE_KINDS: tuple[EdgeKind, ...] = ("static", "joint", "dynamic")
 PROCESS_KINDS: tuple[ProcessKind, ...] = ("static", "joints", "guard", "simulate", "external", "run")
+READY_KINDS: tuple[ReadyKind, ...] = ("edges", "topic", "service", "lifecycle", "log", "exit", "time")
+LIFECYCLE_STATES = ("inactive", "active")
+LOG_LEVELS = ("debug", "info", "warn", "error", "fatal")
+STOP_SIGNALS = ("SIGINT", "SIGTERM", "SIGQUIT", "SIGHUP", "SIGKILL", "SIGUSR1", "SIGUSR2")
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +82,36 @@ class Simulation:
 
 
 @dataclass(frozen=True, slots=True)
+class Ready:
+    """When a process counts as ready.
+
+    ``text`` is the full name of the topic or the service, the lifecycle state of the process's nodes, or the regular
+    expression that a line of the output holds; ``number`` the exit code, or the seconds after the start. Without
+    ``timeout_s`` the launcher's own time holds.
+    """
+
+    kind: ReadyKind
+    text: str = ""
+    number: float = 0.0
+    timeout_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class StopRule:
+    """How a process is ended: the first signal, and the time until a firmer one; None: the launcher's own."""
+
+    signal: str = "SIGINT"
+    timeout_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class PlanProcess:
-    """What is started, or, with kind ``external``, expected to run."""
+    """What is started, or, with kind ``external``, expected to run.
+
+    ``nodes`` are full names; ``lifecycle`` says of some of them into which state they are brought after the start.
+    ``required`` says that the plan ends when the process does. ``max_restarts`` None is the launcher's default, as is
+    ``ready`` None: the edges that the process owns, or that it was started.
+    """
 
     name: str
     kind: ProcessKind
@@ -86,8 +122,13 @@ class PlanProcess:
     remap: dict[str, str] = field(default_factory=dict)
     nodes: tuple[str, ...] = ()
     restart: str = "no"
+    max_restarts: int | None = None
+    required: bool = False
+    stop: StopRule = field(default_factory=StopRule)
+    log_level: str | None = None
+    lifecycle: dict[str, str] = field(default_factory=dict)
     after: dict[str, str] = field(default_factory=dict)
-    ready: str | None = None
+    ready: Ready | None = None
     host: str | None = None
     owns: tuple[tuple[str, str], ...] = ()
     simulate: Simulation | None = None

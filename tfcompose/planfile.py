@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import json
-import math
-from typing import Any, TypeVar
+from typing import Any
 
 from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
 from tfcompose.plan import (
     EDGE_KINDS,
+    LIFECYCLE_STATES,
+    LOG_LEVELS,
     PROCESS_KINDS,
+    READY_KINDS,
+    STOP_SIGNALS,
     VERSION,
     GuardPolicy,
     Joint,
     Plan,
     PlanEdge,
     PlanProcess,
+    Ready,
     RosSettings,
     Simulation,
+    StopRule,
 )
+from tfcompose.planfields import floats, get, one_of, optional, texts
 from tfcompose.pose import Pose, norm
 
 
@@ -75,7 +81,7 @@ def _block(key: str, rows: list[dict[str, Any]]) -> str:
     return f'  "{key}": [\n' + ",\n".join(f"    {_json(row)}" for row in rows) + "\n  ]"
 
 
-def _fields(value: Joint | GuardPolicy | PlanProcess | RosSettings | Simulation) -> dict[str, Any]:
+def _fields(value: Joint | GuardPolicy | PlanProcess | Ready | RosSettings | Simulation | StopRule) -> dict[str, Any]:
     return {name: getattr(value, name) for name in value.__slots__}
 
 
@@ -99,6 +105,7 @@ def _edge_to_json(edge: PlanEdge) -> dict[str, Any]:
 
 def _process_to_json(process: PlanProcess) -> dict[str, Any]:
     row = _fields(process)
+    row |= {"stop": _fields(process.stop), "ready": process.ready and _fields(process.ready)}
     simulation = row.pop("simulate")
     if simulation:
         row["simulate"] = _fields(simulation)
@@ -111,138 +118,123 @@ def _guard_to_json(guard: GuardPolicy) -> dict[str, Any]:
     return _fields(guard) | {"allow": [{"parent": parent, "child": child} for parent, child in guard.allow]}
 
 
-T = TypeVar("T")
-
-
-def _get(data: dict[str, Any], key: str, kind: type[T], where: str) -> T:
-    value = data[key]
-    if kind is float and isinstance(value, int) and not isinstance(value, bool):
-        value = float(value)
-    if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-        raise TypeError(f"{where}: {key} is {value!r}, not a {kind.__name__}")
-    if isinstance(value, float) and not math.isfinite(value):
-        raise ValueError(f"{where}: {key} is not finite")
-    return value
-
-
-def _one_of(data: dict[str, Any], key: str, allowed: tuple[str, ...], where: str) -> Any:
-    if data[key] not in allowed:
-        raise ValueError(f"{where}: {key} is {data[key]!r}, not one of {', '.join(allowed)}")
-    return data[key]
-
-
-def _optional(data: dict[str, Any], key: str, kind: type[T], where: str) -> T | None:
-    return None if data[key] is None else _get(data, key, kind, where)
-
-
-def _floats(data: dict[str, Any], key: str, count: int, where: str) -> tuple[float, ...]:
-    values = _get(data, key, list, where)
-    if len(values) != count or not all(isinstance(v, (int, float)) and math.isfinite(v) for v in values):
-        raise ValueError(f"{where}: {key} is not {count} finite numbers")
-    return tuple(float(value) for value in values)
-
-
-def _texts(data: dict[str, Any], key: str, where: str) -> dict[str, str]:
-    values = _get(data, key, dict, where)
-    if not all(isinstance(value, str) for value in values.values()):
-        raise TypeError(f"{where}: {key} holds something that is no text")
-    return values
-
-
 def _pose_from_json(data: dict[str, Any], where: str) -> Pose:
-    x, y, z = _floats(data, "xyz", 3, where)
-    qx, qy, qz, qw = _floats(data, "quat_xyzw", 4, where)
+    x, y, z = floats(data, "xyz", 3, where)
+    qx, qy, qz, qw = floats(data, "quat_xyzw", 4, where)
     if abs(norm((qx, qy, qz, qw)) - 1) > 1e-6:  # noqa: PLR2004 (what was written is normalised to the last bit)
         raise ValueError(f"{where}: quat_xyzw is not a unit quaternion")
     return Pose((x, y, z), (qx, qy, qz, qw))
 
 
 def _joint_from_json(data: dict[str, Any], where: str) -> Joint:
-    ax, ay, az = _floats(data, "axis", 3, where)
+    ax, ay, az = floats(data, "axis", 3, where)
     return Joint(
-        name=_get(data, "name", str, where),
-        type=_get(data, "type", str, where),
+        name=get(data, "name", str, where),
+        type=get(data, "type", str, where),
         axis=(ax, ay, az),
-        mimic=_optional(data, "mimic", str, where),
-        multiplier=_get(data, "multiplier", float, where),
-        offset=_get(data, "offset", float, where),
+        mimic=optional(data, "mimic", str, where),
+        multiplier=get(data, "multiplier", float, where),
+        offset=get(data, "offset", float, where),
     )
 
 
 def _edge_from_json(data: dict[str, Any]) -> PlanEdge:
     where = f"edge {data.get('parent')} → {data.get('child')}"
-    source = _get(data, "source", dict, where)
+    source = get(data, "source", dict, where)
     return PlanEdge(
-        parent=_get(data, "parent", str, where),
-        child=_get(data, "child", str, where),
-        kind=_one_of(data, "kind", EDGE_KINDS, where),
-        owner=_get(data, "owner", str, where),
-        node=_get(data, "node", str, where),
+        parent=get(data, "parent", str, where),
+        child=get(data, "child", str, where),
+        kind=one_of(data, "kind", EDGE_KINDS, where),
+        owner=get(data, "owner", str, where),
+        node=get(data, "node", str, where),
         pose=_pose_from_json(data, where),
-        rate=_optional(data, "rate", float, where),
-        source=(_get(source, "file", str, where), _get(source, "line", int, where)),
+        rate=optional(data, "rate", float, where),
+        source=(get(source, "file", str, where), get(source, "line", int, where)),
         joint=_joint_from_json(data["joint"], where) if data.get("joint") else None,
     )
 
 
 def _simulation_from_json(data: dict[str, Any], where: str) -> Simulation:
-    joints = _get(data, "joints", dict, where)
+    joints = get(data, "joints", dict, where)
     return Simulation(
-        kind=_one_of(data, "kind", ("circle", "fixed", "joints"), where),
-        rate=_get(data, "rate", float, where),
-        radius=_get(data, "radius", float, where),
-        speed=_get(data, "speed", float, where),
+        kind=one_of(data, "kind", ("circle", "fixed", "joints"), where),
+        rate=get(data, "rate", float, where),
+        radius=get(data, "radius", float, where),
+        speed=get(data, "speed", float, where),
         pose=_pose_from_json(data, where),
-        joints={name: _get(joints, name, float, where) for name in joints},
+        joints={name: get(joints, name, float, where) for name in joints},
     )
+
+
+def _stop_from_json(data: dict[str, Any], where: str) -> StopRule:
+    return StopRule(one_of(data, "signal", STOP_SIGNALS, where), optional(data, "timeout_s", float, where))
+
+
+def _ready_from_json(data: dict[str, Any], where: str) -> Ready:
+    return Ready(
+        kind=one_of(data, "kind", READY_KINDS, where),
+        text=get(data, "text", str, where),
+        number=get(data, "number", float, where),
+        timeout_s=optional(data, "timeout_s", float, where),
+    )
+
+
+def _states(data: dict[str, Any], where: str) -> dict[str, str]:
+    states = texts(data, "lifecycle", where)
+    return {node: one_of(states, node, LIFECYCLE_STATES, where) for node in states}
 
 
 def _process_from_json(data: dict[str, Any]) -> PlanProcess:
     where = f"process {data.get('name')}"
     simulation = data.get("simulate")
     return PlanProcess(
-        name=_get(data, "name", str, where),
-        kind=_one_of(data, "kind", PROCESS_KINDS, where),
-        argv=tuple(str(word) for word in _get(data, "argv", list, where)),
-        env=_texts(data, "env", where),
-        cwd=_optional(data, "cwd", str, where),
-        params_file=_optional(data, "params_file", str, where),
-        remap=_texts(data, "remap", where),
-        nodes=tuple(str(node) for node in _get(data, "nodes", list, where)),
-        restart=_one_of(data, "restart", ("no", "on-failure", "always"), where),
-        after=_texts(data, "after", where),
-        ready=_optional(data, "ready", str, where),
-        host=_optional(data, "host", str, where),
-        owns=tuple((str(parent), str(child)) for parent, child in _get(data, "owns", list, where)),
+        name=get(data, "name", str, where),
+        kind=one_of(data, "kind", PROCESS_KINDS, where),
+        argv=tuple(str(word) for word in get(data, "argv", list, where)),
+        env=texts(data, "env", where),
+        cwd=optional(data, "cwd", str, where),
+        params_file=optional(data, "params_file", str, where),
+        remap=texts(data, "remap", where),
+        nodes=tuple(str(node) for node in get(data, "nodes", list, where)),
+        restart=one_of(data, "restart", ("no", "on-failure", "always"), where),
+        max_restarts=optional(data, "max_restarts", int, where),
+        required=get(data, "required", bool, where),
+        stop=_stop_from_json(get(data, "stop", dict, where), where),
+        log_level=one_of(data, "log_level", (None, *LOG_LEVELS), where),
+        lifecycle=_states(data, where),
+        after=texts(data, "after", where),
+        ready=_ready_from_json(data["ready"], where) if data["ready"] else None,
+        host=optional(data, "host", str, where),
+        owns=tuple((str(parent), str(child)) for parent, child in get(data, "owns", list, where)),
         simulate=_simulation_from_json(simulation, where) if simulation else None,
     )
 
 
 def _guard_from_json(data: dict[str, Any]) -> GuardPolicy:
     return GuardPolicy(
-        mode=_one_of(data, "mode", ("off", "watch", "strict"), "guard"),
-        unknown_edges=_one_of(data, "unknown_edges", ("ignore", "warn", "error"), "guard"),
-        on_violation=_one_of(data, "on_violation", ("report", "stop"), "guard"),
-        allow=tuple((str(edge["parent"]), str(edge["child"])) for edge in _get(data, "allow", list, "guard")),
+        mode=one_of(data, "mode", ("off", "watch", "strict"), "guard"),
+        unknown_edges=one_of(data, "unknown_edges", ("ignore", "warn", "error"), "guard"),
+        on_violation=one_of(data, "on_violation", ("report", "stop"), "guard"),
+        allow=tuple((str(edge["parent"]), str(edge["child"])) for edge in get(data, "allow", list, "guard")),
     )
 
 
 def _plan_from_json(data: dict[str, Any]) -> Plan:
-    ros = _get(data, "ros", dict, "plan")
+    ros = get(data, "ros", dict, "plan")
     return Plan(
-        robot=_get(data, "robot", str, "plan"),
-        spec_digest=_get(data, "spec_digest", str, "plan"),
-        base=_optional(data, "base", str, "plan"),
+        robot=get(data, "robot", str, "plan"),
+        spec_digest=get(data, "spec_digest", str, "plan"),
+        base=optional(data, "base", str, "plan"),
         ros=RosSettings(
-            namespace=_get(ros, "namespace", str, "ros"),
-            domain_id=_optional(ros, "domain_id", int, "ros"),
-            discovery=_optional(ros, "discovery", str, "ros"),
-            clock=_one_of(ros, "clock", ("wall", "sim"), "ros"),
-            frame_prefix=_get(ros, "frame_prefix", str, "ros"),
-            shared_frames=tuple(str(frame) for frame in _get(ros, "shared_frames", list, "ros")),
+            namespace=get(ros, "namespace", str, "ros"),
+            domain_id=optional(ros, "domain_id", int, "ros"),
+            discovery=optional(ros, "discovery", str, "ros"),
+            clock=one_of(ros, "clock", ("wall", "sim"), "ros"),
+            frame_prefix=get(ros, "frame_prefix", str, "ros"),
+            shared_frames=tuple(str(frame) for frame in get(ros, "shared_frames", list, "ros")),
         ),
-        edges=tuple(_edge_from_json(edge) for edge in _get(data, "edges", list, "plan")),
-        processes=tuple(_process_from_json(process) for process in _get(data, "processes", list, "plan")),
-        guard=_guard_from_json(_get(data, "guard", dict, "plan")),
-        description=_get(data, "description", str, "plan"),
+        edges=tuple(_edge_from_json(edge) for edge in get(data, "edges", list, "plan")),
+        processes=tuple(_process_from_json(process) for process in get(data, "processes", list, "plan")),
+        guard=_guard_from_json(get(data, "guard", dict, "plan")),
+        description=get(data, "description", str, "plan"),
     )

@@ -28,9 +28,9 @@ def emit(robot: Robot) -> tuple[File, ...]:
     """Return the robot's files; the same robot gives the same bytes. There must be no errors in it."""
     live = with_final_names(robot)
     params = tuple(
-        File(f"params/{process.name}.yaml", params_file(process.node, process.params))
+        File(f"params/{process.name}.yaml", params_file({n.name: n.params for n in process.nodes if n.params}))
         for process in robot.processes
-        if process.kind == "run" and process.params
+        if process.kind == "run" and any(node.params for node in process.nodes)
     )
     whole, stock = urdfs(robot)
     return (

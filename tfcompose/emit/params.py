@@ -10,9 +10,12 @@ from typing import Any
 _ESCAPED = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 
 
-def params_file(node: str, params: dict[str, Any]) -> str:
+def params_file(nodes: dict[str, dict[str, Any]]) -> str:
     """Return the file's text. Texts are always quoted, so that ROS cannot take one for a number or a bool."""
-    return "\n".join([f"{_text(node)}:", "  ros__parameters:", *_mapping(params, "    "), ""])
+    lines = []
+    for node, params in nodes.items():
+        lines += [f"{_text(node)}:", "  ros__parameters:", *_mapping(params, "    ")]
+    return "\n".join([*lines, ""])
 
 
 def _mapping(values: dict[str, Any], indent: str) -> list[str]:

@@ -84,7 +84,7 @@ def _relative(file: str, to: str) -> str:
 
 
 def _process(process: Process, robot: Robot, owned: list[tuple[str, str]], names: frozenset[str]) -> PlanProcess:
-    has_params = process.kind == "run" and bool(process.params)
+    has_params = process.kind == "run" and any(node.params for node in process.nodes)
     simulation = process.simulate
     if simulation:
         simulation = type(simulation)(
@@ -103,9 +103,16 @@ def _process(process: Process, robot: Robot, owned: list[tuple[str, str]], names
         cwd=process.cwd,
         params_file=f"params/{process.name}.yaml" if has_params else None,
         remap=process.remap,
-        nodes=(process.node,),
+        nodes=tuple(node.name for node in process.nodes),
         restart=process.restart,
+        max_restarts=process.max_restarts,
+        required=process.required,
+        stop=process.stop,
+        log_level=process.log_level,
+        lifecycle={node.name: node.lifecycle for node in process.nodes if node.lifecycle},
         after={name: when for name, when in process.after.items() if name in names},
+        ready=process.ready,
+        host=process.host,
         owns=tuple(owned),
         simulate=simulation,
     )
@@ -116,13 +123,24 @@ def _argv(process: Process, robot: Robot, *, has_params: bool) -> tuple[str, ...
         return ()
     if process.kind != "run":
         return ("${python}", "-m", MODULES[process.kind], "${plan}", process.name)
+    if process.launch is not None:
+        return (f"${{launch:{process.launch}}}", *process.argv)
     if process.package is None:
         return process.argv
     remaps = [word for old, new in process.remap.items() for word in ("-r", f"{old}:={new}")]
-    namespace, _, node = process.node.rpartition("/")
-    ros_args = ["--ros-args", "-r", f"__node:={node}", "-r", f"__ns:={namespace or '/'}", *remaps]
+    ros_args = ["--ros-args", *_names(process, robot), *remaps]
+    if process.log_level is not None:
+        ros_args += ["--log-level", process.log_level]
     if robot.ros.clock == "sim":
         ros_args += ["-p", "use_sim_time:=true"]
     if has_params:
         ros_args += ["--params-file", "${params_file}"]
     return (f"${{executable:{process.package}/{process.executable}}}", *process.argv, *ros_args)
+
+
+def _names(process: Process, robot: Robot) -> list[str]:
+    """Return what gives the node its name and namespace; several nodes have names of their own."""
+    if len(process.nodes) > 1:
+        return ["-r", f"__ns:=/{robot.ros.namespace}"]
+    namespace, _, node = process.node.rpartition("/")
+    return ["-r", f"__node:={node}", "-r", f"__ns:={namespace or '/'}"]

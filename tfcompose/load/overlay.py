@@ -18,7 +18,11 @@ if TYPE_CHECKING:
 
 ROTATIONS = frozenset({"rpy", "quat_xyzw", "axis_angle", "matrix", "look"})
 RUNNING = frozenset({"run", "simulate", "external"})
-COMMANDS = (frozenset({"argv", "package"}), frozenset({"argv", "executable"}), frozenset({"argv", "args"}))
+COMMANDS = (
+    *(frozenset({"argv", key}) for key in ("package", "executable", "args", "launch")),
+    *(frozenset({"launch", key}) for key in ("package", "executable")),
+)
+READY = frozenset({"edges", "topic", "service", "lifecycle", "log", "exit", "time"})
 SHAPES = frozenset({"box", "cylinder", "sphere", "mesh"})
 SIMULATIONS = frozenset({"circle", "fixed", "joints"})
 
@@ -40,6 +44,8 @@ CHOICES: tuple[tuple[tuple[str, ...], frozenset[str]], ...] = (
     *((place, ROTATIONS) for place in _POSES),
     *(((*place, "run"), choice) for place in _PROCESSES for choice in COMMANDS),
     *((place, RUNNING) for place in _PROCESSES),
+    *(((*place, "ready"), READY) for place in _PROCESSES),
+    *((("processes", "*"), frozenset({"nodes", key})) for key in ("node", "lifecycle")),
     (("processes", "*", "simulate"), SIMULATIONS),
     (("links", "*", "visual"), SHAPES),
     (("links", "*", "collision"), SHAPES),

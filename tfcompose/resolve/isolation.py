@@ -81,7 +81,7 @@ def _named(process: Process, robot: Robot, source: Source, found: list[Diagnosti
 
     return replace(
         process,
-        params=fill(process.params, (*section, "params")),
+        nodes=tuple(replace(n, params=fill(n.params, (*n.path, "params"))) for n in process.nodes),
         argv=fill(process.argv, (*section, "run")),
         remap=fill(process.remap, (*section, "remap")),
         env=fill(process.env, (*section, "env")),

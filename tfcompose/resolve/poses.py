@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tfcompose.diagnostic import Span
     from tfcompose.load import Path
     from tfcompose.model import Calibration, Edge
-    from tfcompose.validate.spec import Posed, Turned
+    from tfcompose.validate.posed import Posed, Turned
 
 
 def pose_of(posed: Posed, child: str = "") -> Pose:

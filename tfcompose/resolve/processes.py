@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 from tfcompose.diagnostic import Diagnostic, Note, did_you_mean, finding
-from tfcompose.model import BUILT_IN, GUARD, JOINTS, STATIC, Process
+from tfcompose.model import BUILT_IN, GUARD, JOINTS, STATIC, Node, Process
 from tfcompose.plan import ProcessKind, Simulation
 from tfcompose.resolve.isolation import settings_of
+from tfcompose.resolve.nodes import full_name, nodes_of
 from tfcompose.resolve.poses import pose_of
 from tfcompose.resolve.presets import driver_parameters
+from tfcompose.resolve.running import how, program
 
 if TYPE_CHECKING:
     from tfcompose.load import Path, Source
     from tfcompose.resolve.presets import Sensor
-    from tfcompose.validate.spec import ProcessSpec, RobotSpec, Run, Simulate
+    from tfcompose.validate.process import ProcessSpec, Run, Simulate
+    from tfcompose.validate.spec import RobotSpec
 
-_BUILT_IN_KEYS = frozenset({"rate", "remap", "env", "after"})
+_BUILT_IN_KEYS = frozenset({"rate", "remap", "env", "host", "after"})
 _KINDS: dict[str, ProcessKind] = {STATIC: "static", JOINTS: "joints", GUARD: "guard"}
-
-
-def full_name(namespace: str, name: str) -> str:
-    """Return a node's fully qualified name: below the namespace unless it begins with a slash."""
-    if name.startswith("/"):
-        return name
-    return "/" + "/".join(part for part in (namespace.strip("/"), name) if part)
 
 
 def built_in(spec: RobotSpec, source: Source) -> list[Process]:
@@ -33,11 +30,10 @@ def built_in(spec: RobotSpec, source: Source) -> list[Process]:
     for name in BUILT_IN:
         said = spec.processes.get(name)
         at = source.at_key(("processes", name)) if said else source.at_key(("robot",))
-        process = Process(name, _KINDS[name], at, full_name(spec.ros.namespace, f"tfcompose_{name}"))
+        process = Process(name, _KINDS[name], at, (Node(full_name(spec.ros.namespace, f"tfcompose_{name}"), at),))
         if said:
-            process = Process(
-                name, process.kind, at, process.node, remap=said.remap, env=said.env, after=said.after, rate=said.rate
-            )
+            given = {key: getattr(said, key) for key in _BUILT_IN_KEYS}
+            process = replace(process, **given)
         own.append(process)
     return own
 
@@ -55,23 +51,29 @@ def user_process(
             finding("TF101", f"{name} is built in and has no {key}", source.at_key((*at, key)), help=advice)
             for key in wrong
         ]
-    node = full_name(spec.ros.namespace, said.node or name)
+    nodes, found = nodes_of(name, said, spec.ros.namespace, source)
     if said.external:
-        return Process(name, "external", place, node, after=said.after), []
+        keys = how(said, spec.ros.namespace, ("after", "host", "required", "ready"))
+        return replace(Process(name, "external", place, nodes), **keys), found
     if said.simulate:
-        return _simulated(name, said, said.simulate, node, source)
+        one = (Node(nodes[0].name, nodes[0].at),)
+        process, refused = _simulated(Process(name, "simulate", place, one), said.simulate, source)
+        keys = how(said, spec.ros.namespace, ("after", "env", "host", "required"))
+        return process and replace(process, **keys), [*found, *refused]
     if _starts(said.run):
-        return _run(name, said, node, source), []
+        process = Process(name, "run", place, nodes)
+        return replace(process, **how(said, spec.ros.namespace), **program(said.run, shell=bool(said.shell))), found
+    if _was_refused(source.data["processes"][name].get("run")):
+        return None, found
     if said.run:
-        return None, [finding("TF102", f"{name}: run needs package and executable", source.at_key((*at, "run")))]
+        advice = "run: {package: …, executable: …}, or {launch: package/file.launch.py}"
+        at = (*at, "run")
+        return None, [finding("TF102", f"{name}: run needs package and executable", source.at_key(at), help=advice)]
     advice = "run: {package: …, executable: …}, simulate: {…}, or external: true"
     return None, [finding("TF102", f"{name} does not say how it runs", place, help=advice)]
 
 
-def _simulated(
-    name: str, said: ProcessSpec, simulate: Simulate, node: str, source: Source
-) -> tuple[Process | None, list[Diagnostic]]:
-    place = source.at_key(("processes", name))
+def _simulated(process: Process, simulate: Simulate, source: Source) -> tuple[Process | None, list[Diagnostic]]:
     if simulate.circle:
         circle = simulate.circle
         simulation = Simulation("circle", simulate.rate, radius=circle.radius, speed=circle.speed)
@@ -80,28 +82,9 @@ def _simulated(
     elif simulate.joints is not None:
         simulation = Simulation("joints", simulate.rate, joints=dict(simulate.joints))
     else:
-        message = f"{name}: simulate needs circle, fixed or joints"
-        return None, [finding("TF102", message, source.at_key(("processes", name, "simulate")))]
-    return Process(name, "simulate", place, node, env=said.env, after=said.after, simulate=simulation), []
-
-
-def _run(name: str, said: ProcessSpec, node: str, source: Source) -> Process:
-    run = said.run
-    return Process(
-        name,
-        "run",
-        source.at_key(("processes", name)),
-        node,
-        package=run.package if run else None,
-        executable=run.executable if run else None,
-        argv=(run.argv or run.args) if run else (),
-        params=said.params,
-        remap=said.remap,
-        env=said.env,
-        cwd=said.cwd,
-        restart=said.restart,
-        after=said.after,
-    )
+        message = f"{process.name}: simulate needs circle, fixed or joints"
+        return None, [finding("TF102", message, source.at_key(("processes", process.name, "simulate")))]
+    return replace(process, simulate=simulation), []
 
 
 def driver_process(
@@ -125,27 +108,29 @@ def driver_process(
         place, advice = source.at_key((*at, "run")), "run: {package: …, executable: …}, or external: true"
         return None, [finding("TF102", f"the driver of {sensor.name} does not say how it runs", place, help=advice)]
     computed = driver_parameters(sensor, publishes=publishes, prefix=settings_of(spec.ros).frame_prefix)
-    node = f"{sensor.named(driver.namespace)}/{sensor.named(driver.node)}".strip("/") if driver else sensor.name
-    process = Process(
-        sensor.name,
-        "external" if external else "run",
-        source.at_key(at[:2]),
-        full_name(spec.ros.namespace, (said.node if said else None) or node),
-        package=run.package if run else driver.package if driver else None,
-        executable=run.executable if run else driver.executable if driver else None,
-        argv=(run.argv or run.args) if run else (),
-        params=(said.params if said else {}) | computed,
-        remap=said.remap if said else {},
-        env=said.env if said else {},
-        cwd=said.cwd if said else None,
-        restart=said.restart if said else "no",
-        after=said.after if said else {},
-    )
+    own = f"{sensor.named(driver.namespace)}/{sensor.named(driver.node)}".strip("/") if driver else sensor.name
+    place, namespace = source.at_key(at[:2]), spec.ros.namespace
+    params = (said.params if said else {}) | computed
+    state = said.lifecycle if said else None
+    node = Node(full_name(namespace, (said.node if said else None) or own), place, at, params, state)
+    process = Process(sensor.name, "external" if external else "run", place, (node,))
+    process = replace(process, **how(said, namespace) if said else {})
+    if run:
+        process = replace(process, **program(run, shell=bool(said and said.shell)))
+    elif driver:
+        process = replace(process, package=driver.package, executable=driver.executable)
     return process, _given_parameters(sensor, computed, source)
 
 
-def _starts(run: Run | None) -> bool:
-    return run is not None and bool(run.argv or (run.package and run.executable))
+def _starts(run: Run | None) -> TypeGuard[Run]:
+    return run is not None and bool(run.argv or run.launch or (run.package and run.executable))
+
+
+def _was_refused(run: Any) -> bool:
+    """Whether the command is whole as it was written, and so missing only because a part was refused."""
+    return isinstance(run, (str, list)) or (
+        isinstance(run, dict) and ("launch" in run or {*run} >= {"package", "executable"})
+    )
 
 
 def _named_driver(sensor: Sensor, name: str, source: Source) -> list[Diagnostic]:

@@ -16,6 +16,7 @@ from tfcompose.validate.quantity import (
     NUMBER,
     RATE,
     SPEED,
+    TIME,
     TORQUE,
     TURN_RATE,
     Dimension,
@@ -174,6 +175,7 @@ INERTIA_ = measure(INERTIA)
 SIZE = measure(LENGTH, 1 / LARGEST)
 MASS_ = measure(MASS, 1 / LARGEST)
 RATE_ = measure(RATE, 1e-3)
+DURATION = measure(TIME, 1e-3)
 POSITION = either(ANGLE, LENGTH)
 JOINT_SPEED = either(TURN_RATE, SPEED)
 JOINT_EFFORT = either(TORQUE, FORCE)

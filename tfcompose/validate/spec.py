@@ -18,41 +18,24 @@ from tfcompose.validate.fields import (
     MASS_,
     NAME,
     NUMBER_,
-    ONLY_TRUE,
     POSITION,
     RATE_,
     RGBA,
     SIZE,
     SIZES,
     TEXT,
-    TURN_RATE_,
     XYZ,
     choice,
     integer,
     text,
 )
-from tfcompose.validate.rotation import AXIS_ANGLE, LOOK, MATRIX, QUAT_XYZW, RPY
+from tfcompose.validate.posed import Posed, Turned
+from tfcompose.validate.process import DriverSpec, ProcessSpec, process
 from tfcompose.validate.schema import Model, Problems, Type, key, listing, mapping, record
 
 if TYPE_CHECKING:
     from tfcompose.load import Path
-    from tfcompose.pose import Quaternion, Vector
-
-
-class Turned(Model):
-    """At most one rotation of the child in its parent."""
-
-    rpy: Quaternion | None = key(RPY, None, "roll, pitch, yaw about fixed axes; looking down is positive pitch")
-    quat_xyzw: Quaternion | None = key(QUAT_XYZW, None, "a unit quaternion in the order x, y, z, w")
-    axis_angle: Quaternion | None = key(AXIS_ANGLE, None, "a turn about an axis, right-handed")
-    matrix: Quaternion | None = key(MATRIX, None, "3×3 rows; column i is the child's axis i in the parent")
-    look: Quaternion | None = key(LOOK, None, "what is meant, not its sign", ("down", {"down": "15 deg"}))
-
-
-class Posed(Turned):
-    """A pose: where the child is, in its parent."""
-
-    xyz: Vector = key(XYZ, (0.0, 0.0, 0.0), "x forward, y left, z up", ([0.2, 0, "30 cm"],))
+    from tfcompose.pose import Vector
 
 
 class EdgeKeys(Posed):
@@ -199,76 +182,6 @@ class FrameOverride(Turned):
     name: str | None = key(TEXT, None, "another name for this frame")
 
 
-class Run(Model):
-    """An installed executable, or a command, word by word; no shell reads it."""
-
-    package: str | None = key(TEXT, None, examples=("slam_toolbox",))
-    executable: str | None = key(TEXT, None, examples=("async_slam_toolbox_node",))
-    args: tuple[str, ...] = key(listing(TEXT), ())
-    argv: tuple[str, ...] = key(listing(TEXT), (), "the whole command instead of package and executable")
-
-
-class Circle(Model):
-    """A body that drives on a circle, counter-clockwise."""
-
-    radius: float = key(SIZE, 1.0)
-    speed: float = key(TURN_RATE_, 0.5)
-
-
-class Simulate(Model):
-    """A stand-in for the owner: one of circle, fixed and joints."""
-
-    circle: Circle | None = key(record(Circle), None, "drives its edge on a circle")
-    fixed: Posed | None = key(record(Posed), None, "sends one pose again and again")
-    joints: dict[str, float] | None = key(
-        mapping(POSITION, short="zero"), None, "zero, or joints with positions; the others are at 0"
-    )
-    rate: float = key(RATE_, 20.0)
-
-
-def _environment(value: Any, path: Path, problems: Problems) -> Any:
-    for name in value if isinstance(value, dict) else ():
-        if not name or "=" in name:
-            problems.refuse("TF106", (*path, name), f"{name!r} cannot name a variable", on_key=True)
-    return mapping(TEXT).read(value, path, problems)
-
-
-class ProcessSpec(Model):
-    """What is started, or expected to run: one of run, simulate and external."""
-
-    run: Run | None = key(
-        record(
-            Run,
-            lambda value: {"argv": value} if isinstance(value, list) else value,
-            {"type": "array", "items": {"type": "string"}, "minItems": 1},
-        ),
-        None,
-        "{package, executable, args}, or a command as a list",
-    )
-    simulate: Simulate | None = key(record(Simulate), None)
-    external: bool | None = key(ONLY_TRUE, None, "somebody else starts it")
-    node: str | None = key(
-        text(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*", "a node's name: letters, digits and _"),
-        None,
-        "the node's name; below ros.namespace unless it begins with /",
-    )
-    params: dict[str, Any] = key(mapping(ANYTHING), {}, "the node's parameters, passed on as they are")
-    remap: dict[str, str] = key(mapping(TEXT), {}, "topic names: from, to")
-    env: dict[str, str] = key(Type(_environment, mapping(TEXT).schema), {})
-    cwd: str | None = key(TEXT, None)
-    rate: float | None = key(RATE_, None, "for joints: how often joint states come")
-    restart: str = key(choice("no", "on-failure", "always"), "no")
-    after: dict[str, str] = key(
-        mapping(choice("started", "ready", "done")), {}, "what must have happened before the start"
-    )
-
-
-class DriverSpec(ProcessSpec):
-    """Keys over the preset's driver; or the name of the process that drives this sensor; or none."""
-
-    process: str | None = key(TEXT, None)
-
-
 class SensorSpec(MountKeys):
     """A sensor on its mount; its frames are named after it."""
 
@@ -278,7 +191,7 @@ class SensorSpec(MountKeys):
     options: dict[str, Any] = key(mapping(ANYTHING), {}, "the preset's own choices: streams, imu, …")
     tf: str | None = key(choice("driver", "tfcompose"), None, "who publishes the frames inside the sensor")
     driver: DriverSpec | None = key(
-        record(
+        process(
             DriverSpec,
             lambda value: {"process": value} if isinstance(value, str) else value,
             {"type": "string"},
@@ -341,7 +254,7 @@ class RobotSpec(Model):
     joints: dict[str, JointSpec] = key(mapping(record(JointSpec)), {}, "edges between bodies")
     frames: dict[str, FrameSpec] = key(mapping(record(FrameSpec)), {}, "bare frames: the skeleton")
     sensors: dict[str, SensorSpec] = key(mapping(record(SensorSpec)), {})
-    processes: dict[str, ProcessSpec] = key(mapping(record(ProcessSpec)), {}, "what is started, or expected to run")
+    processes: dict[str, ProcessSpec] = key(mapping(process(ProcessSpec)), {}, "what is started, or expected to run")
     profiles: dict[str, Any] = key(mapping(ANYTHING), {}, "named overlays, chosen with --profile")
     guard: GuardSpec = key(record(GuardSpec), GuardSpec())
     rules: dict[str, str] = key(

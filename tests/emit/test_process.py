@@ -1,0 +1,137 @@
+"""What is said of a process reaches the plan, and what cannot be meant is refused with its place."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+import yaml
+
+from tfcompose.cli.compiling import library
+from tfcompose.compile import compile_robot
+from tfcompose.diagnostic import RejectedError
+from tfcompose.emit import emit
+from tfcompose.plan import PlanProcess, Ready, StopRule
+from tfcompose.planfile import read_plan, write_plan
+
+HEAD = "tfcompose: 1\nrobot: r\nros: {namespace: r1}\nframes: {map: {}}\nprocesses:\n"
+EXE = "run: {package: p, executable: e}"
+
+
+def files_of(processes: str, head: str = HEAD) -> dict[str, str]:
+    compiled = compile_robot(f"{head}  {processes}\n", "r.yaml", library())
+    assert compiled.robot
+    assert not compiled.found, compiled.found
+    return {file.path: file.text for file in emit(compiled.robot)}
+
+
+def process_of(keys: str, head: str = HEAD) -> PlanProcess:
+    text = files_of(f"a: {{{keys}}}", head)["plan.json"]
+    plan = read_plan(text, "plan.json")
+    assert write_plan(plan) == text, "what was read is written again as it was"
+    return plan.process("a")
+
+
+REACH: dict[str, dict[str, Any]] = {
+    "": {"required": False, "max_restarts": None, "stop": StopRule(), "log_level": None, "ready": None, "host": None},
+    "required: true": {"required": True},
+    "host: jetson": {"host": "jetson"},
+    "restart: always, max_restarts: 3": {"restart": "always", "max_restarts": 3},
+    "stop: {signal: SIGTERM, timeout: 200 ms}": {"stop": StopRule("SIGTERM", 0.2)},
+    "stop: {}": {"stop": StopRule("SIGINT", None)},
+    "ready: edges": {"ready": Ready("edges")},
+    "ready: {edges: true, timeout: 1 min}": {"ready": Ready("edges", timeout_s=60.0)},
+    "ready: {topic: scan}": {"ready": Ready("topic", "/r1/scan")},
+    "ready: {topic: /scan, timeout: 3}": {"ready": Ready("topic", "/scan", timeout_s=3.0)},
+    "ready: {service: a/b}": {"ready": Ready("service", "/r1/a/b")},
+    "ready: {lifecycle: inactive}": {"ready": Ready("lifecycle", "inactive")},
+    "ready: {log: 'up .*$'}": {"ready": Ready("log", "up .*$")},
+    "ready: {exit: 3}": {"ready": Ready("exit", number=3.0)},
+    "ready: {time: 1500 ms}": {"ready": Ready("time", number=1.5)},
+    "lifecycle: active, node: /n": {"lifecycle": {"/n": "active"}},
+    "nodes: {n: {lifecycle: inactive}, /m: {}}": {"lifecycle": {"/r1/n": "inactive"}, "nodes": ("/r1/n", "/m")},
+}
+
+
+@pytest.mark.parametrize("keys", REACH)
+def test_a_key_of_a_process_reaches_the_plan(keys: str) -> None:
+    process = process_of(f"{EXE}, {keys}".rstrip(", "))
+    assert {name: getattr(process, name) for name in REACH[keys]} == REACH[keys]
+
+
+COMMANDS: dict[str, tuple[str, ...]] = {
+    f"{EXE}, log_level: debug": (
+        "${executable:p/e}", "--ros-args", "-r", "__node:=a", "-r", "__ns:=/r1", "--log-level", "debug",
+    ),
+    f"{EXE}, nodes: {{m: {{}}, n: {{}}}}": ("${executable:p/e}", "--ros-args", "-r", "__ns:=/r1"),
+    "run: {launch: p/l.launch.py, args: {x: 1, y: true, z: a b, h: '${1/2}', n: '${4/2}'}}": (
+        "${launch:p/l.launch.py}", "x:=1", "y:=true", "z:=a b", "h:=0.5", "n:=2",
+    ),
+    "run: {launch: p/l.launch.py, args: ['x:=1']}": ("${launch:p/l.launch.py}", "x:=1"),
+    "run: 'a | b', shell: true": ("/bin/sh", "-c", "a | b"),
+    "run: [a, '|', b]": ("a", "|", "b"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("keys", COMMANDS)
+def test_how_it_is_run_becomes_words_that_the_launcher_can_follow(keys: str) -> None:
+    assert process_of(keys).argv == COMMANDS[keys]
+
+
+def test_each_node_of_a_process_has_its_own_parameters_under_its_full_name() -> None:
+    text = files_of(f"a: {{{EXE}, nodes: {{m: {{params: {{x: 1}}}}, /q/n: {{params: {{y: b}}}}, o: {{}}}}}}")
+    params = yaml.safe_load(text["params/a.yaml"])
+    assert params == {"/r1/m": {"ros__parameters": {"x": 1}}, "/q/n": {"ros__parameters": {"y": "b"}}}
+
+
+REFUSED = {
+    "run: 'a | b'": ("TF103", "'a | b'"),
+    "run: [a], shell: true": ("TF107", "shell"),
+    "run: {launch: nav.py}": ("TF106", "nav.py"),
+    "run: {launch: a/b, package: c}": ("TF107", "package"),
+    "run: [x], ready: {timeout: 3 s}": ("TF102", "ready"),
+    "run: [x], ready: {log: '('}": ("TF106", "'('"),
+    "run: [x], ready: {topic: a, service: b}": ("TF107", "service"),
+    "run: [x], ready: soon": ("TF103", "soon"),
+    "run: [x], stop: {signal: SIGFOO}": ("TF106", "SIGFOO"),
+    "run: [x], stop: {timeout: 0}": ("TF106", "0"),
+    "run: [x], nodes: {a b: {}}": ("TF106", "a b"),
+    "run: [x], nodes: {a: {}}, node: b": ("TF107", "node"),
+    "run: [x], nodes: {b: {}, c: {}}, params: {y: 1}": ("TF107", "y"),
+    "run: [x], max_restarts: -1": ("TF106", "-1"),
+    "run: [x], required: 1": ("TF103", "1"),
+}
+
+
+@pytest.mark.parametrize("keys", REFUSED)
+def test_what_cannot_be_meant_is_one_finding_at_its_place(keys: str) -> None:
+    text = f"{HEAD}  a: {{{keys}}}\n"
+    (found,) = compile_robot(text, "r.yaml", library()).found
+    at = found.span
+    assert at
+    assert (found.code, text.splitlines()[at.line - 1][at.column - 1 : at.end_column - 1]) == REFUSED[keys]
+
+
+def test_a_stand_in_takes_the_place_of_a_shells_command() -> None:
+    """A profile drops ``run`` and keeps ``shell``, which says nothing then."""
+    text = f"{HEAD}  a: {{run: 'x | y', shell: true}}\nprofiles: {{sim: {{processes: {{a: {{external: true}}}}}}}}\n"
+    assert [one.code for one in compile_robot(text, "r.yaml", library(), ["sim"]).found] == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('"required": false', '"required": 1'),
+        ('"signal": "SIGINT"', '"signal": "SIGFOO"'),
+        ('"timeout_s": null', '"timeout_s": "3"'),
+        ('"lifecycle": {}', '"lifecycle": {"/a": "on"}'),
+        ('"log_level": null', '"log_level": "loud"'),
+        ('"ready": null', '"ready": {"kind": "soon", "text": "", "number": 0.0, "timeout_s": null}'),
+        ('"max_restarts": null', '"max_restarts": 1.5'),
+    ],
+)
+def test_a_plan_with_another_value_is_refused(old: str, new: str) -> None:
+    text = files_of(f"a: {{{EXE}}}")["plan.json"]
+    assert old in text
+    with pytest.raises(RejectedError):
+        read_plan(text.replace(old, new), "plan.json")

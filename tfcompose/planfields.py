@@ -1,0 +1,68 @@
+"""Values out of a plan's JSON, each of the kind that is expected; what is not raises and says where."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+
+def get(data: dict[str, Any], key: str, kind: type[T], where: str) -> T:
+    """Return the value of a key of that kind; a whole number may stand for a float, which is finite.
+
+    Raises:
+        KeyError, TypeError, ValueError: if it is not there, or is something else.
+    """
+    value = data[key]
+    if kind is float and isinstance(value, int) and not isinstance(value, bool):
+        value = float(value)
+    if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
+        raise TypeError(f"{where}: {key} is {value!r}, not a {kind.__name__}")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"{where}: {key} is not finite")
+    return value
+
+
+def one_of(data: dict[str, Any], key: str, allowed: tuple[str | None, ...], where: str) -> Any:
+    """Return the value of a key that is one of those allowed.
+
+    Raises:
+        KeyError, TypeError, ValueError: if it is not there, or is something else.
+    """
+    if data[key] not in allowed:
+        raise ValueError(f"{where}: {key} is {data[key]!r}, not one of {', '.join(str(one) for one in allowed)}")
+    return data[key]
+
+
+def optional(data: dict[str, Any], key: str, kind: type[T], where: str) -> T | None:
+    """Return the value of a key of that kind, or None if it is null.
+
+    Raises:
+        KeyError, TypeError, ValueError: if it is not there, or is something else.
+    """
+    return None if data[key] is None else get(data, key, kind, where)
+
+
+def floats(data: dict[str, Any], key: str, count: int, where: str) -> tuple[float, ...]:
+    """Return a list of ``count`` finite numbers.
+
+    Raises:
+        KeyError, TypeError, ValueError: if it is not there, or is something else.
+    """
+    values = get(data, key, list, where)
+    if len(values) != count or not all(isinstance(v, (int, float)) and math.isfinite(v) for v in values):
+        raise ValueError(f"{where}: {key} is not {count} finite numbers")
+    return tuple(float(value) for value in values)
+
+
+def texts(data: dict[str, Any], key: str, where: str) -> dict[str, str]:
+    """Return a mapping of texts.
+
+    Raises:
+        KeyError, TypeError, ValueError: if it is not there, or is something else.
+    """
+    values = get(data, key, dict, where)
+    if not all(isinstance(value, str) for value in values.values()):
+        raise TypeError(f"{where}: {key} holds something that is no text")
+    return values

@@ -1,0 +1,43 @@
+"""The nodes of a process, by their full names."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.model import Node
+
+if TYPE_CHECKING:
+    from tfcompose.load import Path, Source
+    from tfcompose.validate.process import ProcessSpec
+
+
+def full_name(namespace: str, name: str) -> str:
+    """Return a node's, topic's or service's full name: below the namespace unless it begins with a slash."""
+    if name.startswith("/"):
+        return name
+    return "/" + "/".join(part for part in (namespace.strip("/"), name) if part)
+
+
+def nodes_of(name: str, said: ProcessSpec, namespace: str, source: Source) -> tuple[tuple[Node, ...], list[Diagnostic]]:
+    """Return the nodes of a process, at least one, and what is wrong with them."""
+    at: Path = ("processes", name)
+    if not said.nodes:
+        place = source.at(("processes", name, "node")) if said.node else source.at_key(at)
+        return (Node(full_name(namespace, said.node or name), place, at, said.params, said.lifecycle),), []
+    found = []
+    for key in said.params:
+        advice = f"write it under nodes: {{{next(iter(said.nodes))}: {{params: {{{key}: …}}}}}}"
+        message = f"{name} has nodes, and the parameter {key} names none of them"
+        found.append(finding("TF107", message, source.at_key((*at, "params", key)), help=advice))
+    nodes = [
+        Node(
+            full_name(namespace, node),
+            source.at_key((*at, "nodes", node)),
+            (*at, "nodes", node),
+            own.params,
+            own.lifecycle,
+        )
+        for node, own in said.nodes.items()
+    ]
+    return tuple(nodes), found

@@ -1,0 +1,229 @@
+"""Processes as users describe them: what is started, or expected to run, and how."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.validate.fields import (
+    ANYTHING,
+    BOOLEAN,
+    DURATION,
+    ONLY_TRUE,
+    POSITION,
+    RATE_,
+    SIZE,
+    TEXT,
+    TURN_RATE_,
+    choice,
+    integer,
+    text,
+)
+from tfcompose.validate.posed import Posed
+from tfcompose.validate.quantity import Quantity
+from tfcompose.validate.schema import BROKEN, Model, Problems, Type, key, listing, mapping, record, shown, then
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tfcompose.load import Path
+
+_NODE = r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*"
+_NODE_MEANS = "a node's name: letters, digits and _"
+_LIST = {"type": "array", "items": {"type": "string"}}
+
+
+def _arguments(value: Any, path: Path, problems: Problems) -> Any:
+    """Read a command's arguments: words, or names with values, as launch files take them."""
+    if not isinstance(value, dict):
+        return listing(TEXT).read(value, path, problems)
+    words = [_argument(name, item, (*path, name), problems) for name, item in value.items()]
+    return BROKEN if BROKEN in words else tuple(words)
+
+
+def _argument(name: str, value: Any, path: Path, problems: Problems) -> Any:
+    if value is BROKEN or isinstance(value, (dict, list)):
+        return value if value is BROKEN else problems.refuse("TF103", path, f"{shown(value)} is no text or number")
+    if isinstance(value, Quantity):
+        value = int(value.value) if value.value == int(value.value) else value.value
+    return f"{name}:={value if isinstance(value, str) else shown(value)}"
+
+
+ARGUMENTS = Type(_arguments, {"anyOf": [_LIST, {"type": "object"}]})
+
+
+class Run(Model):
+    """An installed executable, a launch file, or a command, word by word; no shell reads it."""
+
+    package: str | None = key(TEXT, None, examples=("slam_toolbox",))
+    executable: str | None = key(TEXT, None, examples=("async_slam_toolbox_node",))
+    launch: str | None = key(
+        text(r"[^/]+/[^/]+(/[^/]+)*", "package/file.launch.py"),
+        None,
+        "a package's launch file, run as one process",
+        ("nav2_bringup/navigation_launch.py",),
+    )
+    args: tuple[str, ...] = key(
+        ARGUMENTS, (), "words; for a launch file name: value", (["--verbose"], {"use_composition": False})
+    )
+    argv: tuple[str, ...] = key(listing(TEXT), (), "the whole command instead of package and executable")
+
+
+class Circle(Model):
+    """A body that drives on a circle, counter-clockwise."""
+
+    radius: float = key(SIZE, 1.0)
+    speed: float = key(TURN_RATE_, 0.5)
+
+
+class Simulate(Model):
+    """A stand-in for the owner: one of circle, fixed and joints."""
+
+    circle: Circle | None = key(record(Circle), None, "drives its edge on a circle")
+    fixed: Posed | None = key(record(Posed), None, "sends one pose again and again")
+    joints: dict[str, float] | None = key(
+        mapping(POSITION, short="zero"), None, "zero, or joints with positions; the others are at 0"
+    )
+    rate: float = key(RATE_, 20.0)
+
+
+def _environment(value: Any, path: Path, problems: Problems) -> Any:
+    for name in value if isinstance(value, dict) else ():
+        if not name or "=" in name:
+            problems.refuse("TF106", (*path, name), f"{name!r} cannot name a variable", on_key=True)
+    return mapping(TEXT).read(value, path, problems)
+
+
+class StopSpec(Model):
+    """How a process is ended: a first signal to its whole group; then firmer ones."""
+
+    signal: str = key(
+        choice("SIGINT", "SIGTERM", "SIGQUIT", "SIGHUP", "SIGKILL", "SIGUSR1", "SIGUSR2"), "SIGINT", "the first signal"
+    )
+    timeout: float | None = key(DURATION, None, "how long it has until the next, firmer one", ("5 s",))
+
+
+def _regular(value: str, path: Path, problems: Problems) -> Any:
+    try:
+        re.compile(value)
+    except (re.error, RecursionError, OverflowError) as error:
+        return problems.refuse("TF106", path, f"{shown(value)} is no regular expression: {error}")
+    return value
+
+
+class ReadySpec(Model):
+    """When the process counts as ready; one of these. Left out: when all the edges that it owns are live."""
+
+    edges: bool | None = key(ONLY_TRUE, None, "all the edges that it owns are live")
+    topic: str | None = key(TEXT, None, "somebody publishes it; below ros.namespace unless it begins with /", ("scan",))
+    service: str | None = key(TEXT, None, "it is there; below ros.namespace unless it begins with /")
+    lifecycle: str | None = key(choice("inactive", "active"), None, "its nodes are in this state, whoever did it")
+    log: str | None = key(then(TEXT, _regular), None, "a regular expression that a line of its output holds")
+    exit: int | None = key(integer(0, 255), None, "it has ended with this exit code")
+    time: float | None = key(DURATION, None, "so long after its start", ("2 s",))
+    timeout: float | None = key(DURATION, None, "when to give up waiting, and say what was seen instead", ("30 s",))
+
+
+READY_WAYS = frozenset(ReadySpec.KEYS) - {"timeout"}
+
+
+def _ready(value: Any, path: Path, problems: Problems) -> Any:
+    if value == "edges":
+        return ReadySpec(edges=True)
+    if isinstance(value, dict) and not READY_WAYS & set(value):
+        ways = ", ".join(sorted(READY_WAYS))
+        return problems.refuse("TF102", path, "ready does not say what is waited for", f"one of: {ways}", on_key=True)
+    return record(ReadySpec).read(value, path, problems)
+
+
+LIFECYCLE = choice("inactive", "active")
+
+
+class NodeSpec(Model):
+    """One node of a process."""
+
+    params: dict[str, Any] = key(mapping(ANYTHING), {}, "the node's parameters, passed on as they are")
+    lifecycle: str | None = key(LIFECYCLE, None, "a lifecycle node is brought into this state after the start")
+
+
+def _nodes(value: Any, path: Path, problems: Problems) -> Any:
+    for name in value if isinstance(value, dict) else ():
+        if not re.fullmatch(_NODE, name):
+            problems.refuse("TF106", (*path, name), f"{shown(name)} is not {_NODE_MEANS}", on_key=True)
+    return mapping(record(NodeSpec)).read(value, path, problems)
+
+
+class Started(Model):
+    """What is started, or expected to run: one of run, simulate and external."""
+
+    run: Run | None = key(
+        record(
+            Run,
+            lambda value: {"argv": value} if isinstance(value, list) else value,
+            {"anyOf": [_LIST | {"minItems": 1}, {"type": "string", "description": "with shell: true"}]},
+        ),
+        None,
+        "{package, executable, args}, {launch, args}, or a command as a list",
+    )
+    simulate: Simulate | None = key(record(Simulate), None)
+    external: bool | None = key(ONLY_TRUE, None, "somebody else starts it")
+    shell: bool | None = key(ONLY_TRUE, None, "run is one text, and /bin/sh reads it")
+    node: str | None = key(
+        text(_NODE, _NODE_MEANS),
+        None,
+        "the node's name; below ros.namespace unless it begins with /",
+        ("slam_toolbox",),
+    )
+    params: dict[str, Any] = key(mapping(ANYTHING), {}, "the node's parameters, passed on as they are")
+    lifecycle: str | None = key(LIFECYCLE, None, "the lifecycle node is brought into this state after the start")
+    log_level: str | None = key(choice("debug", "info", "warn", "error", "fatal"), None, "of its nodes' loggers")
+    remap: dict[str, str] = key(mapping(TEXT), {}, "topic names: from, to")
+    env: dict[str, str] = key(Type(_environment, mapping(TEXT).schema), {})
+    cwd: str | None = key(TEXT, None)
+    rate: float | None = key(RATE_, None, "for joints: how often joint states come")
+    host: str | None = key(TEXT, None, "the machine that it runs on", ("jetson",))
+    required: bool = key(BOOLEAN, default=False, about="when it ends, everything is stopped")
+    restart: str = key(choice("no", "on-failure", "always"), "no")
+    max_restarts: int | None = key(integer(0, 1_000_000), None, "how often in a row, before it is given up")
+    stop: StopSpec | None = key(record(StopSpec), None, "how it is ended")
+    ready: ReadySpec | None = key(Type(_ready, {"anyOf": [{"const": "edges"}, ReadySpec]}), None, "when it is ready")
+    after: dict[str, str] = key(
+        mapping(choice("started", "ready", "done")), {}, "what must have happened before the start"
+    )
+
+
+class ProcessSpec(Started):
+    """What is started, or expected to run: one of run, simulate and external."""
+
+    nodes: dict[str, NodeSpec] = key(
+        Type(_nodes, mapping(record(NodeSpec)).schema),
+        {},
+        "the nodes of a process that holds several, by name; node, params and lifecycle are the short form for one",
+    )
+
+
+class DriverSpec(Started):
+    """Keys over the preset's driver; or the name of the process that drives this sensor; or none."""
+
+    process: str | None = key(TEXT, None)
+
+
+def process(cls: type[Started], normal: Callable[[Any], Any] | None = None, short: Any = None) -> Type:
+    """Return the type of a process; a command in one text is for a shell, and that must be said."""
+    inner = record(cls, normal, short)
+
+    def read(value: Any, path: Path, problems: Problems) -> Any:
+        if isinstance(value, dict):
+            run, at = value.get("run"), (*path, "run")
+            if isinstance(run, str) and value.get("shell") is True:
+                value = value | {"run": [run]}
+            elif isinstance(run, str):
+                advice = "give a list, one item a word; or shell: true"
+                problems.refuse("TF103", at, "a command in one text is for a shell", advice)
+                value = value | {"run": BROKEN}
+            elif value.get("shell") is True and "run" in value and run is not BROKEN:
+                advice = "run: one text, for example 'zcat log.gz | player'"
+                problems.refuse("TF107", (*path, "shell"), "shell: true, and run is no text", advice, on_key=True)
+        return inner.read(value, path, problems)
+
+    return Type(read, inner.schema)

@@ -186,6 +186,17 @@ def test_a_signal_before_the_tree_is_complete_ends_everything_with_0_too(up: Cal
     assert [process for process in below if not gone(process)] == []
 
 
+@pytest.mark.parametrize("seconds", [0.0, 0.05, 0.1])
+def test_a_signal_while_processes_of_its_own_start_leaves_no_traceback(up: Callable[..., Up], seconds: float) -> None:
+    robot = up(ROVER, "--guard", "off")
+    robot.says("started drive")
+    time.sleep(seconds)
+    robot.popen.send_signal(signal.SIGINT)
+    assert robot.ends() == 0
+    assert "Traceback" not in robot.text
+    assert "KeyboardInterrupt" not in robot.text
+
+
 def test_sigkill_of_the_launcher_ends_everything_within_2_s(up: Callable[..., Up]) -> None:
     robot = up(ROVER)
     robot.says("tree complete")

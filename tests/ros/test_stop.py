@@ -64,3 +64,14 @@ def test_under_nohup_a_hang_up_stays_ignored() -> None:
     with Stop() as stop:
         os.kill(os.getpid(), signal.SIGHUP)
         assert not stop.wait(0.05)
+
+
+def test_a_signal_that_was_blocked_until_then_counts_and_is_blocked_again_afterwards() -> None:
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+        with Stop() as stop:
+            assert stop.wait(5)
+        assert signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
+import time
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tfcompose.run.child import Lines
+from tfcompose.run.child import Lines, spawn
+from tfcompose.run.preflight import Command
 from tfcompose.run.signals import Signals
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 @given(st.text(alphabet="ab\né", max_size=60), st.integers(1, 7))
@@ -47,3 +55,24 @@ def test_a_sighup_that_is_ignored_as_below_nohup_stays_ignored() -> None:
         assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
     finally:
         signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("seconds", [0.0, 0.03, 0.06, 0.1])
+def test_an_own_process_that_is_told_to_end_while_it_starts_ends_by_its_own_rules(
+    number: int, seconds: float, tmp_path: Path
+) -> None:
+    argv = (sys.executable, "-m", "tfcompose.run.static", str(tmp_path / "plan.json"), "static")
+    popen = spawn(Command(argv, dict(os.environ), tmp_path, own=True), ())
+    time.sleep(seconds)
+    popen.send_signal(number)
+    _, errors = popen.communicate(timeout=15)
+    assert popen.returncode == 2  # there is no plan
+    assert errors.decode().splitlines()[1:] == []
+
+
+def test_a_process_that_is_not_our_own_is_started_with_no_signal_blocked(tmp_path: Path) -> None:
+    popen = spawn(Command((sys.executable, "-c", "import time; time.sleep(30)"), dict(os.environ), tmp_path), ())
+    popen.send_signal(signal.SIGTERM)
+    assert popen.wait(15) == -signal.SIGTERM
+    popen.communicate()

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 PYTHON = ("${python}", "-I", "-S", "-c")
 SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); time.sleep(30)"
+#: What tfcompose's own processes do once they handle signals: until then these are blocked.
+LISTEN = "import signal; signal.pthread_sigmask(signal.SIG_UNBLOCK, signal.valid_signals())"
 #: Starts a child of its own that heeds no signal but SIGKILL, and says both process numbers.
 PARENT = """
 import os, signal, subprocess, sys, time
@@ -64,7 +66,7 @@ def program(name: str, code: str, *words: str, **more: Any) -> PlanProcess:
 def guard(*events: Any, end: str = SLEEPER) -> PlanProcess:
     """Return a guard that says these events, or lines, and then sleeps."""
     lines = "".join(event if isinstance(event, str) else to_line(event) for event in events)
-    say = f"import os; os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']), {lines.encode()!r}); {end}"
+    say = f"{LISTEN}; import os; os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']), {lines.encode()!r}); {end}"
     return program("guard", say, kind="guard")
 
 
@@ -344,7 +346,7 @@ def test_no_file_descriptor_is_left_open_and_no_handler_in_place_after_50_runs(t
     broken.chmod(0o755)
     sleeper = PlanProcess("a", "run", argv=("sleep", "60"))
     plans = [
-        (PlanProcess("g", "guard", argv=("sleep", "60")), sleeper),
+        (guard(), sleeper),
         (PlanProcess("g", "guard", argv=(str(broken),)), sleeper),
         (PlanProcess("b", "run", argv=("true",)),),
         (sleeper, PlanProcess("c", "run", argv=(str(broken),))),

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
     from typing_extensions import Self
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+#: The signals that end a process.
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _END = b"\0"
 
 
@@ -33,6 +34,9 @@ class Stop:
     Python runs a signal's handler only when the main thread is back from C, which a wait in ROS may never be. So
     the number of the signal goes through Python's wake-up descriptor to a thread, which sets the flag and ends the
     wait. Without ``with`` no signal is handled and ``request`` sets the flag.
+
+    ``tfcompose up`` starts its own processes with these signals blocked, so that none meets a Python that does not
+    handle it yet. They are let through once they are handled, and blocked again at the block's end.
     """
 
     def __init__(self) -> None:
@@ -71,13 +75,15 @@ class Stop:
         os.set_blocking(self._writer, False)
         self._previous_fd = signal.set_wakeup_fd(self._writer, warn_on_full_buffer=False)
         ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN  # under nohup a hang-up is meant to be ignored
-        taken = _SIGNALS[:2] if ignored else _SIGNALS
+        taken = SIGNALS[:2] if ignored else SIGNALS
         self._previous = {number: signal.signal(number, self._on_signal) for number in taken}
         self._thread = threading.Thread(target=self._watch, name="signals", daemon=True)
         self._thread.start()
+        self._previous_mask = signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
         return self
 
     def __exit__(self, *_: object) -> None:
+        signal.pthread_sigmask(signal.SIG_SETMASK, self._previous_mask)
         for number, handler in self._previous.items():
             signal.signal(number, handler)
         signal.set_wakeup_fd(self._previous_fd)
@@ -93,5 +99,5 @@ class Stop:
 
     def _watch(self) -> None:
         while (numbers := os.read(self._reader, 64)) and _END[0] not in numbers:
-            if any(number in numbers for number in _SIGNALS):
+            if any(number in numbers for number in SIGNALS):
                 self.request()

@@ -15,6 +15,8 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from tfcompose.ros.stop import SIGNALS
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
     from io import FileIO
@@ -117,15 +119,21 @@ class Child:
 def spawn(command: Command, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes]:
     """Start the command as the leader of a new session, with its output in pipes.
 
+    One of tfcompose's own starts with the signals blocked that end it, and unblocks them when it handles them
+    (``tfcompose.ros.stop``): one that comes while Python itself starts waits, and neither kills it nor prints a
+    traceback.
+
     Raises:
         OSError: if it cannot be started.
     """
     launcher = os.getpid()
 
-    def die_with_the_launcher() -> None:
+    def before_the_program() -> None:
         _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != launcher:  # it died before the line above
             os._exit(1)
+        if command.own:
+            signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
 
     return subprocess.Popen(
         command.argv,
@@ -137,7 +145,7 @@ def spawn(command: Command, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes
         stderr=subprocess.PIPE,
         pass_fds=pass_fds,
         start_new_session=True,
-        preexec_fn=die_with_the_launcher,  # noqa: PLW1509 (the launcher has one thread)
+        preexec_fn=before_the_program,  # noqa: PLW1509 (the launcher has one thread)
     )
 
 

@@ -29,11 +29,12 @@ class Environment(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What is executed: program and arguments, environment, and folder."""
+    """What is executed: program and arguments, environment, and folder; ``own`` says that it is one of tfcompose's."""
 
     argv: tuple[str, ...]
     env: dict[str, str]
     folder: Path
+    own: bool = False
 
 
 def commands_of(
@@ -54,8 +55,9 @@ def commands_of(
 def _command_of(
     process: PlanProcess, ros: RosSettings, plan_file: Path, base: Mapping[str, str], environment: Environment
 ) -> Command | Diagnostic:
+    own = process.kind != "run"
     try:
-        env = environment(base, ros, own=process.kind != "run") | process.env
+        env = environment(base, ros, own=own) | process.env
     except RosError as error:
         return finding("TF902", str(error), None)
     argv = filled_in(process, plan_file)
@@ -63,7 +65,7 @@ def _command_of(
         return finding("TF902", f"the plan does not say how {process.name} is started", None)
     folder = folder_of(process, plan_file.parent)
     program = executable_of(process, argv[0], folder, env)
-    return program if isinstance(program, Diagnostic) else Command((program, *argv[1:]), env, folder)
+    return program if isinstance(program, Diagnostic) else Command((program, *argv[1:]), env, folder, own)
 
 
 def _never_started(plan: Plan) -> list[Diagnostic]:

@@ -12,23 +12,24 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "tfcompose"
 
-FOUNDATIONS = {"__init__", "diagnostic", "pose", "model", "plan", "planfields", "planfile"}
+FOUNDATIONS = {"__init__", "codes", "diagnostic", "pose", "model", "plan", "planfields", "planfile"}
 STAGES = {"load", "validate", "resolve", "check"}
 
 #: Which parts of the package each part may import, besides itself.
 MAY_IMPORT: dict[str, set[str]] = {
     "__init__": set(),
-    "diagnostic": set(),
+    "codes": set(),
+    "diagnostic": {"codes"},
     "pose": set(),
     "plan": {"pose"},
     "model": {"diagnostic", "plan", "pose"},
     "planfields": set(),
     "planfile": {"diagnostic", "plan", "planfields", "pose"},
     "load": {"diagnostic"},
-    "render": {"diagnostic", "pose"},
+    "render": {"codes", "diagnostic", "pose"},
     "validate": {"diagnostic", "load", "pose"},
     "resolve": {"diagnostic", "load", "model", "plan", "pose", "validate"},
-    "check": {"diagnostic", "load", "model", "pose"},
+    "check": {"codes", "diagnostic", "load", "model", "pose"},
     "emit": {"model", "plan", "planfile", "pose"},
     "ros": {"diagnostic", "plan", "pose"},
     "run": {"diagnostic", "plan", "planfile", "pose", "ros"},

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tfcompose.cli.parser import COMMANDS, parser_of
-from tfcompose.diagnostic import CODES
+from tfcompose.codes import CODES
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -8,8 +8,8 @@ import pytest
 from tfcompose.check import RULES, code_of
 from tfcompose.check.pages import PAGES, page, rule_table
 from tfcompose.cli.compiling import library
+from tfcompose.codes import CODES
 from tfcompose.compile import compile_robot
-from tfcompose.diagnostic import CODES
 
 
 @pytest.mark.parametrize("code", CODES)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+import textwrap
 import time
 from typing import Any
 
@@ -193,6 +195,9 @@ LARGE = {
     "aliases in merges": bomb("merges"),
     "an alias to itself": "a: &a {b: *a, c: *a}\n",
     "a merge of itself": "a: &a {<<: *a}\n",
+    "aliases that nothing uses": "x-bomb:\n" + textwrap.indent(bomb("lists"), "  ") + "a: 1\n",
+    "aliases that nothing uses, key by key": re.sub("^a", "x-a", bomb("maps"), flags=re.MULTILINE) + "a: 1\n",
+    "an alias to itself that nothing uses": "x-a: &a [*a]\na: 1\n",
     "brackets": "a: " + "[" * 500_000,
     "braces": "a: " + "{a: " * 200_000,
     "indentation": "\n".join(" " * n + "a:" for n in range(2000)),

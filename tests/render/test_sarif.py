@@ -18,8 +18,9 @@ import sarif_om
 from tfcompose import __version__
 from tfcompose.check.pages import page
 from tfcompose.cli.compiling import library
+from tfcompose.codes import CODES
 from tfcompose.compile import compile_robot
-from tfcompose.diagnostic import CODES, Diagnostic, Note, Span
+from tfcompose.diagnostic import Diagnostic, Note, Span
 from tfcompose.render.sarif import render_sarif
 
 SPECS = sorted((Path(__file__).parents[1] / "check" / "specs").glob("*.yaml"))

@@ -9,7 +9,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import CODES, Allow, Diagnostic, did_you_mean, finding
+from tfcompose.codes import CODES
+from tfcompose.diagnostic import Allow, Diagnostic, did_you_mean, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -69,7 +70,9 @@ def code_of(word: str) -> str | None:
 
 def _covers(allow: Allow, found: Diagnostic) -> bool:
     at = found.span
-    return at is not None and at.file == allow.at.file and at.line == allow.line and found.code in allow.codes
+    if at is None or at.file != allow.at.file or found.code not in allow.codes:
+        return False
+    return allow.line <= at.line <= max(allow.line, allow.last)
 
 
 def idle(allows: Sequence[Allow], used: set[tuple[Allow, str]]) -> list[Diagnostic]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.check.rules.tf201_two_parents import two_parents
@@ -13,6 +13,7 @@ from tfcompose.check.rules.tf205_edge_given_twice import edge_given_twice
 from tfcompose.check.rules.tf206_no_frames import no_frames
 from tfcompose.check.rules.tf207_wrong_chain_order import wrong_chain_order
 from tfcompose.check.rules.tf208_base_footprint_below_base_link import base_footprint_below_base_link
+from tfcompose.check.rules.tf209_unused_frame import unused_frame
 from tfcompose.check.rules.tf301_edge_with_two_owners import edge_with_two_owners
 from tfcompose.check.rules.tf302_unknown_owner import unknown_owner
 from tfcompose.check.rules.tf303_owner_cannot_publish import owner_cannot_publish
@@ -20,6 +21,7 @@ from tfcompose.check.rules.tf305_static_edge_with_rate import static_edge_with_r
 from tfcompose.check.rules.tf306_one_node_two_levels import one_node_two_levels
 from tfcompose.check.rules.tf307_rate_too_low import rate_too_low
 from tfcompose.check.rules.tf308_driver_publishes_too import driver_publishes_too
+from tfcompose.check.rules.tf309_many_static_publishers import many_static_publishers
 from tfcompose.check.rules.tf401_optical_frame_not_rotated import optical_frame_not_rotated
 from tfcompose.check.rules.tf410_degrees_as_radians import degrees_as_radians
 from tfcompose.check.rules.tf411_rounded_right_angle import rounded_right_angle
@@ -85,6 +87,7 @@ RULES: tuple[Rule, ...] = (
     Rule("TF206", no_frames),
     Rule("TF207", wrong_chain_order, WARNING),
     Rule("TF208", base_footprint_below_base_link, WARNING),
+    Rule("TF209", unused_frame),
     Rule("TF301", edge_with_two_owners),
     Rule("TF302", unknown_owner),
     Rule("TF303", owner_cannot_publish),
@@ -92,6 +95,7 @@ RULES: tuple[Rule, ...] = (
     Rule("TF306", one_node_two_levels, WARNING),
     Rule("TF307", rate_too_low, WARNING),
     Rule("TF308", driver_publishes_too, WARNING),
+    Rule("TF309", many_static_publishers, WARNING),
     Rule("TF401", optical_frame_not_rotated),
     Rule("TF410", degrees_as_radians, WARNING),
     Rule("TF411", rounded_right_angle, WARNING),
@@ -126,6 +130,11 @@ RULES: tuple[Rule, ...] = (
 )
 
 
+def as_severe(found: Diagnostic, severity: Severity) -> Diagnostic:
+    """Return the finding as a rule of that severity gives it: a rule of errors may warn, one of warnings only warns."""
+    return replace(found, severity=WARNING) if severity == WARNING else found
+
+
 def check(robot: Robot, codes: frozenset[str] | None = None) -> list[Diagnostic]:
     """Return what the rules find, in no particular order; with ``codes`` only the rules of these."""
     found: list[Diagnostic] = []
@@ -133,7 +142,7 @@ def check(robot: Robot, codes: frozenset[str] | None = None) -> list[Diagnostic]
         if codes is not None and rule.code not in codes:
             continue
         try:
-            found += rule.check(robot)
+            found += [as_severe(one, rule.severity) for one in rule.check(robot)]
         except Exception as error:  # noqa: BLE001 (a rule's fault must not hide the others' findings)
             message = f"the rule {rule.code} {rule.name} crashed: {type(error).__name__}: {error}"
             found.append(finding("TF903", message, Span(robot.file), help="this is a fault of tfcompose: report it"))

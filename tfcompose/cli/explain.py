@@ -15,7 +15,8 @@ from tfcompose.check.pages import page, rule_table
 from tfcompose.cli.compiling import robot_or_code
 from tfcompose.cli.options import add_variant
 from tfcompose.cli.terminal import UNREADABLE, complain
-from tfcompose.diagnostic import CODES, did_you_mean
+from tfcompose.codes import CODES
+from tfcompose.diagnostic import did_you_mean
 from tfcompose.emit.tree import edge_facts
 
 if TYPE_CHECKING:

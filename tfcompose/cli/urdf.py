@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import unquote, urlparse
 
-from tfcompose.check import check
+from tfcompose.check import apply, check, idle
 from tfcompose.cli.terminal import read_text
 from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
+from tfcompose.load.comments import allows_in_xml
 from tfcompose.load.urdf import load_xml
 from tfcompose.resolve.urdf import robot_of_urdf
 
@@ -20,14 +21,16 @@ if TYPE_CHECKING:
 
 #: The rules that make sense without owners, sensors and processes.
 CODES = frozenset(
-    {"TF201", "TF202", "TF203", "TF204", "TF205", "TF206", "TF401", "TF501", "TF503"}
+    {"TF201", "TF202", "TF203", "TF204", "TF205", "TF206", "TF209", "TF401", "TF501", "TF503"}
     | {"TF701", "TF702", "TF704", "TF705", "TF706", "TF707", "TF708", "TF709", "TF710", "TF711"}
 )
 
 #: What to do, in URDF's words, where a rule speaks of YAML. Advice that names a near word is kept.
 _HELP = {
     "TF203": 'add <link name="…"/>',
+    "TF204": "join the trees with a fixed joint",
     "TF206": 'add <link name="base_link"/>',
+    "TF209": "remove it, or give it a joint",
     "TF401": 'an optical frame has <origin rpy="-1.5707963267948966 0 -1.5707963267948966"/> in its camera\'s frame',
     "TF704": '<limit lower="-1.57" upper="1.57" effort="10" velocity="1"/>; without an end it is continuous',
     "TF709": 'add <inertial> with <mass value="…"/> and <inertia …/>',
@@ -43,8 +46,9 @@ def lint_urdf(file: str) -> list[Diagnostic]:
         robot, found = robot_of_urdf(load_xml(text, name), name, lambda mesh: missing_mesh(mesh, Path(file).parent))
     except RejectedError as error:
         return list(error.diagnostics)
-    every = [*found, *(_said(one) for one in check(robot, CODES))]
-    return sorted(dict.fromkeys(every), key=lambda one: one.sort_key)
+    allows = allows_in_xml(text, name)
+    kept, used = apply(dict.fromkeys([*found, *(_said(one) for one in check(robot, CODES))]), allows)
+    return sorted([*kept, *idle(allows, used)], key=lambda one: one.sort_key)
 
 
 def _said(found: Diagnostic) -> Diagnostic:
@@ -67,11 +71,28 @@ def expanded(file: str) -> str:
         message = "xacro is not installed"
         raise RejectedError([finding("TF904", message, Span(file), help=advice)]) from None
     try:
-        text: str = xacro.process_file(file).toprettyxml(indent="  ")
+        document = xacro.process_file(file)
+        _raise_comments(document)
+        text: str = document.toprettyxml(indent="  ")
     except Exception as error:  # noqa: BLE001 (xacro evaluates Python: anything can come out of it)
         said = " ".join(str(error).split()) or type(error).__name__
         raise RejectedError([finding("TF018", f"xacro: {said}", Span(file))]) from None
     return text
+
+
+def _raise_comments(node: Any) -> None:
+    """Put comments that let findings stand above the tag on whose line they stood: printing gives each its own line."""
+    for child in list(node.childNodes):
+        _raise_comments(child)
+        before = child.previousSibling
+        if child.nodeType != child.COMMENT_NODE or "tfcompose:" not in child.data or before is None:
+            continue
+        if before.nodeType == child.TEXT_NODE and ("\n" in before.data or before.data.strip()):
+            continue
+        while before is not None and before.nodeType != child.ELEMENT_NODE:
+            before = before.previousSibling
+        over = before or node
+        over.parentNode.insertBefore(child, over)
 
 
 def missing_mesh(name: str, folder: Path) -> tuple[str, str, str] | None:

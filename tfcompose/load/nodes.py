@@ -150,6 +150,36 @@ class _Composer:
         return self.anchors[event.anchor]
 
 
+class Sizes:
+    """How many values nodes hold once aliases are followed, counted without following them twice."""
+
+    def __init__(self, most: int) -> None:
+        self.most = most
+        self._known: dict[int, int] = {}
+        self._open: set[int] = set()
+
+    def measure(self, node: Node) -> int:
+        """Return the number of values that the node holds, itself too.
+
+        Raises:
+            ValueError: if there are more than ``most``, or the node holds itself; it says so in a sentence.
+        """
+        key = id(node)  # nodes live as long as their root
+        if key in self._known:
+            return self._known[key]
+        if key in self._open or len(self._open) > DEEPEST:
+            raise ValueError(
+                "an alias stands inside what it names" if key in self._open else f"nested deeper than {DEEPEST} levels"
+            )
+        self._open.add(key)
+        size = 1 + sum(self.measure(item) for item in node.items)
+        self._open.remove(key)
+        if size > self.most:
+            raise ValueError(f"more than {self.most:,} values once aliases are followed")
+        self._known[key] = size
+        return size
+
+
 def _until(start: Span, end: Span) -> Span:
     return Span(start.file, start.line, start.column, end.end_line, end.end_column)
 

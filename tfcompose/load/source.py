@@ -10,7 +10,7 @@ from typing import Any
 
 from tfcompose.diagnostic import Allow, Diagnostic, Note, RejectedError, Span, finding
 from tfcompose.load.comments import allows_in
-from tfcompose.load.nodes import DEEPEST, Node, compose
+from tfcompose.load.nodes import DEEPEST, Node, Sizes, compose
 from tfcompose.load.scalars import MAP, SCALAR_TAGS, SEQ, STR, TAG, scalar
 
 Path = tuple[str | int, ...]
@@ -101,6 +101,7 @@ class Walk:
         self.keys: dict[Path, Span] = {}
         self.found: list[Diagnostic] = []
         self.visits = 0
+        self.sizes = Sizes(MOST_VALUES)
 
     def value(self, node: Node, path: Path) -> Any:
         """Return the node's plain data, and remember where all of it stands."""
@@ -123,6 +124,15 @@ class Walk:
         else:
             return
         raise RejectedError([*self.found, finding("TF008", message, node.span)])
+
+    def _measure(self, node: Node) -> None:
+        """Refuse what is not walked because nothing uses it, where its aliases make it as long as a bomb."""
+        if node.kind == "scalar":
+            return
+        try:
+            self.sizes.measure(node)
+        except ValueError as error:
+            raise RejectedError([*self.found, finding("TF008", str(error), node.span)]) from None
 
     def _expect(self, node: Node, tag: str) -> None:
         if node.tag != tag:
@@ -161,7 +171,10 @@ class Walk:
                 self.found.append(finding("TF003", f"the key {key} is given twice", key_node.span, notes=[note]))
                 continue
             seen[key] = key_node.span
-            if key_node.is_merge or key in data or (not path and key.startswith("x-")):
+            if key_node.is_merge or key in data:
+                continue
+            if not path and key.startswith("x-"):
+                self._measure(value_node)
                 continue
             at = (*path, key)
             self.keys[at] = key_node.span

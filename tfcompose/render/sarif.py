@@ -6,7 +6,7 @@ import json
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from tfcompose.diagnostic import CODES
+from tfcompose.codes import CODES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -73,6 +73,25 @@ def user_process(
     return None, [finding("TF102", f"{name} does not say how it runs", place, help=advice)]
 
 
+def idle_rates(spec: RobotSpec, source: Source) -> list[Diagnostic]:
+    """Return a finding for each process with a rate that nothing reads: only ``joints`` has one."""
+    said: dict[Path, tuple[str, ProcessSpec | None]] = {}
+    said |= {("processes", name): (name, process) for name, process in spec.processes.items() if name != JOINTS}
+    said |= {("sensors", name, "driver"): (f"the driver of {name}", s.driver) for name, s in spec.sensors.items()}
+    found = []
+    for path, (name, process) in said.items():
+        if process is None or process.rate is None:
+            continue
+        advice = "remove it; an edge says itself how often it is sent: odom: {parent: map, owner: …, rate: 10 Hz}"
+        if process.simulate:
+            advice = "write it under simulate"
+        elif name == STATIC:
+            advice = "remove it; fixed edges are sent once"
+        place = source.at_key((*path, "rate"))
+        found.append(finding("TF101", f"{name} has no rate; only the process joints has", place, help=advice))
+    return found
+
+
 def _simulated(process: Process, simulate: Simulate, source: Source) -> tuple[Process | None, list[Diagnostic]]:
     if simulate.circle:
         circle = simulate.circle
@@ -163,16 +182,26 @@ def _given_parameters(sensor: Sensor, computed: dict[str, Any], source: Source) 
     return found
 
 
-def name_clashes(processes: list[Process]) -> list[Diagnostic]:
-    """Return a finding for each name that a sensor's driver and a process, or two processes, share."""
+def name_clashes(processes: list[Process], spec: RobotSpec, source: Source) -> list[Diagnostic]:
+    """Return a finding for each name that a sensor and a process, or two processes, share.
+
+    A sensor may have the name of the process that drives it.
+    """
     first: dict[str, Process] = {}
     found = []
+    for name, sensor in spec.sensors.items():
+        driven_by_it = sensor.driver is not None and sensor.driver.process == name
+        if name in spec.processes and not driven_by_it:
+            first[name] = Process(name, "external", source.at_key(("sensors", name)))
     for process in processes:
         other = first.setdefault(process.name, process)
-        if other is not process:
+        if other.at != process.at:
             notes = [Note(f"{other.name} stands here too", other.at)]
+            advice = "rename one of them"
+            if process.name in spec.sensors:
+                advice += f", or, if it drives the sensor, driver: {process.name}"
             message = f"the name {process.name} is used twice; sensors and processes share one name space"
-            found.append(finding("TF502", message, process.at, notes=notes, help="rename one of them"))
+            found.append(finding("TF502", message, process.at, notes=notes, help=advice))
     return found
 
 

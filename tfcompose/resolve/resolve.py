@@ -13,7 +13,7 @@ from tfcompose.resolve.edges import Drafts
 from tfcompose.resolve.isolation import isolate, settings_of
 from tfcompose.resolve.poses import Solver
 from tfcompose.resolve.presets import Library, sensor_of
-from tfcompose.resolve.processes import built_in, name_clashes, unknown_names, user_process
+from tfcompose.resolve.processes import built_in, idle_rates, name_clashes, unknown_names, user_process
 from tfcompose.resolve.written import as_written
 
 if TYPE_CHECKING:
@@ -58,7 +58,13 @@ def resolve(validated: Validated, library: Library, read: Callable[[str], str] |
     edges = solver.solve()
     processes = [*processes, *drafts.drivers]
     names = frozenset(name for _, name in broken)
-    found += [*drafts.found, *solver.found, *name_clashes(processes), *unknown_names(processes, source, names)]
+    found += [
+        *drafts.found,
+        *solver.found,
+        *name_clashes(processes, spec, source),
+        *idle_rates(spec, source),
+        *unknown_names(processes, source, names),
+    ]
     found = [one for one in found if not (one.code == "TF404" and broken)]  # an edge on the way may have been refused
     edges = tuple(_with_rate(edge, processes) for edge in edges)
     robot = Robot(

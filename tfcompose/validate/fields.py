@@ -92,7 +92,7 @@ def read_quantity(value: Any, path: Path, problems: Problems, dimension: Dimensi
     want = f"an {name}" if name[0] in "aeiou" else f"a {name}"
     if isinstance(value, str):
         try:
-            value = quantity(value)
+            value = quantity(value, dimension)
         except UnitError as error:
             code = "TF104" if error.unit else "TF103"
             instead = respelt(value, error.unit, dimension) if error.unit else None

@@ -103,8 +103,8 @@ class UnitError(ValueError):
         self.unit = unit
 
 
-def quantity(text: str) -> Quantity:
-    """Return what a text such as ``30 cm`` or ``1e-3`` says.
+def quantity(text: str, wanted: Dimension | None = None) -> Quantity:
+    """Return what a text such as ``30 cm`` or ``1e-3`` says; ``wanted`` is the dimension that advice is given for.
 
     Raises:
         UnitError: if it is no number, or its unit is not known.
@@ -115,24 +115,32 @@ def quantity(text: str) -> Quantity:
     number, unit = float(match[1]), match[2]
     if not math.isfinite(number):
         raise UnitError(f"{text!r} is not finite")
-    return in_unit(number, unit) if unit else Quantity(number)
+    return in_unit(number, unit, wanted) if unit else Quantity(number)
 
 
-def in_unit(number: float, unit: str) -> Quantity:
-    """Return ``number`` times the unit.
+def in_unit(number: float, unit: str, wanted: Dimension | None = None) -> Quantity:
+    """Return ``number`` times the unit; ``wanted`` is the dimension that advice is given for, None: any.
 
     Raises:
         UnitError: if the unit is not known, or the result too large for a number.
     """
     if unit not in UNITS:
-        advice = did_you_mean(unit, UNITS, f"known units: {', '.join(UNITS)}")
-        raise UnitError(f"unknown unit {unit}", f"write {_SPELLINGS[unit]}" if unit in _SPELLINGS else advice, unit)
+        raise UnitError(f"unknown unit {unit}", _instead_of(unit, wanted), unit)
     factor, dimension = UNITS[unit]
     above, below = _FRACTIONS.get(unit, (factor, 1))
     value = math.radians(number) if unit == "deg" else number * above / below
     if not math.isfinite(value):
         raise UnitError(f"{number!r} {unit} is not finite")
     return Quantity(value, dimension)
+
+
+def _instead_of(unit: str, wanted: Dimension | None) -> str:
+    """Return which unit of the wanted dimension (None: of any) is probably meant, or all that there are."""
+    known = [name for name, (_, its) in UNITS.items() if wanted in {None, its}]
+    if _SPELLINGS.get(unit) in known:
+        return f"write {_SPELLINGS[unit]}"
+    what = "known units" if wanted is None else f"units of {dimension_name(wanted)}"
+    return did_you_mean(unit, known, f"{what}: {', '.join(known)}" if known else "leave the unit out")
 
 
 #: How else people write units, and their name here.

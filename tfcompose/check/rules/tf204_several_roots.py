@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tfcompose.check.forest import main_root, trees
 from tfcompose.diagnostic import Diagnostic, Note, finding
 
 if TYPE_CHECKING:
@@ -15,12 +16,13 @@ if TYPE_CHECKING:
 def several_roots(robot: Robot) -> Iterator[Diagnostic]:
     """The robot falls into several trees.
 
-    Between frames of two trees there is no transform. Give every root but one a parent; a frame that nobody needs can
-    go.
+    Between frames of two trees there is no transform, so that nobody can reach the frames of the one from the other.
+    Give every root but one a parent; a tree that nobody needs can go.
     """
-    roots = [root for root in robot.roots() if not robot.excuses(root)]
-    if len(roots) > 1:
-        notes = [Note(f"{root} is one", robot.frames[root]) for root in roots[:-1]]
-        message = f"{len(roots)} roots: {', '.join(roots)}"
-        advice = "give all but one a parent"
-        yield finding("TF204", message, robot.frames[roots[-1]], notes=notes, help=advice)
+    grown = trees(robot)
+    main = main_root(robot, grown)
+    for root, frames in grown.items():
+        if root != main and len(frames) > 1 and not robot.excuses(root):
+            message = f"{root} begins a tree of its own, with {len(frames)} frames: nothing ties it to {main}"
+            notes = [Note(f"{main} is the root of the robot's tree", robot.frames[main])]
+            yield finding("TF204", message, robot.frames[root], notes=notes, help=f"give {root} a parent")

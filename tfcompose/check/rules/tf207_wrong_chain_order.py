@@ -36,7 +36,7 @@ def wrong_chain_order(robot: Robot) -> Iterator[Diagnostic]:
             if other is not None and other > level and other_prefix in {prefix, ""}:
                 message = f"{edge.child} hangs below {parent}; by REP-105 it is the other way round"
                 advice = "the order is earth → map → odom → base_link; the pose of a turned edge is the inverse"
-                yield finding("TF207", message, edge.at, help=advice, severity="warning")
+                yield finding("TF207", message, edge.at, help=advice)
                 break
             parent = above[parent].parent if parent in above else parent
 

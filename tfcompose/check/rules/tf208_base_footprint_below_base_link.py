@@ -26,4 +26,4 @@ def base_footprint_below_base_link(robot: Robot) -> Iterator[Diagnostic]:
         if (name, parent) == ("base_footprint", "base_link") and prefix == above:
             message = f"{edge.child} hangs on {edge.parent}, and tilts with it"
             advice = f"turn it round: {edge.parent}: {{parent: {edge.child}}}, with the inverse pose"
-            yield finding("TF208", message, edge.at, help=advice, severity="warning")
+            yield finding("TF208", message, edge.at, help=advice)

@@ -23,4 +23,4 @@ def static_edge_with_rate(robot: Robot) -> Iterator[Diagnostic]:
         if edge.kind == "static" and edge.rate is not None and not robot.excuses(edge.owner):
             message = f"{edge.name} is fixed, and is sent once; the rate {edge.rate:g} Hz has no meaning"
             advice = "remove the rate" if edge.owner_at else "remove the rate, or name the owner that sends it"
-            yield finding("TF305", message, edge.rate_at or edge.at, help=advice, severity="warning")
+            yield finding("TF305", message, edge.rate_at or edge.at, help=advice)

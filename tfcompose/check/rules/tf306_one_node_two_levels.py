@@ -30,7 +30,7 @@ def one_node_two_levels(robot: Robot) -> Iterator[Diagnostic]:
                 message = f"{edge.owner} publishes both {other.name} and {edge.name}"
                 notes = [Note(f"{other.name} stands here", other.owner_at or other.at)]
                 advice = "one process for localisation, another for odometry"
-                yield finding("TF306", message, edge.owner_at or edge.at, help=advice, notes=notes, severity="warning")
+                yield finding("TF306", message, edge.owner_at or edge.at, help=advice, notes=notes)
 
 
 def _ends(edge: Edge, parent: str, children: set[str]) -> bool:

@@ -37,4 +37,4 @@ def rate_too_low(robot: Robot) -> Iterator[Diagnostic]:
                 continue
             message = f"{edge.name} comes with {edge.rate:g} Hz, and should with {least:g} Hz or more"
             advice = f"raise the rate of {edge.owner}, and then the one that is declared here"
-            yield finding("TF307", message, edge.rate_at or edge.at, help=advice, severity="warning")
+            yield finding("TF307", message, edge.rate_at or edge.at, help=advice)

@@ -37,4 +37,4 @@ def driver_publishes_too(robot: Robot) -> Iterator[Diagnostic]:
             switch = ", ".join(f"{key}: {str(value).lower()}" for key, value in sensor.switch.items())
             advice = f"start {process.name} with the parameter {switch}; or leave the frames to it: tf: driver"
             notes = [Note(f"{process.name} is declared here", process.at)] if process.at != sensor.at else []
-            yield finding("TF308", message, sensor.tf_at or sensor.at, help=advice, notes=notes, severity="warning")
+            yield finding("TF308", message, sensor.tf_at or sensor.at, help=advice, notes=notes)

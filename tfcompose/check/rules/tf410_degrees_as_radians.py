@@ -36,4 +36,4 @@ def degrees_as_radians(robot: Robot) -> Iterator[Diagnostic]:
             size = abs(number)
             if not with_unit and (size in ROUND_LIMITS if is_limit else size in ROUND or size > TURN_RAD):
                 message = f"{value.entry}: {value.key} is {number:g} rad, {number / math.tau:.3g} turns"
-                yield finding("TF410", message, at, help=f"in degrees: {number:g} deg", severity="warning")
+                yield finding("TF410", message, at, help=f"in degrees: {number:g} deg")

@@ -38,7 +38,7 @@ def rounded_right_angle(robot: Robot) -> Iterator[Diagnostic]:
             said = ", ".join(dict.fromkeys(f"{n:g}" for n, _ in rounded))
             message = f"{value.entry}: {value.key} has {said}, {off:.2g} deg off {quarters * 90} deg"
             advice = f'write {quarters * 90} deg, or "${{{sign}{QUARTERS[abs(quarters)]}}}"'
-            yield finding("TF411", message, at, help=advice, severity="warning")
+            yield finding("TF411", message, at, help=advice)
 
 
 def _is_rounded(number: float) -> bool:

@@ -54,4 +54,4 @@ def camera_looks_away(robot: Robot) -> Iterator[Diagnostic]:
             angle = math.degrees(math.asin(min(1.0, abs(axis[2]))))
             message = f"{sensor.name} looks {angle:.0f} deg {'up' if axis[2] > 0 else 'down'}"
             advice = f"look: {{{'down' if sign < 0 else 'up'}: {angle:.0f} deg}}; looking down is positive pitch"
-            yield finding("TF413", message, sensor.at, help=advice, severity="warning")
+            yield finding("TF413", message, sensor.at, help=advice)

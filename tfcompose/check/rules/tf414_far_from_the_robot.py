@@ -33,7 +33,7 @@ def far_from_the_robot(robot: Robot) -> Iterator[Diagnostic]:
         largest = max((max(shape.size) for shape in (*link.visuals, *link.collisions)), default=0.0)
         if largest > LARGEST_M:
             message = f"the body of {link.name} is {largest:g} m long"
-            yield finding("TF414", message, link.at, help=f"in millimetres: {largest:g} mm", severity="warning")
+            yield finding("TF414", message, link.at, help=f"in millimetres: {largest:g} mm")
     body = max((size for size in sizes if size <= LARGEST_M), default=0.0)
     below = placed(robot, moving=True)
     mounts = [norm(edge.pose.xyz) for edge in robot.edges if edge.given and edge.child in below and any(edge.pose.xyz)]
@@ -51,7 +51,7 @@ def far_from_the_robot(robot: Robot) -> Iterator[Diagnostic]:
         if child in below and distance > limit:
             message = f"{value.entry} is {distance:g} m away; the rest of the robot is within {limit:.3g} m"
             at = value.places[max(range(len(value.numbers)), key=lambda index: abs(value.numbers[index]))]
-            yield finding("TF414", message, at, help="a bare number is in metres: 250 mm", severity="warning")
+            yield finding("TF414", message, at, help="a bare number is in metres: 250 mm")
 
 
 _OF_AN_EDGE = 3  # section, name, xyz

@@ -41,6 +41,9 @@ def bad_frame_name(robot: Robot) -> Iterator[Diagnostic]:
 
 
 def _bad(name: str, at: Span, what: str) -> Diagnostic:
+    bare = name.lstrip("/")
+    if what == "name" and bare != name and _GOOD.fullmatch(bare):
+        return finding("TF501", f"{name!r} is no good {what}", at, help=f"tf2 drops a leading slash: write {bare}")
     better = re.sub(r"[^A-Za-z0-9_/]+|//+", "_", name).strip("/")
     advice = f"for example {better}" if _GOOD.fullmatch(better) and better != name.strip("/") else _LETTERS
     return finding("TF501", f"{name!r} is no good {what}", at, help=advice)

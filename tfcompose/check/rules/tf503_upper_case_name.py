@@ -33,7 +33,7 @@ def upper_case_name(robot: Robot) -> Iterator[Diagnostic]:
             Note(f"{known[name.lower()]} is another frame", at) for name, at in bad.items() if name.lower() in known
         ]
         notes += [Note(f"{name} is one too", bad[name]) for name in others[:SHOWN]]
-        yield finding("TF503", message, bad[first], help=_better(first), notes=notes, severity="warning")
+        yield finding("TF503", message, bad[first], help=_better(first), notes=notes)
 
 
 SHOWN = 5

@@ -21,4 +21,4 @@ def unused_variable(robot: Robot) -> Iterator[Diagnostic]:
     """
     for name, at in robot.unused.items():
         if at.file == robot.file and ("vars", name) not in robot.broken:
-            yield finding("TF504", f"nothing uses the variable {name}", at, help="remove it", severity="warning")
+            yield finding("TF504", f"nothing uses the variable {name}", at, help="remove it")

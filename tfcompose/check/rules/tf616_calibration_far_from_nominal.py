@@ -31,7 +31,7 @@ def calibration_far_from_nominal(robot: Robot) -> Iterator[Diagnostic]:
             message = f"{made.name} is {off} from nominal; the limit is {limit}"
             advice = "mend the pose beside it, or set limit: {xyz: …, rot: …}"
             notes = [Note("measured here", made.at)]
-            yield finding("TF616", message, made.named_at, help=advice, notes=notes, severity="warning")
+            yield finding("TF616", message, made.named_at, help=advice, notes=notes)
 
 
 def _both(metres: float, radians: float) -> str:

@@ -29,4 +29,4 @@ def calibration_copied(robot: Robot) -> Iterator[Diagnostic]:
             message = f"{made.name} has the very values of {other.child}"
             notes = [Note("the other one", other.at), Note("this one", made.at)]
             advice = "give each its own measurement"
-            yield finding("TF618", message, made.named_at, help=advice, notes=notes, severity="warning")
+            yield finding("TF618", message, made.named_at, help=advice, notes=notes)

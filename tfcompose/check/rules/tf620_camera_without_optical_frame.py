@@ -36,4 +36,4 @@ def camera_without_optical_frame(robot: Robot) -> Iterator[Diagnostic]:
         if not any(is_optical(frame) for frame in seen):
             message = f"the camera {sensor.name} has no optical frame"
             advice = f"a frame {sensor.name}_optical_frame with rpy: [-90 deg, 0, -90 deg]"
-            yield finding("TF620", message, sensor.at, help=advice, severity="warning")
+            yield finding("TF620", message, sensor.at, help=advice)

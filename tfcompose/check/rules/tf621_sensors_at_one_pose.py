@@ -38,4 +38,4 @@ def sensors_at_one_pose(robot: Robot) -> Iterator[Diagnostic]:
         if other is not edge and turned < NEAR_RAD and not are_mirrored(other, edge):
             message = f"{edge.sensor} and {other.sensor} are at one pose on {edge.parent}"
             notes = [Note(f"{other.sensor} is mounted here", other.at)]
-            yield finding("TF621", message, edge.at, help="measure one of them again", notes=notes, severity="warning")
+            yield finding("TF621", message, edge.at, help="measure one of them again", notes=notes)

@@ -30,4 +30,4 @@ def mount_copied(robot: Robot) -> Iterator[Diagnostic]:
             message = f"{edge.child} and {twin.child} are both at [{x:g}, {y:g}, {z:g}] in {edge.parent}"
             notes = [Note(f"{twin.child} stands here", twin.at)]
             advice = "y is positive to the left, x to the front: one of the two has another sign"
-            yield finding("TF622", message, edge.at, help=advice, notes=notes, severity="warning")
+            yield finding("TF622", message, edge.at, help=advice, notes=notes)

@@ -37,7 +37,7 @@ def serial_missing(robot: Robot) -> Iterator[Diagnostic]:
                 message = f"{sensor.name} and {other.name} have one driver, and {sensor.name} has no serial number"
                 notes = [Note(f"{other.name} stands here", other.at)]
                 advice = f'options: {{{sensor.serial_option}: "…"}}'
-                yield finding("TF623", message, sensor.at, help=advice, notes=notes, severity="warning")
+                yield finding("TF623", message, sensor.at, help=advice, notes=notes)
 
 
 def _told(process: Process) -> bool:

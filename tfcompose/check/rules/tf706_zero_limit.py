@@ -29,4 +29,4 @@ def zero_limit(robot: Robot) -> Iterator[Diagnostic]:
             if value is not None and value <= 0:
                 message = f"{joint.name}: the greatest {name} is {value:g}"
                 advice = f"give the motor's {name}, or leave it out"
-                yield finding("TF706", message, joint.at, help=advice, severity="warning")
+                yield finding("TF706", message, joint.at, help=advice)

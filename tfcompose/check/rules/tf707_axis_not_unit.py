@@ -27,4 +27,4 @@ def axis_not_unit(robot: Robot) -> Iterator[Diagnostic]:
         if joint and abs(joint.axis_length - 1) > TOLERANCE:
             axis = ", ".join(f"{part:.4g}" for part in joint.axis)
             message = f"{joint.name}: the axis has length {joint.axis_length:.4g}, not 1"
-            yield finding("TF707", message, joint.at, help=f"of length 1: [{axis}]", severity="warning")
+            yield finding("TF707", message, joint.at, help=f"of length 1: [{axis}]")

@@ -36,7 +36,7 @@ def mimic_chain(robot: Robot) -> Iterator[Diagnostic]:
         message = f"{joint.name} follows {middle.name}, which follows {middle.mimic}"
         notes = [Note(f"{middle.name} stands here", middle.at)]
         advice = f"mimic: {{joint: {middle.mimic}, multiplier: {multiplier:g}{end}}}"
-        yield finding("TF708", message, joint.at, help=advice, notes=notes, severity="warning")
+        yield finding("TF708", message, joint.at, help=advice, notes=notes)
 
 
 def _loops(joints: dict[str, Joint], name: str) -> bool:

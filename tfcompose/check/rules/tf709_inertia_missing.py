@@ -32,7 +32,7 @@ def inertia_missing(robot: Robot) -> Iterator[Diagnostic]:
         if not weighed[edge.child]:
             message = f"{edge.child} moves by {edge.joint_name} and has no mass, while {other} has"
             link = robot.links[edge.child]
-            yield finding("TF709", message, link.at, help="inertial: {mass: 0.5 kg}", severity="warning")
+            yield finding("TF709", message, link.at, help="inertial: {mass: 0.5 kg}")
 
 
 def _weighs(robot: Robot, fixed: dict[str, list[str]], link: str) -> bool:

@@ -37,7 +37,7 @@ def impossible_inertia(robot: Robot) -> Iterator[Diagnostic]:
         if why:
             message = f"no body has the inertia of {link.name}: {why} kg m²"
             advice = "leave inertia out: it is computed from mass and shape"
-            yield finding("TF710", message, inertial.at, help=advice, severity="warning")
+            yield finding("TF710", message, inertial.at, help=advice)
 
 
 def _principal(tensor: tuple[float, float, float, float, float, float]) -> tuple[float, float, float]:

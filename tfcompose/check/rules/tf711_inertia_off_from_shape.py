@@ -34,4 +34,4 @@ def inertia_off_from_shape(robot: Robot) -> Iterator[Diagnostic]:
         ratio = min(ratios, key=lambda one: abs(math.log(one)))
         message = f"the inertia of {link.name} is {ratio:.3g} times what its mass and shape give"
         advice = "leave inertia out: it is computed; or give it in kg m², about the centre of mass"
-        yield finding("TF711", message, inertial.at or link.at, help=advice, severity="warning")
+        yield finding("TF711", message, inertial.at or link.at, help=advice)

@@ -31,5 +31,5 @@ def root_link_with_inertia(robot: Robot) -> Iterator[Diagnostic]:
             message = f"the root link {root.name} has an inertia, which {process.package} leaves out"
             notes = [Note(f"{process.name} is started here", process.at)]
             advice = f"a fixed frame above {root.name}, without a body"
-            yield finding("TF712", message, root.at, help=advice, notes=notes, severity="warning")
+            yield finding("TF712", message, root.at, help=advice, notes=notes)
             return

@@ -40,4 +40,4 @@ def process_without_role(robot: Robot) -> Iterator[Diagnostic]:
         if "edge" in what:
             advice = f"owner: {process.name} at the edge that it publishes, or remove it"
         message = f"{process.name} has nothing to do here: {what}"
-        yield finding("TF815", message, process.at, help=advice, severity="warning")
+        yield finding("TF815", message, process.at, help=advice)

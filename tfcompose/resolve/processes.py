@@ -17,7 +17,7 @@ from tfcompose.resolve.running import how, program
 if TYPE_CHECKING:
     from tfcompose.load import Path, Source
     from tfcompose.resolve.presets import Sensor
-    from tfcompose.validate.process import ProcessSpec, Run, Simulate
+    from tfcompose.validate.process import ProcessSpec, Run, Simulate, Started
     from tfcompose.validate.spec import RobotSpec
 
 _BUILT_IN_KEYS = frozenset({"rate", "remap", "env", "host", "after"})
@@ -75,7 +75,7 @@ def user_process(
 
 def idle_rates(spec: RobotSpec, source: Source) -> list[Diagnostic]:
     """Return a finding for each process with a rate that nothing reads: only ``joints`` has one."""
-    said: dict[Path, tuple[str, ProcessSpec | None]] = {}
+    said: dict[Path, tuple[str, Started | None]] = {}
     said |= {("processes", name): (name, process) for name, process in spec.processes.items() if name != JOINTS}
     said |= {("sensors", name, "driver"): (f"the driver of {name}", s.driver) for name, s in spec.sensors.items()}
     found = []

@@ -1,198 +1,189 @@
-"""What is known of the live tree, as tf2 knows it: for each frame its parent, and poses over time.
+"""What is known of the live tree: tf2's buffer, in Python, with tf2's names and calling conventions, without ROS.
 
-Like tf2 (geometry2, ``BufferCore``) a frame has one parent, that of the newest sample; a leading slash is dropped;
-self-transforms, empty names, values that are not finite and quaternions off unit length are refused; between two
-samples positions are interpolated linearly and rotations on the great circle. Times are integer nanoseconds.
+``Buffer`` answers as tf2's does (geometry2 for ROS 2 Jazzy, ``tf2_ros.Buffer``): a frame has one parent at a time, that
+of its newest sample; samples are kept for 10 s before the newest of their edge; between two samples positions go
+straight and rotations on the great circle; time 0 asks for the newest time that all moving edges have reached; fixed
+edges hold at any time. Where it differs, on purpose:
+
+- what it raises says which edge is missing, or how many milliseconds too early or too late the time is;
+- an infinite value is refused like NaN, and a quaternion that is off unit length is refused as tf2's log says (Jazzy's
+  ``BufferCore`` normalises before it looks, so that only a quaternion of zeros is);
+- of the two quaternions for a rotation the one with w ≥ 0 comes back;
+- a chain of more than 1,000 edges is no loop.
+
+Times are integer nanoseconds throughout.
 """
 
 from __future__ import annotations
 
-import math
-from bisect import bisect_right
-from collections import deque
-from dataclasses import dataclass, field
+from time import monotonic_ns
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from tfcompose.diagnostic import nearest
-from tfcompose.pose import Pose, Quaternion, normalised
+from tfcompose.observe.core import CACHE_NS, BufferCore, Refusal, Row
+from tfcompose.observe.exceptions import (
+    ConnectivityException,
+    ExtrapolationException,
+    InvalidArgumentException,
+    LookupException,
+    TimeoutException,
+    TransformException,
+)
+from tfcompose.observe.frames import FrameInfo, as_string, as_yaml, frame_info
+from tfcompose.observe.rotation import Seven, product, unit
+from tfcompose.observe.stamped import nanoseconds, time_of, transform_stamped
 
-CACHE_NS = 10_000_000_000
-#: tf2 refuses a quaternion whose squared length is off by this much.
-DENORMALISED = 0.01
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
+__all__ = ["CACHE_NS", "Buffer", "BufferCore", "FrameInfo", "Refusal", "Row"]
+__all__ += ["ConnectivityException", "ExtrapolationException", "InvalidArgumentException", "LookupException"]
+__all__ += ["TimeoutException", "TransformException"]
 
-class TransformError(Exception):
-    """Raised when there is no pose of one frame in another; the message says why."""
+_Answer = TypeVar("_Answer")
 
-
-class LookupError(TransformError):  # noqa: A001 (tf2's name for it)
-    """Raised when a frame is not known."""
-
-
-class ConnectivityError(TransformError):
-    """Raised when two frames are in two trees."""
-
-
-class ExtrapolationError(TransformError):
-    """Raised when the edges between two frames have no time in common."""
-
-
-@dataclass(slots=True)
-class _Edge:
-    parent: str
-    static: bool
-    stamps: deque[int] = field(default_factory=deque)
-    poses: deque[Pose] = field(default_factory=deque)
-
-    def add(self, stamp_ns: int, pose: Pose) -> None:
-        if self.static:
-            self.stamps.clear()
-            self.poses.clear()
-        at = bisect_right(self.stamps, stamp_ns)
-        if at and self.stamps[at - 1] == stamp_ns and not self.static:
-            self.poses[at - 1] = pose
-            return
-        self.stamps.insert(at, stamp_ns)
-        self.poses.insert(at, pose)
-        while self.stamps[-1] - self.stamps[0] > CACHE_NS:
-            self.stamps.popleft()
-            self.poses.popleft()
-
-    def pose_at(self, stamp_ns: int) -> Pose:
-        if self.static or len(self.stamps) == 1:
-            return self.poses[-1]
-        at = min(max(bisect_right(self.stamps, stamp_ns), 1), len(self.stamps) - 1)
-        before, after = self.stamps[at - 1], self.stamps[at]
-        part = (stamp_ns - before) / (after - before)
-        return interpolated(self.poses[at - 1], self.poses[at], min(max(part, 0.0), 1.0))
+# How often a waiting buffer looks for messages itself, in seconds.
+_POLL_S = 0.005
 
 
-class Buffer:
-    """Takes transforms and answers where one frame is in another."""
+class Buffer(BufferCore):
+    """tf2_ros's ``Buffer``: takes and gives messages, and waits.
 
-    def __init__(self) -> None:
-        self._edges: dict[str, _Edge] = {}
-        self._frames: set[str] = set()
+    Args:
+        cache_time: how long samples are kept, a duration; default 10 s.
 
-    @property
-    def frames(self) -> frozenset[str]:
-        """Every frame that was heard of."""
-        return frozenset(self._frames)
+    Frames, times and durations are given as to tf2; see ``stamped`` for what a time may be. All lookups raise
 
-    def set(self, parent: str, child: str, pose: Pose, stamp_ns: int, *, static: bool) -> bool:
-        """Take the pose of ``child`` in ``parent``; return False if tf2 would refuse it."""
-        parent, child = parent.removeprefix("/"), child.removeprefix("/")
-        if not parent or not child or parent == child or not _is_sound(pose):
-            return False
-        edge = self._edges.get(child)
-        if edge is not None and edge.static == static and edge.stamps and not static:
-            if stamp_ns < edge.stamps[-1] - CACHE_NS:
-                return False
-            if edge.parent != parent and stamp_ns < edge.stamps[-1]:
-                return False  # an older sample does not decide the parent
-        if edge is None or edge.static != static or edge.parent != parent:
-            edge = self._edges[child] = _Edge(parent, static)
-        edge.add(stamp_ns, Pose(pose.xyz, normalised(pose.quat_xyzw)))
-        self._frames.update((parent, child))
-        return True
+    - ``InvalidArgumentException`` if a name is empty or starts with a slash,
+    - ``LookupException`` if a frame is not known, or the frames above it lead back to it,
+    - ``ConnectivityException`` if two frames are in two trees,
+    - ``ExtrapolationException`` if an edge between them has no samples around that time.
+    """
 
-    def latest(self, a: str, b: str) -> tuple[Pose, int | None]:
-        """Return the pose of ``b`` in ``a`` at the newest time that all edges between them know, and that time.
+    def __init__(self, cache_time: Any = None) -> None:
+        super().__init__(CACHE_NS if cache_time is None else nanoseconds(cache_time))
+        self._pollers: list[Callable[[], object]] = []
 
-        The time is in nanoseconds, or None where only fixed edges are on the way.
+    def set_transform(self, transform: Any, authority: str = "default_authority") -> bool:
+        """Take a TransformStamped of a moving edge; return False if it was refused."""
+        return not self.insert([_row(transform)], static=False, authority=authority)
 
-        Raises:
-            LookupError: if a frame is not known.
-            ConnectivityError: if they are in two trees.
-            ExtrapolationError: if the edges have no time in common.
+    def set_transform_static(self, transform: Any, authority: str = "default_authority") -> bool:
+        """Take a TransformStamped of a fixed edge; return False if it was refused."""
+        return not self.insert([_row(transform)], static=True, authority=authority)
+
+    def lookup_transform(self, target_frame: str, source_frame: str, time: Any, timeout: Any = 0) -> Any:
+        """Return the pose of ``source_frame`` in ``target_frame`` at a time as a TransformStamped.
+
+        It takes coordinates in the source frame to the target frame. The stamp is the time asked for, or what time 0
+        stands for. With a ``timeout`` it waits so long for the transform to come.
         """
-        up, down = self._path(a.removeprefix("/"), b.removeprefix("/"))
-        stamp = self._common_time([*up, *down])
-        return self._down(up, stamp).inverse() @ self._down(down, stamp), stamp
+        time_ns = nanoseconds(time)
+        if timeout == 0:
+            pose, stamp_ns = self._pose(target_frame, source_frame, time_ns)
+        else:
+            pose, stamp_ns = self._wait(lambda: self._pose(target_frame, source_frame, time_ns), timeout)
+        return transform_stamped(target_frame, source_frame, stamp_ns, pose)
 
-    def behind(self, a: str, b: str) -> str | None:
-        """Return the name of the moving edge between the two whose newest sample is the oldest, or None.
+    def lookup_transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
+        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str,
+        timeout: Any = 0,
+    ) -> Any:  # fmt: skip
+        """Return the pose of the source frame at one time in the target frame at another.
 
-        Raises:
-            LookupError: if a frame is not known.
-            ConnectivityError: if they are in two trees.
+        Between the times ``fixed_frame`` is taken to stand still. The stamp is that of the target.
         """
-        up, down = self._path(a.removeprefix("/"), b.removeprefix("/"))
-        moving = [child for child in (*up, *down) if not self._edges[child].static]
-        if not moving:
-            return None
-        child = min(moving, key=lambda frame: self._edges[frame].stamps[-1])
-        return f"{self._edges[child].parent} → {child}"
-
-    def _path(self, a: str, b: str) -> tuple[list[str], list[str]]:
-        """Return the frames from ``a`` up to below where the two meet, and those from ``b``."""
-        for frame in (a, b):
-            if frame not in self._frames:
-                raise LookupError(self._unknown(frame))
-        up_a, up_b = self._ancestors(a), self._ancestors(b)
-        meeting = next((frame for frame in up_b if frame in up_a), None)
-        if meeting is None:
-            raise ConnectivityError(f"{a} and {b} are in two trees: one begins at {up_a[-1]}, the other at {up_b[-1]}")
-        return up_a[: up_a.index(meeting)], up_b[: up_b.index(meeting)]
-
-    def _unknown(self, frame: str) -> str:
-        near = nearest(frame, sorted(self._frames))
-        return (
-            f"no frame {frame}; did you mean {near}?" if near else f"no frame {frame} among {len(self._frames)} frames"
+        times = nanoseconds(target_time), nanoseconds(source_time)
+        pose, stamp_ns = self._wait(
+            lambda: self._full_pose(target_frame, times[0], source_frame, times[1], fixed_frame), timeout
         )
+        return transform_stamped(target_frame, source_frame, stamp_ns, pose)
 
-    def _ancestors(self, frame: str) -> list[str]:
-        chain = [frame]
-        while frame in self._edges:
-            frame = self._edges[frame].parent
-            if frame in chain:
-                loop = " → ".join([*reversed(chain[chain.index(frame) :]), chain[-1]])
-                raise ConnectivityError(f"the live tree has a loop: {loop}")
-            chain.append(frame)
-        return chain
+    def can_transform(
+        self, target_frame: str, source_frame: str, time: Any, timeout: Any = 0, return_debug_tuple: bool = False  # noqa: FBT001, FBT002 (tf2's)
+    ) -> Any:  # fmt: skip
+        """Return whether ``lookup_transform`` would answer; with ``return_debug_tuple`` also why not."""
+        time_ns = nanoseconds(time)
+        reason = self._reason(lambda: self._pose(target_frame, source_frame, time_ns), timeout)
+        return (not reason, reason) if return_debug_tuple else not reason
 
-    def _common_time(self, children: list[str]) -> int | None:
-        moving = [(child, self._edges[child]) for child in children if not self._edges[child].static]
-        if not moving:
-            return None
-        oldest = min(moving, key=lambda item: item[1].stamps[-1])
-        stamp = oldest[1].stamps[-1]
-        for child, edge in moving:
-            if edge.stamps[0] > stamp:
-                ahead_ms = (edge.stamps[0] - stamp) / 1e6
-                message = (
-                    f"{edge.parent} → {child} begins {ahead_ms:.0f} ms after the last of "
-                    f"{oldest[1].parent} → {oldest[0]}: they have no time in common"
-                )
-                raise ExtrapolationError(message)
-        return stamp
+    def can_transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
+        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str,
+        timeout: Any = 0, return_debug_tuple: bool = False,  # noqa: FBT001, FBT002 (the same)
+    ) -> Any:  # fmt: skip
+        """Return whether ``lookup_transform_full`` would answer; with ``return_debug_tuple`` also why not."""
+        times = nanoseconds(target_time), nanoseconds(source_time)
+        reason = self._reason(
+            lambda: self._full_pose(target_frame, times[0], source_frame, times[1], fixed_frame), timeout
+        )
+        return (not reason, reason) if return_debug_tuple else not reason
 
-    def _down(self, children: list[str], stamp_ns: int | None) -> Pose:
-        """Return the pose of the first frame in the parent of the last."""
-        pose = Pose()
-        for child in children:
-            pose = self._edges[child].pose_at(stamp_ns or 0) @ pose
-        return pose
+    def get_latest_common_time(self, target_frame: str, source_frame: str) -> Any:
+        """Return the newest time that all moving edges between the two have reached; 0 where none moves."""
+        if target_frame == source_frame:
+            return time_of(self._newest_ns(target_frame))
+        with self._lock:
+            return time_of(self._chain(target_frame, source_frame).common_ns())
+
+    def all_frames(self) -> list[FrameInfo]:
+        """Return what is known of each frame, in the order in which they were first heard of."""
+        with self._lock:
+            return [frame_info(name, self._histories.get(name)) for name in self._names]
+
+    def all_frames_as_string(self) -> str:
+        """Return a line for each edge, in tf2's words."""
+        return as_string(self.all_frames())
+
+    def all_frames_as_yaml(self) -> str:
+        """Return each edge with its rate and times, as tf2's ``tf2_frames`` service does."""
+        return as_yaml(self.all_frames())
+
+    def time_jump_callback(self, time_jump: object = None) -> None:  # noqa: ARG002 (what rclpy's clock gives)
+        """Forget all samples of moving edges, since the clock went back."""
+        self.clear()
+
+    def _full_pose(self, target: str, target_ns: int, source: str, source_ns: int, fixed: str) -> tuple[Seven, int]:
+        with self._lock:
+            for frame in (target, source, fixed):
+                self._require(frame)
+            first, _ = self._pose(fixed, source, source_ns)
+            second, stamp_ns = self._pose(target, fixed, target_ns)
+        return unit(product(second, first)), stamp_ns
+
+    def _reason(self, attempt: Callable[[], object], timeout: Any) -> str:
+        try:
+            self._wait(attempt, timeout)
+        except TransformException as error:
+            return str(error)
+        return ""
+
+    def _wait(self, attempt: Callable[[], _Answer], timeout: Any) -> _Answer:
+        """Return the answer as soon as there is one; raise what it raised last when the time is over.
+
+        Where a listener has no thread of its own the caller may be the one who would take its messages, so they are
+        taken here.
+        """
+        end_ns = monotonic_ns() + nanoseconds(timeout)
+        while True:
+            with self._news:
+                try:
+                    return attempt()
+                except InvalidArgumentException:
+                    raise
+                except TransformException:
+                    left_s = (end_ns - monotonic_ns()) / 1e9
+                    if left_s <= 0:
+                        raise
+                self._waiting += 1
+                self._news.wait(min(left_s, _POLL_S) if self._pollers else left_s)
+                self._waiting -= 1
+            for poll in tuple(self._pollers):
+                poll()
 
 
-def interpolated(a: Pose, b: Pose, part: float) -> Pose:
-    """Return the pose that is ``part`` (0 to 1) of the way from ``a`` to ``b``: linear, and spherical for rotations."""
-    x, y, z = (p + (q - p) * part for p, q in zip(a.xyz, b.xyz, strict=True))
-    return Pose((x, y, z), _slerp(a.quat_xyzw, b.quat_xyzw, part))
-
-
-def _slerp(a: Quaternion, b: Quaternion, part: float) -> Quaternion:
-    dot = math.fsum(p * q for p, q in zip(a, b, strict=True))
-    sign, dot = (-1.0, -dot) if dot < 0 else (1.0, dot)
-    angle = math.acos(min(dot, 1.0))
-    if angle < 1e-6:  # noqa: PLR2004 (the chord and the arc agree to the last bit)
-        weights = 1 - part, part
-    else:
-        weights = math.sin((1 - part) * angle) / math.sin(angle), math.sin(part * angle) / math.sin(angle)
-    x, y, z, w = (weights[0] * p + sign * weights[1] * q for p, q in zip(a, b, strict=True))
-    return normalised((x, y, z, w))
-
-
-def _is_sound(pose: Pose) -> bool:
-    if not all(math.isfinite(value) for value in (*pose.xyz, *pose.quat_xyzw)):
-        return False
-    return abs(math.fsum(value * value for value in pose.quat_xyzw) - 1) < DENORMALISED
+def _row(transform: Any) -> Row:
+    header, to, turn = transform.header, transform.transform.translation, transform.transform.rotation
+    stamp = header.stamp
+    return (
+        header.frame_id, transform.child_frame_id, stamp.sec, stamp.nanosec, to.x, to.y, to.z,
+        turn.x, turn.y, turn.z, turn.w,
+    )  # fmt: skip

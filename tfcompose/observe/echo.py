@@ -6,15 +6,15 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.observe.buffer import Buffer, TransformError
-from tfcompose.pose import Pose
-from tfcompose.ros.message import decode
+from tfcompose.observe.buffer import Buffer, TransformException
+from tfcompose.ros.decoder import Decoder
 from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFSubscription, wait
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from tfcompose.pose import Pose
     from tfcompose.ros.stop import Stop
 
 
@@ -43,7 +43,7 @@ def echo(asked: Asked, say: Callable[[Pose, int | None], None], stop: Stop) -> M
     A pose whose time is that of the last one is not new and not given again. Return None after one pose with ``once``,
     or when ``stop`` is requested; else why there was no new one for so long.
     """
-    buffer = Buffer()
+    buffer, decoder = Buffer(), Decoder()
     prefix = f"/{asked.namespace.strip('/')}" if asked.namespace else ""
     with open_node("tfcompose_echo", asked.namespace.strip("/")) as node:
         topics = [(True, f"{prefix}/tf_static"), (False, f"{prefix}/tf")]
@@ -53,13 +53,15 @@ def echo(asked: Asked, say: Callable[[Pose, int | None], None], stop: Stop) -> M
         said_ns: int | None = None
         while not stop.requested:
             wait(node, [subscription for subscription, _ in subscriptions], 0.05, stop)
-            messages += sum(_take(buffer, subscription, static=static) for subscription, static in subscriptions)
+            messages += sum(
+                _take(buffer, decoder, subscription, static=static) for subscription, static in subscriptions
+            )
             now = time.monotonic()
             if now < next_at:
                 continue
             try:
                 pose, stamp_ns = buffer.latest(asked.a, asked.b)
-            except TransformError as error:
+            except TransformException as error:
                 reason = str(error)
             else:
                 if stamp_ns is None or stamp_ns != said_ns:
@@ -74,16 +76,14 @@ def echo(asked: Asked, say: Callable[[Pose, int | None], None], stop: Stop) -> M
     return None
 
 
-def _take(buffer: Buffer, subscription: TFSubscription, *, static: bool) -> int:
+def _take(buffer: Buffer, decoder: Decoder, subscription: TFSubscription, *, static: bool) -> int:
     count = 0
     for received in subscription.take():
         count += 1
         try:
-            transforms = decode(received.data)
+            buffer.insert(decoder.rows(received.data), static=static)
         except ValueError:
             continue
-        for t in transforms:
-            buffer.set(t.parent, t.child, Pose(t.xyz, t.quat_xyzw), t.stamp_ns, static=static)
     return count
 
 

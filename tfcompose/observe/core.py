@@ -1,0 +1,257 @@
+"""What is known of a TF tree over time, in and out as plain numbers: the part of the buffer that needs no messages."""
+
+from __future__ import annotations
+
+from enum import Enum
+from math import isfinite, sqrt
+from threading import Condition, RLock
+from typing import TYPE_CHECKING
+
+from tfcompose.observe import reasons
+from tfcompose.observe.chain import Chain
+from tfcompose.observe.exceptions import (
+    ConnectivityException,
+    ExtrapolationException,
+    InvalidArgumentException,
+    LookupException,
+    TransformException,
+)
+from tfcompose.observe.history import History
+from tfcompose.observe.rotation import IDENTITY, Seven
+from tfcompose.observe.walk import newest_ways, ways_at
+from tfcompose.pose import Pose
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+CACHE_NS = 10_000_000_000
+#: A quaternion whose squared length is off by this much is refused.
+DENORMALISED = 0.01
+# Closer to 1 than this a sum of four squares cannot be told from 1.
+_ROUNDING = 1e-15
+# So many chains are remembered at most.
+_MOST_CHAINS = 4096
+_SECOND_NS = 1_000_000_000
+
+#: One transform: parent, child, seconds, nanoseconds, x y z in metres, quaternion x y z w.
+Row = tuple[str, str, int, int, float, float, float, float, float, float, float]
+
+
+class Refusal(Enum):
+    """Why a transform was not taken; the values are the words of tf2's log."""
+
+    SELF = "TF_SELF_TRANSFORM"
+    NO_CHILD = "TF_NO_CHILD_FRAME_ID"
+    NO_PARENT = "TF_NO_FRAME_ID"
+    NOT_FINITE = "TF_NAN_INPUT"
+    DENORMALISED = "TF_DENORMALIZED_QUATERNION"
+    OLD = "TF_OLD_DATA"
+
+
+class BufferCore:
+    """Takes transforms and answers where one frame is in another; safe to use from several threads.
+
+    Args:
+        cache_ns: how long samples are kept, in nanoseconds before the newest of their edge.
+
+    Raises:
+        ValueError: if the time is negative.
+    """
+
+    def __init__(self, cache_ns: int = CACHE_NS) -> None:
+        if cache_ns < 0:
+            raise ValueError(f"samples cannot be kept for {cache_ns} ns")
+        self.cache_ns = cache_ns
+        self._lock = RLock()
+        self._news = Condition(self._lock)
+        self._waiting = 0
+        self._histories: dict[str, History] = {}
+        self._names: dict[str, None] = {}
+        self._chains: dict[tuple[str, str], Chain] = {}
+        self._mixed: set[str] = set()
+
+    @property
+    def frames(self) -> frozenset[str]:
+        """Every frame that was heard of."""
+        with self._lock:
+            return frozenset(self._names)
+
+    def set(  # noqa: PLR0913 (a transform has that many parts)
+        self, parent: str, child: str, pose: Pose, stamp_ns: int, *, static: bool, authority: str = ""
+    ) -> bool:
+        """Take the pose of ``child`` in ``parent``; return False if tf2 would refuse it."""
+        row = (parent, child, 0, stamp_ns, *pose.xyz, *pose.quat_xyzw)
+        return not self.insert([row], static=static, authority=authority)
+
+    def insert(  # noqa: C901 (fifty thousand times a second: a call for each step would cost as much as the step)
+        self, rows: Iterable[Row], *, static: bool, authority: str = ""
+    ) -> list[tuple[str, Refusal]]:
+        """Take transforms in order; return the child and the reason of each that was refused.
+
+        A leading slash is dropped from names. Not taken is what ``Refusal`` lists, as tf2 says it in its log; infinite
+        values count as not a number. Quaternions are normalised.
+        """
+        refused: list[tuple[str, Refusal]] = []
+        with self._lock:
+            for parent, child, sec, nsec, x, y, z, qx, qy, qz, qw in rows:
+                if parent[:1] == "/":
+                    parent = parent[1:]  # noqa: PLW2901 (tf2 strips it as well)
+                if child[:1] == "/":
+                    child = child[1:]  # noqa: PLW2901 (the same)
+                squared = qx * qx + qy * qy + qz * qz + qw * qw
+                off = squared - 1.0
+                if not (
+                    -DENORMALISED < off < DENORMALISED and isfinite(x + y + z) and parent and child and child != parent
+                ):
+                    reason = _refusal(parent, child, (x, y, z, qx, qy, qz, qw))
+                    if reason:
+                        refused.append((child, reason))
+                        continue
+                if not -_ROUNDING < off < _ROUNDING:
+                    scale = 1 / sqrt(squared)
+                    qx, qy, qz, qw = qx * scale, qy * scale, qz * scale, qw * scale  # noqa: PLW2901 (to unit length)
+                history = self._histories.get(child)
+                if history is None or history.static is not static:
+                    history = self._new_history(child, static=static)
+                outcome = history.insert(sec * _SECOND_NS + nsec, parent, (x, y, z, qx, qy, qz, qw), self.cache_ns)
+                if outcome == "old":
+                    refused.append((child, Refusal.OLD))
+                    continue
+                if outcome == "changed":
+                    self._changed(history)
+                if outcome == "changed" or history.mixed:
+                    self._names.setdefault(child)
+                    self._names.setdefault(parent)
+                history.authority = authority
+            if self._waiting:
+                self._news.notify_all()
+        return refused
+
+    def lookup(self, target: str, source: str, stamp_ns: int = 0) -> tuple[Pose, int]:
+        """Return the pose of ``source`` in ``target`` at a time, and that time, both in nanoseconds since the epoch.
+
+        Time 0 is the newest that all moving edges between them have reached; where none moves it stays 0. The
+        quaternion's w is not negative. A frame in itself is the identity, whether it is known or not.
+
+        Raises:
+            InvalidArgumentException: if a name is empty or starts with a slash.
+            LookupException: if a frame is not known.
+            ConnectivityException: if they are in two trees.
+            ExtrapolationException: if an edge between them has no samples around that time.
+        """
+        (x, y, z, *quat), stamp_ns = self._pose(target, source, stamp_ns)
+        return Pose((x, y, z), (quat[0], quat[1], quat[2], quat[3])), stamp_ns
+
+    def latest(self, target: str, source: str) -> tuple[Pose, int | None]:
+        """Return what ``lookup`` does for time 0; the time is None where only fixed edges are on the way."""
+        pose, stamp_ns = self.lookup(target, source)
+        return pose, stamp_ns or None
+
+    def behind(self, target: str, source: str) -> str | None:
+        """Return the moving edge between the two whose newest sample is the oldest, as "parent → child", or None.
+
+        Raises:
+            LookupException: if a frame is not known.
+            ConnectivityException: if they are in two trees.
+        """
+        with self._lock:
+            moving = self._chain(target, source).moving if target != source else []
+            if not moving:
+                return None
+            last = min(moving, key=lambda history: history.newest_ns)
+            return f"{last.parent} → {last.child}"
+
+    def clear(self) -> None:
+        """Forget all samples of moving edges; fixed ones and the names stay, as in tf2."""
+        with self._lock:
+            for history in self._histories.values():
+                if not history.static:
+                    history.clear()
+            self._chains.clear()
+            self._mixed.clear()
+
+    def can_lookup(self, target: str, source: str, stamp_ns: int = 0) -> str:
+        """Return nothing if ``lookup`` would answer, else why it would not."""
+        try:
+            self._pose(target, source, stamp_ns)
+        except TransformException as error:
+            return str(error)
+        return ""
+
+    def _pose(self, target: str, source: str, stamp_ns: int) -> tuple[Seven, int]:
+        """Return what ``lookup`` does, as numbers."""
+        with self._lock:
+            if target == source:
+                return IDENTITY, stamp_ns or self._newest_ns(target)
+            chain = self._chains.get((target, source)) or self._chain(target, source, stamp_ns)
+            if chain.fixed is not None:
+                return chain.fixed, stamp_ns
+            at_ns = stamp_ns or chain.common_ns()
+            if self._mixed and at_ns:
+                chain = Chain(*ways_at(self._histories, target, source, at_ns))
+            pose = chain.at(at_ns)
+            if pose is None:
+                raise ExtrapolationException(self._why_not(chain, target, source, stamp_ns))
+            return pose, at_ns
+
+    def _chain(self, target: str, source: str, stamp_ns: int = 0) -> Chain:
+        """Return the chain between the two; the one by newest parents, if there is any, is remembered."""
+        self._require(target)
+        self._require(source)
+        try:
+            chain = Chain(*newest_ways(self._histories, target, source))
+        except (ConnectivityException, LookupException):
+            if not stamp_ns:
+                raise
+            return Chain(*ways_at(self._histories, target, source, stamp_ns))
+        if len(self._chains) >= _MOST_CHAINS:
+            self._chains.clear()
+        self._chains[target, source] = chain
+        return chain
+
+    def _require(self, frame: str) -> None:
+        if not frame or frame[0] == "/":
+            raise InvalidArgumentException(reasons.unusable_name(frame))
+        if frame not in self._names:
+            raise LookupException(reasons.unknown_frame(frame, self._names))
+
+    def _why_not(self, chain: Chain, target: str, source: str, stamp_ns: int) -> str:
+        """Return why the chain has no pose at that time."""
+        if not stamp_ns:
+            behind = min(chain.moving, key=lambda history: history.newest_ns)
+            ahead = max(chain.moving, key=lambda history: history.oldest_ns)
+            return reasons.no_common_time(ahead, behind)
+        try:
+            ways_at(self._histories, target, source, stamp_ns)
+        except TransformException as error:
+            return str(error)
+        return f"{source} has no pose in {target} at {reasons.seconds(stamp_ns)}"
+
+    def _new_history(self, child: str, *, static: bool) -> History:
+        """Return the samples of a frame that is new, or fixed from now on, or moving from now on."""
+        history = self._histories[child] = History(child, static=static)
+        self._mixed.discard(child)
+        return history
+
+    def _changed(self, history: History) -> None:
+        """Forget the chains, since an edge is new, or has another fixed pose or parent."""
+        self._chains.clear()
+        (self._mixed.add if history.mixed else self._mixed.discard)(history.child)
+
+    def _newest_ns(self, frame: str) -> int:
+        history = self._histories.get(frame)
+        return history.newest_ns if history and not history.static and len(history) else 0
+
+
+def _refusal(parent: str, child: str, pose: Seven) -> Refusal | None:
+    """Return why a transform is not taken; as in tf2 the first that holds counts."""
+    if parent == child:
+        return Refusal.SELF
+    if not child:
+        return Refusal.NO_CHILD
+    if not parent:
+        return Refusal.NO_PARENT
+    if not all(map(isfinite, pose)):
+        return Refusal.NOT_FINITE
+    x, y, z, w = pose[3:]
+    return None if abs(x * x + y * y + z * z + w * w - 1) < DENORMALISED else Refusal.DENORMALISED

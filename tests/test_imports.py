@@ -43,6 +43,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 ONLY_IN: dict[str, set[str]] = {
     "yaml": {"load"},
     "xacro": {"cli"},
+    "trimesh": {"cli"},
     "rclpy": {"ros"},
     "tf2_msgs": {"ros"},
     "geometry_msgs": {"ros"},

@@ -102,12 +102,16 @@ CODES = {
     "TF710": "impossible_inertia",
     "TF711": "inertia_off_from_shape",
     "TF712": "root_link_with_inertia",
-    # a URDF that somebody else wrote
+    "TF713": "material_with_two_colours",
+    "TF714": "material_without_colour",
+    # a URDF that somebody else wrote; meshes and packages
     "TF720": "unknown_urdf_word",
     "TF721": "bad_urdf_value",
     "TF722": "urdf_name_twice",
     "TF723": "mesh_not_found",
     "TF724": "package_not_found",
+    "TF725": "mesh_without_volume",
+    "TF726": "mesh_in_no_package",
     # processes, guard, live tree
     "TF801": "foreign_publisher",
     "TF802": "second_parent_seen",
@@ -129,4 +133,5 @@ CODES = {
     "TF902": "bad_plan",
     "TF903": "rule_crashed",
     "TF904": "no_xacro",
+    "TF905": "no_trimesh",
 }

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from tfcompose.check import apply, check, levelled, unknown_rules, with_edits
 from tfcompose.diagnostic import Allow, Diagnostic, RejectedError, Span
 from tfcompose.load import Source, composed, load, with_includes
-from tfcompose.resolve import Library, resolve
+from tfcompose.resolve import Disk, Library, resolve
 from tfcompose.validate import validate
 
 if TYPE_CHECKING:
@@ -50,32 +50,35 @@ def compile_robot(  # noqa: PLR0913 (text, and what is laid over it)
     *,
     overlays: Sequence[Source] = (),
     read: Callable[[str], str] | None = None,
+    disk: Disk | None = None,
 ) -> Compiled:
     """Return the robot that the text describes with profiles and overlays laid over it, and all findings, by place.
 
-    ``read`` gives the text of a file that is included or holds a calibration; without it nothing can be.
+    ``read`` gives the text of a file that is included or holds a calibration; without it nothing can be. ``disk`` says
+    which files and packages there are; without it no mesh is looked for.
     """
     try:
         source = load(text, file)
         source = with_includes(source, read) if read else source
     except RejectedError as error:
         return Compiled(None, error.diagnostics)
-    return compile_source(source, library, profiles, overlays, read)
+    return compile_source(source, library, profiles, overlays, read, disk)
 
 
-def compile_source(
+def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     source: Source,
     library: Library,
     profiles: Sequence[str] = (),
     overlays: Sequence[Source] = (),
     read: Callable[[str], str] | None = None,
+    disk: Disk | None = None,
 ) -> Compiled:
     """Return what ``compile_robot`` does, from text that has been loaded, with what it includes."""
     try:
         validated = validate(composed(source, profiles, overlays), source.data.get("profiles"))
     except RejectedError as error:
         return Compiled(None, error.diagnostics)
-    resolved = resolve(validated, library, read)
+    resolved = resolve(validated, library, read, disk)
     later = [*resolved.found, *check(resolved.robot)]
     source = validated.source
     plain = not (profiles or overlays)

@@ -30,21 +30,43 @@ def is_optical(frame: str) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
+class Asset:
+    """A file of triangles or an image, as it was addressed and where it is.
+
+    ``path`` is where it was found, or where it has to be: absolute, or relative like the robot's own file; empty where
+    nobody here can say. ``package`` and ``inside`` are the package that it is in and the path there, if it is in one.
+    """
+
+    uri: str
+    at: Span | None = None
+    path: str = ""
+    package: str = ""
+    inside: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Material:
-    """A colour with a name; red, green, blue and opacity from 0 to 1."""
+    """A colour (red, green, blue and opacity from 0 to 1) or a texture, with a name."""
 
     name: str
-    rgba: tuple[float, float, float, float]
+    rgba: tuple[float, float, float, float] | None = None
+    texture: Asset | None = None
+    at: Span | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A primitive and its pose in the link. ``size``: box x, y, z · cylinder radius, length · sphere radius."""
+    """A body's shape and its pose in the link.
 
-    kind: Literal["box", "cylinder", "sphere"]
+    ``size``: box x, y, z · cylinder and capsule radius, length (a capsule's without its ends) · sphere radius · mesh
+    its scale along x, y, z.
+    """
+
+    kind: Literal["box", "cylinder", "sphere", "capsule", "mesh"]
     size: tuple[float, ...]
     pose: Pose
     material: Material | None = None
+    mesh: Asset | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,14 +13,18 @@ import pytest
 
 from tfcompose.check import RULES, check, idle
 from tfcompose.cli.compiling import library
+from tfcompose.cli.disk import moments as measured
 from tfcompose.cli.terminal import read_text
 from tfcompose.codes import CODES
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.diagnostic import Diagnostic, Span
+from tfcompose.resolve import Disk
 
 if TYPE_CHECKING:
     from tfcompose.check import Rule
     from tfcompose.model import Robot
+    from tfcompose.pose import Vector
+    from tfcompose.resolve.moments import Moments
 
 SPECS = sorted((Path(__file__).parent / "specs").glob("*.yaml"))
 PACKAGE = Path(__file__).parents[2] / "tfcompose"
@@ -28,7 +33,9 @@ MARK = re.compile(r"# expect(?:-with (?P<profile>\w+))?: (?P<codes>TF\d{3}(?: TF
 #: Codes that no line of a robot file can provoke; each has a test of its own elsewhere.
 NOT_OF_A_LINE = {"TF001", "TF002", "TF008", "TF009", "TF015", "TF016", "TF903"}
 #: Codes of a URDF that somebody else wrote: tests/cli/test_lint_urdf.py.
-NOT_OF_A_LINE |= {"TF018", "TF720", "TF721", "TF722", "TF723", "TF724"}
+NOT_OF_A_LINE |= {"TF018", "TF720", "TF721", "TF722"}
+#: Of a command line: tests/cli/test_mesh.py.
+NOT_OF_A_LINE |= {"TF726"}
 #: Codes of the running robot, of its plan and of its surroundings.
 LIVE = {code for code in CODES if code.startswith(("TF8", "TF9"))} - {"TF812", "TF813"}
 
@@ -47,7 +54,14 @@ def compiled(spec: Path, *profiles: str) -> Compiled:
     def read(name: str) -> str:
         return read_text(str(spec.parent / name))
 
-    return compile_robot(spec.read_text("utf-8"), spec.name, library(), profiles, read=read)
+    files = Disk(read, lambda name: (spec.parent / name).is_file(), lambda name: (spec.parent / name).is_dir())
+    return compile_robot(
+        spec.read_text("utf-8"), spec.name, library(), profiles, read=read, disk=replace(files, moments=moments)
+    )
+
+
+def moments(name: str, scale: Vector) -> Moments:
+    return measured(str(SPECS[0].parent / name), scale)
 
 
 def places(found: tuple[Diagnostic, ...]) -> set[tuple[int, str]]:

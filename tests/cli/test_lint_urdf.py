@@ -15,11 +15,13 @@ from hypothesis import strategies as st
 
 from tfcompose.cli import urdf
 from tfcompose.cli.compiling import library
+from tfcompose.cli.disk import disk
 from tfcompose.cli.urdf import CODES, lint_urdf
 from tfcompose.compile import compile_robot
 from tfcompose.diagnostic import Diagnostic, RejectedError
 from tfcompose.emit import emit
 from tfcompose.load.urdf import load_xml
+from tfcompose.resolve.packages import Packages
 from tfcompose.resolve.urdf import robot_of_urdf
 
 ROOT = Path(__file__).parents[2]
@@ -135,15 +137,21 @@ def test_a_package_is_looked_for_where_ros_looks(tmp_path: Path, monkeypatch: py
     mesh.parent.mkdir(parents=True)
     mesh.touch()
     monkeypatch.setenv("AMENT_PREFIX_PATH", f"/nowhere:{tmp_path}")
-    assert urdf.missing_mesh("package://mine/meshes/a.stl", tmp_path) is None
-    missing = urdf.missing_mesh("package://mine/b.stl", tmp_path)
-    assert missing
-    assert (missing[0], str(tmp_path / "share/mine/b.stl") in missing[2]) == ("TF723", True)
-    other = urdf.missing_mesh("package://other/b.stl", tmp_path)
+
+    def missing(name: str) -> tuple[str, str, str] | None:
+        return urdf.missing_mesh(name, str(tmp_path / "a.urdf"), Packages(disk()))
+
+    assert missing("package://mine/meshes/a.stl") is None
+    assert missing(f"file://{mesh}") is None
+    assert missing("share/mine/meshes/a.stl") is None
+    gone = missing("package://mine/b.stl")
+    assert gone
+    assert (gone[0], str(tmp_path / "share/mine/b.stl") in gone[2]) == ("TF723", True)
+    other = missing("package://other/b.stl")
     assert other
     assert (other[0], "/nowhere/share/other" in other[2]) == ("TF724", True)
     monkeypatch.delenv("AMENT_PREFIX_PATH")
-    unset = urdf.missing_mesh("package://mine/meshes/a.stl", tmp_path)
+    unset = missing("package://mine/meshes/a.stl")
     assert unset
     assert "AMENT_PREFIX_PATH is empty" in unset[2]
 

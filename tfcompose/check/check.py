@@ -51,6 +51,8 @@ from tfcompose.check.rules.tf709_inertia_missing import inertia_missing
 from tfcompose.check.rules.tf710_impossible_inertia import impossible_inertia
 from tfcompose.check.rules.tf711_inertia_off_from_shape import inertia_off_from_shape
 from tfcompose.check.rules.tf712_root_link_with_inertia import root_link_with_inertia
+from tfcompose.check.rules.tf713_material_with_two_colours import material_with_two_colours
+from tfcompose.check.rules.tf714_material_without_colour import material_without_colour
 from tfcompose.check.rules.tf812_start_order_loop import start_order_loop
 from tfcompose.check.rules.tf815_process_without_role import process_without_role
 from tfcompose.diagnostic import Diagnostic, Severity, Span, finding
@@ -125,6 +127,8 @@ RULES: tuple[Rule, ...] = (
     Rule("TF710", impossible_inertia, WARNING),
     Rule("TF711", inertia_off_from_shape, WARNING),
     Rule("TF712", root_link_with_inertia, WARNING),
+    Rule("TF713", material_with_two_colours, WARNING),
+    Rule("TF714", material_without_colour),
     Rule("TF812", start_order_loop),
     Rule("TF815", process_without_role, WARNING),
 )

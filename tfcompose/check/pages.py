@@ -164,12 +164,21 @@ Numbers are SI: m, rad, kg. Readers refuse the robot, take a default without a w
     "TF722": """Two links or two joints of a URDF have one name.
 
 Readers refuse the robot or keep one of the two. Often a xacro macro was used twice with one prefix.""",
-    "TF723": """A mesh file is not there.
+    "TF723": """The file of a mesh or a texture is not there.
 
-The body does not appear, and the collision with it is not checked.""",
-    "TF724": """A mesh's package is not installed here.
+The body does not appear, and the collision with it is not checked. A relative path begins at the file that writes
+it.""",
+    "TF724": """A package is not to be found here.
 
-It was looked for in share/PACKAGE of each folder in AMENT_PREFIX_PATH. Source the workspace's setup file first.""",
+It was looked for where packages: says, then in share/PACKAGE of each folder in AMENT_PREFIX_PATH. Source the
+workspace's setup file first, or name the folder: packages: {my_robot_description: ../description}.""",
+    "TF725": """A mass is to be spread over a mesh that has no volume.
+
+Only a closed mesh has one. Close it, give a closed collision shape (the tensor is computed from collision shapes where
+there are any), or give mass and inertia from CAD.""",
+    "TF726": """A mesh is to be addressed by package, and is in none.
+
+build --mesh package needs a package.xml in a folder above the file, or an address that begins with package://.""",
     "TF801": """A node publishes an edge that another process owns.
 
 tf2 takes whatever came last, so the frame jumps between two values. The finding names the node. End it, or switch its
@@ -215,6 +224,9 @@ Build it again.""",
     "TF904": """A xacro file is to be read, and xacro is not installed.
 
 It comes with ROS, and from PyPI: pip install xacro.""",
+    "TF905": """An inertia is to be computed from a mesh, and trimesh is not installed.
+
+pip install 'tfcompose[mesh]', or give the inertia.""",
     "TF903": """A rule crashed.
 
 The other rules went on. This is a fault of tfcompose; please report it with the robot file.""",

@@ -12,11 +12,15 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.compiling import robot_or_code
 from tfcompose.cli.options import add_file, add_variant
 from tfcompose.cli.output import write_all
-from tfcompose.cli.terminal import UNREADABLE, complain
-from tfcompose.emit import emit
+from tfcompose.cli.terminal import UNREADABLE, complain, print_findings
+from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.emit import Target, emit, unaddressed
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
+
+    from tfcompose.emit import Form
+    from tfcompose.model import Asset
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -24,6 +28,10 @@ def arguments(parser: ArgumentParser) -> None:
     add_file(parser)
     add_variant(parser)
     parser.add_argument("-o", "--output", metavar="DIR", help="default: build/ROBOT")
+    parser.add_argument(
+        "--mesh", choices=("package", "file", "relative"), default="as-written",
+        help="how meshes are addressed: package://…, file:///…, or relative to DIR; default: as they are written",
+    )  # fmt: skip
 
 
 def run(arguments: Namespace) -> int:
@@ -41,8 +49,13 @@ def build(arguments: Namespace) -> tuple[Path, list[str]] | int:
     robot = robot_or_code(arguments.file, arguments)
     if isinstance(robot, int):
         return robot
-    written = emit(robot)
+    form: Form = getattr(arguments, "mesh", "as-written")
+    lost = [_no_address(asset, form) for asset in unaddressed(robot, form)]
+    if lost:
+        print_findings(lost, sys.stderr)
+        return 1
     folder = Path(arguments.output) if arguments.output else Path("build") / robot.name
+    written = emit(robot, Target(form, folder.as_posix(), Path.cwd().as_posix()))
     try:
         write_all(folder, written)
     except OSError as error:
@@ -50,3 +63,11 @@ def build(arguments: Namespace) -> tuple[Path, list[str]] | int:
         complain(f"nothing was written to {folder}: {error.strerror}{where}")
         return UNREADABLE
     return folder, [file.path for file in written]
+
+
+def _no_address(asset: Asset, form: Form) -> Diagnostic:
+    """Return the finding that a file cannot be addressed as the command line asks for."""
+    if form != "package":
+        return finding("TF724", f"{asset.uri} was not found, and has no path", asset.at, help="build without --mesh")
+    advice = "a folder with a package.xml above it, packages: {name: FOLDER} and package://name/…, or no --mesh"
+    return finding("TF726", f"{asset.uri} is in no package", asset.at, help=advice)

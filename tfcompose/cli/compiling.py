@@ -6,6 +6,7 @@ import os
 import sys
 from typing import TYPE_CHECKING
 
+from tfcompose.cli.disk import disk
 from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
 from tfcompose.compile import compile_robot
 from tfcompose.diagnostic import RejectedError
@@ -46,7 +47,7 @@ def robot_or_code(file: str, arguments: Namespace) -> Robot | int:
     try:
         overlays = overlays_of(arguments)
         compiled = compile_robot(
-            read_text(file), file, library(), arguments.profiles, overlays=overlays, read=read_text
+            read_text(file), file, library(), arguments.profiles, overlays=overlays, read=read_text, disk=disk()
         )
         found = compiled.found
     except RejectedError as error:

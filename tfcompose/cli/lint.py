@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from tfcompose import __version__
 from tfcompose.check import idle
 from tfcompose.cli.compiling import library, overlays_of
+from tfcompose.cli.disk import disk
 from tfcompose.cli.options import DEFAULT_FILE, add_variant
 from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
 from tfcompose.compile import compile_source, profiles_of
@@ -137,13 +138,13 @@ def lint_file(
     except RejectedError as error:
         return list(error.diagnostics)
     if arguments.profiles or overlays:
-        return list(compile_source(source, presets, arguments.profiles, overlays, read).found)
-    alone = compile_source(source, presets, read=read)
+        return list(compile_source(source, presets, arguments.profiles, overlays, read, disk()).found)
+    alone = compile_source(source, presets, read=read, disk=disk())
     found, used, looked = list(alone.found), set(alone.used), alone.robot is not None
     for profile in profiles_of(source):
         note = Note(f"with --profile {profile}")
         known = {(one.code, one.message, one.span) for one in found}
-        variant = compile_source(source, presets, [profile], read=read)
+        variant = compile_source(source, presets, [profile], read=read, disk=disk())
         used |= variant.used
         looked = looked and variant.robot is not None
         found += [

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING
-from urllib.parse import unquote, urlparse
 
 from tfcompose.check import apply, check, idle
+from tfcompose.cli.disk import disk
 from tfcompose.cli.terminal import read_text
 from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
 from tfcompose.load.comments import allows_in_xml
 from tfcompose.load.urdf import load_xml
+from tfcompose.resolve.packages import Packages
 from tfcompose.resolve.urdf import robot_of_urdf
 
 if TYPE_CHECKING:
@@ -43,7 +42,8 @@ def lint_urdf(file: str) -> list[Diagnostic]:
     """Return what is wrong with the file, by place. A xacro file is expanded, and places are those of the result."""
     try:
         name, text = (f"{file} (expanded)", expanded(file)) if file.endswith(".xacro") else (file, read_text(file))
-        robot, found = robot_of_urdf(load_xml(text, name), name, lambda mesh: missing_mesh(mesh, Path(file).parent))
+        packages = Packages(disk())
+        robot, found = robot_of_urdf(load_xml(text, name), name, lambda mesh: missing_mesh(mesh, file, packages))
     except RejectedError as error:
         return list(error.diagnostics)
     allows = allows_in_xml(text, name)
@@ -95,27 +95,7 @@ def _raise_comments(node: Any) -> None:
         over.parentNode.insertBefore(child, over)
 
 
-def missing_mesh(name: str, folder: Path) -> tuple[str, str, str] | None:
+def missing_mesh(name: str, file: str, packages: Packages) -> tuple[str, str, str] | None:
     """Return code, message and advice about a mesh file that is not there, or None."""
-    parsed = urlparse(name)
-    if parsed.scheme == "package":
-        return _missing_in_package(parsed.netloc, unquote(parsed.path).lstrip("/"))
-    if parsed.scheme not in {"", "file"}:
-        return None  # model:// and http:// are for others to resolve
-    path = Path(unquote(parsed.path) if parsed.scheme else name)
-    where = path if path.is_absolute() else folder / path
-    if "\0" in name or not where.is_file():
-        return "TF723", f"no mesh {name}", f"looked for {where}"
-    return None
-
-
-def _missing_in_package(package: str, rest: str) -> tuple[str, str, str] | None:
-    prefixes = [prefix for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix]
-    folders = [Path(prefix) / "share" / package for prefix in prefixes]
-    found = next((folder for folder in folders if folder.is_dir()), None)
-    if found is None:
-        looked = f"looked in {', '.join(map(str, folders))}" if folders else "AMENT_PREFIX_PATH is empty"
-        return "TF724", f"no package {package}", f"{looked}; source the workspace's setup file"
-    if not (found / rest).is_file():
-        return "TF723", f"no mesh {rest} in {package}", f"looked for {found / rest}"
-    return None
+    wrong = packages.asset(name, Span(file))[1]
+    return (wrong.code, wrong.message, wrong.help) if wrong else None

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from tfcompose.emit.final import with_final_names
 from tfcompose.emit.params import params_file
 from tfcompose.emit.plan import plan_of
+from tfcompose.emit.target import AS_WRITTEN, Target
 from tfcompose.emit.tree import tree
 from tfcompose.emit.urdf import urdfs
 from tfcompose.planfile import write_plan
@@ -24,15 +25,18 @@ class File:
     text: str
 
 
-def emit(robot: Robot) -> tuple[File, ...]:
-    """Return the robot's files; the same robot gives the same bytes. There must be no errors in it."""
+def emit(robot: Robot, target: Target = AS_WRITTEN) -> tuple[File, ...]:
+    """Return the robot's files; the same robot gives the same bytes. There must be no errors in it.
+
+    ``target`` says where they are written and how they address meshes.
+    """
     live = with_final_names(robot)
     params = tuple(
         File(f"params/{process.name}.yaml", params_file({n.name: n.params for n in process.nodes if n.params}))
         for process in robot.processes
         if process.kind == "run" and any(node.params for node in process.nodes)
     )
-    whole, stock = urdfs(robot)
+    whole, stock = urdfs(robot, target)
     return (
         File("plan.json", write_plan(plan_of(live))),
         File("robot.full.urdf", whole),

@@ -8,35 +8,37 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tfcompose.emit.bodies import link_lines, origin
 from tfcompose.emit.markup import quoted
-from tfcompose.emit.numbers import clean_rpy, clean_tensor, clean_xyz, number, numbers
+from tfcompose.emit.numbers import number, numbers
+from tfcompose.emit.target import AS_WRITTEN
 from tfcompose.model import JOINTS, STATIC
-from tfcompose.pose import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.model import Edge, Inertial, Joint, Link, Robot, Shape
+    from tfcompose.emit.target import Target
+    from tfcompose.model import Edge, Joint, Robot
 
 
-def urdf(robot: Robot, *, full: bool) -> str:
+def urdf(robot: Robot, *, full: bool, target: Target = AS_WRITTEN) -> str:
     """Return the URDF of everything below ``robot.base``, which must be there, in a right tree.
 
     With ``full`` it holds every edge as it is, whoever publishes it. Without, it is for a stock robot_state_publisher:
-    edges of other owners are floating joints, which that node leaves alone.
+    edges of other owners are floating joints, which that node leaves alone. ``target`` says how files are addressed.
     """
-    whole, stock = urdfs(robot)
+    whole, stock = urdfs(robot, target)
     return whole if full else stock
 
 
-def urdfs(robot: Robot) -> tuple[str, str]:
+def urdfs(robot: Robot, target: Target = AS_WRITTEN) -> tuple[str, str]:
     """Return both: with every edge as it is, and for a stock robot_state_publisher. They differ in few joints."""
     if robot.base is None:
         raise ValueError(f"{robot.name} has no base")
     edges = list(_below(robot.base, robot.children()))
     links = ['<?xml version="1.0"?>', f"<robot name={quoted(robot.name)}>"]
     for frame in [robot.base, *(edge.child for edge in edges)]:
-        links += _link(frame, robot.links.get(frame))
+        links += link_lines(frame, robot.links.get(frame), target)
     whole, stock = list(links), links
     for edge, name in zip(edges, _joint_names(edges), strict=True):
         joint = _joint(edge, name, _kind(edge))
@@ -53,55 +55,6 @@ def _below(root: str, children: dict[str, list[Edge]]) -> Iterator[Edge]:
         edge = waiting.pop()
         yield edge
         waiting += reversed(children.get(edge.child, []))
-
-
-def _link(name: str, link: Link | None) -> list[str]:
-    body: list[str] = []
-    if link and link.inertial:
-        body += _inertial(link.inertial)
-    for shape in link.visuals if link else ():
-        body += _shape("visual", shape)
-    for shape in link.collisions if link else ():
-        body += _shape("collision", shape)
-    if not body:
-        return [f"  <link name={quoted(name)}/>"]
-    return [f"  <link name={quoted(name)}>", *body, "  </link>"]
-
-
-def _inertial(inertial: Inertial) -> list[str]:
-    named = zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), clean_tensor(inertial.tensor), strict=True)
-    tensor = " ".join(f'{name}="{number(value)}"' for name, value in named)
-    return [
-        "    <inertial>",
-        *_origin(inertial.pose, "      "),
-        f'      <mass value="{number(inertial.mass)}"/>',
-        f"      <inertia {tensor}/>",
-        "    </inertial>",
-    ]
-
-
-def _shape(tag: str, shape: Shape) -> list[str]:
-    if shape.kind == "box":
-        geometry = f'<box size="{numbers(shape.size)}"/>'
-    elif shape.kind == "cylinder":
-        geometry = f'<cylinder radius="{number(shape.size[0])}" length="{number(shape.size[1])}"/>'
-    else:
-        geometry = f'<sphere radius="{number(shape.size[0])}"/>'
-    material = []
-    if shape.material and tag == "visual":
-        colour = f'<color rgba="{numbers(shape.material.rgba)}"/>'
-        material = [f"      <material name={quoted(shape.material.name)}>{colour}</material>"]
-    origin = _origin(shape.pose, "      ")
-    return [f"    <{tag}>", *origin, f"      <geometry>{geometry}</geometry>", *material, f"    </{tag}>"]
-
-
-def _origin(pose: Pose, indent: str) -> list[str]:
-    if pose == _AT_HOME:
-        return []
-    return [f'{indent}<origin xyz="{numbers(clean_xyz(pose.xyz))}" rpy="{numbers(clean_rpy(pose.quat_xyzw))}"/>']
-
-
-_AT_HOME = Pose()
 
 
 def _joint_names(edges: list[Edge]) -> list[str]:
@@ -128,7 +81,7 @@ def _joint(edge: Edge, name: str, kind: str) -> list[str]:
         f'  <joint name={quoted(name)} type="{kind}">',
         f"    <parent link={quoted(edge.parent)}/>",
         f"    <child link={quoted(edge.child)}/>",
-        *_origin(edge.pose, "    "),
+        *origin(edge.pose, "    "),
     ]
     if edge.joint and kind != "floating":
         lines += _motion(edge.joint)

@@ -23,7 +23,8 @@ COMMANDS = (
     *(frozenset({"launch", key}) for key in ("package", "executable")),
 )
 READY = frozenset({"edges", "topic", "service", "lifecycle", "log", "exit", "time"})
-SHAPES = frozenset({"box", "cylinder", "sphere", "mesh"})
+SHAPES = frozenset({"box", "cylinder", "sphere", "capsule", "mesh"})
+MASSES = frozenset({"mass", "density"})
 SIMULATIONS = frozenset({"circle", "fixed", "joints"})
 
 _POSES: tuple[tuple[str, ...], ...] = (
@@ -49,6 +50,7 @@ CHOICES: tuple[tuple[tuple[str, ...], frozenset[str]], ...] = (
     (("processes", "*", "simulate"), SIMULATIONS),
     (("links", "*", "visual"), SHAPES),
     (("links", "*", "collision"), SHAPES),
+    (("links", "*", "inertial"), MASSES),
 )
 
 

@@ -1,118 +1,169 @@
-"""Bodies: shapes, and the inertia that follows from them.
-
-Moments of solid primitives about their centre of mass: box m/12 (b² + c²), cylinder along z m/12 (3r² + l²) and
-m r²/2, sphere 2/5 m r². Several shapes share the mass by volume and are added with the parallel axis theorem.
-"""
+"""Bodies: shapes, colours, the files of meshes, and the inertia that follows from shapes."""
 
 from __future__ import annotations
 
-import math
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+from tfcompose.diagnostic import Diagnostic, finding
 from tfcompose.model import Inertial, Link, Material, Shape
-from tfcompose.pose import Pose, matrix_from_quat, normalised
-from tfcompose.resolve.poses import pose_of
+from tfcompose.pose import Pose
+from tfcompose.resolve.moments import Moments, Tensor, joined, of_primitive
+from tfcompose.resolve.packages import Packages, UnmeasurableError
+from tfcompose.resolve.poses import pose_of, rotation_of
 
 if TYPE_CHECKING:
     from tfcompose.diagnostic import Span
-    from tfcompose.pose import Matrix, Vector
-    from tfcompose.validate import spec
+    from tfcompose.load import Path, Source
+    from tfcompose.validate import bodies as said
 
-Tensor = tuple[float, float, float, float, float, float]
-
-
-def link_of(name: str, body: spec.LinkSpec, at: Span) -> Link:
-    """Return the link with its shapes and, where it has a mass, its inertia."""
-    visuals = tuple(shape_of(shape) for shape in body.visual if kind_of(shape))
-    collisions = tuple(shape_of(shape) for shape in body.collision if kind_of(shape))
-    inertial = _inertial(body.inertial, visuals, collisions, at) if body.inertial else None
-    return Link(name, at, visuals, collisions, inertial)
+FORMS = ("box", "cylinder", "sphere", "capsule", "mesh")
 
 
-def kind_of(shape: spec.Shape) -> str | None:
-    """Return which shape is given, or None."""
-    return next((kind for kind in ("box", "cylinder", "sphere") if getattr(shape, kind)), None)
+@dataclass(slots=True)
+class Bodies:
+    """Makes links of what is written; ``found`` holds what is wrong with the files of meshes and textures."""
+
+    source: Source
+    packages: Packages = field(default_factory=Packages)
+    found: list[Diagnostic] = field(default_factory=list)
+
+    def link(self, name: str, body: said.LinkSpec) -> Link:
+        """Return the link with its shapes and, where it has a mass, its inertia."""
+        at: Path = ("links", name)
+        visuals = self._shapes(body.visual, (*at, "visual"))
+        same = self.source.data["links"][name].get("collision") == "same"
+        collisions = visuals if same else self._shapes(body.collision, (*at, "collision"))
+        place = self.source.at_key(at)
+        inertial = None
+        if body.inertial:
+            inertial = self._inertial(body.inertial, visuals, collisions, (*at, "inertial"))
+        return Link(name, place, visuals, collisions, inertial)
+
+    def shape(self, shape: said.Shape, at: Path) -> Shape:
+        """Return the shape, which must have a form."""
+        material = self._material(shape.material, (*at, "material")) if shape.material else None
+        pose = pose_of(shape)
+        if shape.box:
+            return Shape("box", shape.box, pose, material)
+        if shape.cylinder:
+            return Shape("cylinder", (shape.cylinder.radius, shape.cylinder.length), pose, material)
+        if shape.sphere:
+            return Shape("sphere", (shape.sphere.radius,), pose, material)
+        if shape.capsule:
+            return Shape("capsule", (shape.capsule.radius, shape.capsule.length), pose, material)
+        if shape.mesh:
+            place = self.source.at((*at, "mesh", "uri"))
+            mesh, wrong = self.packages.asset(shape.mesh.uri, place)
+            self.found += [wrong] if wrong else []
+            return Shape("mesh", shape.mesh.scale, pose, material, mesh)
+        raise ValueError("a shape without a form")
+
+    def _shapes(self, shapes: tuple[said.Shape, ...], at: Path) -> tuple[Shape, ...]:
+        return tuple(
+            self.shape(shape, (*at, index) if (*at, index) in self.source.values else at)
+            for index, shape in enumerate(shapes)
+            if any(getattr(shape, form) for form in FORMS)
+        )
+
+    def _material(self, given: said.Material, at: Path) -> Material:
+        """Return the colour with its name; one without is named after its parts, so that URDF keeps them apart."""
+        texture = None
+        if given.texture is not None:
+            texture, wrong = self.packages.asset(given.texture, self.source.at((*at, "texture")))
+            self.found += [wrong] if wrong else []
+        name, rgba = given.name, given.rgba
+        if name is None:
+            rgba = rgba if rgba or texture else (0.5, 0.5, 0.5, 1.0)
+            name = "_".join(["rgba", *(f"{part:g}".replace(".", "p").replace("-", "m") for part in rgba or ())])
+            name = name if texture is None else f"{name}_{_word(texture.uri)}"
+        return Material(name, rgba, texture, self.source.at(at))
+
+    def _inertial(
+        self, given: said.Inertial, visuals: tuple[Shape, ...], collisions: tuple[Shape, ...], at: Path
+    ) -> Inertial | None:
+        shapes, place = collisions or visuals, self.source.at_key(at[:2])
+        pose = Pose(given.xyz or (0.0, 0.0, 0.0), rotation_of(given) or Pose().quat_xyzw)
+        if given.inertia and given.mass:
+            i = given.inertia
+            tensor = (i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz)
+            return Inertial(given.mass, pose, tensor, traces(given.mass, visuals, collisions), place)
+        whole = self.moments(shapes, self.source.at_key(at)) if shapes else None
+        if whole is None:
+            return None
+        density = given.density or (given.mass or 0.0) / whole.volume
+        if given.inertia:
+            i = given.inertia
+            tensor = (i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz)
+            return Inertial(density * whole.volume, pose, tensor, (density * _trace(whole.tensor),), place)
+        inertial = _of_density(whole, density, given.mass)
+        return replace(inertial, pose=Pose(given.xyz)) if given.xyz else inertial
+
+    def moments(self, shapes: tuple[Shape, ...], at: Span) -> Moments | None:
+        """Return the moments of the shapes at density 1 in the link's axes, or None after saying why there are none."""
+        parts: list[Moments] = []
+        for shape in shapes:
+            if shape.mesh is None:
+                parts.append(of_primitive(shape).at(shape.pose))
+                continue
+            measure = self.packages.disk.moments if self.packages.disk else None
+            if measure is None or not shape.mesh.path or self._is_missing(shape.mesh.path):
+                return None
+            try:
+                x, y, z = shape.size
+                parts.append(measure(shape.mesh.path, (x, y, z)).at(shape.pose))
+            except UnmeasurableError as error:
+                self.found.append(finding(error.code, f"{shape.mesh.uri}: {error}", at, help=error.advice))
+                return None
+        return joined(parts)
+
+    def _is_missing(self, path: str) -> bool:
+        return self.packages.disk is not None and not self.packages.disk.is_file(path)
 
 
-def shape_of(shape: spec.Shape) -> Shape:
-    """Return the primitive; the shape must have one."""
-    material = material_of(shape.material) if shape.material else None
-    pose = pose_of(shape)
-    if shape.box:
-        return Shape("box", shape.box, pose, material)
-    if shape.cylinder:
-        return Shape("cylinder", (shape.cylinder.radius, shape.cylinder.length), pose, material)
-    if shape.sphere:
-        return Shape("sphere", (shape.sphere.radius,), pose, material)
-    raise ValueError("a shape without a shape")
+def with_colours(links: dict[str, Link]) -> dict[str, Link]:
+    """Return the links in which a material that is a name alone is the first one that has a colour by that name."""
+    known: dict[str, Material] = {}
+    for material in materials(links):
+        if material.rgba or material.texture:
+            known.setdefault(material.name, material)
+    bare = {one.name for one in materials(links) if not (one.rgba or one.texture) and one.name in known}
+    return {name: _coloured(link, known, bare) for name, link in links.items()} if bare else links
 
 
-def material_of(given: spec.Material) -> Material:
-    """Return the colour with its name; one without a name is named after its parts, so that URDF keeps them apart."""
-    name = given.name or "rgba_" + "_".join(f"{part:g}".replace(".", "p").replace("-", "m") for part in given.rgba)
-    return Material(name, given.rgba)
+def _coloured(link: Link, known: dict[str, Material], bare: set[str]) -> Link:
+    def shape(one: Shape) -> Shape:
+        is_bare = one.material and one.material.name in bare and not (one.material.rgba or one.material.texture)
+        return replace(one, material=known[one.material.name]) if one.material and is_bare else one
+
+    return replace(link, visuals=tuple(map(shape, link.visuals)), collisions=tuple(map(shape, link.collisions)))
 
 
-def _inertial(given: spec.Inertial, visuals: tuple[Shape, ...], collisions: tuple[Shape, ...], at: Span) -> Inertial:
-    pose, shapes = pose_of(given), collisions or visuals
-    if given.inertia:
-        i = given.inertia
-        of_shapes = tuple(_trace(inertial_of(given.mass, some).tensor) for some in (visuals, collisions) if some)
-        return Inertial(given.mass, pose, (i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz), of_shapes, at)
-    if not shapes:
-        return Inertial(given.mass, pose, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-    return inertial_of(given.mass, shapes)
+def materials(links: dict[str, Link]) -> list[Material]:
+    """Return the materials of all visuals, in the order of declaration."""
+    return [shape.material for link in links.values() for shape in link.visuals if shape.material]
+
+
+def _word(uri: str) -> str:
+    return "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in uri)
+
+
+def traces(mass: float, *several: tuple[Shape, ...]) -> tuple[float, ...]:
+    """Return the traces of the tensors that these shapes would have at one density; those with a mesh have none."""
+    plain = [shapes for shapes in several if shapes and not any(shape.mesh for shape in shapes)]
+    return tuple(_trace(inertial_of(mass, shapes).tensor) for shapes in plain)
 
 
 def inertial_of(mass: float, shapes: tuple[Shape, ...]) -> Inertial:
-    """Return centre of mass and tensor (xx, xy, xz, yy, yz, zz, in the link's axes) of shapes of one density."""
-    volumes = [_volume(shape) for shape in shapes]
-    masses = [mass * volume / math.fsum(volumes) for volume in volumes]
-    centre: Vector = (
-        math.fsum(m * shape.pose.xyz[0] for m, shape in zip(masses, shapes, strict=True)) / mass,
-        math.fsum(m * shape.pose.xyz[1] for m, shape in zip(masses, shapes, strict=True)) / mass,
-        math.fsum(m * shape.pose.xyz[2] for m, shape in zip(masses, shapes, strict=True)) / mass,
-    )
-    parts = [_about(m, shape, centre) for m, shape in zip(masses, shapes, strict=True)]
-    xx, xy, xz, yy, yz, zz = (math.fsum(values) for values in zip(*parts, strict=True))
-    return Inertial(mass, Pose(centre), (xx, xy, xz, yy, yz, zz))
+    """Return centre of mass and tensor (xx, xy, xz, yy, yz, zz, in the link's axes) of primitives of one density."""
+    whole = joined([of_primitive(shape).at(shape.pose) for shape in shapes])
+    return _of_density(whole, mass / whole.volume, mass)
+
+
+def _of_density(whole: Moments, density: float, mass: float | None) -> Inertial:
+    xx, xy, xz, yy, yz, zz = (density * value for value in whole.tensor)
+    return Inertial(mass or density * whole.volume, Pose(whole.centre), (xx, xy, xz, yy, yz, zz))
 
 
 def _trace(tensor: Tensor) -> float:
     return tensor[0] + tensor[3] + tensor[5]
-
-
-def _volume(shape: Shape) -> float:
-    if shape.kind == "box":
-        return math.prod(shape.size)
-    if shape.kind == "cylinder":
-        return math.pi * shape.size[0] ** 2 * shape.size[1]
-    return 4 / 3 * math.pi * shape.size[0] ** 3
-
-
-def _principal(mass: float, shape: Shape) -> Vector:
-    if shape.kind == "box":
-        x, y, z = (length * length for length in shape.size)
-        return (mass / 12 * (y + z), mass / 12 * (x + z), mass / 12 * (x + y))
-    if shape.kind == "cylinder":
-        radius, length = shape.size
-        across = mass / 12 * (3 * radius**2 + length**2)
-        return (across, across, mass * radius**2 / 2)
-    each = 2 / 5 * mass * shape.size[0] ** 2
-    return (each, each, each)
-
-
-def _about(mass: float, shape: Shape, point: Vector) -> Tensor:
-    """Return the shape's tensor about ``point``, in the link's axes: R diag R^T + m (d·d 1 − d d^T)."""
-    rows: Matrix = matrix_from_quat(normalised(shape.pose.quat_xyzw))
-    principal = _principal(mass, shape)
-    dx, dy, dz = (c - p for c, p in zip(shape.pose.xyz, point, strict=True))
-    turned = [[math.fsum(rows[i][k] * principal[k] * rows[j][k] for k in range(3)) for j in range(3)] for i in range(3)]
-    return (
-        turned[0][0] + mass * (dy * dy + dz * dz),
-        turned[0][1] - mass * dx * dy,
-        turned[0][2] - mass * dx * dz,
-        turned[1][1] + mass * (dx * dx + dz * dz),
-        turned[1][2] - mass * dy * dz,
-        turned[2][2] + mass * (dx * dx + dy * dy),
-    )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.diagnostic import Diagnostic, Span, did_you_mean, finding
 from tfcompose.model import JOINTS, STATIC, Edge, Joint, Limit, Link, MountedSensor, Process
 from tfcompose.pose import Pose, norm
-from tfcompose.resolve.bodies import inertial_of, link_of, shape_of
+from tfcompose.resolve.bodies import Bodies, inertial_of
 from tfcompose.resolve.poses import Draft, pose_of, rotation_of
 from tfcompose.resolve.processes import driver_process
 
@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from tfcompose.load import Path, Source
     from tfcompose.plan import EdgeKind
     from tfcompose.resolve.presets import Sensor
-    from tfcompose.validate.spec import EdgeKeys, JointSpec, RobotSpec
+    from tfcompose.validate.edges import EdgeKeys
+    from tfcompose.validate.joints import JointSpec
+    from tfcompose.validate.spec import RobotSpec
 
 
 @dataclass(slots=True)
@@ -26,6 +28,7 @@ class Drafts:
     spec: RobotSpec
     source: Source
     simulated: frozenset[str]
+    bodies: Bodies
     frames: dict[str, Span] = field(default_factory=dict)
     edges: list[Draft] = field(default_factory=list)
     links: dict[str, Link] = field(default_factory=dict)
@@ -45,7 +48,7 @@ class Drafts:
         for name, link in self.spec.links.items():
             at = self.source.at_key(("links", name))
             self.frames.setdefault(name, at)
-            self.links[name] = link_of(name, link, at)
+            self.links[name] = self.bodies.link(name, link)
             if link.parent is not None:
                 self._add(("links", name), link.parent, name, link)
 
@@ -196,8 +199,8 @@ class Drafts:
         frame = self._renamed(sensor, sensor.named(body.frame))
         if frame in self.links:
             return
-        shape = shape_of(body.shape)
-        inertial = inertial_of(body.mass, (shape,)) if body.mass else None
+        shape = self.bodies.shape(body.shape, ("sensors", sensor.name))
+        inertial = inertial_of(body.mass, (shape,)) if body.mass and not shape.mesh else None
         place = self.source.at_key(("sensors", sensor.name))
         self.links[frame] = Link(frame, place, (shape,), (shape,), inertial)
 

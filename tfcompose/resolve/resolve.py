@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
 from tfcompose.model import Edge, Process, Robot
 from tfcompose.plan import GuardPolicy
+from tfcompose.resolve.bodies import Bodies, with_colours
 from tfcompose.resolve.edges import Drafts
 from tfcompose.resolve.isolation import isolate, settings_of
+from tfcompose.resolve.packages import Packages
 from tfcompose.resolve.poses import Solver
 from tfcompose.resolve.presets import Library, sensor_of
 from tfcompose.resolve.processes import built_in, idle_rates, name_clashes, unknown_names, user_process
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tfcompose.load import Source
+    from tfcompose.resolve.packages import Disk
     from tfcompose.validate import Validated
     from tfcompose.validate.spec import RobotSpec
 
@@ -32,13 +35,20 @@ class Resolved:
     found: tuple[Diagnostic, ...]
 
 
-def resolve(validated: Validated, library: Library, read: Callable[[str], str] | None = None) -> Resolved:
-    """Return the robot with presets expanded, poses solved and owners given; ``read`` gives a calibration's text."""
+def resolve(
+    validated: Validated, library: Library, read: Callable[[str], str] | None = None, disk: Disk | None = None
+) -> Resolved:
+    """Return the robot with presets expanded, poses solved and owners given; ``read`` gives a calibration's text.
+
+    Without ``disk`` no mesh and no package is looked for.
+    """
     spec, source = validated.spec, validated.source
     found: list[Diagnostic] = []
     broken = set(validated.broken)
     processes = _processes(spec, source, found)
-    drafts = Drafts(spec, source, frozenset(p.name for p in processes if p.kind == "simulate"))
+    named = {name: (folder, source.at(("packages", name))) for name, folder in spec.packages.items()}
+    bodies = Bodies(source, Packages(disk, named))
+    drafts = Drafts(spec, source, frozenset(p.name for p in processes if p.kind == "simulate"), bodies)
     drafts.add_frames()
     drafts.add_links()
     drafts.add_joints()
@@ -60,6 +70,7 @@ def resolve(validated: Validated, library: Library, read: Callable[[str], str] |
     names = frozenset(name for _, name in broken)
     found += [
         *drafts.found,
+        *bodies.found,
         *solver.found,
         *name_clashes(processes, spec, source),
         *idle_rates(spec, source),
@@ -72,7 +83,7 @@ def resolve(validated: Validated, library: Library, read: Callable[[str], str] |
         file=source.file,
         frames=drafts.frames,
         edges=edges,
-        links=drafts.links,
+        links=with_colours(drafts.links),
         processes=tuple(_with_positions(process, edges, source, found) for process in processes),
         base=None,
         ros=settings_of(spec.ros),

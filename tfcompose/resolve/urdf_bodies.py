@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from tfcompose.diagnostic import Diagnostic, finding
 from tfcompose.model import Inertial, Link, Shape
-from tfcompose.resolve.bodies import inertial_of
+from tfcompose.resolve.bodies import traces
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -96,6 +96,5 @@ class Bodies:
             self.values.refuse(f"the mass of {name} is {mass:g} kg", said.place("value"), advice, level)
             return None
         xx, xy, xz, yy, yz, zz = (self.values.number(tensor, key, 0.0) for key in _TENSOR)
-        shapes = [inertial_of(mass, some).tensor for some in (visuals, collisions) if some]
-        traces = tuple(one[0] + one[3] + one[5] for one in shapes)
-        return Inertial(mass, self.values.pose(element), (xx, xy, xz, yy, yz, zz), traces, tensor.at)
+        of_shapes = traces(mass, visuals, collisions)
+        return Inertial(mass, self.values.pose(element), (xx, xy, xz, yy, yz, zz), of_shapes, tensor.at)

@@ -9,6 +9,8 @@ from tfcompose.diagnostic import did_you_mean
 from tfcompose.pose import norm
 from tfcompose.validate.quantity import (
     ANGLE,
+    DAMPING,
+    DENSITY,
     FORCE,
     INERTIA,
     LENGTH,
@@ -18,6 +20,7 @@ from tfcompose.validate.quantity import (
     SPEED,
     TIME,
     TORQUE,
+    TURN_DAMPING,
     TURN_RATE,
     Dimension,
     Quantity,
@@ -153,6 +156,14 @@ def _has_direction(axis: Vector, path: Path, problems: Problems) -> Any:
     return problems.refuse("TF106", path, f"an axis of length {length:g} has no direction", "for example [0, 0, 1]")
 
 
+def _scale(value: Any, path: Path, problems: Problems) -> Any:
+    """Return a scale's three factors; a negative one is a mirror."""
+    factors = _THREE.read(value if isinstance(value, list) else [value] * 3, path, problems)
+    if factors is BROKEN or all(abs(factor) > 1 / LARGEST for factor in factors):
+        return factors
+    return problems.refuse("TF106", path, f"{shown(value)} is no scale: nothing is left of the mesh")
+
+
 def _plain(value: Any) -> Any:
     """Return plain data, as it is passed on: a computed quantity is its number."""
     if isinstance(value, Quantity):
@@ -174,13 +185,17 @@ TURN_RATE_ = measure(TURN_RATE)
 INERTIA_ = measure(INERTIA)
 SIZE = measure(LENGTH, 1 / LARGEST)
 MASS_ = measure(MASS, 1 / LARGEST)
+DENSITY_ = measure(DENSITY, 1 / LARGEST)
 RATE_ = measure(RATE, 1e-3)
 DURATION = measure(TIME, 1e-3)
 POSITION = either(ANGLE, LENGTH)
 JOINT_SPEED = either(TURN_RATE, SPEED)
 JOINT_EFFORT = either(TORQUE, FORCE)
+JOINT_DAMPING = either(TURN_DAMPING, DAMPING)
 XYZ = listing(LENGTH_, count=3, sample="[0.2, 0, 30 cm]")
 SIZES = listing(SIZE, count=3, sample="[0.5, 0.4, 0.15]")
 NUMBERS = listing(NUMBER_, count=3, sample="[0, 0, 1]")
+_THREE = listing(NUMBER_, count=3, sample="[0.001, 0.001, 0.001]")
+SCALE = Type(_scale, {"anyOf": [NUMBER_.schema, _THREE.schema]})
 AXIS = then(NUMBERS, _has_direction)
 RGBA = listing(then(NUMBER_, _colour_part), count=4, sample="[0.2, 0.4, 0.8, 1]")

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from tfcompose.validate.bodies import Shape
 from tfcompose.validate.fields import ANYTHING, BOOLEAN, MASS_, TEXT, choice
 from tfcompose.validate.posed import Posed
 from tfcompose.validate.schema import Model, key, listing, mapping, record
-from tfcompose.validate.spec import Shape
 
 Condition = dict[str, Any]
 CONDITION = mapping(ANYTHING)

@@ -24,6 +24,9 @@ TURN_RATE: Dimension = (0, 0, -1, 1)
 FORCE: Dimension = (1, 1, -2, 0)
 TORQUE: Dimension = (2, 1, -2, 0)
 INERTIA: Dimension = (2, 1, 0, 0)
+DENSITY: Dimension = (-3, 1, 0, 0)
+DAMPING: Dimension = (0, 1, -1, 0)
+TURN_DAMPING: Dimension = (2, 1, -1, -1)
 
 DIMENSION_NAMES: dict[Dimension, str] = {
     NUMBER: "number",
@@ -37,6 +40,9 @@ DIMENSION_NAMES: dict[Dimension, str] = {
     FORCE: "force",
     TORQUE: "torque",
     INERTIA: "moment of inertia",
+    DENSITY: "density",
+    DAMPING: "damping",
+    TURN_DAMPING: "damping",
 }
 
 #: Unit, its size in SI, its dimension. International inch and foot are exact since 1959; 1 lb = 0.45359237 kg.
@@ -67,6 +73,10 @@ UNITS: dict[str, tuple[float, Dimension]] = {
     "N": (1.0, FORCE),
     "Nm": (1.0, TORQUE),
     "kg*m^2": (1.0, INERTIA),
+    "kg/m^3": (1.0, DENSITY),
+    "g/cm^3": (1000.0, DENSITY),
+    "Ns/m": (1.0, DAMPING),
+    "Nms/rad": (1.0, TURN_DAMPING),
 }
 
 # Units whose size is a fraction, as numerator and denominator: 30 cm is 0.3 and 12 in are 0.3048, to the last bit.
@@ -204,4 +214,7 @@ _EXAMPLES = {
     RATE: "50 Hz",
     SPEED: "0.5 m/s",
     TURN_RATE: "0.5 rad/s",
+    DENSITY: "2700 kg/m^3",
+    DAMPING: "0.5 Ns/m",
+    TURN_DAMPING: "0.5 Nms/rad",
 }

@@ -1,0 +1,119 @@
+"""Mesh addresses: as they are written, and for a target; found by packages of the robot and of the workspace."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+import trimesh
+
+ROBOT = """tfcompose: 1
+robot: r
+packages: {named: ../third party/named}
+links:
+  base_link:
+    visual:
+      - {mesh: meshes/a b.stl}
+      - {mesh: package://named/n.stl}
+      - {mesh: package://sourced/meshes/s.stl}
+"""
+MESHES = ("ws/src/robots/meshes/a b.stl", "ws/src/third party/named/n.stl", "ws/install/share/sourced/meshes/s.stl")
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Path:
+    for name in MESHES:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        trimesh.creation.box((1, 1, 1)).export(tmp_path / name)
+    (tmp_path / "ws/src/robots/r.yaml").write_text(ROBOT)
+    return tmp_path / "ws"
+
+
+def build(workspace: Path, *words: str, file: str = "src/robots/r.yaml") -> subprocess.CompletedProcess[str]:
+    env = os.environ | {"AMENT_PREFIX_PATH": f"/nowhere:{workspace}/install"}
+    command = [sys.executable, "-m", "tfcompose", "build", file, *words]
+    return subprocess.run(command, capture_output=True, text=True, cwd=workspace, env=env, check=False)
+
+
+def addresses(folder: Path) -> list[str]:
+    both = [ET.parse(folder / name).iter("mesh") for name in ("robot.full.urdf", "robot.urdf")]  # noqa: S314 (our own)
+    full, short = ([str(mesh.get("filename")) for mesh in meshes] for meshes in both)
+    assert full == short
+    return full
+
+
+def test_addresses_stay_as_written_and_relative_ones_lead_from_the_build_folder(workspace: Path) -> None:
+    assert build(workspace).returncode == 0
+    relative, *packages = addresses(workspace / "build/r")
+    assert (workspace / "build/r" / relative).samefile(workspace / "src/robots/meshes/a b.stl")
+    assert packages == ["package://named/n.stl", "package://sourced/meshes/s.stl"]
+    build(workspace, "-o", "elsewhere/deep/er")
+    moved = addresses(workspace / "elsewhere/deep/er")[0]
+    assert (workspace / "elsewhere/deep/er" / moved).is_file()
+
+
+def test_for_readers_without_ros_every_address_is_a_file_that_is_there(workspace: Path) -> None:
+    assert build(workspace, "--mesh", "file").returncode == 0
+    found = addresses(workspace / "build/r")
+    assert all(address.startswith("file:///") for address in found)
+    assert [Path(unquote(address[7:])) for address in found] == [workspace.parent / name for name in MESHES]
+    assert build(workspace, "--mesh", "relative").returncode == 0
+    found = addresses(workspace / "build/r")
+    assert [(workspace / "build/r" / address).resolve() for address in found] == [
+        workspace.parent / name for name in MESHES
+    ]
+
+
+def test_for_ros_every_address_is_in_a_package_or_nothing_is_written(workspace: Path) -> None:
+    refused = build(workspace, "--mesh", "package")
+    assert refused.returncode == 1
+    assert "src/robots/r.yaml:7:16: error[TF726] meshes/a b.stl is in no package" in refused.stderr
+    assert not (workspace / "build").exists()
+    (workspace / "src/robots/package.xml").write_text("<package><name>robots_of_ours</name></package>")
+    assert build(workspace, "--mesh", "package").returncode == 0
+    assert addresses(workspace / "build/r") == [
+        "package://robots_of_ours/meshes/a%20b.stl",
+        "package://named/n.stl",
+        "package://sourced/meshes/s.stl",
+    ]
+
+
+def test_a_package_that_is_nowhere_is_said_with_the_places_that_were_looked_at(workspace: Path) -> None:
+    robot = workspace / "src/robots/r.yaml"
+    robot.write_text(ROBOT.replace("package://sourced", "package://sorced"))
+    built = build(workspace)
+    assert built.returncode == 0  # on another machine it may be installed
+    assert "r.yaml:9:16: warning[TF724] no package sorced" in built.stderr
+    assert f"looked in /nowhere/share/sorced, {workspace}/install/share/sorced" in built.stderr
+    asked = build(workspace, "--mesh", "file")
+    assert asked.returncode == 1
+    assert "error[TF724] package://sorced/meshes/s.stl was not found" in asked.stderr
+
+
+def test_a_build_is_the_same_wherever_the_workspace_is(workspace: Path) -> None:
+    build(workspace)
+    first = {file.name: file.read_bytes() for file in (workspace / "build/r").rglob("*") if file.is_file()}
+    moved = workspace.rename(workspace.parent / "moved")
+    build(moved, "-o", "again/r")
+    assert {file.name: file.read_bytes() for file in (moved / "again/r").rglob("*") if file.is_file()} == first
+
+
+def test_a_mass_over_a_mesh_is_spread_by_its_triangles_and_trimesh_is_loaded_only_for_that(workspace: Path) -> None:
+    names = "import sys, tfcompose.cli as c; c.main(['lint', 'src/robots/r.yaml']); print('trimesh' in sys.modules)"
+    env = os.environ | {"AMENT_PREFIX_PATH": f"{workspace}/install"}
+
+    def loaded() -> str:
+        done = subprocess.run(
+            [sys.executable, "-c", names], capture_output=True, text=True, cwd=workspace, env=env, check=False
+        )
+        return done.stdout.splitlines()[-1]
+
+    assert loaded() == "False"
+    robot = workspace / "src/robots/r.yaml"
+    robot.write_text(ROBOT + "    inertial: {mass: 6 kg}\n")
+    assert loaded() == "True"

@@ -1,0 +1,76 @@
+"""How the written files name meshes and textures: as the robot does, or for a target that reads other addresses."""
+
+from __future__ import annotations
+
+import posixpath
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model import Asset, Robot
+
+Form = Literal["as-written", "package", "file", "relative"]
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Where the files are written, seen from where the robot's paths begin, and how they address others.
+
+    ``as-written`` keeps addresses; a relative path becomes relative to ``folder``, so that readers of the written URDF
+    find the file. ``package`` writes ``package://``, ``file`` absolute ``file://`` (``top`` is the absolute folder that
+    relative paths begin in), ``relative`` paths from ``folder``.
+    """
+
+    form: Form = "as-written"
+    folder: str = "."
+    top: str = "/"
+
+    def address(self, asset: Asset) -> str:
+        """Return the address; one that cannot be had in this form is kept (``unaddressed`` names those)."""
+        if self.form == "package" and asset.package:
+            return f"package://{asset.package}/{_quoted(asset.inside)}"
+        if self.form == "file" and asset.path:
+            return "file://" + _quoted(posixpath.normpath(posixpath.join(self.top, asset.path)))
+        plain = "://" not in asset.uri and not asset.uri.startswith("/")
+        if asset.path and (self.form == "relative" or plain):
+            return self._from_folder(asset.path)
+        return asset.uri
+
+    def _from_folder(self, path: str) -> str:
+        """Return the path seen from the folder of the written files."""
+        begin = posixpath.join(self.top, self.folder)
+        return posixpath.relpath(posixpath.join(self.top, path), begin)
+
+
+AS_WRITTEN = Target()
+
+
+def _quoted(path: str) -> str:
+    """Return the path as an address has it: a space is %20."""
+    return str(import_module("urllib.parse").quote(path))  # seldom needed
+
+
+def assets(robot: Robot) -> Iterator[Asset]:
+    """Yield the files that the robot's bodies name."""
+    for link in robot.links.values():
+        for shape in (*link.visuals, *link.collisions):
+            if shape.mesh:
+                yield shape.mesh
+            if shape.material and shape.material.texture:
+                yield shape.material.texture
+
+
+def unaddressed(robot: Robot, form: Form) -> list[Asset]:
+    """Return the files that have no address of this form: in no package, or of unknown place; each once."""
+    if form == "as-written":
+        return []
+    lost = [one for one in assets(robot) if not (one.package if form == "package" else one.path)]
+    return list(dict.fromkeys(one for one in lost if not _elsewhere(one)))
+
+
+def _elsewhere(asset: Asset) -> bool:
+    """Whether the address is for others to resolve: http, model."""
+    return "://" in asset.uri and not asset.uri.startswith(("package://", "file://"))

@@ -1,0 +1,140 @@
+"""Where packages and files are: by the robot's own ``packages:``, then by the ament index.
+
+Nothing is opened here. What may be asked about files is handed in, so that a robot can be compiled from text alone.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import Diagnostic, Span, did_you_mean, finding
+from tfcompose.model import Asset
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from tfcompose.pose import Vector
+    from tfcompose.resolve.moments import Moments
+
+_PACKAGE_NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
+_SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://")
+_HIGHEST = 12  # so many folders above a file its package.xml is looked for
+
+
+@dataclass(frozen=True, slots=True)
+class Disk:
+    """What a compiler may ask about files. ``prefixes`` are those of AMENT_PREFIX_PATH, in order.
+
+    ``moments`` gives those of a mesh file at a scale, and raises ``UnmeasurableError`` with the finding's parts.
+    """
+
+    read: Callable[[str], str]
+    is_file: Callable[[str], bool]
+    is_folder: Callable[[str], bool]
+    prefixes: tuple[str, ...] = ()
+    moments: Callable[[str, Vector], Moments] | None = None
+
+
+class UnmeasurableError(Exception):
+    """A mesh has no volume, or it cannot be read: code, message and help of the finding."""
+
+    def __init__(self, code: str, message: str, advice: str) -> None:
+        self.code, self.advice = code, advice
+        super().__init__(message)
+
+
+def beside(named: str, at: Span) -> str:
+    """Return the path of a file that is named at a place; on the command line it is relative to the folder."""
+    folder = "" if at.file.startswith("--") else posixpath.dirname(at.file)
+    return posixpath.normpath(posixpath.join(folder, named))
+
+
+def _unquoted(text: str) -> str:
+    """Return the text with ``%20`` and its like as what they stand for."""
+    return str(import_module("urllib.parse").unquote(text)) if "%" in text else text
+
+
+@dataclass(slots=True)
+class Packages:
+    """Finds packages and addressed files. ``named`` are the robot's own: name → folder and its place."""
+
+    disk: Disk | None = None
+    named: Mapping[str, tuple[str, Span]] = field(default_factory=dict)
+    _above: dict[str, tuple[str, str]] = field(default_factory=dict)
+
+    def places(self, name: str) -> list[str]:
+        """Return where a package of that name would be, in the order of looking."""
+        own = [beside(*self.named[name])] if name in self.named else []
+        return own + [posixpath.join(prefix, "share", name) for prefix in (self.disk.prefixes if self.disk else ())]
+
+    def folder(self, name: str) -> str | None:
+        """Return the package's folder, or None where there is none."""
+        if self.disk is None:
+            return None
+        return next((place for place in self.places(name) if self.disk.is_folder(place)), None)
+
+    def not_found(self, name: str, at: Span | None) -> Diagnostic:
+        """Return the finding that a package is nowhere, with the list of where it was looked for."""
+        places = self.places(name)
+        looked = f"looked in {', '.join(places)}" if places else "AMENT_PREFIX_PATH is empty"
+        otherwise = f"packages: {{{name}: FOLDER}}, or source the workspace's setup file"
+        advice = f"{looked}; {did_you_mean(name, self.named, otherwise)}"
+        return finding("TF724", f"no package {name}", at, help=advice, severity="warning")
+
+    def asset(self, uri: str, at: Span) -> tuple[Asset, Diagnostic | None]:
+        """Return the file that is addressed at a place, and what is wrong with the address, if anything is.
+
+        ``package://NAME/PATH`` is in a package, ``file:///PATH`` and plain paths are files, the relative ones beside
+        the file that writes them. Other schemes (``http``, ``model``) are for others to resolve.
+        """
+        scheme = _SCHEME.match(uri)
+        if scheme and scheme[1] == "package":
+            return self._in_package(uri, at)
+        if scheme and scheme[1] != "file":
+            return Asset(uri, at), None
+        path = _unquoted(uri[scheme.end() :]) if scheme else uri
+        if scheme and not path.startswith("/"):
+            wrong = f"{uri} is no address of a file"
+            return Asset(uri, at), finding("TF723", wrong, at, help="file:// and an absolute path have three slashes")
+        path = posixpath.normpath(path) if path.startswith("/") else beside(path, at)
+        package, inside = self._package_above(path)
+        return Asset(uri, at, path, package, inside), self._missing(path, f"no file {uri}", at)
+
+    def _in_package(self, uri: str, at: Span) -> tuple[Asset, Diagnostic | None]:
+        name, _, inside = _unquoted(uri.partition("://")[2]).partition("/")
+        if not name or not inside:
+            return Asset(uri, at), finding("TF723", f"{uri} is no address of a file", at, help="package://NAME/PATH")
+        folder = self.folder(name)
+        if folder is None:
+            return Asset(uri, at, "", name, inside), self.not_found(name, at) if self.disk else None
+        path = posixpath.join(folder, inside)
+        return Asset(uri, at, path, name, inside), self._missing(path, f"no file {inside} in {name}", at)
+
+    def _missing(self, path: str, message: str, at: Span) -> Diagnostic | None:
+        if self.disk is None or ("\0" not in path and self.disk.is_file(path)):
+            return None
+        return finding("TF723", message, at, help=f"looked for {path}")
+
+    def _package_above(self, path: str) -> tuple[str, str]:
+        """Return the package whose source or share folder the file is in, and its path there; empty without one."""
+        folder = posixpath.dirname(path)
+        if folder not in self._above:
+            self._above[folder] = self._find_above(folder)
+        name, top = self._above[folder]
+        return (name, posixpath.relpath(path, top or ".")) if name else ("", "")
+
+    def _find_above(self, folder: str) -> tuple[str, str]:
+        for _ in range(_HIGHEST if self.disk else 0):
+            manifest = posixpath.join(folder, "package.xml")
+            if self.disk and self.disk.is_file(manifest):
+                found = _PACKAGE_NAME.search(self.disk.read(manifest))
+                return (found[1], folder) if found else ("", "")
+            above = posixpath.normpath(posixpath.join(folder, ".."))
+            if above == folder:
+                break
+            folder = above
+        return ("", "")

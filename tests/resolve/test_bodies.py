@@ -104,7 +104,8 @@ def test_several_turned_boxes_have_the_inertia_of_their_triangles(given: list[An
     found = inertial_of({"collision": shapes, "inertial": {"density": 7}})
     assert found.mass == pytest.approx(7 * whole.volume, rel=1e-9)
     assert found.pose.xyz == pytest.approx(tuple(whole.center_mass), abs=1e-9)
-    assert matrix(found) == pytest.approx(whole.moment_inertia, rel=1e-8, abs=1e-9 * np.trace(whole.moment_inertia))
+    lost = 1e-13 * found.mass * 100  # trimesh integrates about the origin, up to 10 m away
+    assert matrix(found) == pytest.approx(whole.moment_inertia, rel=1e-8, abs=lost)
 
 
 @pytest.mark.parametrize("ending", ["stl", "obj", "ply"])

@@ -54,6 +54,8 @@ CODES = {
     "TF307": "rate_too_low",
     "TF308": "driver_publishes_too",
     "TF309": "many_static_publishers",
+    "TF310": "switched_edge_without_owner",
+    "TF311": "switched_edge_static",
     # poses and conventions
     "TF401": "optical_frame_not_rotated",
     "TF402": "quaternion_not_unit",

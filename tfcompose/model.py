@@ -206,7 +206,11 @@ class Calibration:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A frame and its parent, and who publishes where the one is in the other."""
+    """A frame and its parent, and who publishes where the one is in the other.
+
+    ``switched`` holds the further parents between which the owner may change it, as a tool changer does; ``parent`` is
+    the nominal one.
+    """
 
     parent: str
     child: str
@@ -224,6 +228,7 @@ class Edge:
     nominal: bool = False
     rate_at: Span | None = None
     calibration: Calibration | None = None
+    switched: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:

@@ -51,7 +51,10 @@ class Joint:
 
 @dataclass(frozen=True, slots=True)
 class PlanEdge:
-    """One TF edge and the process that publishes it. ``node`` is the publishing node's full name."""
+    """One TF edge and the process that publishes it. ``node`` is the publishing node's full name.
+
+    ``switched`` holds the further parents between which the owner may change the child; ``parent`` is the nominal one.
+    """
 
     parent: str
     child: str
@@ -62,11 +65,16 @@ class PlanEdge:
     rate: float | None
     source: tuple[str, int]
     joint: Joint | None = None
+    switched: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
         """The edge as people read it."""
         return f"{self.parent} → {self.child}"
+
+    def may_hang_on(self, parent: str) -> bool:
+        """Return whether the owner may publish the child below this parent."""
+        return parent == self.parent or parent in self.switched
 
 
 @dataclass(frozen=True, slots=True)

@@ -100,6 +100,8 @@ def _edge_to_json(edge: PlanEdge) -> dict[str, Any]:
     }
     if edge.joint:
         row["joint"] = _fields(edge.joint)
+    if edge.switched:
+        row["switched"] = edge.switched
     return row
 
 
@@ -151,6 +153,7 @@ def _edge_from_json(data: dict[str, Any]) -> PlanEdge:
         rate=optional(data, "rate", float, where),
         source=(get(source, "file", str, where), get(source, "line", int, where)),
         joint=_joint_from_json(data["joint"], where) if data.get("joint") else None,
+        switched=tuple(str(parent) for parent in get(data, "switched", list, where)) if "switched" in data else (),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -10,8 +11,10 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from tfcompose.cli.compiling import library
+from tfcompose.cli.diff import differences
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
+from tfcompose.planfile import read_plan
 from tfcompose.pose import Pose, angle_between
 
 if TYPE_CHECKING:
@@ -251,3 +254,31 @@ def test_names_are_below_the_namespace_unless_they_begin_with_a_slash() -> None:
         "a": "/fleet/r1/a",
         "b": "/b",
     }
+
+
+TOOL = """
+ros: {frame_prefix: "r/"}
+frames: {rack: {parent: base_link}, tool: {parent: [base_link, rack], owner: changer, rate: 10 Hz}}
+processes: {changer: {external: true}}
+"""
+
+
+def test_an_edge_with_several_parents_hangs_on_the_first_and_names_the_others_everywhere() -> None:
+    robot = robot_of(TOOL)
+    edge = edge_of(robot, "tool")
+    assert (edge.parent, edge.switched, edge.kind) == ("base_link", ("rack",), "dynamic")
+    files = {file.path: file.text for file in emit(robot)}
+    (planned,) = [edge for edge in read_plan(files["plan.json"], "plan.json").edges if edge.child == "r/tool"]
+    assert (planned.parent, planned.switched) == ("r/base_link", ("r/rack",))
+    assert "or on r/rack" in files["tree.txt"]
+    joint = re.search(r'<parent link="(\w+)"/>\s*<child link="tool"/>', files["robot.full.urdf"])
+    assert joint
+    assert joint[1] == "base_link"
+    more = robot_of(TOOL.replace("[base_link, rack]", "base_link"))
+    assert differences(robot, more) == ["switch base_link → tool: or on rack → no other parent"]
+
+
+@pytest.mark.parametrize("parents", ["[]", "[base_link, base_link]", "[base_link, 3]"])
+def test_a_list_of_parents_has_different_names(parents: str) -> None:
+    found = compiled(TOOL.replace("[base_link, rack]", parents)).found
+    assert [one.code for one in found if one.code.startswith("TF1")] != []

@@ -34,6 +34,7 @@ EDGES = (
     edge("base lidar", "static", "static"),
     edge("base camera", "static", "static"),
 )
+TOOL = replace(edge("arm tool", "changer"), switched=("rack_1", "rack_2"))
 PROCESSES = (
     PlanProcess("static", "static"),
     PlanProcess("joints", "joints"),
@@ -62,6 +63,7 @@ class History:
     guard: GuardPolicy = field(default_factory=GuardPolicy)
     settle_s: float = SETTLE_S
     gids: bool = True
+    edges: tuple[PlanEdge, ...] = EDGES
     now: float = 1000.0
     events: list[GuardEvent] = field(default_factory=list)
     graph: list[Publisher] = field(default_factory=list)
@@ -70,7 +72,7 @@ class History:
     looked: float = field(init=False)
 
     def __post_init__(self) -> None:
-        plan = Plan("rover", "0", "base", RosSettings(), EDGES, PROCESSES, self.guard)
+        plan = Plan("rover", "0", "base", RosSettings(), self.edges, PROCESSES, self.guard)
         self.judge = Judge(plan, self.settle_s, self.now, self.wall_ns())
         self.looked = self.now
 
@@ -554,3 +556,25 @@ def test_a_name_that_is_part_of_the_owners_does_not_pass_for_it() -> None:
     running.joins("/slam_toolbox")
     running.repeat(running.joins("/other"), "map odom", 10)
     assert [found.code for found in running.found()] == ["TF801"]
+
+
+# A tool that changes its parent.
+
+
+def test_the_owner_may_hang_a_switched_edge_on_each_of_its_parents_and_on_no_other() -> None:
+    history = History(edges=(*EDGES, TOOL)).clear()
+    changer = history.joins("/changer")
+    for parent in ("arm", "rack_1", "rack_2", "arm"):
+        history.repeat(changer, f"{parent} tool", 5)
+    assert history.said() == []
+    history.repeat(changer, "table tool", 10)
+    message = "tool has a second parent: /changer publishes table → tool, changer (/changer) arm → tool"
+    assert history.said() == [f"TF802 {message}"]
+
+
+def test_another_node_may_not_publish_a_switched_edge_on_any_of_its_parents() -> None:
+    history = History(edges=(*EDGES, TOOL)).clear()
+    history.repeat(history.joins("/changer"), "arm tool", 5)
+    history.repeat(history.joins("/rogue"), "rack_1 tool", 10)
+    assert [found.code for found in history.found()] == ["TF801"]
+    assert "/rogue" in history.found()[0].message

@@ -69,6 +69,8 @@ def _changes(was: Edge, now: Edge) -> list[str]:
     turned = angle_between(was.pose.quat_xyzw, now.pose.quat_xyzw)
     if was.parent == now.parent and (far > MOVED_M or turned > TURNED_RAD):
         lines.append(f"moved  {now.name}: {far * 1000:.3g} mm, {math.degrees(turned):.3g} deg")
+    if set(was.switched) != set(now.switched):
+        lines.append(f"switch {now.name}: {_others(was)} → {_others(now)}")
     if was.owner != now.owner:
         lines.append(f"owner  {now.name}: {was.owner} → {now.owner}")
     if was.kind != now.kind:
@@ -76,6 +78,10 @@ def _changes(was: Edge, now: Edge) -> list[str]:
     if was.rate != now.rate:
         lines.append(f"rate   {now.name}: {_hz(was.rate)} → {_hz(now.rate)}")
     return lines
+
+
+def _others(edge: Edge) -> str:
+    return f"or on {', '.join(edge.switched)}" if edge.switched else "no other parent"
 
 
 def _hz(rate: float | None) -> str:

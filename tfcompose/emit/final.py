@@ -21,7 +21,15 @@ def with_final_names(robot: Robot) -> Robot:
     return replace(
         robot,
         frames={final(frame): at for frame, at in robot.frames.items()},
-        edges=tuple(replace(edge, parent=final(edge.parent), child=final(edge.child)) for edge in robot.edges),
+        edges=tuple(
+            replace(
+                edge,
+                parent=final(edge.parent),
+                child=final(edge.child),
+                switched=tuple(final(parent) for parent in edge.switched),
+            )
+            for edge in robot.edges
+        ),
         base=robot.base and final(robot.base),
         guard=replace(robot.guard, allow=allow),
     )

@@ -75,6 +75,7 @@ def _edge(edge: Edge, node: str, file: str) -> PlanEdge:
         rate=edge.rate,
         source=(file, edge.at.line),
         joint=joint,
+        switched=edge.switched,
     )
 
 

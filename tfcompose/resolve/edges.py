@@ -88,7 +88,7 @@ class Drafts:
     def _add(  # noqa: PLR0913 (an edge has that many parts)
         self,
         at: Path,
-        parent: str,
+        parents: tuple[str, ...],
         child: str,
         keys: EdgeKeys,
         *,
@@ -99,7 +99,7 @@ class Drafts:
         owner = keys.owner or (JOINTS if joint else STATIC)
         place: str | None = getattr(keys, "place", None)
         edge = Edge(
-            parent=parent,
+            parent=parents[0],
             child=child,
             kind=self._kind(owner, keys, joint),
             pose=pose_of(keys, place or child),
@@ -112,6 +112,7 @@ class Drafts:
             owner_at=self.source.at((*at, "owner")) if keys.owner else None,
             sensor=sensor.name if sensor else None,
             rate_at=self.source.at((*at, "rate")) if keys.rate else None,
+            switched=parents[1:],
         )
         relative_at = self.source.at((*at, "relative_to"))
         place_at = self.source.at((*at, "place"))

@@ -143,7 +143,7 @@ class Judge:
         if nodes:
             return NAMELESS_S
         edge = self._planned.get(sight.child)
-        if edge is None or edge.parent != sight.parent:
+        if edge is None or not edge.may_hang_on(sight.parent):
             return NAMELESS_S
         owner = self._owner_gids.get(sight.child)
         known = owner is not None and self._senders.is_present(owner[0])
@@ -168,7 +168,7 @@ class Judge:
             declared = self._may_be_undeclared(sight.parent, sight.child)
             return None if declared else Offence("TF803", sight.parent, sight.child, nodes, sight.static, None)
         code, namesake = "", False
-        if sight.parent != edge.parent:
+        if not edge.may_hang_on(sight.parent):
             code = "TF802"
         elif edge.node not in nodes:
             code = "TF801"

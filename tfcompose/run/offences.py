@@ -63,8 +63,8 @@ def taken(offences: Sequence[Offence]) -> Diagnostic:
     """Return the finding for edges that a node published before the start."""
     first = offences[0]
     message = f"{first.name}{_more(offences)}: published by {first.who} before the start"
-    if first.edge and first.parent != first.edge.parent:
-        message += f", and the plan hangs {first.child} on {first.edge.parent}"
+    if first.edge and not first.edge.may_hang_on(first.parent):
+        message += f", and the plan hangs {first.child} on {' or '.join((first.edge.parent, *first.edge.switched))}"
     notes = [*_others(offences), *_declared(first)]
     advice = f"end {first.who}"
     if first.namesake:

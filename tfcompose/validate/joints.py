@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.validate.edges import EdgeKeys
+from tfcompose.validate.edges import PARENT, EdgeKeys
 from tfcompose.validate.fields import (
     AXIS,
     JOINT_DAMPING,
@@ -65,7 +65,7 @@ class JointSpec(EdgeKeys):
     """An edge between bodies, in URDF's words. A planar or floating joint needs an owner: joint states say nothing."""
 
     type: str = key(choice("fixed", "revolute", "continuous", "prismatic", "planar", "floating"))
-    parent: str = key(TEXT, about="the link that this joint hangs on")
+    parent: tuple[str, ...] = key(PARENT, about="the link that this joint hangs on")
     child: str = key(TEXT, about="the link that moves")
     axis: Vector = key(
         AXIS, (1.0, 0.0, 0.0), "in the child's frame; as in URDF the default is x; of planar: the normal", ([0, 0, 1],)

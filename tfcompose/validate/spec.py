@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.validate.bodies import LINK, LinkSpec
-from tfcompose.validate.edges import MountKeys
+from tfcompose.validate.edges import PARENTS, MountKeys
 from tfcompose.validate.fields import (
     ANYTHING,
     TEXT,
@@ -41,7 +41,7 @@ class SensorSpec(MountKeys):
     """A sensor on its mount; its frames are named after it."""
 
     preset: str = key(TEXT, about="vendor/model", examples=("realsense/d435i", "generic/lidar2d"))
-    parent: str = key(TEXT, about="the frame that the mount hangs on", examples=("base_link",))
+    parent: tuple[str, ...] = key(PARENTS, about="the frame that the mount hangs on", examples=("base_link",))
     place: str | None = key(TEXT, None, "the pose is this frame's; the mount edge is solved for")
     options: dict[str, Any] = key(mapping(ANYTHING), {}, "the preset's own choices: streams, imu, …")
     tf: str | None = key(choice("driver", "tfcompose"), None, "who publishes the frames inside the sensor")

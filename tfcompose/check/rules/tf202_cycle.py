@@ -32,3 +32,14 @@ def cycle(robot: Robot) -> Iterator[Diagnostic]:
             notes = [Note(above[child].name, above[child].at) for child in loop[1:]]
             yield finding("TF202", f"a cycle: {names}", above[loop[0]].at, notes=notes, help="one edge must go")
         done.update(path)
+    for edge in robot.edges:
+        for parent in edge.switched:
+            path = {}
+            frame = parent
+            while frame != edge.child and frame in above and frame not in path:
+                path[frame] = None
+                frame = above[frame].parent
+            if frame == edge.child:
+                names = " → ".join((frame, *reversed(path), frame))
+                message = f"a cycle when {edge.child} hangs on {parent}: {names}"
+                yield finding("TF202", message, edge.at, help=f"remove {parent} from its parents")

@@ -19,9 +19,10 @@ def unknown_frame(robot: Robot) -> Iterator[Diagnostic]:
     no lookup reaches.
     """
     for edge in robot.edges:
-        if edge.given and edge.parent not in robot.frames and not robot.excuses(edge.parent):
-            advice = did_you_mean(edge.parent, robot.frames, f"declare it: frames: {{{edge.parent}: {{}}}}")
-            yield finding("TF203", f"{edge.child} hangs on {edge.parent}, which is no frame", edge.at, help=advice)
+        for parent in (edge.parent, *edge.switched) if edge.given else ():
+            if parent not in robot.frames and not robot.excuses(parent):
+                advice = did_you_mean(parent, robot.frames, f"declare it: frames: {{{parent}: {{}}}}")
+                yield finding("TF203", f"{edge.child} hangs on {parent}, which is no frame", edge.at, help=advice)
         if edge.child not in robot.frames and not robot.excuses(edge.child):
             advice = did_you_mean(edge.child, robot.frames, f"declare it: links: {{{edge.child}: {{}}}}")
             message = f"the joint {edge.joint_name} moves {edge.child}, which is no link"

@@ -42,11 +42,12 @@ def impossible_inertia(robot: Robot) -> Iterator[Diagnostic]:
 
 def _principal(tensor: tuple[float, float, float, float, float, float]) -> tuple[float, float, float]:
     """Return the eigenvalues of the symmetric tensor xx, xy, xz, yy, yz, zz, least first (Smith, 1961)."""
-    xx, xy, xz, yy, yz, zz = tensor
+    scale = max(map(abs, tensor)) or 1.0  # squares of what a foreign file holds may leave the range of floats
+    xx, xy, xz, yy, yz, zz = (value / scale for value in tensor)
     mean = (xx + yy + zz) / 3
     spread = math.sqrt(((xx - mean) ** 2 + (yy - mean) ** 2 + (zz - mean) ** 2 + 2 * (xy**2 + xz**2 + yz**2)) / 6)
     if spread <= abs(mean) * 1e-12:
-        return (mean, mean, mean)
+        return (mean * scale, mean * scale, mean * scale)
     a, b, c, d, e, f = (
         (xx - mean) / spread,
         xy / spread,
@@ -58,4 +59,4 @@ def _principal(tensor: tuple[float, float, float, float, float, float]) -> tuple
     half = (a * (d * f - e * e) - b * (b * f - e * c) + c * (b * e - d * c)) / 2
     angle = math.acos(max(-1.0, min(1.0, half))) / 3
     high, low = mean + 2 * spread * math.cos(angle), mean + 2 * spread * math.cos(angle + math.tau / 3)
-    return (low, 3 * mean - high - low, high)
+    return (low * scale, (3 * mean - high - low) * scale, high * scale)

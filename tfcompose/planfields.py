@@ -3,18 +3,46 @@
 from __future__ import annotations
 
 import math
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 T = TypeVar("T")
+
+
+def there(data: dict[str, Any], key: str, where: str) -> Any:
+    """Return the value of a key.
+
+    Raises:
+        ValueError: if it is not there.
+    """
+    if key not in data:
+        raise ValueError(f"{where}: {key} is missing")
+    return data[key]
+
+
+def rows(data: dict[str, Any], key: str, read: Callable[[dict[str, Any], str], T]) -> tuple[T, ...]:
+    """Return what ``read`` makes of a list of mappings; each is named by its place in the list, counted from 1.
+
+    Raises:
+        TypeError, ValueError: if it is not there, or is something else.
+    """
+    made = []
+    for number, row in enumerate(get(data, key, list, "plan"), 1):
+        if not isinstance(row, dict):
+            raise TypeError(f"{key} {number} is {row!r}, not a mapping")
+        made.append(read(row, f"{key} {number}"))
+    return tuple(made)
 
 
 def get(data: dict[str, Any], key: str, kind: type[T], where: str) -> T:
     """Return the value of a key of that kind; a whole number may stand for a float, which is finite.
 
     Raises:
-        KeyError, TypeError, ValueError: if it is not there, or is something else.
+        TypeError, ValueError: if it is not there, or is something else.
     """
-    value = data[key]
+    value = there(data, key, where)
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
     if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
@@ -28,9 +56,9 @@ def one_of(data: dict[str, Any], key: str, allowed: tuple[str | None, ...], wher
     """Return the value of a key that is one of those allowed.
 
     Raises:
-        KeyError, TypeError, ValueError: if it is not there, or is something else.
+        TypeError, ValueError: if it is not there, or is something else.
     """
-    if data[key] not in allowed:
+    if there(data, key, where) not in allowed:
         raise ValueError(f"{where}: {key} is {data[key]!r}, not one of {', '.join(str(one) for one in allowed)}")
     return data[key]
 
@@ -39,16 +67,16 @@ def optional(data: dict[str, Any], key: str, kind: type[T], where: str) -> T | N
     """Return the value of a key of that kind, or None if it is null.
 
     Raises:
-        KeyError, TypeError, ValueError: if it is not there, or is something else.
+        TypeError, ValueError: if it is not there, or is something else.
     """
-    return None if data[key] is None else get(data, key, kind, where)
+    return None if there(data, key, where) is None else get(data, key, kind, where)
 
 
 def floats(data: dict[str, Any], key: str, count: int, where: str) -> tuple[float, ...]:
     """Return a list of ``count`` finite numbers.
 
     Raises:
-        KeyError, TypeError, ValueError: if it is not there, or is something else.
+        TypeError, ValueError: if it is not there, or is something else.
     """
     values = get(data, key, list, where)
     if len(values) != count or not all(isinstance(v, (int, float)) and math.isfinite(v) for v in values):
@@ -60,7 +88,7 @@ def texts(data: dict[str, Any], key: str, where: str) -> dict[str, str]:
     """Return a mapping of texts.
 
     Raises:
-        KeyError, TypeError, ValueError: if it is not there, or is something else.
+        TypeError, ValueError: if it is not there, or is something else.
     """
     values = get(data, key, dict, where)
     if not all(isinstance(value, str) for value in values.values()):

@@ -24,7 +24,7 @@ from tfcompose.plan import (
     Simulation,
     StopRule,
 )
-from tfcompose.planfields import floats, get, one_of, optional, texts
+from tfcompose.planfields import floats, get, one_of, optional, rows, texts
 from tfcompose.pose import Pose, norm
 
 
@@ -140,8 +140,8 @@ def _joint_from_json(data: dict[str, Any], where: str) -> Joint:
     )
 
 
-def _edge_from_json(data: dict[str, Any]) -> PlanEdge:
-    where = f"edge {data.get('parent')} → {data.get('child')}"
+def _edge_from_json(data: dict[str, Any], where: str) -> PlanEdge:
+    where += f", {data.get('parent')} → {data.get('child')}"
     source = get(data, "source", dict, where)
     return PlanEdge(
         parent=get(data, "parent", str, where),
@@ -187,8 +187,8 @@ def _states(data: dict[str, Any], where: str) -> dict[str, str]:
     return {node: one_of(states, node, LIFECYCLE_STATES, where) for node in states}
 
 
-def _process_from_json(data: dict[str, Any]) -> PlanProcess:
-    where = f"process {data.get('name')}"
+def _process_from_json(data: dict[str, Any], where: str) -> PlanProcess:
+    where += f", {data.get('name')}"
     simulation = data.get("simulate")
     return PlanProcess(
         name=get(data, "name", str, where),
@@ -236,8 +236,8 @@ def _plan_from_json(data: dict[str, Any]) -> Plan:
             frame_prefix=get(ros, "frame_prefix", str, "ros"),
             shared_frames=tuple(str(frame) for frame in get(ros, "shared_frames", list, "ros")),
         ),
-        edges=tuple(_edge_from_json(edge) for edge in get(data, "edges", list, "plan")),
-        processes=tuple(_process_from_json(process) for process in get(data, "processes", list, "plan")),
+        edges=rows(data, "edges", _edge_from_json),
+        processes=rows(data, "processes", _process_from_json),
         guard=_guard_from_json(get(data, "guard", dict, "plan")),
         description=get(data, "description", str, "plan"),
     )

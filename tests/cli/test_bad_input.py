@@ -197,13 +197,14 @@ def test_output_that_cannot_be_written_is_one_sentence(folder: Path) -> None:
     assert done.stderr == "tfcompose: the output cannot be written: No space left on device\n"
 
 
-def test_a_reader_that_goes_away_causes_no_traceback(folder: Path) -> None:
+@pytest.mark.parametrize("words", [("tree", "robots/autonomous_robot.yaml"), ("--help",), ("up", "--help")])
+def test_a_reader_that_goes_away_causes_no_traceback(words: tuple[str, ...]) -> None:
     reader, writer = os.pipe()
     os.close(reader)
     with os.fdopen(writer, "w") as gone:
         done = subprocess.run(
-            [sys.executable, "-m", "tfcompose", "tree", str(ROBOTS / "autonomous_robot.yaml")],
-            cwd=folder, stdout=gone, stderr=subprocess.PIPE, text=True, check=False,
+            [sys.executable, "-m", "tfcompose", *words],
+            cwd=ROBOTS.parent, stdout=gone, stderr=subprocess.PIPE, text=True, check=False,
         )  # fmt: skip
     assert (done.returncode, done.stderr) == (141, "")
 

@@ -261,7 +261,7 @@ def test_an_owner_that_somebody_else_starts_is_waited_for_by_name_and_missing_at
     robot = up(EXTERNAL, "--for", "9")
     robot.says("waiting for drive (/diff_drive): odom → base_link")
     assert "expecting drive (/diff_drive): somebody else starts it" in robot.text
-    assert "live  base_link → lidar" in robot.text
+    assert "live  static (/tfcompose_static): base_link → lidar  " in robot.text
     assert robot.ends() == 1
     assert "error[TF811] drive never published odom → base_link" in robot.text
 
@@ -294,3 +294,37 @@ def test_without_ros_it_says_in_one_sentence_what_to_install_and_writes_nothing(
     assert line.startswith("error[TF901] rclpy cannot be imported: ")
     assert rest == []
     assert sorted(path.name for path in tmp_path.iterdir()) == ["output0.txt", "rover.yaml", "stubs"]
+
+
+def test_without_a_guard_edges_are_still_said_to_be_live_and_nobody_is_judged(
+    up: Callable[..., Up], rogue: Callable[[], object]
+) -> None:
+    rogue()
+    robot = up(ROVER, "--guard", "off", "--for", "6")
+    robot.says("tree complete: 2 edges live after ")
+    assert robot.ends() == 0
+    assert "TF80" not in robot.text
+
+
+def test_looking_before_the_start_takes_nothing_from_the_time_that_was_asked_for(up: Callable[..., Up]) -> None:
+    robot = up(ROVER, "--settle", "3", "--for", "2.5")
+    assert robot.ends() == 0, robot.text
+    assert "tree complete" in robot.text
+
+
+def test_settle_without_a_guard_is_wrong_use_and_settle_0_is_not(up: Callable[..., Up]) -> None:
+    robot = up(ROVER, "--guard", "off", "--settle", "1")
+    assert robot.ends() == 2
+    assert "leave out --settle" in robot.text
+    assert up(ROVER, "--settle", "0", "--for", "3").ends() == 0
+
+
+def test_what_is_missing_is_named_once_with_the_profile_that_needs_none_of_it(up: Callable[..., Up]) -> None:
+    simulated = "drive: {simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}"
+    missing = "drive: {run: [no_drive], node: drive}\n  more: {run: [no_more]}"
+    demo = f"profiles: {{demo: {{processes: {{{simulated}, more: {{run: ['true']}}}}}}, idle: {{}}}}\n"
+    robot = up(ROVER.replace(simulated, missing) + demo)
+    assert robot.ends() == 1
+    assert robot.text.startswith("error[TF810] 2 executables were not found: no_drive of drive, no_more of more\n")
+    assert robot.text.count("looked in the PATH") == 1
+    assert robot.text.endswith("help: without them: tfcompose up rover.yaml --profile demo\n")

@@ -14,10 +14,11 @@ from tfcompose.pose import Pose
 from tfcompose.run.events import Clear, Complete, Found, Live, OwnerReady, Recovered, Taken
 from tfcompose.run.machine import step
 from tfcompose.run.notice import (
-    EdgeLive,
     Ended,
     FindingShown,
+    Missing,
     Notice,
+    OwnerLive,
     ProcessState,
     RecoveredShown,
     Stopping,
@@ -142,9 +143,18 @@ def test_the_guard_is_started_first_and_the_rest_only_after_it_is_clear_in_the_p
     assert history.started == ["guard", "slam", "static"]
 
 
-@pytest.mark.parametrize("processes", [(SLAM, STATIC), (SLAM, STATIC, GUARD)], ids=["none", "off"])
-def test_without_a_guard_everything_starts_at_once(processes: tuple[PlanProcess, ...]) -> None:
-    assert begin(*processes, guard=GuardPolicy(mode="off")).started == ["slam", "static"]
+def test_without_a_guard_everything_starts_at_once() -> None:
+    assert begin(SLAM, STATIC).started == ["slam", "static"]
+
+
+def test_a_guard_that_is_off_is_not_waited_for_and_still_says_what_is_live_and_ready() -> None:
+    off, waits = GuardPolicy(mode="off"), run_process("b", after={"slam": "ready"})
+    history = begin(SLAM, GUARD, waits, guard=off)
+    assert history.started == ["guard", "slam"]
+    assert history.wait(60).found() == []
+    history.feed(Live("map", "odom", "slam", "/slam"), OwnerReady("slam"), Complete(1))
+    assert history.started == ["guard", "slam", "b"]
+    assert history.feed(TimeUp(), Exited("b", 0), Exited("slam", 0), Exited("guard", 0)).exit_code == 0
 
 
 def test_an_external_process_is_expected_and_not_started() -> None:
@@ -313,8 +323,9 @@ def test_a_process_that_waits_for_its_restart_is_not_started_once_everything_sto
 
 def test_what_the_guard_sees_is_told_with_the_seconds_since_the_start() -> None:
     history = begin(GUARD, STATIC).wait(1.5).feed(Clear()).wait(0.5)
-    history.feed(Live("base_link", "laser", "static", "/static"), Complete(1), Recovered("it is back"))
-    assert history.all(EdgeLive) == [EdgeLive("base_link", "laser", "static", "/static", 2.0)]
+    live = Live("base_link", "laser", "static", "/static")
+    history.feed(live, OwnerReady("static"), Complete(1), Recovered("it is back"))
+    assert history.all(OwnerLive) == [OwnerLive("static", "/static", ("base_link → laser",), 2.0)]
     assert history.all(TreeComplete) == [TreeComplete(1, 2.0)]
     assert history.all(RecoveredShown) == [RecoveredShown("it is back", 2.0)]
 
@@ -337,12 +348,12 @@ def test_a_violation_is_only_shown_where_the_policy_is_report() -> None:
 def test_missing_edges_are_named_after_5_s_and_again_only_when_there_are_others() -> None:
     history = begin(GUARD, STATIC, SLAM).wait(3).feed(Clear())
     assert history.sleep_until_due() == pytest.approx(5)
-    assert [[owner for owner, _ in notice.missing] for notice in history.all(Waiting)] == [["static", "slam"]]
+    assert [[one.owner for one in notice.missing] for notice in history.all(Waiting)] == [["static", "slam"]]
     assert wake_time(history.state) is None
     history.wait(60)
     assert len(history.all(Waiting)) == 1
     history.feed(Live("base_link", "laser", "static", "/static"))
-    assert history.all(Waiting)[1:] == [Waiting((("slam", (edge("map", "odom", "slam"),)),))]
+    assert history.all(Waiting)[1:] == [Waiting((Missing("slam", "/slam", ("map → odom",), 1),))]
     history.feed(Live("map", "odom", "slam", "/slam"), Complete(2)).wait(60)
     assert len(history.all(Waiting)) == 2
 
@@ -430,10 +441,10 @@ def test_nothing_happens_after_the_end() -> None:
     assert (len(history.told), history.exit_code) == (told, 0)
 
 
-def test_output_that_nobody_reads_any_more_ends_everything_with_exit_1() -> None:
+def test_output_that_nobody_reads_any_more_ends_everything_with_exit_141() -> None:
     history = begin(STATIC).feed(OutputLost(), Exited("static", 0))
     assert history.all(Stopping) == [Stopping("nobody reads the output any more")]
-    assert history.exit_code == 1
+    assert history.exit_code == 141
 
 
 # An end that was asked for.
@@ -454,6 +465,16 @@ def test_time_is_up_ends_with_1_and_names_the_edges_that_were_never_seen() -> No
     assert [(found.code, found.message) for found in history.found()] == [("TF811", "slam never published map → odom")]
     history.feed(Exited("slam", 0), Exited("static", 0), Exited("guard", 0))
     assert history.exit_code == 1
+
+
+def test_a_process_that_was_never_started_is_not_blamed_for_its_edges() -> None:
+    slam = replace(SLAM, after={"drive": "ready"})
+    history = begin(GUARD, STATIC, slam, DRIVE).feed(Clear(), TimeUp())
+    assert [found.message for found in history.found()] == [
+        "static never published base_link → laser",
+        "nobody published map → odom: slam was not started: it waits for drive to be ready",
+        "drive never published odom → base_link",
+    ]
 
 
 def test_time_is_up_ends_with_0_where_no_guard_looks() -> None:

@@ -67,7 +67,19 @@ def test_a_misspelt_ros_executable_is_reported_with_where_it_was_looked_for_and_
 
 def test_a_package_that_is_not_installed_is_to_be_installed(tmp_path: Path, prefix: Path) -> None:
     _, (found,) = look(tmp_path, lidar("${executable:nope/no_such_node}"), env={"AMENT_PREFIX_PATH": str(prefix)})
-    assert found.help == "install the package nope"
+    assert found.help.startswith("install the package nope (")
+
+
+def test_all_that_is_missing_is_one_finding_that_says_once_where_it_was_looked_for(tmp_path: Path) -> None:
+    words = {"laser": "${executable:sllidar_ros2/sllidar_node}", "slam": "${executable:slam_toolbox/slam}", "a": "no_a"}
+    _, (found,) = look(tmp_path, *(PlanProcess(name, "run", argv=(word,)) for name, word in words.items()))
+    missing = "sllidar_ros2/sllidar_node of laser, slam_toolbox/slam of slam, no_a of a"
+    assert found.message == f"3 executables were not found: {missing}"
+    assert [note.message for note in found.notes] == [
+        "AMENT_PREFIX_PATH names no folder",
+        f"looked in the PATH: {os.environ['PATH']}",
+    ]
+    assert found.help == "source the setup file of your ROS installation first"
 
 
 def test_without_any_prefix_the_setup_file_is_to_be_sourced(tmp_path: Path) -> None:

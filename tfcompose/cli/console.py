@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.terminal import line_of
 from tfcompose.render.text import BOLD, GREEN, PLAIN, RED, YELLOW, render_text
 from tfcompose.run.notice import (
-    EdgeLive,
     Ended,
     FindingShown,
     LogLine,
+    OwnerLive,
     ProcessState,
     RecoveredShown,
     Stopping,
@@ -33,6 +33,10 @@ NAMED_AT_MOST = 4
 QUIET = frozenset({"STARTING", "STOPPED"})
 
 
+def _counted(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"
+
+
 class Console:
     """Writes notices as lines: ``name | text``, coloured on a terminal."""
 
@@ -41,7 +45,6 @@ class Console:
         self._stream = stream
         self._colour = colour
         self._width = max(len(name) for name in [*names, OURS])
-        self._edges = max((len(f"{edge.parent} → {edge.child}") for edge in plan.edges), default=0)
         self._colours = {name: COLOURS[index % len(COLOURS)] for index, name in enumerate(names)}
         self._nodes = {process.name: process.nodes for process in plan.processes}
 
@@ -76,22 +79,22 @@ class Console:
         self._say(text)
 
     @_write.register
-    def _(self, notice: EdgeLive) -> None:
-        edge = f"{notice.parent} → {notice.child}"
+    def _(self, notice: OwnerLive) -> None:
+        edges = _counted(len(notice.edges), "edge") if len(notice.edges) > NAMED_AT_MOST else ", ".join(notice.edges)
         owner = f"{notice.owner} ({notice.node})"
-        self._say(f"{self._paint('live', GREEN)}  {edge:<{self._edges}}  {owner}  {notice.seconds:.2f} s")
+        self._say(f"{self._paint('live', GREEN)}  {owner}: {edges}  {notice.seconds:.2f} s")
 
     @_write.register
     def _(self, notice: TreeComplete) -> None:
-        edges = f"{notice.edges} edge{'s' if notice.edges != 1 else ''}"
+        edges = _counted(notice.edges, "edge")
         self._say(self._paint(f"tree complete: {edges} live after {notice.seconds:.2f} s", GREEN, BOLD))
 
     @_write.register
     def _(self, notice: Waiting) -> None:
-        for owner, edges in notice.missing:
-            named = ", ".join(edge.name for edge in edges[:NAMED_AT_MOST])
-            more = f" and {len(edges) - NAMED_AT_MOST} more" if len(edges) > NAMED_AT_MOST else ""
-            self._say(self._paint(f"waiting for {owner} ({edges[0].node}): {named}{more}", YELLOW))
+        for one in notice.missing:
+            named = ", ".join(one.edges[:NAMED_AT_MOST])
+            more = f" and {len(one.edges) - NAMED_AT_MOST} more" if len(one.edges) > NAMED_AT_MOST else ""
+            self._say(self._paint(f"waiting for {one.owner} ({one.node}): {named}{more}", YELLOW))
 
     @_write.register
     def _(self, notice: FindingShown) -> None:

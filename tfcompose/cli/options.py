@@ -37,10 +37,27 @@ def positive(text: str) -> float:
     Raises:
         ArgumentTypeError: if it is none.
     """
+    value = _number(text)
+    if value is None or value == 0:
+        raise ArgumentTypeError(f"{text} is not a positive number")
+    return value
+
+
+def not_negative(text: str) -> float:
+    """Read a number that is 0 or more.
+
+    Raises:
+        ArgumentTypeError: if it is none.
+    """
+    value = _number(text)
+    if value is None:
+        raise ArgumentTypeError(f"{text} is not a number of 0 or more")
+    return value
+
+
+def _number(text: str) -> float | None:
     try:
         value = float(text)
     except ValueError:
-        value = 0.0
-    if not 0 < value < 1e9:  # noqa: PLR2004 (in seconds thirty years)
-        raise ArgumentTypeError(f"{text} is not a positive number")
-    return value
+        return None
+    return value if 0 <= value < 1e9 else None  # noqa: PLR2004 (in seconds thirty years)

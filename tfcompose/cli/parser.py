@@ -33,21 +33,15 @@ COMMANDS = {
 }
 
 
+#: The exit code of a command whose output nobody reads any more: what a shell says of a program ended by SIGPIPE.
+UNREAD = 141
+
+
 def main(argv: list[str] | None = None) -> int:
     """Run the command line and return the exit code: 0 clean, 1 findings or a failed process, 2 wrong use."""
     _steady(sys.stdout, sys.stderr)
-    words = sys.argv[1:] if argv is None else argv
-    command = words[0] if words else ""
-    if command in {"-h", "--help", "help"}:
-        sys.stdout.write(help_text())
-        return 0
-    if command == "--version":
-        sys.stdout.write(f"tfcompose {__version__}\n")
-        return 0
-    if command not in COMMANDS:
-        return _no_command(command)
     try:
-        code = _run(command, words[1:])
+        code = _main(sys.argv[1:] if argv is None else argv)
         sys.stdout.flush()
     except KeyboardInterrupt:
         return 130
@@ -60,6 +54,17 @@ def main(argv: list[str] | None = None) -> int:
         sys.stderr.write(f"tfcompose: the output cannot be written: {error.strerror}\n")
         return 2
     return code
+
+
+def _main(words: list[str]) -> int:
+    command = words[0] if words else ""
+    if command in {"-h", "--help", "help"}:
+        sys.stdout.write(help_text())
+        return 0
+    if command == "--version":
+        sys.stdout.write(f"tfcompose {__version__}\n")
+        return 0
+    return _run(command, words[1:]) if command in COMMANDS else _no_command(command)
 
 
 def _steady(*streams: TextIO | None) -> None:
@@ -100,7 +105,13 @@ def _run(command: str, words: list[str]) -> int:
     gc.set_threshold(200_000, 50, 1000)
     module = import_module(f"tfcompose.cli.{command}")
     parser = parser_of(command)
-    arguments = parser.parse_args(words)
+    if not {"-h", "--help"}.isdisjoint(words):  # argparse would say nothing of a reader that is gone
+        sys.stdout.write(parser.format_help())
+        return 0
+    try:
+        arguments = parser.parse_args(words)
+    except SystemExit as end:  # after wrong use
+        return end.code if isinstance(end.code, int) else 2
     code: int = module.run(arguments)
     return code
 
@@ -108,7 +119,7 @@ def _run(command: str, words: list[str]) -> int:
 def _unwritten() -> int:
     """Return the exit code for output that nobody reads; what is still held back goes nowhere, without a traceback."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return 141
+    return UNREAD
 
 
 def parser_of(command: str) -> ArgumentParser:

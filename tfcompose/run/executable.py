@@ -10,13 +10,14 @@ import os
 import re
 import shutil
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, did_you_mean, finding
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from tfcompose.plan import PlanProcess
 
@@ -37,8 +38,31 @@ def filled_in(process: PlanProcess, plan_file: Path) -> tuple[str, ...]:
     return tuple(_PLACEHOLDER.sub(lambda found: values.get(found[1], found[0]), word) for word in process.argv)
 
 
-def executable_of(process: PlanProcess, word: str, folder: Path, env: Mapping[str, str]) -> str | Diagnostic:
-    """Return the path of the program that ``word`` means, or the finding that says where it was looked for.
+@dataclass(frozen=True, slots=True)
+class NotFound:
+    """A program that is not there: whose it is, what it is called, where it was looked for, and what may help."""
+
+    process: str
+    program: str
+    places: tuple[str, ...]
+    path: str = ""
+    advice: str = ""
+
+
+def not_found(missing: Sequence[NotFound]) -> Diagnostic:
+    """Return the one finding for all programs that were not found."""
+    what = ", ".join(f"{one.program} of {one.process}" for one in missing)
+    message = f"{len(missing)} executables were not found: {what}"
+    if len(missing) == 1:
+        message = f"the executable {what} was not found"
+    places = dict.fromkeys(place for one in missing for place in one.places)
+    paths = dict.fromkeys(f"looked in the PATH: {one.path}" for one in missing if one.path)
+    advice = dict.fromkeys(one.advice for one in missing if one.advice)
+    return finding("TF810", message, None, notes=[Note(note) for note in (*places, *paths)], help="; ".join(advice))
+
+
+def executable_of(process: PlanProcess, word: str, folder: Path, env: Mapping[str, str]) -> str | NotFound:
+    """Return the path of the program that ``word`` means, or what is missing.
 
     A relative path is looked up in ``folder``, a bare name on the PATH of ``env``.
     """
@@ -47,12 +71,12 @@ def executable_of(process: PlanProcess, word: str, folder: Path, env: Mapping[st
         return _in_package(process, ros[1], ros[2], env)
     if "/" in word:
         path = folder / word
-        return str(path) if _can_run(path) else _not_found(process, word, [_why_not(path)])
+        return str(path) if _can_run(path) else NotFound(process.name, word, (_why_not(path),))
     path_variable = env.get("PATH", os.defpath)
-    return shutil.which(word, path=path_variable) or _not_found(process, word, [_path_note(path_variable)])
+    return shutil.which(word, path=path_variable) or NotFound(process.name, word, (), path_variable)
 
 
-def _in_package(process: PlanProcess, package: str, name: str, env: Mapping[str, str]) -> str | Diagnostic:
+def _in_package(process: PlanProcess, package: str, name: str, env: Mapping[str, str]) -> str | NotFound:
     prefixes = [prefix for prefix in env.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix]
     folders = [Path(prefix) / "lib" / package for prefix in prefixes]
     for folder in folders:
@@ -64,9 +88,12 @@ def _in_package(process: PlanProcess, package: str, name: str, env: Mapping[str,
         return on_path
     notes = [_why_not(folder / name) for folder in folders] or ["AMENT_PREFIX_PATH names no folder"]
     known = [file.name for folder in folders if folder.is_dir() for file in sorted(folder.iterdir())]
-    otherwise = f"install the package {package}" if prefixes else "source the setup file of your ROS installation first"
+    otherwise = "source the setup file of your ROS installation first"
+    if prefixes:
+        debian = f"ros-{env.get('ROS_DISTRO', 'jazzy')}-{package.replace('_', '-')}"
+        otherwise = f"install the package {package} (on Ubuntu probably: sudo apt install {debian})"
     advice = did_you_mean(name, known, "" if known else otherwise)
-    return _not_found(process, f"{package}/{name}", [*notes, _path_note(path_variable)], advice)
+    return NotFound(process.name, f"{package}/{name}", tuple(notes), path_variable, advice)
 
 
 def _can_run(path: Path) -> bool:
@@ -77,12 +104,3 @@ def _why_not(path: Path) -> str:
     if path.is_file():
         return f"{path} may not be executed"
     return f"{path} is a folder" if path.is_dir() else f"{path} is not there"
-
-
-def _path_note(path_variable: str) -> str:
-    return f"looked in the PATH: {path_variable}"
-
-
-def _not_found(process: PlanProcess, word: str, notes: list[str], advice: str = "") -> Diagnostic:
-    message = f"the executable {word} of {process.name} was not found"
-    return finding("TF810", message, None, notes=[Note(note) for note in notes], help=advice)

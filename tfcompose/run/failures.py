@@ -9,6 +9,11 @@ from tfcompose.diagnostic import Diagnostic, Note, finding
 
 if TYPE_CHECKING:
     from tfcompose.plan import PlanEdge
+    from tfcompose.run.state import Tracked
+
+
+#: How many of an owner's edges a finding names.
+NAMED_AT_MOST = 12
 
 
 def signal_name(number: int) -> str:
@@ -47,7 +52,13 @@ def never_clear(name: str, seconds: float) -> Diagnostic:
     return finding("TF808", message, None, help="its own log says how far it came; --guard off starts without it")
 
 
-def never_seen(owner: str, edges: tuple[PlanEdge, ...]) -> Diagnostic:
+def never_seen(owner: Tracked, edges: tuple[PlanEdge, ...]) -> Diagnostic:
     """Return the finding for the edges of one owner that nobody published until the time was up."""
-    names = ", ".join(edge.name for edge in edges)
-    return finding("TF811", f"{owner} never published {names}", None)
+    names = ", ".join(edge.name for edge in edges[:NAMED_AT_MOST])
+    more = f" and {len(edges) - NAMED_AT_MOST} more" if len(edges) > NAMED_AT_MOST else ""
+    name = owner.process.name
+    if owner.state == "STOPPED" and owner.order == 0:
+        waits = " and ".join(f"{other} to be {what}" for other, what in owner.process.after.items())
+        why = f"was not started: it waits for {waits}" if waits else "was not started"
+        return finding("TF811", f"nobody published {names}{more}: {name} {why}", None)
+    return finding("TF811", f"{name} never published {names}{more}", None)

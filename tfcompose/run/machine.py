@@ -1,10 +1,10 @@
 """What the launcher does next: a pure function of what is known, what happened, and the time.
 
 The guard is started first and listens; once it says that nobody publishes a planned edge, the others follow in the
-plan's order, each when what it waits for is there. Without a guard nothing waits for its word, and ``after: ready``
-means ``started``. Whatever goes wrong, or is asked for, everything is stopped: a process when all that wait for it are
-gone, the guard last of all. What the guard says while everything stops is not heeded, because an owner that is stopped
-falls silent.
+plan's order, each when what it waits for is there. A guard that is switched off only says which edges are live, and
+nothing waits for its word. Whatever goes wrong, or is asked for, everything is stopped: a process when all that wait
+for it are gone, the guard last of all. What the guard says while everything stops is not heeded, because an owner that
+is stopped falls silent.
 """
 
 from __future__ import annotations
@@ -22,9 +22,10 @@ from tfcompose.run.failures import (
     not_started,
     signal_name,
 )
-from tfcompose.run.notice import EdgeLive, RecoveredShown, TreeComplete, Waiting
+from tfcompose.run.notice import Missing, OwnerLive, RecoveredShown, TreeComplete, Waiting
 from tfcompose.run.state import (
     MAX_RESTARTS,
+    UNREAD,
     Action,
     Begin,
     Event,
@@ -44,6 +45,7 @@ from tfcompose.run.turn import Turn
 
 if TYPE_CHECKING:
     from tfcompose.diagnostic import Diagnostic
+    from tfcompose.plan import Plan, PlanEdge
 
 
 def step(state: State, event: Event, now: float) -> tuple[State, tuple[Action, ...]]:
@@ -73,7 +75,7 @@ def _react(turn: Turn, event: Event) -> None:
         case Signalled(number):
             _signalled(turn, signal_name(number))
         case OutputLost():
-            turn.stop(Stop("failure", 1), "nobody reads the output any more")
+            turn.stop(Stop("failure", UNREAD), "nobody reads the output any more")
         case TimeUp():
             _time_up(turn)
         case Taken(found):
@@ -84,7 +86,8 @@ def _react(turn: Turn, event: Event) -> None:
 
 def _begin(turn: Turn) -> None:
     guard = turn.state.guard
-    turn.know(begun=turn.now, clear=None if guard else turn.now)
+    judges = guard is not None and turn.state.plan.guard.mode != "off"
+    turn.know(begun=turn.now, clear=None if judges else turn.now)
     for name, tracked in turn.state.tracked.items():
         if tracked.state == "EXPECTED":
             turn.enter(name, "EXPECTED")
@@ -137,7 +140,7 @@ def _time_up(turn: Turn) -> None:
     complete = turn.state.complete or turn.state.guard is None
     if not complete and "TF811" not in turn.state.shown:
         for owner, edges in by_owner(turn.state.missing):
-            turn.show(never_seen(owner, edges))
+            turn.show(never_seen(turn.state.tracked[owner], edges))
     failed = not complete or bool(turn.state.shown)
     turn.stop(Stop("time", 1 if failed else 0), "the time is up")
 
@@ -154,11 +157,13 @@ def _guard_said(turn: Turn, event: Event) -> None:
     match event:
         case Clear():
             turn.know(clear=turn.now if turn.state.clear is None else turn.state.clear)
-        case Live(parent, child, owner, node):
+        case Live(child=child):
             turn.know(live=turn.state.live | {child})
-            turn.tell(EdgeLive(parent, child, owner, node, seconds))
         case OwnerReady(process) if process in turn.state.tracked:
             turn.track(process, replace(turn.state.tracked[process], ready=True))
+            edges = turn.state.plan.edges_of(process)
+            if edges:
+                turn.tell(OwnerLive(process, edges[0].node, tuple(edge.name for edge in edges), seconds))
         case Complete(edges):
             turn.know(complete=True)
             turn.tell(TreeComplete(edges, seconds))
@@ -199,9 +204,13 @@ def _go_on(turn: Turn) -> None:
     if due is not None and turn.now >= due:
         missing = turn.state.missing
         turn.know(waiting=frozenset(edge.child for edge in missing), waiting_said=turn.now)
-        turn.tell(Waiting(by_owner(missing)))
+        turn.tell(Waiting(tuple(_missing(turn.state.plan, owner, edges) for owner, edges in by_owner(missing))))
     if all(one.state in ("EXITED", "EXPECTED") for one in turn.state.tracked.values()):
         turn.finish(0)
+
+
+def _missing(plan: Plan, owner: str, edges: tuple[PlanEdge, ...]) -> Missing:
+    return Missing(owner, edges[0].node, tuple(edge.name for edge in edges), len(plan.edges_of(owner)))
 
 
 def _may_start(turn: Turn, one: Tracked) -> bool:
@@ -209,9 +218,7 @@ def _may_start(turn: Turn, one: Tracked) -> bool:
 
 
 def _is_there(turn: Turn, name: str, what: str) -> bool:
-    other = turn.state.tracked.get(name)
-    if other is None:  # a guard that is switched off
-        return True
+    other = turn.state.tracked[name]
     if what == "done":
         return other.state == "EXITED"
     started = other.was_started or other.state == "EXPECTED"

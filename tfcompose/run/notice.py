@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     from tfcompose.diagnostic import Diagnostic
-    from tfcompose.plan import PlanEdge
 
 #: supervisord's names, and EXPECTED for a process that somebody else starts.
 StateName = Literal["STOPPED", "STARTING", "RUNNING", "BACKOFF", "STOPPING", "EXITED", "FATAL", "EXPECTED"]
@@ -34,13 +33,12 @@ class ProcessState:
 
 
 @dataclass(frozen=True, slots=True)
-class EdgeLive:
-    """An edge was received from its owner for the first time, ``seconds`` after the start."""
+class OwnerLive:
+    """All edges of an owner were received from it, ``seconds`` after the start; ``edges`` are their names."""
 
-    parent: str
-    child: str
     owner: str
     node: str
+    edges: tuple[str, ...]
     seconds: float
 
 
@@ -53,10 +51,20 @@ class TreeComplete:
 
 
 @dataclass(frozen=True, slots=True)
-class Waiting:
-    """Edges that nobody has published yet: each owner with its missing edges, in the plan's order."""
+class Missing:
+    """The edges of one owner that nobody has published yet, in the plan's order, of ``owned`` ones."""
 
-    missing: tuple[tuple[str, tuple[PlanEdge, ...]], ...]
+    owner: str
+    node: str
+    edges: tuple[str, ...]
+    owned: int
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """Edges that nobody has published yet, by owner."""
+
+    missing: tuple[Missing, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,4 +96,4 @@ class Ended:
     exit_code: int
 
 
-Notice = LogLine | ProcessState | EdgeLive | TreeComplete | Waiting | FindingShown | RecoveredShown | Stopping | Ended
+Notice = LogLine | ProcessState | OwnerLive | TreeComplete | Waiting | FindingShown | RecoveredShown | Stopping | Ended

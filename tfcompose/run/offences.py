@@ -41,6 +41,11 @@ class Offence:
         return f"another {name}" if self.namesake else name
 
     @property
+    def whom(self) -> str:
+        """The offender, as the one to do something about."""
+        return f"the other {self.nodes[0]}" if self.namesake and len(self.nodes) == 1 else self.who
+
+    @property
     def name(self) -> str:
         """The edge that was seen."""
         return f"{self.parent} → {self.child}"
@@ -66,7 +71,7 @@ def taken(offences: Sequence[Offence]) -> Diagnostic:
     if first.edge and not first.edge.may_hang_on(first.parent):
         message += f", and the plan hangs {first.child} on {' or '.join((first.edge.parent, *first.edge.switched))}"
     notes = [*_others(offences), *_declared(first)]
-    advice = f"end {first.who}"
+    advice = f"end {first.whom}"
     if first.namesake:
         advice += ": is the robot running already?"
     elif len(first.nodes) == 1:
@@ -112,7 +117,7 @@ def _help(first: Offence) -> str:
         return f"declare it under frames, or allow it: guard: {{allow: [{allowed}]}}"
     if first.code == "TF809":
         return "static: true says that the owner sends it on /tf_static"
-    return f"end {first.who}, or switch its TF off; tf2 takes whatever came last"
+    return f"end {first.whom}, or switch its TF off; tf2 takes whatever came last"
 
 
 def _others(offences: Sequence[Offence]) -> list[Note]:

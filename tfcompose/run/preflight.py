@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from tfcompose.diagnostic import Diagnostic, finding
 from tfcompose.ros.environment import RosError
-from tfcompose.run.executable import executable_of, filled_in, folder_of
+from tfcompose.run.executable import NotFound, executable_of, filled_in, folder_of, not_found
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -37,24 +37,34 @@ class Command:
     own: bool = False
 
 
+def started_by_us(plan: Plan) -> list[PlanProcess]:
+    """Return the processes that the launcher starts, in the plan's order."""
+    return [process for process in plan.processes if process.kind != "external"]
+
+
 def commands_of(
     plan: Plan, processes: list[PlanProcess], plan_file: Path, base: Mapping[str, str], environment: Environment
 ) -> tuple[dict[str, Command], list[Diagnostic]]:
     """Return each process's command, and what is wrong; with anything wrong, nothing should be started."""
     found = _never_started(plan)
     commands: dict[str, Command] = {}
+    missing = []
     for process in processes:
         command = _command_of(process, plan.ros, plan_file.absolute(), base, environment)
         if isinstance(command, Diagnostic):
             found.append(command)
+        elif isinstance(command, NotFound):
+            missing.append(command)
         else:
             commands[process.name] = command
+    if missing:
+        found.append(not_found(missing))
     return commands, list(dict.fromkeys(found))
 
 
 def _command_of(
     process: PlanProcess, ros: RosSettings, plan_file: Path, base: Mapping[str, str], environment: Environment
-) -> Command | Diagnostic:
+) -> Command | NotFound | Diagnostic:
     own = process.kind != "run"
     try:
         env = environment(base, ros, own=own) | process.env
@@ -65,7 +75,7 @@ def _command_of(
         return finding("TF902", f"the plan does not say how {process.name} is started", None)
     folder = folder_of(process, plan_file.parent)
     program = executable_of(process, argv[0], folder, env)
-    return program if isinstance(program, Diagnostic) else Command((program, *argv[1:]), env, folder, own)
+    return program if isinstance(program, NotFound) else Command((program, *argv[1:]), env, folder, own)
 
 
 def _never_started(plan: Plan) -> list[Diagnostic]:

@@ -38,6 +38,8 @@ class Times:
 
 
 MAX_RESTARTS = 5
+#: The exit code when nobody reads the output any more: what a shell says of a program that SIGPIPE ended.
+UNREAD = 141
 
 
 # What happens.
@@ -199,8 +201,8 @@ class State:
 
 
 def initial(plan: Plan, times: Times | None = None) -> State:
-    """Return the state before ``Begin``: nothing runs. A guard that is switched off is not there at all."""
-    processes = [process for process in plan.processes if process.kind != "guard" or plan.guard.mode != "off"]
+    """Return the state before ``Begin``: nothing runs."""
+    processes = plan.processes
     guards = [process.name for process in processes if process.kind == "guard"]
     tracked = {
         process.name: Tracked(process, "EXPECTED" if process.kind == "external" else "STOPPED") for process in processes

@@ -69,8 +69,8 @@ def supervise(  # noqa: PLR0913 (all but two are named, and most have what a use
     """Run the plan until it ends, and return the exit code: 0 after a clean end, 1 after a failure or a finding.
 
     SIGINT, SIGTERM and SIGHUP end it. ``report`` is given everything that a person should know, in order; an OSError
-    from it means that nobody reads it any more, and ends the plan. ``duration_s`` is how long to run, in seconds. Must
-    be called in the main thread.
+    from it means that nobody reads it any more, and ends the plan. ``duration_s`` is how long to run after
+    the look before the start, in seconds. Must be called in the main thread.
     """
     state = initial(plan, times)
     processes = [one.process for one in state.tracked.values() if one.state != "EXPECTED"]
@@ -104,9 +104,9 @@ class _Supervisor:
         stack.callback(self._abandon)
 
     def run(self, duration_s: float | None) -> int:
-        end = None if duration_s is None else time.monotonic() + duration_s
         self._handle(Begin())
         while self._exit_code is None:
+            end = self._end(duration_s)
             for key, _ in self._selector.select(self._sleep_s(end)):
                 key.data()
             for number in self._signals.taken():
@@ -114,10 +114,16 @@ class _Supervisor:
             for child in [child for child in self._children.values() if has_ended(child.popen.pid)]:
                 self._ended(child)
             if end is not None and time.monotonic() >= end:
-                end = None
                 self._handle(TimeUp())
             self._handle(Tick())
         return self._exit_code
+
+    def _end(self, duration_s: float | None) -> float | None:
+        """Return when the time is up: it counts from the end of the look before the start."""
+        state = self._state
+        if duration_s is None or state.clear is None or state.stop:
+            return None
+        return state.clear + duration_s
 
     def _sleep_s(self, end: float | None) -> float:
         due = [at for at in (wake_time(self._state), end) if at is not None]

@@ -11,7 +11,7 @@ from tfcompose.ros.graph import UNKNOWN_NODE, writers
 from tfcompose.ros.message import decode
 from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFSubscription, wait
-from tfcompose.run.events import EVENTS_FD, to_line
+from tfcompose.run.events import EVENTS_FD, Clear, Complete, Live, OwnerReady, to_line
 from tfcompose.run.judge import Judge, Message, Writer
 from tfcompose.run.own import say
 
@@ -20,12 +20,17 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node
 
+    from tfcompose.plan import Plan
     from tfcompose.ros.stop import Stop
     from tfcompose.ros.tf import Received
     from tfcompose.run.events import GuardEvent
     from tfcompose.run.own import Own
 
 SETTLE = "TFCOMPOSE_SETTLE_S"
+#: The guard's mode, where it is another than the plan's.
+MODE = "TFCOMPOSE_GUARD"
+#: What a guard says that is switched off: it looks, and judges nobody.
+_SEEN = (Clear, Live, OwnerReady, Complete)
 DEFAULT_SETTLE_S = 1.0
 LOOK_EVERY_S = 0.1
 #: A longer frame name is cut; no planned one is that long.
@@ -34,11 +39,17 @@ LONGEST_NAME = 1024
 
 def guard(own: Own, stop: Stop) -> None:
     """Watch /tf and /tf_static until a signal comes."""
-    settle_s = float(os.environ.get(SETTLE, DEFAULT_SETTLE_S))
-    emit = _emitter()
+    judges = os.environ.get(MODE, own.plan.guard.mode) != "off"
+    settle_s = float(os.environ.get(SETTLE, DEFAULT_SETTLE_S)) if judges else 0.0
+    emit = _emitter(judges=judges)
     with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
-        watch = _Watch(node, Judge(own.plan, settle_s, time.monotonic(), time.time_ns()), emit)
-        say(f"watching {len(own.plan.edges)} edges")
+        now = time.monotonic()
+        # One that judges nobody takes every owner as the plan's, whenever it began.
+        judge = Judge(own.plan, settle_s, now, time.time_ns() if judges else 0)
+        watch = _Watch(node, judge, emit)
+        if not judges:
+            judge.tick(now)
+        say(f"watching {_counted(own.plan)}{'' if judges else ', and judging nobody'}")
         while not stop.requested:
             wait(node, [watch.fixed, watch.moving], LOOK_EVERY_S, stop)
             watch.look()
@@ -107,13 +118,22 @@ def _writers(node: Node, fixed: TFSubscription, moving: TFSubscription) -> list[
     ]
 
 
-def _emitter() -> Callable[[GuardEvent], None]:
+def _counted(plan: Plan) -> str:
+    return f"{len(plan.edges)} edge{'s' if len(plan.edges) != 1 else ''}"
+
+
+def _emitter(*, judges: bool) -> Callable[[GuardEvent], None]:
     """Return what takes an event: a writer to the launcher's pipe, or, without a launcher, to the output."""
-    if EVENTS_FD not in os.environ:
-        return lambda event: say(to_line(event).rstrip())
-    pipe = os.fdopen(int(os.environ[EVENTS_FD]), "w", encoding="utf-8", buffering=1)
+    pipe = (
+        os.fdopen(int(os.environ[EVENTS_FD]), "w", encoding="utf-8", buffering=1) if EVENTS_FD in os.environ else None
+    )
 
     def emit(event: GuardEvent) -> None:
+        if not judges and not isinstance(event, _SEEN):
+            return
+        if pipe is None:
+            say(to_line(event).rstrip())
+            return
         try:
             pipe.write(to_line(event))
         except BrokenPipeError:

@@ -353,10 +353,10 @@ def test_no_file_descriptor_is_left_open_and_no_handler_in_place_after_50_runs(t
     ]
     before_all = signal.signal(SIGTERM, lambda *_: None)
     handlers = [signal.getsignal(number) for number in (SIGINT, SIGTERM, SIGHUP, signal.SIGCHLD)]
-    run(tmp_path, *plans[0], duration_s=0)
+    run(tmp_path, *plans[0], duration_s=0, times=Times(clear_s=0.01))
     before = len(list(Path("/proc/self/fd").iterdir()))
     for i in range(50):
-        run(tmp_path, *plans[i % len(plans)], duration_s=0.01)
+        run(tmp_path, *plans[i % len(plans)], duration_s=0.01, times=Times(clear_s=0.01))
     assert len(list(Path("/proc/self/fd").iterdir())) == before
     assert [signal.getsignal(number) for number in (SIGINT, SIGTERM, SIGHUP, signal.SIGCHLD)] == handlers
     signal.signal(SIGTERM, before_all)

@@ -96,7 +96,7 @@ def _stands(found: Diagnostic, validated: Validated) -> bool:
     if found.code not in _FROM_A_POSE:
         return True
     at = found.span
-    spans = (validated.source.values.get(entry) for entry in validated.broken)
+    spans = (validated.source.exactly_at(entry) for entry in validated.broken)
     return at is None or not any(span and _holds(span, at) for span in spans)
 
 

@@ -49,19 +49,19 @@ def _turned(found: Diagnostic, source: Source) -> tuple[Edit, ...]:
 
 def _entry(at: Span | None, source: Source) -> tuple[Path, dict[str, Any]] | None:
     """Return the only entry of the file whose parent stands at ``at``."""
-    hits = [path for path, span in source.values.items() if span == at and path[-1:] == ("parent",)]
+    hits = [path for path, place in source.places.walk() if path[-1:] == ("parent",) and place.span == at]
     if len(hits) != 1 or len(hits[0]) != 3 or hits[0][0] not in _SECTIONS:  # noqa: PLR2004 (section, name, parent)
         return None
     section, name, _ = hits[0]
     data = source.data[str(section)][name]
-    return (hits[0][:-1], data) if source.values[hits[0][:-1]].file == source.values[hits[0]].file else None
+    return (hits[0][:-1], data) if source.at(hits[0][:-1]).file == source.at(hits[0]).file else None
 
 
 def _insertion(path: Path, data: dict[str, Any], source: Source) -> Edit:
     """Return the edit that writes the rotation behind the parent."""
     parent = source.at((*path, "parent"))
     first = min((source.at_key((*path, key)) for key in data), key=lambda span: (span.line, span.column))
-    begin = source.values[path]
+    begin = source.at(path)
     if (begin.line, begin.column) < (first.line, first.column):  # in braces
         at = (parent.end_line, parent.end_column)
         return Edit(Span(parent.file, *at, *at), f", {_WRITTEN}")
@@ -74,7 +74,7 @@ def _replaced(old: Any, new: Any, path: Path, source: Source) -> list[Edit]:
     """Return the edits that put each scalar of ``new`` where that of ``old`` stands; none where they differ in form."""
     steps = new.items() if isinstance(new, dict) else enumerate(new) if isinstance(new, list) else None
     if steps is None:
-        return [] if isinstance(old, (dict, list)) or str(old) == new else [Edit(source.values[path], new)]
+        return [] if isinstance(old, (dict, list)) or str(old) == new else [Edit(source.at(path), new)]
     same = (
         isinstance(old, type(new)) and len(old) == len(new) and all(not isinstance(old, dict) or k in old for k in new)
     )
@@ -85,5 +85,5 @@ def _replaced(old: Any, new: Any, path: Path, source: Source) -> list[Edit]:
 
 def _is_alone(span: Span, path: Path, source: Source) -> bool:
     """Whether the stretch belongs to this entry alone, and to no alias of it."""
-    others = (other for other, its in source.values.items() if its == span and other[: len(path)] != path)
+    others = (other for other, place in source.places.walk() if other[: len(path)] != path and place.span == span)
     return next(others, None) is None

@@ -5,6 +5,7 @@ Calibration files and URDF are read by modules of their own, which are loaded wh
 
 from tfcompose.load.include import set_value, with_includes
 from tfcompose.load.overlay import composed
-from tfcompose.load.source import Path, Source, load
+from tfcompose.load.places import Path
+from tfcompose.load.source import Source, load
 
 __all__ = ["Path", "Source", "composed", "load", "set_value", "with_includes"]

@@ -12,15 +12,13 @@ from itertools import accumulate
 from typing import TYPE_CHECKING, Any, Literal
 
 from tfcompose.diagnostic import Span, finding
-from tfcompose.load.nodes import compose_all
+from tfcompose.load.nodes import Reader
+from tfcompose.load.places import Place
 from tfcompose.load.scalars import FLOAT, INT, implicit_tag, scalar
-from tfcompose.load.source import Source, Walk, refuse_unreadable
+from tfcompose.load.source import Source, refuse_unreadable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from tfcompose.load.nodes import Node
-    from tfcompose.load.source import Path
 
 Form = Literal["yaml", "rows", "launch"]
 
@@ -64,39 +62,31 @@ def _is_row(line: str) -> bool:
 
 
 def _documents(text: str, file: str) -> Iterator[Source]:
-    visits = 0
-    for node in compose_all(text, file):
-        if node.kind == "scalar" and not node.text.strip():  # ros2 topic echo ends with ---
-            continue
-        walk = _CalibrationWalk(file, visits)
-        data = walk.value(node, ())
-        visits = walk.visits
-        yield Source(file, data, walk.values, walk.keys, tuple(walk.found))
+    reader = _CalibrationReader(file)
+    reader.read(text, single=False)
+    found = tuple(reader.found)
+    for data, place in reader.documents:
+        if data is not None and (not isinstance(data, str) or data.strip()):  # ros2 topic echo ends with ---
+            yield Source(file, data, place, found)
+            found = ()
 
 
-class _CalibrationWalk(Walk):
-    """A walk that reads numbers with xacro's tags for angles, in radians; ``visits`` counts over all documents."""
+class _CalibrationReader(Reader):
+    """Reads numbers with xacro's tags for angles too, in radians."""
 
-    def __init__(self, file: str, visits: int) -> None:
-        super().__init__(file)
-        self.visits = visits
-
-    def _scalar(self, node: Node) -> Any:
-        if node.tag not in ANGLE_TAGS:
-            return super()._scalar(node)
-        kind = implicit_tag(node.text.strip())
+    def tagged(self, tag: str, text: str, place: Place) -> Any:
+        """Return the value of a scalar with a tag."""
+        if tag not in ANGLE_TAGS:
+            return super().tagged(tag, text, place)
+        kind = implicit_tag(text.strip())
         if kind not in {INT, FLOAT}:
-            message, advice = f"{node.tag} takes a number, not {node.text[:40]!r}", "write the number"
-            self.found.append(finding("TF005", message, node.span, help=advice))
+            message, advice = f"{tag} takes a number, not {text[:40]!r}", "write the number"
+            self.found.append(finding("TF005", message, place.span, help=advice))
             return 0.0
-        try:
-            return float(scalar(kind, node.text.strip()) or 0) * ANGLE_TAGS[node.tag]
-        except OverflowError as error:
-            self.found.append(finding("TF007", str(error), node.span, help="give a finite number"))
-            return 0.0
+        return float(scalar(kind, text.strip()) or 0) * ANGLE_TAGS[tag]
 
 
-class _Places:
+class _Lines:
     """Where an offset in the text stands."""
 
     def __init__(self, text: str, file: str) -> None:
@@ -110,33 +100,33 @@ class _Places:
 
 
 def _rows(lines: list[str], file: str) -> Source:
-    values: dict[Path, Span] = {}
-    data: list[list[str]] = []
+    places: dict[str | int, Place] = {}
+    data: Any = []
     for number, line in enumerate(lines, 1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
         row = [(m.group(), m.start() + 1, m.end() + 1) for m in _WORD.finditer(line)]
-        values[(len(data),)] = Span(file, number, row[0][1], number, row[-1][2])
-        values |= {(len(data), i): Span(file, number, a, number, b) for i, (_, a, b) in enumerate(row)}
+        whole = Span(file, number, row[0][1], number, row[-1][2])
+        words = {i: Place(Span(file, number, a, number, b)) for i, (_, a, b) in enumerate(row)}
+        places[len(data)] = Place(whole, words)
         data.append([word for word, _, _ in row])
-    values[()] = Span(file, values[(0,)].line, values[(0,)].column, len(lines) + 1, 1)
-    return _source(file, data, values)
+    first = places[0].span
+    return Source(file, data, Place(Span(file, first.line, first.column, len(lines) + 1, 1), places))
 
 
 def _launch(text: str, file: str) -> Source:
     """Return the words of each static_transform_publisher; what stands in comments is left out, nothing is run."""
-    places = _Places(text, file)
-    values: dict[Path, Span] = {(): Span(file)}
-    data: list[list[str]] = []
+    lines = _Lines(text, file)
+    places: dict[str | int, Place] = {}
+    data: Any = []
     found = _in_xml(text) if text.lstrip().startswith("<") else _in_python(text)
     for words in found:
         if not words:
             continue
-        at = len(data)
-        values[(at,)] = places.span(words[0][1], words[-1][2])
-        values |= {(at, index): places.span(start, end) for index, (_, start, end) in enumerate(words)}
+        inside = {index: Place(lines.span(start, end)) for index, (_, start, end) in enumerate(words)}
+        places[len(data)] = Place(lines.span(words[0][1], words[-1][2]), inside)
         data.append([word for word, _, _ in words])
-    return _source(file, data, values)
+    return Source(file, data, Place(Span(file), places))
 
 
 def _in_xml(text: str) -> Iterator[list[tuple[str, int, int]]]:
@@ -163,7 +153,3 @@ def _in_python(text: str) -> Iterator[list[tuple[str, int, int]]]:
             words.append((word, token.start(), token.end()))
         elif word == PUBLISHER:
             named = True
-
-
-def _source(file: str, data: Any, values: dict[Path, Span]) -> Source:
-    return Source(file, data, values, {})

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, finding
 from tfcompose.load.overlay import lay_over, without
-from tfcompose.load.source import Path, Source, load
+from tfcompose.load.places import Path, Place
+from tfcompose.load.source import Source, load
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -91,8 +92,9 @@ def set_value(setting: str) -> Source:
         raise RejectedError([finding("TF016", message, span, help="for example sensors.camera.tf=driver")])
     read = load(f"value: {value_text.strip() or 'null'}", span.file)
     data: Any = read.data["value"]
-    steps = [path[:length] for length in range(len(path) + 1)]
+    whole = Place(span)
+    below = read.places.inside["value"]
+    place = whole.with_inside(below.inside, below.keys)
     for step in reversed(path):
-        data = {step: data}
-    spans = {(*path, *below[1:]): span for below in read.values if below} | dict.fromkeys(steps, span)
-    return Source(span.file, data, spans, {at: span for at in spans if at}, read.found)
+        data, place = {step: data}, whole.with_inside({step: place}, {str(step): whole})
+    return Source(span.file, data, place, read.found)

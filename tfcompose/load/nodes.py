@@ -1,187 +1,269 @@
-"""YAML text as a graph of nodes, built from PyYAML's parser events.
+"""YAML text as plain data with places, in one pass over PyYAML's parser events.
 
 PyYAML's own composer recurses in C and a deeply nested text ends the interpreter; this one has a stack of its own and
-stops at a depth that no robot needs. An alias is the node that it names, so a bomb of aliases stays small here.
+stops at a depth that no robot needs. Nothing is constructed by tags, no code is run. An alias *is* the value that it
+names, so a bomb of aliases stays small here, and what reads the data can see that it has read a value before.
 """
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any
 
 import yaml
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, finding
-from tfcompose.load.scalars import MAP, SEQ, STR, implicit_tag
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+from tfcompose.load.places import Place
+from tfcompose.load.scalars import MAP, SCALAR_TAGS, SEQ, STR, TAG, plain, scalar
 
 DEEPEST = 40
+MOST_VALUES = 400_000  # with those that aliases stand for
 
 #: NUL, which no file name, argument or variable can hold, and halves of characters, which no file can.
 _FORBIDDEN = re.compile("[\0\ud800-\udfff]")
 
-#: A scalar's items; one for all of them.
-_NOTHING: list[Node] = []
-
 _LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
 
-@dataclass(slots=True, eq=False)
-class Node:
-    """A scalar's text, a sequence's items, or a mapping's pairs, with a tag and a place."""
+@dataclass(slots=True)
+class _Part:
+    """A finished value that has a name: how many values and levels it holds, and what was found in it."""
 
-    kind: Literal["scalar", "sequence", "mapping"]
-    tag: str
-    span: Span
-    text: str = ""
-    plain: bool = False
-    items: list[Node] = field(default_factory=list)
-
-    @property
-    def pairs(self) -> Iterator[tuple[Node, Node]]:
-        """A mapping's keys and values, as written."""
-        return zip(self.items[::2], self.items[1::2], strict=True)
-
-    @property
-    def is_merge(self) -> bool:
-        """Whether this key is ``<<``."""
-        return self.plain and self.text == "<<"
+    value: Any
+    place: Place
+    size: int = 1
+    height: int = 0
+    found: list[Diagnostic] = field(default_factory=list)
 
 
-def compose(text: str, file: str) -> Node | None:
-    """Return the root of the text's only document, or None if there is nothing in it.
+@dataclass(slots=True)
+class _Open:
+    """A mapping or list that is being read; ``key`` waits for its value, which ``keeps`` says to keep."""
 
-    Raises:
-        RejectedError: with one finding, where the text stops being YAML or is too deep.
-    """
-    return next(iter(_composed(text, file, single=True)), None)
+    data: Any
+    start: yaml.CollectionStartEvent
+    is_mapping: bool
+    is_root: bool
+    found_before: int
+    waits_for_key: bool
+    inside: dict[str | int, Place] = field(default_factory=dict)
+    keys: dict[str, Place] = field(default_factory=dict)
+    merges: list[tuple[Any, Place]] = field(default_factory=list)
+    size: int = 1
+    height: int = 0
+    key: str = ""
+    is_merge: bool = False
+    keeps: bool = True
+    found_before_value: int = 0
 
-
-def compose_all(text: str, file: str) -> list[Node]:
-    """Return the roots of the text's documents.
-
-    Raises:
-        RejectedError: as ``compose`` does.
-    """
-    return _composed(text, file, single=False)
-
-
-def _composed(text: str, file: str, *, single: bool) -> list[Node]:
-    try:
-        return _Composer(file, single=single).compose(text)
-    except yaml.MarkedYAMLError as error:
-        raise RejectedError([_syntax(error, text, file)]) from None
-    except yaml.reader.ReaderError as error:
-        hit = yaml.reader.Reader.NON_PRINTABLE.search(text)  # the C parser's position counts bytes
-        position = hit.start() if hit else error.position
-        line, column = text.count("\n", 0, position) + 1, position - text.rfind("\n", 0, position)
-        span = Span(file, line, column, line, column + 1)
-        raise RejectedError([finding("TF002", "a character that YAML does not allow", span)]) from None
-    except UnicodeEncodeError as error:
-        raise RejectedError([finding("TF001", f"the text is not Unicode: {error.reason}", Span(file))]) from None
+    def is_aside(self, key: str) -> bool:
+        """Whether the key stands at the top and holds nothing but anchors."""
+        return self.is_root and key.startswith("x-")
 
 
-class _Composer:
-    def __init__(self, file: str, *, single: bool) -> None:
+class Reader:
+    """Reads the documents of one text. ``found`` is what was wrong, ``has_nulls`` whether a value is null."""
+
+    def __init__(self, file: str) -> None:
         self.file = file
-        self.single = single
-        self.anchors: dict[str, Node] = {}
-        self.stack: list[Node] = []
-        self.roots: list[Node] = []
+        self.found: list[Diagnostic] = []
+        self.has_nulls = False
+        self.documents: list[tuple[Any, Place]] = []
+        self._anchors: dict[str, _Part | None] = {}
+        self._stack: list[_Open] = []
+        self._values = 0
+        self._size = 0
 
-    def compose(self, text: str) -> list[Node]:
-        for event in yaml.parse(text, Loader=_LOADER):
-            if type(event) is yaml.ScalarEvent:  # most of them are: asked first, and without a search
-                self._add(self._scalar(event), event)
-            elif isinstance(event, yaml.CollectionStartEvent):
-                self._open(event)
-            elif isinstance(event, yaml.CollectionEndEvent):
-                node = self.stack.pop()
-                node.span = _until(node.span, self._span(event))
-            elif isinstance(event, yaml.AliasEvent):
-                self._add(self._alias(event), None)
-            elif isinstance(event, yaml.DocumentStartEvent):
-                self.anchors = {}
-                if self.single and self.roots:
-                    message = "a second document begins here; a robot is one document"
-                    raise RejectedError([finding("TF002", message, self._span(event))])
-        return self.roots
-
-    def _span(self, event: yaml.Event) -> Span:
-        start, end = event.start_mark, event.end_mark
-        if start is None or end is None:  # only for events that a program made
-            return Span(self.file)
-        return Span(self.file, start.line + 1, start.column + 1, end.line + 1, end.column + 1)
-
-    def _add(self, node: Node, event: yaml.NodeEvent | None) -> None:
-        if event is not None and event.anchor:
-            self.anchors[event.anchor] = node
-        if self.stack:
-            self.stack[-1].items.append(node)
-        else:
-            self.roots.append(node)
-
-    def _open(self, event: yaml.CollectionStartEvent) -> None:
-        span = self._span(event)
-        if len(self.stack) >= DEEPEST:
-            raise RejectedError([finding("TF008", f"nested deeper than {DEEPEST} levels", span)])
-        mapping = isinstance(event, yaml.MappingStartEvent)
-        tag = event.tag if event.tag not in {None, "!"} else MAP if mapping else SEQ
-        node = Node("mapping" if mapping else "sequence", tag, span)
-        self._add(node, event)
-        self.stack.append(node)
-
-    def _scalar(self, event: yaml.ScalarEvent) -> Node:
-        span, plain = self._span(event), event.implicit[0]
-        if not plain and _FORBIDDEN.search(event.value):  # written as an escape
-            raise RejectedError([finding("TF002", "a character that no text can hold", span)])
-        if event.tag is not None and event.tag != "!":
-            return Node("scalar", event.tag, span, event.value, False, _NOTHING)  # noqa: FBT003 (by place: there are many)
-        tag = implicit_tag(event.value) if plain else STR
-        return Node("scalar", tag, span, event.value, plain, _NOTHING)
-
-    def _alias(self, event: yaml.AliasEvent) -> Node:
-        if event.anchor not in self.anchors:
-            message = f"no anchor &{event.anchor} stands above this alias"
-            raise RejectedError([finding("TF002", message, self._span(event))])
-        return self.anchors[event.anchor]
-
-
-class Sizes:
-    """How many values nodes hold once aliases are followed, counted without following them twice."""
-
-    def __init__(self, most: int) -> None:
-        self.most = most
-        self._known: dict[int, int] = {}
-        self._open: set[int] = set()
-
-    def measure(self, node: Node) -> int:
-        """Return the number of values that the node holds, itself too.
+    def read(self, text: str, *, single: bool = True) -> None:
+        """Read the text; with ``single`` it is one document.
 
         Raises:
-            ValueError: if there are more than ``most``, or the node holds itself; it says so in a sentence.
+            RejectedError: where the text stops being YAML, is too deep, or too large.
         """
-        key = id(node)  # nodes live as long as their root
-        if key in self._known:
-            return self._known[key]
-        if key in self._open or len(self._open) > DEEPEST:
-            raise ValueError(
-                "an alias stands inside what it names" if key in self._open else f"nested deeper than {DEEPEST} levels"
-            )
-        self._open.add(key)
-        size = 1 + sum(self.measure(item) for item in node.items)
-        self._open.remove(key)
-        if size > self.most:
-            raise ValueError(f"more than {self.most:,} values once aliases are followed")
-        self._known[key] = size
-        return size
+        try:
+            for event in yaml.parse(text, Loader=_LOADER):
+                if isinstance(event, yaml.ScalarEvent):  # most of them are
+                    self._scalar(event)
+                elif isinstance(event, yaml.CollectionStartEvent):
+                    self._open(event)
+                elif isinstance(event, yaml.CollectionEndEvent):
+                    self._close(event)
+                elif isinstance(event, yaml.AliasEvent):
+                    self._alias(event)
+                elif isinstance(event, yaml.DocumentStartEvent):
+                    self._begin(event, single=single)
+        except yaml.MarkedYAMLError as error:
+            raise RejectedError([_syntax(error, text, self.file)]) from None
+        except yaml.reader.ReaderError as error:
+            raise RejectedError([_no_character(error, text, self.file)]) from None
+        except UnicodeEncodeError as error:
+            message = f"the text is not Unicode: {error.reason}"
+            raise RejectedError([finding("TF001", message, Span(self.file))]) from None
+        self.found = list(dict.fromkeys(self.found))  # an alias says again what its anchor said
+
+    def _begin(self, event: yaml.Event, *, single: bool) -> None:
+        self._anchors = {}
+        if single and self.documents:
+            message = "a second document begins here; a robot is one document"
+            raise RejectedError([finding("TF002", message, self._place(event).span)])
+
+    def _place(self, event: yaml.Event) -> Place:
+        return Place((self.file, event.start_mark, event.end_mark))
+
+    def _refuse(self, message: str, place: Place) -> RejectedError:
+        return RejectedError([*self.found, finding("TF008", message, place.span)])
+
+    def _scalar(self, event: yaml.ScalarEvent) -> None:
+        place = Place((self.file, event.start_mark, event.end_mark))
+        top = self._stack[-1] if self._stack else None
+        before = len(self.found)
+        value = self.value_of(event, place)
+        if event.anchor:
+            self._anchors[event.anchor] = _Part(value, place, found=self.found[before:])
+        if top and top.waits_for_key:
+            del self.found[before:]
+            key = value if isinstance(value, str) and event.tag in {None, "!", STR} else None
+            is_merge = key == "<<" and event.implicit[0]
+            self._key(top, key, place, "a number, true, false or null", is_merge=is_merge)
+        else:
+            self._put(value, place, 1, 0)
+
+    def value_of(self, event: yaml.ScalarEvent, place: Place) -> Any:
+        """Return a scalar's value, and note what is wrong with it."""
+        tag, text = event.tag, event.value
+        try:
+            if event.implicit[0] and (tag is None or tag == "!"):
+                value: Any = plain(text)
+                self.has_nulls = self.has_nulls or value is None
+                return value
+            if _FORBIDDEN.search(text):  # written as an escape
+                raise RejectedError([finding("TF002", "a character that no text can hold", place.span)])
+            if tag is None or tag in {"!", STR}:
+                return text
+            return self.tagged(tag, text, place)
+        except OverflowError as error:
+            self.found.append(finding("TF007", str(error), place.span, help="give a finite number"))
+            return 0.0
+
+    def tagged(self, tag: str, text: str, place: Place) -> Any:
+        """Return the value of a scalar with a tag, and note what is wrong with it."""
+        if tag not in SCALAR_TAGS:
+            self._unknown_tag(tag, place)
+            return text
+        try:
+            value = scalar(tag, text)
+        except ValueError as error:
+            self.found.append(finding("TF005", str(error), place.span, help="leave the tag out"))
+            return text
+        self.has_nulls = self.has_nulls or value is None
+        return value
+
+    def _unknown_tag(self, tag: str, place: Place) -> None:
+        message = f"unknown tag {tag.replace(TAG, '!!')}"
+        self.found.append(finding("TF005", message, place.span, help="tags are not used: leave it out"))
+
+    def _open(self, event: yaml.CollectionStartEvent) -> None:
+        if len(self._stack) >= DEEPEST:
+            raise self._refuse(f"nested deeper than {DEEPEST} levels", self._place(event))
+        is_mapping = type(event) is yaml.MappingStartEvent
+        data: Any = {} if is_mapping else []
+        self._stack.append(_Open(data, event, is_mapping, not self._stack, len(self.found), is_mapping))
+        if event.anchor:
+            self._anchors[event.anchor] = None
+        if event.tag not in {None, "!", MAP if is_mapping else SEQ}:
+            self._unknown_tag(event.tag, self._place(event))
+
+    def _close(self, event: yaml.Event) -> None:
+        done = self._stack.pop()
+        for value, place in done.merges:
+            self._inherit(done, value, place)
+        place = Place((self.file, done.start.start_mark, event.end_mark), done.inside, done.keys)
+        self._size += 0 if self._stack else done.size
+        if done.size > MOST_VALUES or self._size > MOST_VALUES:
+            raise self._refuse(f"more than {MOST_VALUES:,} values once aliases are followed", place)
+        if done.start.anchor:
+            found = self.found[done.found_before :]
+            self._anchors[done.start.anchor] = _Part(done.data, place, done.size, done.height, found)
+        top = self._stack[-1] if self._stack else None
+        if top and top.waits_for_key:
+            del self.found[done.found_before :]
+            self._key(top, None, place, "a list or a mapping")
+        else:
+            self._put(done.data, place, done.size, done.height)
+
+    def _inherit(self, done: _Open, value: Any, place: Place) -> None:
+        """Take what ``<<`` names for the keys that the mapping does not have; the first mapping that has a key wins."""
+        steps = enumerate(value) if isinstance(value, list) else [(None, value)]
+        for index, source in steps:
+            at = place if index is None else place.inside[index]
+            if not isinstance(source, dict):
+                message = "<< takes a mapping, or a list of mappings"
+                self.found.append(finding("TF011", message, at.span))
+                continue
+            for key, item in source.items():
+                if key not in done.data and not done.is_aside(key):
+                    done.data[key], done.inside[key], done.keys[key] = item, at.inside[key], at.keys[key]
+
+    def _alias(self, event: yaml.AliasEvent) -> None:
+        if event.anchor not in self._anchors:
+            message = f"no anchor &{event.anchor} stands above this alias"
+            raise RejectedError([finding("TF002", message, self._place(event).span)])
+        part = self._anchors[event.anchor]
+        if part is None or len(self._stack) + part.height > DEEPEST:
+            why = f"nested deeper than {DEEPEST} levels" if part else "an alias stands inside what it names"
+            raise self._refuse(why, self._place(event))
+        top = self._stack[-1]
+        if top.waits_for_key:
+            key = part.value if isinstance(part.value, str) else None
+            self._key(top, key, self._place(event), "not a text")
+        else:
+            self.found += part.found
+            self._put(part.value, part.place, part.size, part.height)
+
+    def _key(self, top: _Open, key: str | None, place: Place, what: str = "", *, is_merge: bool = False) -> None:
+        """Take a key; the value of one that is no text, or is given twice, or holds anchors only, is not kept."""
+        top.key, top.waits_for_key, top.is_merge, top.keeps = key or "", False, is_merge, True
+        if key is None:
+            message = f"a key must be a text; this one is {what}"
+            self.found.append(finding("TF004", message, place.span, help="put it in quotes"))
+            top.keeps = False
+        elif key in top.keys:
+            note = Note("it stands here first", top.keys[key].span)
+            self.found.append(finding("TF003", f"the key {key} is given twice", place.span, notes=[note]))
+            top.keeps = False
+        else:
+            top.keys[key] = place
+            top.keeps = not top.is_aside(key)
+        top.found_before_value = len(self.found)
+
+    def _put(self, value: Any, place: Place, size: int, height: int) -> None:
+        """Put a finished value where it belongs."""
+        if not self._stack:
+            self.documents.append((value, place))
+            return
+        top = self._stack[-1]
+        top.size += size
+        if height >= top.height:
+            top.height = height + 1
+        if not top.is_mapping:
+            top.inside[len(top.data)] = place
+            top.data.append(value)
+            return
+        top.waits_for_key = True
+        if not top.keeps:
+            del self.found[top.found_before_value :]
+        elif top.is_merge:
+            top.merges.append((value, place))
+        else:
+            top.data[top.key], top.inside[top.key] = value, place
 
 
-def _until(start: Span, end: Span) -> Span:
-    return Span(start.file, start.line, start.column, end.end_line, end.end_column)
+def _no_character(error: yaml.reader.ReaderError, text: str, file: str) -> Diagnostic:
+    hit = yaml.reader.Reader.NON_PRINTABLE.search(text)  # the C parser's position counts bytes
+    position = hit.start() if hit else error.position
+    line, column = text.count("\n", 0, position) + 1, position - text.rfind("\n", 0, position)
+    return finding("TF002", "a character that YAML does not allow", Span(file, line, column, line, column + 1))
 
 
 def _syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Diagnostic:

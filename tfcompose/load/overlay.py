@@ -11,10 +11,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, did_you_mean, finding
-from tfcompose.load.source import Path, Source
+from tfcompose.load.places import Path, Place
+from tfcompose.load.source import Source
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
+
+    from tfcompose.diagnostic import Span
 
 ROTATIONS = frozenset({"rpy", "quat_xyzw", "axis_angle", "matrix", "look"})
 RUNNING = frozenset({"run", "simulate", "external"})
@@ -86,80 +89,66 @@ def lay_over(base: Source, overlay: Source, *, is_overlay: bool = True) -> Sourc
 
     With ``is_overlay`` a value that changes nothing is a finding.
     """
-    merger = _Merger(base, is_overlay=is_overlay)
-    merger.merge(merger.data, overlay.data, overlay, ())
+    merger = _Merger(is_overlay=is_overlay)
+    data, places = merger.merge((base.data, base.places), (overlay.data, overlay.places), ())
     found = (*base.found, *overlay.found, *merger.found)
     allows = tuple(dict.fromkeys((*base.allows, *overlay.allows)))
-    return Source(base.file, merger.data, merger.values, merger.keys, found, allows, merger.replaced)
+    has_nulls = base.has_nulls or overlay.has_nulls
+    return Source(base.file, data, places, found, allows, base.replaced | merger.replaced, has_nulls)
+
+
+Part = tuple[dict[str, Any], Place]
+"""A mapping, and where it and what is in it stands."""
 
 
 class _Merger:
-    """Merges in time proportional to the overlay and to what it drops, not to the whole base."""
+    """Merges in time proportional to the overlay and to the mappings that it reaches; neither side is changed."""
 
-    def __init__(self, base: Source, *, is_overlay: bool) -> None:
+    def __init__(self, *, is_overlay: bool) -> None:
         self.is_overlay = is_overlay
-        self.data = _copy(base.data)
-        self.values = dict(base.values)
-        self.keys = dict(base.keys)
-        self.replaced = dict(base.replaced)
+        self.replaced: dict[Path, Span] = {}
         self.found: list[Diagnostic] = []
 
-    def merge(self, target: dict[str, Any], data: dict[str, Any], overlay: Source, path: Path) -> None:
-        for choice in _choices_at(path, data):
-            for dropped in sorted(choice & (set(target) - set(data))):
-                self.forget((*path, dropped), target.pop(dropped))
-        for key, value in data.items():
-            at = (*path, key)
+    def merge(self, base: Part, overlay: Part, path: Path) -> Part:
+        """Return ``base`` with ``overlay`` laid over it."""
+        data, inside, keys = dict(base[0]), dict(base[1].inside), dict(base[1].keys)
+        for choice in _choices_at(path, overlay[0]):
+            for dropped in choice & (data.keys() - overlay[0].keys()):
+                _drop(dropped, data, inside, keys)
+        for key, value in overlay[0].items():
+            at, place = (*path, key), overlay[1].inside[key]
             if value is None and path[:1] != ("profiles",):  # in a profile it is for later
-                self.remove(target, key, overlay, at)
+                self.note_removal(key in data, overlay[1].keys[key], at)
+                _drop(key, data, inside, keys)
             elif isinstance(value, dict):
-                if not isinstance(target.get(key), dict):
-                    self.forget(at, target.get(key))
-                    target[key] = {}
-                    self.values[at] = overlay.at(at)
-                self.keys[at] = overlay.at_key(at)
-                self.merge(target[key], value, overlay, at)
+                old = data.get(key)
+                under = (old, inside[key]) if isinstance(old, dict) else ({}, place.with_inside({}, {}))
+                data[key], inside[key] = self.merge(under, (value, place), at)
+                keys[key] = overlay[1].keys[key]
             else:
-                if key in target:
-                    self.note(target[key], value, overlay, at)
-                self.forget(at, target.get(key))
-                target[key] = _copy(value)
-                self.remember(at, value, overlay)
+                if key in data:
+                    self.note(data[key], inside[key], value, place, at)
+                data[key], inside[key], keys[key] = value, place, overlay[1].keys[key]
+        return data, base[1].with_inside(inside, keys)
 
-    def remove(self, target: dict[str, Any], key: str, overlay: Source, path: Path) -> None:
-        if key not in target:
+    def note_removal(self, was_there: bool, key: Place, path: Path) -> None:  # noqa: FBT001 (the fact itself)
+        """Say so if nothing was removed."""
+        if not was_there:
             message = f"{'.'.join(map(str, path))} is removed here, but nothing is there"
-            self.found.append(finding("TF010", message, overlay.at_key(path), severity="warning"))
-        self.forget(path, target.pop(key, None))
+            self.found.append(finding("TF010", message, key.span, severity="warning"))
 
-    def note(self, old: Any, new: Any, overlay: Source, path: Path) -> None:
+    def note(self, old: Any, old_place: Place, new: Any, place: Place, path: Path) -> None:
         """Remember what is replaced, and say so if that changes nothing."""
-        if path in self.values:
-            self.replaced[path] = self.values[path]
+        self.replaced[path] = old_place.span
         if self.is_overlay and type(old) is type(new) and old == new:
             message = f"{'.'.join(map(str, path))} is {_shown(new)} already"
-            notes = [Note("here", self.values[path])] if path in self.values else []
-            span = overlay.at(path)
-            self.found.append(finding("TF014", message, span, notes=notes, help="remove it", severity="warning"))
-
-    def forget(self, path: Path, value: Any) -> None:
-        for below in _paths(value, path):
-            self.values.pop(below, None)
-            self.keys.pop(below, None)
-
-    def remember(self, path: Path, value: Any, overlay: Source) -> None:
-        for below in _paths(value, path):
-            for table, theirs in ((self.values, overlay.values), (self.keys, overlay.keys)):
-                if below in theirs:
-                    table[below] = theirs[below]
+            notes = [Note("here", old_place.span)]
+            self.found.append(finding("TF014", message, place.span, notes=notes, help="remove it", severity="warning"))
 
 
-def _paths(value: Any, path: Path) -> Iterator[Path]:
-    """Yield the paths of a value and of everything in it."""
-    yield path
-    steps = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    for step, item in steps:
-        yield from _paths(item, (*path, step))
+def _drop(key: str, *tables: dict[Any, Any]) -> None:
+    for table in tables:
+        table.pop(key, None)
 
 
 def _choices_at(path: Path, data: dict[str, Any]) -> list[frozenset[str]]:
@@ -172,12 +161,6 @@ def _choices_at(path: Path, data: dict[str, Any]) -> list[frozenset[str]]:
     ]
 
 
-def _copy(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _copy(item) for key, item in value.items()}
-    return [_copy(item) for item in value] if isinstance(value, list) else value
-
-
 def _shown(value: Any) -> str:
     return "that list" if isinstance(value, list) else str(value)
 
@@ -188,16 +171,19 @@ def _only(source: Source, key: str) -> Source:
 
 def without(source: Source, key: str) -> Source:
     """Return the source without one of its sections."""
-    if key not in source.data and (key,) not in source.values:
+    if key not in source.data:
         return source
+    place = source.places
+    inside = {step: below for step, below in place.inside.items() if step != key}
+    keys = {name: below for name, below in place.keys.items() if name != key}
     data = {name: value for name, value in source.data.items() if name != key}
-    values = {path: span for path, span in source.values.items() if path[:1] != (key,)}
-    keys = {path: span for path, span in source.keys.items() if path[:1] != (key,)}
-    return replace(source, data=data, values=values, keys=keys)
+    return replace(source, data=data, places=place.with_inside(inside, keys))
 
 
 def _without_nulls(source: Source) -> Source:
     """Report what is null after all overlays: a key without a value says nothing."""
+    if not source.has_nulls:
+        return source
     found: list[Diagnostic] = []
 
     def clean(value: Any, path: Path) -> Any:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+from functools import lru_cache
 
 TAG = "tag:yaml.org,2002:"
 NULL, BOOL, INT, FLOAT, STR, MAP, SEQ = (TAG + kind for kind in ("null", "bool", "int", "float", "str", "map", "seq"))
@@ -42,6 +43,16 @@ def implicit_tag(text: str) -> str:
         if text[:1] in first and pattern.match(text):
             return tag
     return STR
+
+
+@lru_cache(maxsize=4096)
+def plain(text: str) -> str | bool | int | float | None:
+    """Return the value of a plain scalar.
+
+    Raises:
+        OverflowError: if it is no finite number.
+    """
+    return scalar(implicit_tag(text), text) if text[:1] in _FIRST else text
 
 
 def scalar(tag: str, text: str) -> str | bool | int | float | None:

@@ -61,7 +61,7 @@ class Bodies:
 
     def _shapes(self, shapes: tuple[said.Shape, ...], at: Path) -> tuple[Shape, ...]:
         return tuple(
-            self.shape(shape, (*at, index) if (*at, index) in self.source.values else at)
+            self.shape(shape, (*at, index) if self.source.has((*at, index)) else at)
             for index, shape in enumerate(shapes)
             if any(getattr(shape, form) for form in FORMS)
         )

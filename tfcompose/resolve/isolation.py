@@ -61,7 +61,7 @@ def _wrong(robot: Robot, ros: RosSpec, source: Source) -> list[Diagnostic]:
 def _named(process: Process, robot: Robot, source: Source, found: list[Diagnostic]) -> Process:
     """Return the process with every ``${frame(NAME)}`` replaced by that frame's final name."""
     section: Path = ("processes", process.name)
-    if section not in source.keys:
+    if not source.has(section):
         section = ("sensors", process.name, "driver")
 
     def fill(value: Any, path: Path) -> Any:

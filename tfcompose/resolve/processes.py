@@ -210,7 +210,7 @@ def unknown_names(processes: list[Process], source: Source, broken: frozenset[st
     names = [process.name for process in processes]
     found = []
     for process in processes:
-        section = "processes" if ("processes", process.name) in source.keys else "sensors"
+        section = "processes" if source.has(("processes", process.name)) else "sensors"
         inside = ("after",) if section == "processes" else ("driver", "after")
         for other in process.after:
             if other not in names and other not in broken:

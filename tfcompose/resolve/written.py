@@ -71,6 +71,6 @@ def _take(item: Any, steps: Iterable[str | int], path: Path, source: Source, fou
             at = (*path, step)
             numbers.append(float(number))
             units.append(with_unit)
-            places.append(source.values.get(at) or source.at(at))
+            places.append(source.at(at))
     if numbers:
         found.append(AsWritten(path, tuple(numbers), tuple(units), tuple(places)))

@@ -102,7 +102,7 @@ class Entries:
 
     def add(self, source: Source, path: Path, pose: Pose, names: tuple[str | None, str | None], what: str = "") -> None:
         """Take an entry; ``names`` are its parent and child."""
-        span = source.keys.get(path) or source.at(path)
+        span = source.at_key(path) if source.has_key(path) else source.at(path)
         self.entries.append(Entry(pose, span, *names, what))
 
     def matrix(self, rows: Any, source: Source, path: Path) -> Pose:

@@ -56,6 +56,8 @@ CODES = {
     "TF309": "many_static_publishers",
     "TF310": "switched_edge_without_owner",
     "TF311": "switched_edge_static",
+    "TF312": "part_with_other_settings",
+    "TF313": "part_without_one_root",
     # poses and conventions
     "TF401": "optical_frame_not_rotated",
     "TF402": "quaternion_not_unit",
@@ -72,6 +74,7 @@ CODES = {
     "TF502": "name_used_twice",
     "TF503": "upper_case_name",
     "TF504": "unused_variable",
+    "TF505": "part_brings_a_taken_name",
     # sensors
     "TF601": "unknown_preset",
     "TF603": "unknown_option",

@@ -86,7 +86,7 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     rules = validated.spec.rules
     found += unknown_rules({word: source.at_key(("rules", word)) for word in rules})
     found = with_edits(found, source)
-    kept, used = apply(levelled(dict.fromkeys(found), rules), source.allows)
+    kept, used = apply(levelled(dict.fromkeys(found), rules), (*source.allows, *resolved.allows))
     ordered = sorted(kept, key=lambda one: one.sort_key)
     return Compiled(resolved.robot, tuple(ordered), source.allows, frozenset(used))
 

@@ -255,7 +255,7 @@ class Process:
     """A process of the plan, before it is a command line.
 
     It runs a ``package``'s ``executable``, a ``launch`` file (``package/file``), or else the command ``argv``, which
-    for the others holds the arguments.
+    for the others holds the arguments. ``part`` is the ``Part`` that it belongs to, if any.
     """
 
     name: str
@@ -279,6 +279,7 @@ class Process:
     after: dict[str, str] = field(default_factory=dict)
     simulate: Simulation | None = None
     rate: float | None = None
+    part: str = ""
 
     @property
     def node(self) -> str:
@@ -292,13 +293,26 @@ class Process:
 
 
 @dataclass(frozen=True, slots=True)
+class Part:
+    """A part that is a robot of its own beside others, with its own ``static``, ``joints`` and description.
+
+    ``robot`` has the names of the part's own file; in the robot that holds it, frames and joints have ``prefix`` too.
+    """
+
+    name: str
+    prefix: str
+    robot: Robot
+
+
+@dataclass(frozen=True, slots=True)
 class Robot:
     """One robot, resolved.
 
     ``frames`` holds every frame that was declared, with its place; ``base`` is where the URDF begins, or None where the
     tree has no single root; ``sensors`` are those with a known preset, ``as_written`` the numbers of poses and limits
     before they became poses, ``unused`` the variables that nothing uses; ``written`` is the plain data that the robot
-    was made from, profiles laid over it; ``broken`` holds the entries (section, name) that were refused already.
+    was made from, profiles laid over it; ``broken`` holds the entries (section, name) that were refused
+    already, of a part how its names begin. ``parts`` are those that are robots of their own.
     """
 
     name: str
@@ -315,6 +329,7 @@ class Robot:
     unused: dict[str, Span] = field(default_factory=dict, compare=False)
     written: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
     broken: frozenset[tuple[str, str]] = frozenset()
+    parts: tuple[Part, ...] = ()
 
     def final(self, frame: str) -> str:
         """Return the frame's name on the live tree: with the prefix, unless it is shared."""
@@ -323,7 +338,10 @@ class Robot:
     def excuses(self, name: str) -> bool:
         """Return whether a frame, process or joint may be missing only because an entry was refused already."""
         return any(
-            name == entry or (section == "sensors" and name.startswith(f"{entry}_")) for section, entry in self.broken
+            name == entry
+            or (section == "sensors" and name.startswith(f"{entry}_"))
+            or (section == "parts" and name.startswith(entry))
+            for section, entry in self.broken
         )
 
     def parent_edge(self, child: str) -> Edge | None:

@@ -14,6 +14,9 @@ from tfcompose.pose import Pose
 
 VERSION = 1
 
+#: The file beside the plan that holds the whole robot's description.
+DESCRIPTION = "robot.full.urdf"
+
 EdgeKind = Literal["static", "joint", "dynamic"]
 ProcessKind = Literal["static", "joints", "guard", "simulate", "external", "run"]
 GuardMode = Literal["off", "watch", "strict"]
@@ -119,6 +122,7 @@ class PlanProcess:
     ``nodes`` are full names; ``lifecycle`` says of some of them into which state they are brought after the start.
     ``required`` says that the plan ends when the process does. ``max_restarts`` None is the launcher's default, as is
     ``ready`` None: the edges that the process owns, or that it was started.
+    ``description`` is the file beside the plan that a publisher sends as ``robot_description``; None: the plan's.
     """
 
     name: str
@@ -140,6 +144,7 @@ class PlanProcess:
     host: str | None = None
     owns: tuple[tuple[str, str], ...] = ()
     simulate: Simulation | None = None
+    description: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +180,7 @@ class Plan:
     edges: tuple[PlanEdge, ...]
     processes: tuple[PlanProcess, ...]
     guard: GuardPolicy = field(default_factory=GuardPolicy)
-    description: str = "robot.full.urdf"
+    description: str = DESCRIPTION
     version: int = VERSION
 
     def process(self, name: str) -> PlanProcess:

@@ -109,6 +109,8 @@ def _process_to_json(process: PlanProcess) -> dict[str, Any]:
     row = _fields(process)
     row |= {"stop": _fields(process.stop), "ready": process.ready and _fields(process.ready)}
     simulation = row.pop("simulate")
+    if process.description is None:
+        del row["description"]
     if simulation:
         row["simulate"] = _fields(simulation)
         pose = row["simulate"].pop("pose")
@@ -210,6 +212,7 @@ def _process_from_json(data: dict[str, Any], where: str) -> PlanProcess:
         host=optional(data, "host", str, where),
         owns=tuple((str(parent), str(child)) for parent, child in get(data, "owns", list, where)),
         simulate=_simulation_from_json(simulation, where) if simulation else None,
+        description=get(data, "description", str, where) if "description" in data else None,
     )
 
 

@@ -108,6 +108,13 @@ A rotation is written in one way, a process runs in one way, a shape has one for
     "TF304": """A robot is to be isolated and has no name for it.
 
 isolate moves topics below the namespace, or makes the namespace the frames' prefix. Give ros: {namespace: robot1}.""",
+    "TF312": """A part has another clock, domain or discovery than the robot that holds it.
+
+All processes of a plan share them. Set it in the robot that holds the part, or leave it out of the part's file.""",
+    "TF313": """A part that is bolted on has no root, or several.
+
+The part's pose is that of its root. Say which frame that is with root: what is not below it is left out. A root that
+is shared needs no parent: it is the holder's frame.""",
     "TF402": """A quaternion does not have length 1.
 
 tf2 drops transforms whose quaternion is off, and the frame never appears. Write the digits that are missing, or check
@@ -125,6 +132,10 @@ the nominal values, so the frame ends up off by the difference. Give this unit's
     "TF502": """One name is used for two things.
 
 Sensors and processes share one name space, because a sensor's driver is a process; joints share another.""",
+    "TF505": """A part brings a frame of a name that is taken.
+
+Frames of all robots in one file need different names, because listeners know frames by nothing else. Give the part a
+prefix; or, if both mean one and the same frame, name it under ros: shared_frames.""",
     "TF601": """There is no such preset.
 
 tfcompose schema and the README list the presets that come with it.""",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import posixpath
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.emit.final import with_final_names
@@ -11,6 +12,7 @@ from tfcompose.emit.plan import plan_of
 from tfcompose.emit.target import AS_WRITTEN, Target
 from tfcompose.emit.tree import tree
 from tfcompose.emit.urdf import urdfs
+from tfcompose.plan import DESCRIPTION
 from tfcompose.planfile import write_plan
 
 if TYPE_CHECKING:
@@ -36,11 +38,16 @@ def emit(robot: Robot, target: Target = AS_WRITTEN) -> tuple[File, ...]:
         for process in robot.processes
         if process.kind == "run" and any(node.params for node in process.nodes)
     )
-    whole, stock = urdfs(robot, target)
     return (
         File("plan.json", write_plan(plan_of(live))),
-        File("robot.full.urdf", whole),
-        File("robot.urdf", stock),
+        *_descriptions(robot, target),
+        *(file for part in robot.parts for file in _descriptions(part.robot, target, f"{part.name}/")),
         File("tree.txt", tree(live)),
         *params,
     )
+
+
+def _descriptions(robot: Robot, target: Target, folder: str = "") -> tuple[File, File]:
+    """Return what describes the robot, or a part that is a robot of its own, in a folder of its own."""
+    whole, stock = urdfs(robot, replace(target, folder=posixpath.join(target.folder, folder)))
+    return File(f"{folder}{DESCRIPTION}", whole), File(f"{folder}robot.urdf", stock)

@@ -8,8 +8,8 @@ import posixpath
 from typing import TYPE_CHECKING
 
 from tfcompose.emit.numbers import clean
-from tfcompose.model import GUARD, JOINTS, STATIC
-from tfcompose.plan import Joint, Plan, PlanEdge, PlanProcess
+from tfcompose.model import JOINTS, STATIC
+from tfcompose.plan import DESCRIPTION, Joint, Plan, PlanEdge, PlanProcess
 
 if TYPE_CHECKING:
     from tfcompose.model import Edge, Process, Robot
@@ -23,13 +23,22 @@ MODULES = {
 }
 
 
+_PUBLISHERS = frozenset({"static", "joints"})
+
+#: The order of processes: who has fixed edges and descriptions first, who watches last.
+_ORDER = {"static": 0, "joints": 1, "guard": 3}
+
+
 def plan_of(robot: Robot) -> Plan:
     """Return the plan of a right robot."""
     nodes = {process.name: process.node for process in robot.processes}
     needed = _needed(robot)
     names = frozenset(process.name for process in needed)
     relative = {file: _relative(file, robot.file) for file in {edge.at.file for edge in robot.edges}}
-    edges = tuple([_edge(edge, nodes[edge.owner], relative[edge.at.file]) for edge in robot.edges])
+    prefixes = {f"{part.name}/{JOINTS}": part.prefix for part in robot.parts}
+    edges = tuple(
+        [_edge(edge, nodes[edge.owner], relative[edge.at.file], prefixes.get(edge.owner, "")) for edge in robot.edges]
+    )
     owned: dict[str, list[tuple[str, str]]] = {}
     for edge in edges:
         owned.setdefault(edge.owner, []).append((edge.parent, edge.child))
@@ -45,13 +54,20 @@ def plan_of(robot: Robot) -> Plan:
 
 
 def _needed(robot: Robot) -> list[Process]:
-    """Return the processes that have something to do: ``joints`` where joints move, else ``static`` at least."""
+    """Return the processes that have something to do: ``joints`` where joints move, else ``static`` at least.
+
+    That holds for the robot, and for each part that is a robot of its own.
+    """
     owners = {edge.owner for edge in robot.edges}
-    idle = {name for name in (STATIC, JOINTS) if name not in owners}
-    if idle == {STATIC, JOINTS}:
-        idle = {JOINTS}
-    order = {STATIC: 0, JOINTS: 1, GUARD: 3}
-    return sorted((p for p in robot.processes if p.name not in idle), key=lambda process: order.get(process.name, 2))
+    idle = {process.name for process in robot.processes if process.kind in _PUBLISHERS and process.name not in owners}
+    for name in {_below(process.part, STATIC) for process in robot.processes}:
+        if _below(name.removesuffix(STATIC).rstrip("/"), JOINTS) in idle:
+            idle.discard(name)
+    return sorted((p for p in robot.processes if p.name not in idle), key=lambda process: _ORDER.get(process.kind, 2))
+
+
+def _below(part: str, name: str) -> str:
+    return f"{part}/{name}" if part else name
 
 
 def _digest(robot: Robot) -> str:
@@ -60,11 +76,13 @@ def _digest(robot: Robot) -> str:
     return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
 
 
-def _edge(edge: Edge, node: str, file: str) -> PlanEdge:
+def _edge(edge: Edge, node: str, file: str, prefix: str) -> PlanEdge:
+    """Return the edge; its joint without the ``prefix`` that joint states do not have."""
     moving = edge.joint
     joint = None
     if moving:
-        joint = Joint(moving.name, moving.type, moving.axis, moving.mimic, moving.multiplier, moving.offset)
+        name, mimic = moving.name.removeprefix(prefix), moving.mimic and moving.mimic.removeprefix(prefix)
+        joint = Joint(name, moving.type, moving.axis, mimic, moving.multiplier, moving.offset)
     return PlanEdge(
         parent=edge.parent,
         child=edge.child,
@@ -116,6 +134,7 @@ def _process(process: Process, robot: Robot, owned: list[tuple[str, str]], names
         host=process.host,
         owns=tuple(owned),
         simulate=simulation,
+        description=f"{process.part}/{DESCRIPTION}" if process.part and process.kind in _PUBLISHERS else None,
     )
 
 

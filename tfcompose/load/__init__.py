@@ -4,8 +4,8 @@ Calibration files and URDF are read by modules of their own, which are loaded wh
 """
 
 from tfcompose.load.include import set_value, with_includes
-from tfcompose.load.overlay import composed
-from tfcompose.load.places import Path
+from tfcompose.load.overlay import composed, lay_over
+from tfcompose.load.places import Path, Place
 from tfcompose.load.source import Source, load
 
-__all__ = ["Path", "Source", "composed", "load", "set_value", "with_includes"]
+__all__ = ["Path", "Place", "Source", "composed", "lay_over", "load", "set_value", "with_includes"]

@@ -38,6 +38,7 @@ _POSES: tuple[tuple[str, ...], ...] = (
     ("links", "*", "inertial"),
     ("joints", "*"),
     ("sensors", "*"),
+    ("parts", "*"),
     ("sensors", "*", "frames", "*"),
     ("processes", "*", "simulate", "fixed"),
 )

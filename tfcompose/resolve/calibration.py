@@ -7,13 +7,13 @@ handed in; what is wrong with them is said at the place in the robot file, with 
 
 from __future__ import annotations
 
-import posixpath
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, did_you_mean, finding, nearest
 from tfcompose.load.overlay import ROTATIONS
 from tfcompose.model import Calibration
+from tfcompose.resolve.beside import beside
 from tfcompose.validate.calibration import CalibrationLimit, CalibrationSpec
 from tfcompose.validate.calibration_file import CalibrationFile, read_calibration
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     Reader = Callable[[str], str]
 
-_MEASURABLE = frozenset({"frames", "links", "sensors"})
+_MEASURABLE = frozenset({"frames", "links", "sensors", "parts"})
 _DEFAULT_LIMIT = CalibrationLimit()
 
 
@@ -37,19 +37,13 @@ def calibrated(
     """Return the drafts, those with a calibration measured, and what is wrong with the calibrations."""
     work = _Work(_Files(read), frozenset(frames), source)
     for draft in drafts:
-        if draft.edge.sensor:
-            work.inside.setdefault(draft.edge.sensor, set()).add(draft.edge.child)
+        if draft.group:
+            work.inside.setdefault(draft.group, set()).add(draft.edge.child)
     result = [work.own(draft, spec) for draft in drafts]
     for index, name in enumerate(spec.calibrations):
         path = ("calibrations", index)
         result = work.apply(name, source.at(path), result)
     return result, [*work.files.found, *work.found]
-
-
-def _beside(named: str, at: Span) -> str:
-    """Return the path of a file that is named at a place; on the command line it is relative to the folder."""
-    folder = "" if at.file.startswith("--") else posixpath.dirname(at.file)
-    return posixpath.normpath(posixpath.join(folder, named))
 
 
 @dataclass(slots=True)
@@ -62,7 +56,7 @@ class _Files:
 
     def get(self, named: str, at: Span, form: str = "auto") -> CalibrationFile:
         """Return what the file says; what is wrong with it is said once."""
-        path = _beside(named, at)
+        path = beside(named, at)
         if (path, form) not in self._known:
             self._known[path, form] = self._load(path, at, form)
         return self._known[path, form]
@@ -114,7 +108,7 @@ class _Work:
     source: Source
     found: list[Diagnostic] = field(default_factory=list)
     used: set[int] = field(default_factory=set)
-    inside: dict[str, set[str]] = field(default_factory=dict)
+    inside: dict[tuple[str, str], set[str]] = field(default_factory=dict)
 
     def own(self, draft: Draft, spec: RobotSpec) -> Draft:
         """Return the draft with what its own ``calibration`` says."""
@@ -128,7 +122,7 @@ class _Work:
 
     def _around(self, draft: Draft) -> tuple[set[str], set[str]]:
         """Return the names of the frames that the edge's parent and child can have in its entry."""
-        inside = self.inside[draft.edge.sensor] if draft.edge.sensor else {draft.edge.child}
+        inside = self.inside[draft.group] if draft.group else {draft.edge.child}
         return {draft.edge.parent, draft.relative_to or draft.edge.parent}, inside
 
     def _pick(self, draft: Draft, said: CalibrationSpec, file: CalibrationFile, at: Span) -> _Match | None:

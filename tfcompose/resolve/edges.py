@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, Span, did_you_mean, finding
+from tfcompose.diagnostic import Diagnostic, Note, Span, did_you_mean, finding
 from tfcompose.model import JOINTS, STATIC, Edge, Joint, Limit, Link, MountedSensor, Process
 from tfcompose.pose import Pose, norm
 from tfcompose.resolve.bodies import Bodies, inertial_of
@@ -15,6 +15,7 @@ from tfcompose.resolve.processes import driver_process
 if TYPE_CHECKING:
     from tfcompose.load import Path, Source
     from tfcompose.plan import EdgeKind
+    from tfcompose.resolve.parts import Joined
     from tfcompose.resolve.presets import Sensor
     from tfcompose.validate.edges import EdgeKeys
     from tfcompose.validate.joints import JointSpec
@@ -85,6 +86,36 @@ class Drafts:
         self._add_body(sensor)
         self.sensors.append(self._mounted(sensor, mount))
 
+    def add_part(self, part: Joined) -> bool:
+        """Take a part: its frames, edges and bodies under the names that they have here, and its mount edge.
+
+        Return False, and take nothing, if it brings names that are there already.
+        """
+        robot, at = part.robot, ("parts", part.name)
+        hanging = {edge.child for edge in robot.edges}
+        free = part.shared | (self.spec.frames.keys() - hanging)  # a free root can have its edge here
+        taken = [name for name in robot.frames if name in self.frames and name not in free]
+        if taken:
+            self._refuse_names(taken, part)
+            return False
+        for name, place in robot.frames.items():
+            self.frames.setdefault(name, place)
+        for name, link in robot.links.items():
+            self.links.setdefault(name, link)
+        if part.said.parent is not None and part.root is not None:
+            self._add(at, part.said.parent, part.root, part.said, owner=STATIC, part=part.name)
+        self.edges += [Draft(edge, part=part.name) for edge in robot.edges]
+        self.sensors += robot.sensors
+        return True
+
+    def _refuse_names(self, taken: list[str], part: Joined) -> None:
+        first, more = taken[0], f" and {len(taken) - 1} more" if taken[1:] else ""
+        notes = [Note(f"{first} stands here", self.frames[first]), Note("and here", part.robot.frames[first])]
+        advice = f"a prefix of its own, prefix: {part.name}/; or ros: {{shared_frames: [{first}]}}"
+        message = f"the part {part.name} brings the frame {first}{more}, which is there already"
+        place = self.source.at_key(("parts", part.name))
+        self.found.append(finding("TF505", message, place, notes=notes, help=advice))
+
     def _add(  # noqa: PLR0913 (an edge has that many parts)
         self,
         at: Path,
@@ -95,8 +126,10 @@ class Drafts:
         joint: Joint | None = None,
         joint_name: str = "",
         sensor: Sensor | None = None,
+        owner: str | None = None,
+        part: str | None = None,
     ) -> None:
-        owner = keys.owner or (JOINTS if joint else STATIC)
+        owner = owner or keys.owner or (JOINTS if joint else STATIC)
         place: str | None = getattr(keys, "place", None)
         edge = Edge(
             parent=parents[0],
@@ -116,7 +149,7 @@ class Drafts:
         )
         relative_at = self.source.at((*at, "relative_to"))
         place_at = self.source.at((*at, "place"))
-        self.edges.append(Draft(edge, keys.relative_to, relative_at, place, place_at, at))
+        self.edges.append(Draft(edge, keys.relative_to, relative_at, place, place_at, at, part))
 
     def _kind(self, owner: str, keys: EdgeKeys, joint: Joint | None) -> EdgeKind:
         if owner == STATIC:

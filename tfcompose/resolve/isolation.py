@@ -40,14 +40,15 @@ def isolate(robot: Robot, ros: RosSpec, source: Source) -> tuple[Robot, list[Dia
         remap = {topic: f"/{robot.ros.namespace}{topic}" for topic in TF_TOPICS}
     processes = []
     for process in robot.processes:
-        moved = replace(process, remap=remap | process.remap) if process.kind != "external" else process
+        moved = replace(process, remap=remap | process.remap)
         processes.append(_named(moved, robot, source, found))
     return replace(robot, processes=tuple(processes)), found
 
 
 def _wrong(robot: Robot, ros: RosSpec, source: Source) -> list[Diagnostic]:
     found = []
-    if ros.isolate != "none" and not robot.ros.namespace and not (ros.isolate == "frames" and ros.frame_prefix):
+    named = robot.ros.namespace or robot.parts or (ros.isolate == "frames" and ros.frame_prefix)
+    if ros.isolate != "none" and not named:
         message = f"isolate: {ros.isolate} needs a namespace"
         found.append(finding("TF304", message, source.at(("ros", "isolate")), help="ros: {namespace: robot1}"))
     for index, frame in enumerate(ros.shared_frames):

@@ -39,7 +39,7 @@ class Draft:
     """An edge whose pose may still have to be solved. Its ``pose`` is that of ``place``, in ``relative_to``.
 
     ``at`` is where it is written. With ``measured`` the pose is that of a calibration, and the one that is written is
-    the nominal one, if ``has_nominal``.
+    the nominal one, if ``has_nominal``. An edge into or inside a ``part`` belongs to that.
     """
 
     edge: Edge
@@ -48,8 +48,16 @@ class Draft:
     place: str | None = None
     place_at: Span | None = None
     at: Path = ()
+    part: str | None = None
     measured: Calibration | None = None
     has_nominal: bool = False
+
+    @property
+    def group(self) -> tuple[str, str] | None:
+        """The part or the sensor whose mount the edge is, or in which it is; None for any other edge."""
+        if self.part is not None:
+            return ("parts", self.part)
+        return ("sensors", self.edge.sensor) if self.edge.sensor else None
 
 
 #: How deep a chain of poses that are given relative to each other is followed before it is solved from its far end.
@@ -190,7 +198,7 @@ class Solver:
         mount = draft.edge.child
         if mount not in names:
             message = f"{place} is not a frame of this sensor" if draft.edge.sensor else f"{place} is not below {mount}"
-            inside = [d.edge.child for d in self.drafts if d.edge.sensor == draft.edge.sensor]
+            inside = [d.edge.child for d in self.drafts if d.group == draft.group]
             raise _UnsolvableError(finding("TF404", message, at, help=did_you_mean(place, inside)))
         pose = self._down(chain, mount, at)
         inner = [self.drafts[index].edge for _, index in chain[: names.index(mount)]]

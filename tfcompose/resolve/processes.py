@@ -205,15 +205,20 @@ def name_clashes(processes: list[Process], spec: RobotSpec, source: Source) -> l
     return found
 
 
-def unknown_names(processes: list[Process], source: Source, broken: frozenset[str]) -> list[Diagnostic]:
-    """Return a finding for each name under ``after`` that no process has."""
-    names = [process.name for process in processes]
+def unknown_names(
+    processes: list[Process], source: Source, known: frozenset[str], missing: tuple[str, ...]
+) -> list[Diagnostic]:
+    """Return a finding for each name under ``after`` that is no process.
+
+    ``known`` are those that are there or were refused, ``missing`` how the names of those begin that are not known.
+    """
+    names = sorted(known)
     found = []
     for process in processes:
         section = "processes" if source.has(("processes", process.name)) else "sensors"
         inside = ("after",) if section == "processes" else ("driver", "after")
         for other in process.after:
-            if other not in names and other not in broken:
+            if other not in known and not other.startswith(missing):
                 place = source.at_key((section, process.name, *inside, other))
                 advice = did_you_mean(other, names, f"there is {', '.join(names)}")
                 found.append(

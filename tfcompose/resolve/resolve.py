@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.diagnostic import Allow, Diagnostic, did_you_mean, finding
 from tfcompose.model import Edge, Process, Robot
 from tfcompose.plan import GuardPolicy
 from tfcompose.resolve.bodies import Bodies, with_colours
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from tfcompose.load import Source
     from tfcompose.resolve.packages import Disk
+    from tfcompose.resolve.parts import Joined, Parts
     from tfcompose.validate import Validated
     from tfcompose.validate.spec import RobotSpec
 
@@ -33,22 +34,38 @@ class Resolved:
 
     robot: Robot
     found: tuple[Diagnostic, ...]
+    allows: tuple[Allow, ...] = ()
 
 
 def resolve(
-    validated: Validated, library: Library, read: Callable[[str], str] | None = None, disk: Disk | None = None
+    validated: Validated,
+    library: Library,
+    read: Callable[[str], str] | None = None,
+    disk: Disk | None = None,
+    holder: Parts | None = None,
 ) -> Resolved:
-    """Return the robot with presets expanded, poses solved and owners given; ``read`` gives a calibration's text.
+    """Return the robot with presets expanded, parts joined, poses solved and owners given.
 
-    Without ``disk`` no mesh and no package is looked for.
+    ``read`` gives the text of a calibration or a part; without ``disk`` no mesh and no package is looked for.
+    ``holder`` is what resolves the robot as a part. ``allows`` are the comments in the files of parts.
     """
     spec, source = validated.spec, validated.source
     found: list[Diagnostic] = []
     broken = set(validated.broken)
     processes = _processes(spec, source, found)
+    joined: list[Joined] = []
+    allows: list[Allow] = []
+    if spec.parts:  # few robots have any, and what joins them is loaded only then
+        made = holder or import_module("tfcompose.resolve.parts").Parts(library, read, disk, resolve, (source.file,))
+        joined = made.join(spec, source, settings_of(spec.ros).frame_prefix)
+        found += made.found
+        allows = made.allows
+        broken |= {entry for part in joined for entry in part.robot.broken}
+        broken |= set(made.missing)
+    everybody = [*processes, *(process for part in joined for process in part.robot.processes)]
     named = {name: (folder, source.at(("packages", name))) for name, folder in spec.packages.items()}
     bodies = Bodies(source, Packages(disk, named))
-    drafts = Drafts(spec, source, frozenset(p.name for p in processes if p.kind == "simulate"), bodies)
+    drafts = Drafts(spec, source, frozenset(p.name for p in everybody if p.kind == "simulate"), bodies)
     drafts.add_frames()
     drafts.add_links()
     drafts.add_joints()
@@ -59,6 +76,9 @@ def resolve(
             drafts.add_sensor(sensor)
         else:
             broken.add(("sensors", name))
+    for part in [part for part in joined if not drafts.add_part(part)]:
+        joined.remove(part)
+        broken |= {("parts", name) for name in (*part.robot.frames, *(p.name for p in part.robot.processes))}
     measured = drafts.edges
     if _has_calibrations(spec):  # few robots do, and what reads them is loaded only then
         calibrated = import_module("tfcompose.resolve.calibration").calibrated
@@ -66,41 +86,44 @@ def resolve(
         found += refused
     solver = Solver(measured, drafts.frames)
     edges = solver.solve()
-    processes = [*processes, *drafts.drivers]
-    names = frozenset(name for _, name in broken)
+    processes = [_with_positions(process, edges, source, found) for process in (*processes, *drafts.drivers)]
+    everybody = [*processes, *(process for part in joined for process in part.robot.processes)]
+    known = frozenset(name for _, name in broken) | {process.name for process in everybody}
+    missing = tuple(name for section, name in broken if section == "parts")
     found += [
         *drafts.found,
         *bodies.found,
         *solver.found,
-        *name_clashes(processes, spec, source),
+        *name_clashes(everybody, spec, source),
         *idle_rates(spec, source),
-        *unknown_names(processes, source, names),
+        *unknown_names(processes, source, known, missing),
     ]
     found = [one for one in found if not (one.code == "TF404" and broken)]  # an edge on the way may have been refused
-    edges = tuple(_with_rate(edge, processes) for edge in edges)
+    edges = tuple(_with_rate(edge, everybody) for edge in edges)
     robot = Robot(
         name=spec.robot,
         file=source.file,
         frames=drafts.frames,
         edges=edges,
         links=with_colours(drafts.links),
-        processes=tuple(_with_positions(process, edges, source, found) for process in processes),
+        processes=tuple(everybody),
         base=None,
         ros=settings_of(spec.ros),
-        guard=_guard(spec),
+        guard=_guard(spec, joined),
         sensors=tuple(drafts.sensors),
-        as_written=as_written(validated.data, source),
+        as_written=as_written(validated.data, source) + tuple(one for part in joined for one in part.robot.as_written),
         unused={name: source.at_key(("vars", name)) for name in validated.unused},
-        written=source.data,
+        written=_written(source, joined),
         broken=frozenset(broken),
+        parts=tuple(alone for part in joined for alone in part.robot.parts),
     )
     robot = replace(robot, base=_base(robot, spec, source, found))
     isolated, refused = isolate(robot, spec.ros, source)
-    return Resolved(isolated, (*found, *refused))
+    return Resolved(isolated, (*found, *refused), tuple(allows))
 
 
 def _has_calibrations(spec: RobotSpec) -> bool:
-    entries = (*spec.frames.values(), *spec.links.values(), *spec.sensors.values())
+    entries = (*spec.frames.values(), *spec.links.values(), *spec.sensors.values(), *spec.parts.values())
     return bool(spec.calibrations) or any(entry.calibration for entry in entries)
 
 
@@ -114,9 +137,15 @@ def _processes(spec: RobotSpec, source: Source, found: list[Diagnostic]) -> list
     return processes
 
 
-def _guard(spec: RobotSpec) -> GuardPolicy:
+def _written(source: Source, joined: list[Joined]) -> dict[str, Any]:
+    """Return what the robot was made from, with what its parts were made from."""
+    return source.data | ({"in parts": {part.name: part.robot.written for part in joined}} if joined else {})
+
+
+def _guard(spec: RobotSpec, joined: list[Joined]) -> GuardPolicy:
     guard = spec.guard
     allow = tuple((edge.parent, edge.child) for edge in guard.allow)
+    allow += tuple(pattern for part in joined for pattern in part.robot.guard.allow if pattern not in allow)
     return GuardPolicy(
         mode="off" if guard.mode == "off" else "watch",
         unknown_edges="ignore"

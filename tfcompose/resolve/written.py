@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tfcompose.diagnostic import Span
     from tfcompose.load import Path, Source
 
-_SECTIONS = ("frames", "links", "joints", "sensors", "processes")
+_SECTIONS = ("frames", "links", "joints", "sensors", "parts", "processes")
 
 #: Keys whose values are numbers of a pose or a limit.
 _LISTS = frozenset({"xyz", "rpy", "quat_xyzw"})
@@ -27,7 +27,7 @@ _MAPPINGS = {
     "limit": ("lower", "upper"),
 }
 #: Keys below which other languages stand, and no poses.
-_OPAQUE = frozenset({"params", "options", "env", "remap", "run", "after", "material", "inertia"})
+_OPAQUE = frozenset({"params", "options", "env", "remap", "run", "after", "material", "inertia", "vars"})
 
 
 def as_written(data: dict[str, Any], source: Source) -> tuple[AsWritten, ...]:

@@ -50,7 +50,7 @@ class Own:
     @property
     def description(self) -> Path:
         """The file that becomes ``robot_description``; it stands beside the plan."""
-        return self.file.parent / self.plan.description
+        return self.file.parent / (self.process.description or self.plan.description)
 
     @property
     def _full_name(self) -> str:

@@ -41,7 +41,7 @@ def static(own: Own, stop: Stop) -> None:
             publisher.publish(encode(edges))
         say(f"{_count(len(edges), 'edge')} on /tf_static")
         latched = None
-        if not any(process.kind == "joints" for process in own.plan.processes):
+        if not any(p.kind == "joints" and p.description == own.process.description for p in own.plan.processes):
             latched = _latch_description(own, node)
         stop.wait(None)
         del latched

@@ -14,6 +14,7 @@ from tfcompose.ros.tf import TFSubscription, wait
 from tfcompose.run.events import EVENTS_FD, Clear, Complete, Live, OwnerReady, to_line
 from tfcompose.run.judge import Judge, Message, Writer
 from tfcompose.run.own import say
+from tfcompose.run.topics import plans_by_topics, together
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -41,25 +42,30 @@ def guard(own: Own, stop: Stop) -> None:
     """Watch /tf and /tf_static until a signal comes."""
     judges = os.environ.get(MODE, own.plan.guard.mode) != "off"
     settle_s = float(os.environ.get(SETTLE, DEFAULT_SETTLE_S)) if judges else 0.0
-    emit = _emitter(judges=judges)
+    plans = plans_by_topics(own.plan, own.process)
+    emit = together(_emitter(judges=judges), list(plans.values()))
     with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
         now = time.monotonic()
-        # One that judges nobody takes every owner as the plan's, whenever it began.
-        judge = Judge(own.plan, settle_s, now, time.time_ns() if judges else 0)
-        watch = _Watch(node, judge, emit)
-        if not judges:
-            judge.tick(now)
+        watches = []
+        for topics, plan in plans.items():
+            # One that judges nobody takes every owner as the plan's, whenever it began.
+            judge = Judge(plan, settle_s, now, time.time_ns() if judges else 0)
+            watches.append(_Watch(node, topics, judge, emit))
+            if not judges:
+                judge.tick(now)
         say(f"watching {_counted(own.plan)}{'' if judges else ', and judging nobody'}")
         while not stop.requested:
-            wait(node, [watch.fixed, watch.moving], LOOK_EVERY_S, stop)
-            watch.look()
+            wait(node, [each for watch in watches for each in (watch.fixed, watch.moving)], LOOK_EVERY_S, stop)
+            for watch in watches:
+                watch.look()
 
 
 class _Watch:
     """The judge's eyes and mouth."""
 
-    def __init__(self, node: Node, judge: Judge, emit: Callable[[GuardEvent], None]) -> None:
-        self.moving, self.fixed = TFSubscription(node, static=False), TFSubscription(node, static=True)
+    def __init__(self, node: Node, topics: tuple[str, str], judge: Judge, emit: Callable[[GuardEvent], None]) -> None:
+        self.moving = TFSubscription(node, static=False, topic=topics[0])
+        self.fixed = TFSubscription(node, static=True, topic=topics[1])
         self._node = node
         self._judge = judge
         self._emit = emit

@@ -176,6 +176,7 @@ def _plain(value: Any) -> Any:
 ANYTHING = Type(lambda value, _path, _problems: _plain(value), {})
 TEXT = text()
 NAME = text(r"[A-Za-z][A-Za-z0-9_]*", "a name: a letter, then letters, digits and _")
+NAMESPACE = text(r"(/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?", "a namespace such as robot1 or fleet/robot1")
 BOOLEAN = Type(_boolean, {"type": "boolean"})
 ONLY_TRUE = Type(_true, {"const": True})
 NUMBER_ = measure(NUMBER)

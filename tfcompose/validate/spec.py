@@ -11,6 +11,7 @@ from tfcompose.validate.bodies import LINK, LinkSpec
 from tfcompose.validate.edges import PARENTS, MountKeys
 from tfcompose.validate.fields import (
     ANYTHING,
+    NAMESPACE,
     TEXT,
     XYZ,
     choice,
@@ -18,6 +19,7 @@ from tfcompose.validate.fields import (
     text,
 )
 from tfcompose.validate.joints import JointSpec
+from tfcompose.validate.part import PartSpec
 from tfcompose.validate.posed import Turned
 from tfcompose.validate.process import DriverSpec, ProcessSpec, process
 from tfcompose.validate.schema import Model, key, listing, mapping, record
@@ -76,9 +78,7 @@ class GuardSpec(Model):
 class RosSpec(Model):
     """What all processes share."""
 
-    namespace: str = key(
-        text(r"(/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?", "a namespace such as robot1 or fleet/robot1"), ""
-    )
+    namespace: str = key(NAMESPACE, "")
     frame_prefix: str = key(TEXT, "", "written in front of every frame as it is; with its slash", ("robot1/",))
     shared_frames: tuple[str, ...] = key(listing(TEXT), (), "frames that never get the prefix", (["map"],))
     isolate: str = key(
@@ -115,6 +115,7 @@ class RobotSpec(Model):
     joints: dict[str, JointSpec] = key(mapping(record(JointSpec)), {}, "edges between bodies")
     frames: dict[str, FrameSpec] = key(mapping(record(FrameSpec)), {}, "bare frames: the skeleton")
     sensors: dict[str, SensorSpec] = key(mapping(record(SensorSpec)), {})
+    parts: dict[str, PartSpec] = key(mapping(record(PartSpec)), {}, "other robots as subtrees, or beside each other")
     processes: dict[str, ProcessSpec] = key(mapping(process(ProcessSpec)), {}, "what is started, or expected to run")
     profiles: dict[str, Any] = key(mapping(ANYTHING), {}, "named overlays, chosen with --profile")
     guard: GuardSpec = key(record(GuardSpec), GuardSpec())

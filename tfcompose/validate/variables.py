@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import did_you_mean
 from tfcompose.validate.expression import ExpressionError, Value, fill, names_in
-from tfcompose.validate.quantity import Quantity, UnitError, quantity
+from tfcompose.validate.quantity import NUMBER, Quantity, UnitError, quantity
 from tfcompose.validate.schema import BROKEN, Problems, shown
 
 if TYPE_CHECKING:
@@ -130,8 +130,9 @@ class _Variables:
         if not isinstance(value, str):
             return value
         try:
-            return quantity(value)
+            read = quantity(value)
         except UnitError as error:
             if error.unit:
                 raise ExpressionError(f"{error} in the variable {name}", error.advice) from None
             return value
+        return value if read.dimension == NUMBER else read  # a number in quotes is a text, such as a serial number

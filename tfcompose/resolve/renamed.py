@@ -1,0 +1,122 @@
+"""A robot under other names: what it is called as a part of another one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from tfcompose.model import BUILT_IN
+
+if TYPE_CHECKING:
+    from tfcompose.model import Calibration, Edge, Joint, MountedSensor, Part, Process, Robot
+    from tfcompose.plan import GuardPolicy
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """What the names of a part become in the robot that holds it.
+
+    Frames and joints get ``prefix``, frames in ``shared`` stay; processes and sensors are below the part's name. A
+    part that is ``alone`` brings its own ``static`` and ``joints``; else the holder's do their work.
+    """
+
+    part: str
+    prefix: str
+    shared: frozenset[str]
+    alone: bool
+
+    def frame(self, name: str) -> str:
+        """Return the frame's name."""
+        return name if name in self.shared else f"{self.prefix}{name}"
+
+    def joint(self, name: str) -> str:
+        """Return the joint's name, if it has one."""
+        return f"{self.prefix}{name}" if name else name
+
+    def process(self, name: str) -> str:
+        """Return the name of a process, or of a sensor."""
+        return name if name in BUILT_IN and not self.alone else f"{self.part}/{name}"
+
+
+def renamed(robot: Robot, names: Names) -> Robot:
+    """Return the robot with the names that it has as a part."""
+    kept = [process for process in robot.processes if process.name not in BUILT_IN or names.alone]
+    broken = {(section, again) for section, name in robot.broken for again in _names_of(section, name, names)}
+    return replace(
+        robot,
+        frames={names.frame(name): at for name, at in robot.frames.items()},
+        edges=tuple(_edge(edge, names) for edge in robot.edges),
+        links={names.frame(name): replace(link, name=names.frame(name)) for name, link in robot.links.items()},
+        processes=tuple(_process(process, names) for process in kept if process.kind != "guard"),
+        base=robot.base and names.frame(robot.base),
+        guard=_policy(robot.guard, robot, names),
+        sensors=tuple(_sensor(sensor, names) for sensor in robot.sensors),
+        broken=frozenset(broken),
+        parts=tuple(_part(part, names) for part in robot.parts),
+    )
+
+
+def _edge(edge: Edge, names: Names) -> Edge:
+    return replace(
+        edge,
+        parent=names.frame(edge.parent),
+        child=names.frame(edge.child),
+        owner=names.process(edge.owner),
+        joint=_joint(edge.joint, names) if edge.joint else None,
+        joint_name=names.joint(edge.joint_name),
+        sensor=names.process(edge.sensor) if edge.sensor else None,
+        calibration=_calibration(edge.calibration, names) if edge.calibration else None,
+        switched=tuple(map(names.frame, edge.switched)),
+    )
+
+
+def _joint(joint: Joint, names: Names) -> Joint:
+    return replace(joint, name=names.joint(joint.name), mimic=names.joint(joint.mimic) if joint.mimic else None)
+
+
+def _calibration(calibration: Calibration, names: Names) -> Calibration:
+    return replace(calibration, parent=names.frame(calibration.parent), child=names.frame(calibration.child))
+
+
+def _process(process: Process, names: Names) -> Process:
+    simulate = process.simulate
+    if simulate and not (
+        names.alone or process.part
+    ):  # joint states are sent under the names that joints have in the whole
+        simulate = replace(simulate, joints={names.joint(name): q for name, q in simulate.joints.items()})
+    return replace(
+        process,
+        name=names.process(process.name),
+        after={names.process(name): what for name, what in process.after.items()},
+        simulate=simulate,
+        part=f"{names.part}/{process.part}".rstrip("/") if names.alone or process.part else "",
+    )
+
+
+def _part(part: Part, names: Names) -> Part:
+    return replace(part, name=f"{names.part}/{part.name}", prefix=f"{names.prefix}{part.prefix}")
+
+
+def _sensor(sensor: MountedSensor, names: Names) -> MountedSensor:
+    return replace(
+        sensor,
+        name=names.process(sensor.name),
+        mount=names.frame(sensor.mount),
+        frames=tuple(map(names.frame, sensor.frames)),
+        driver_frames=tuple(map(names.frame, sensor.driver_frames)),
+        driver=names.process(sensor.driver) if sensor.driver else "",
+    )
+
+
+def _policy(policy: GuardPolicy, robot: Robot, names: Names) -> GuardPolicy:
+    """Return the policy with its patterns renamed where they name a frame; other patterns are as they were."""
+
+    def final(pattern: str) -> str:
+        return names.frame(pattern) if pattern in robot.frames else pattern
+
+    return replace(policy, allow=tuple((final(parent), final(child)) for parent, child in policy.allow))
+
+
+def _names_of(section: str, name: str, names: Names) -> tuple[str, ...]:
+    """Return the names that what an entry should have brought may be looked for under."""
+    return (names.frame(name), names.process(name)) if section in {"sensors", "processes"} else (names.frame(name),)

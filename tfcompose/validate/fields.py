@@ -91,25 +91,30 @@ def integer(least: int, most: int) -> Type:
 
 def read_quantity(value: Any, path: Path, problems: Problems, dimension: Dimension) -> Any:
     """Return the value in SI, or ``BROKEN``: it is no number, its unit is unknown, or it has another dimension."""
-    name = dimension_name(dimension)
-    want = f"an {name}" if name[0] in "aeiou" else f"a {name}"
     if isinstance(value, str):
         try:
             value = quantity(value, dimension)
         except UnitError as error:
             code = "TF104" if error.unit else "TF103"
             instead = respelt(value, error.unit, dimension) if error.unit else None
-            return problems.refuse(code, path, f"{error}; {want} is expected", error.advice, instead=instead)
-    elif isinstance(value, bool) or not isinstance(value, (int, float, Quantity)):
-        return problems.refuse("TF103", path, f"{shown(value)} is no {name}", f"for example {example(dimension)}")
+            message = f"{error}; {_wanted(dimension)} is expected"
+            return problems.refuse(code, path, message, error.advice, instead=instead)
     if isinstance(value, Quantity):
         if value.dimension not in {NUMBER, dimension}:
-            message = f"{want} is expected; this is of the kind {dimension_name(value.dimension)}"
+            message = f"{_wanted(dimension)} is expected; this is of the kind {dimension_name(value.dimension)}"
             return problems.refuse("TF104", path, message, f"for example {example(dimension)}")
         value = value.value
-    if abs(value) > LARGEST:
-        return problems.refuse("TF106", path, f"{shown(float(value))} is beyond what can be computed with")
-    return float(value)
+    elif isinstance(value, bool) or not isinstance(value, (int, float)):
+        message = f"{shown(value)} is no {dimension_name(dimension)}"
+        return problems.refuse("TF103", path, message, f"for example {example(dimension)}")
+    if -LARGEST <= value <= LARGEST:
+        return float(value)
+    return problems.refuse("TF106", path, f"{shown(float(value))} is beyond what can be computed with")
+
+
+def _wanted(dimension: Dimension) -> str:
+    name = dimension_name(dimension)
+    return f"an {name}" if name[0] in "aeiou" else f"a {name}"
 
 
 #: Beyond this, and for sizes and masses below its inverse, products of four such numbers leave the range of floats.
@@ -134,6 +139,8 @@ def either(turning: Dimension, sliding: Dimension) -> Type:
     """Return the type of what is one quantity for a turning joint and another for a sliding one, in SI."""
 
     def read(value: Any, path: Path, problems: Problems) -> Any:
+        if isinstance(value, (int, float)):
+            return read_quantity(value, path, problems, turning)
         number = read_quantity(value, path, Problems(), turning)
         return number if number is not BROKEN else read_quantity(value, path, problems, sliding)
 

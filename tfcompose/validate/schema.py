@@ -61,17 +61,16 @@ class Problems:
 
 
 class Type:
-    """What a value may be: ``read`` returns its meaning or ``BROKEN``; ``schema`` is its JSON Schema."""
+    """What a value may be: ``read`` returns its meaning or ``BROKEN``; ``schema`` is its JSON Schema.
 
-    __slots__ = ("_read", "schema")
+    A value that is ``BROKEN`` already is never read: mappings and lists see to that.
+    """
+
+    __slots__ = ("read", "schema")
 
     def __init__(self, read: Callable[[Any, Path, Problems], Any], schema: Any) -> None:
-        self._read = read
+        self.read = read
         self.schema = schema
-
-    def read(self, value: Any, path: Path, problems: Problems) -> Any:
-        """Return what the value means, or ``BROKEN``."""
-        return BROKEN if value is BROKEN else self._read(value, path, problems)
 
 
 class Key:
@@ -99,16 +98,20 @@ class Model:
     """A mapping with known keys; others are refused. Objects are frozen."""
 
     KEYS: ClassVar[dict[str, Key]] = {}
+    _DEFAULTS: ClassVar[dict[str, Any]] = {}
+    _REQUIRED: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:
         own = {name: value for name, value in vars(cls).items() if isinstance(value, Key)}
         cls.KEYS = {**cls.KEYS, **own}
+        cls._DEFAULTS = {name: described.default for name, described in cls.KEYS.items()}
+        cls._REQUIRED = tuple(name for name, described in cls.KEYS.items() if described.required)
         for name in own:
             delattr(cls, name)
 
     def __init__(self, **values: Any) -> None:
-        for name, described in self.KEYS.items():
-            self.__dict__[name] = values.get(name, described.default)
+        self.__dict__.update(self._DEFAULTS)
+        self.__dict__.update(values)
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"{name} cannot be set: what the user wrote does not change")
@@ -153,25 +156,31 @@ def record(cls: type[Model], normal: Callable[[Any], Any] | None = None, short: 
 
 
 def _read_model(cls: type[Model], data: dict[str, Any], path: Path, problems: Problems) -> Any:
+    known = cls.KEYS
+    if not data.keys() <= known.keys():
+        _refuse_unknown(cls, data, path, problems)
+    values: dict[str, Any] = {}
+    for name, item in data.items():
+        if name in known and item is not BROKEN:
+            value = known[name].type.read(item, (*path, name), problems)
+            if value is not BROKEN:
+                values[name] = value
+    whole = True
+    for name in cls._REQUIRED:
+        if name not in data:
+            examples = known[name].examples
+            sample = f"for example {name}: {examples[0]}" if examples else ""
+            problems.refuse("TF102", path, f"{name} is missing", sample, on_key=True)
+        whole = whole and name in values
+    return cls(**values) if whole else BROKEN
+
+
+def _refuse_unknown(cls: type[Model], data: dict[str, Any], path: Path, problems: Problems) -> None:
     unknown = {name: slip_of(name, cls.KEYS) for name in data if name not in cls.KEYS}
     for name, meant in unknown.items():
         advice = did_you_mean(name, cls.KEYS, f"known here: {', '.join(cls.KEYS)}")
         only = meant if meant not in data and list(unknown.values()).count(meant) == 1 else None
         problems.refuse("TF101", (*path, name), f"unknown key {name}", advice, on_key=True, instead=only)
-    values: dict[str, Any] = {}
-    whole = True
-    for name, described in cls.KEYS.items():
-        if name in data:
-            value = described.type.read(data[name], (*path, name), problems)
-            if value is not BROKEN:
-                values[name] = value
-            else:
-                whole = whole and not described.required
-        elif described.required:
-            whole = False
-            sample = f"for example {name}: {described.examples[0]}" if described.examples else ""
-            problems.refuse("TF102", path, f"{name} is missing", sample, on_key=True)
-    return cls(**values) if whole else BROKEN
 
 
 def mapping(of: Type, short: str | None = None) -> Type:
@@ -182,8 +191,18 @@ def mapping(of: Type, short: str | None = None) -> Type:
             return {}
         if not isinstance(value, dict):
             return problems.refuse("TF103", path, f"{shown(value)} is no mapping", "for example name: {…}")
-        items = {name: of.read(item, (*path, name), problems) for name, item in value.items()}
-        return {name: item for name, item in items.items() if item is not BROKEN}
+        meanings: dict[str, Any] = {}
+        sound: dict[int, Any] = {}  # by identity: an alias need not be read again, unless there is something to say
+        for name, item in value.items():
+            meaning = sound.get(id(item), BROKEN)
+            if meaning is BROKEN and item is not BROKEN:
+                before = len(problems.all)
+                meaning = of.read(item, (*path, name), problems)
+                if isinstance(item, dict) and len(problems.all) == before:
+                    sound[id(item)] = meaning
+            if meaning is not BROKEN:
+                meanings[name] = meaning
+        return meanings
 
     schema = {"type": "object", "additionalProperties": of}
     return Type(read, {"anyOf": [{"const": short}, schema]} if short is not None else schema)
@@ -201,7 +220,9 @@ def listing(of: Type, *, count: int | None = None, sample: str = "", single: boo
             return problems.refuse("TF103", path, f"{shown(value)} is not {wanted}", sample and f"for example {sample}")
         if count is not None and len(value) != count:
             return problems.refuse("TF103", path, f"{shown(value)}, and {count} are expected", f"for example {sample}")
-        items = [of.read(item, (*path, index), problems) for index, item in enumerate(value)]
+        items = [
+            BROKEN if item is BROKEN else of.read(item, (*path, index), problems) for index, item in enumerate(value)
+        ]
         return BROKEN if BROKEN in items else tuple(items)
 
     schema: dict[str, Any] = {"type": "array", "items": of}

@@ -41,7 +41,7 @@ def validate(source: Source, aside: Any = None) -> Validated:
     problems = Problems()
     data = compute(source.data, problems)
     spec = _read(RobotSpec, data, problems)
-    _exclusive(source.data, problems)
+    _exclusive(source.data, _FORKS, (), problems)
     said_once = [problem for problem in _once(problems.all) if not _in_a_copy(problem, source.data)]
     found = (*source.found, *(_finding(problem, source) for problem in said_once))
     if spec is BROKEN:
@@ -86,24 +86,46 @@ def _finding(problem: Problem, source: Source) -> Diagnostic:
     return finding(problem.code, problem.message, span, help=problem.help, notes=notes, edits=edits)
 
 
-def _exclusive(data: dict[str, Any], problems: Problems) -> None:
-    """Refuse two keys of which a mapping can hold one, wherever the language has such a choice."""
+@dataclass(slots=True)
+class _Fork:
+    """What stands at one place of the language: choices of one key, and places below, where ``*`` is any name."""
+
+    choices: list[frozenset[str]] = field(default_factory=list)
+    below: dict[str, _Fork] = field(default_factory=dict)
+
+
+def _forks() -> _Fork:
+    root = _Fork()
     for pattern, choice in CHOICES:
-        for path, found in _matching(data, pattern, ()):
-            present = [key for key in found if key in choice]
-            for second in present[1:]:
-                message = f"{second} and {present[0]} exclude each other"
-                advice = f"keep one of {', '.join(present)}"
-                at, other = (*path, second), (*path, present[0])
-                problems.refuse("TF107", at, message, advice, on_key=True, other=other)
+        fork = root
+        for step in pattern:
+            fork = fork.below.setdefault(step, _Fork())
+        fork.choices.append(choice)
+    return root
 
 
-def _matching(value: Any, pattern: tuple[str, ...], path: Path) -> list[tuple[Path, dict[str, Any]]]:
+_FORKS = _forks()
+
+
+def _exclusive(value: Any, fork: _Fork, path: Path, problems: Problems) -> None:
+    """Refuse two keys of which a mapping can hold one, wherever the language has such a choice."""
     if isinstance(value, list):
-        return [hit for index, item in enumerate(value) for hit in _matching(item, pattern, (*path, index))]
+        for index, item in enumerate(value):
+            _exclusive(item, fork, (*path, index), problems)
+        return
     if not isinstance(value, dict):
-        return []
-    if not pattern:
-        return [(path, value)]
-    steps = list(value) if pattern[0] == "*" else [pattern[0]] if pattern[0] in value else []
-    return [hit for step in steps for hit in _matching(value[step], pattern[1:], (*path, step))]
+        return
+    for choice in fork.choices:
+        if len(choice & value.keys()) > 1:
+            _refuse_all_but_one([key for key in value if key in choice], path, problems)
+    for step, below in fork.below.items():
+        for name in value if step == "*" else (step,):
+            if name in value:
+                _exclusive(value[name], below, (*path, name), problems)
+
+
+def _refuse_all_but_one(present: list[str], path: Path, problems: Problems) -> None:
+    for second in present[1:]:
+        message = f"{second} and {present[0]} exclude each other"
+        advice = f"keep one of {', '.join(present)}"
+        problems.refuse("TF107", (*path, second), message, advice, on_key=True, other=(*path, present[0]))

@@ -43,13 +43,20 @@ def _names(value: Any) -> Iterator[str]:
 
 
 def _filled(value: Any, path: Path, variables: _Variables) -> Any:
+    """Return the value with expressions computed; the same object where it holds none, so that aliases stay one."""
     if isinstance(value, str):
         return variables.fill(value, path) if "${" in value else value
-    if isinstance(value, dict):
-        return {key: _filled(item, (*path, key), variables) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_filled(item, (*path, index), variables) for index, item in enumerate(value)]
-    return value
+    if not isinstance(value, (dict, list)):
+        return value
+    filled: dict[Any, Any] = {}
+    for step, item in value.items() if isinstance(value, dict) else enumerate(value):
+        if isinstance(item, (dict, list)) or (isinstance(item, str) and "${" in item):
+            new = _filled(item, (*path, step), variables)
+            if new is not item:
+                filled[step] = new
+    if not filled:
+        return value
+    return value | filled if isinstance(value, dict) else [filled.get(index, item) for index, item in enumerate(value)]
 
 
 #: What a process is told, and what is known only when frames are named, or when it is started.

@@ -109,6 +109,8 @@ CODES = {
     "TF712": "root_link_with_inertia",
     "TF713": "material_with_two_colours",
     "TF714": "material_without_colour",
+    "TF715": "joint_without_owner",
+    "TF716": "soft_limit_outside",
     # a URDF that somebody else wrote; meshes and packages
     "TF720": "unknown_urdf_word",
     "TF721": "bad_urdf_value",

@@ -106,11 +106,37 @@ class Limit:
 
 
 @dataclass(frozen=True, slots=True)
+class Dynamics:
+    """What slows a joint down: N m s/rad and N m, or N s/m and N."""
+
+    damping: float = 0.0
+    friction: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyController:
+    """Where a controller begins to hold a joint back, and how hard."""
+
+    soft_lower_limit: float = 0.0
+    soft_upper_limit: float = 0.0
+    k_position: float = 0.0
+    k_velocity: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class ReferencePositions:
+    """Where a joint's reference switch changes; URDF calls it calibration."""
+
+    rising: float | None = None
+    falling: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Joint:
-    """A joint that can move; ``axis`` is a unit vector in the child's frame."""
+    """A joint that can move; ``axis`` is a unit vector in the child's frame, for planar the plane's normal."""
 
     name: str
-    type: Literal["revolute", "continuous", "prismatic"]
+    type: Literal["revolute", "continuous", "prismatic", "planar", "floating"]
     at: Span
     axis: Vector = (1.0, 0.0, 0.0)
     limit: Limit | None = None
@@ -118,6 +144,9 @@ class Joint:
     multiplier: float = 1.0
     offset: float = 0.0
     axis_length: float = 1.0  # as it was written
+    dynamics: Dynamics | None = None
+    safety: SafetyController | None = None
+    reference: ReferencePositions | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,6 +239,7 @@ class Edge:
 
     ``switched`` holds the further parents between which the owner may change it, as a tool changer does; ``parent`` is
     the nominal one.
+    ``joint`` moves by joint states. ``free`` is a planar or floating joint, of which joint states say nothing.
     """
 
     parent: str
@@ -229,6 +259,7 @@ class Edge:
     rate_at: Span | None = None
     calibration: Calibration | None = None
     switched: tuple[str, ...] = ()
+    free: Joint | None = None
 
     @property
     def name(self) -> str:

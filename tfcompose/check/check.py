@@ -55,6 +55,8 @@ from tfcompose.check.rules.tf711_inertia_off_from_shape import inertia_off_from_
 from tfcompose.check.rules.tf712_root_link_with_inertia import root_link_with_inertia
 from tfcompose.check.rules.tf713_material_with_two_colours import material_with_two_colours
 from tfcompose.check.rules.tf714_material_without_colour import material_without_colour
+from tfcompose.check.rules.tf715_joint_without_owner import joint_without_owner
+from tfcompose.check.rules.tf716_soft_limit_outside import soft_limit_outside
 from tfcompose.check.rules.tf812_start_order_loop import start_order_loop
 from tfcompose.check.rules.tf815_process_without_role import process_without_role
 from tfcompose.diagnostic import Diagnostic, Severity, Span, finding
@@ -133,6 +135,8 @@ RULES: tuple[Rule, ...] = (
     Rule("TF712", root_link_with_inertia, WARNING),
     Rule("TF713", material_with_two_colours, WARNING),
     Rule("TF714", material_without_colour),
+    Rule("TF715", joint_without_owner),
+    Rule("TF716", soft_limit_outside, WARNING),
     Rule("TF812", start_order_loop),
     Rule("TF815", process_without_role, WARNING),
 )

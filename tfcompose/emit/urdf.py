@@ -71,8 +71,9 @@ def _joint_names(edges: list[Edge]) -> list[str]:
 
 
 def _kind(edge: Edge) -> str:
-    if edge.joint:
-        return edge.joint.type
+    joint = edge.joint or edge.free
+    if joint:
+        return joint.type
     return "floating" if edge.kind == "dynamic" else "fixed"
 
 
@@ -83,24 +84,32 @@ def _joint(edge: Edge, name: str, kind: str) -> list[str]:
         f"    <child link={quoted(edge.child)}/>",
         *origin(edge.pose, "    "),
     ]
-    if edge.joint and kind != "floating":
-        lines += _motion(edge.joint)
+    joint = edge.joint or edge.free
+    if joint and kind != "floating":
+        lines += _motion(joint)
     return [*lines, "  </joint>"]
 
 
 def _motion(joint: Joint) -> list[str]:
     lines = [f'    <axis xyz="{numbers(joint.axis)}"/>']
-    limit = joint.limit
-    if joint.type != "continuous" or limit:
-        said = [
-            ("lower", limit.lower if limit else None),
-            ("upper", limit.upper if limit else None),
-            ("effort", (limit.effort if limit else None) or 0.0),
-            ("velocity", (limit.velocity if limit else None) or 0.0),
-        ]
-        values = " ".join(f'{name}="{number(value)}"' for name, value in said if value is not None)
-        lines.append(f"    <limit {values}/>")
-    if joint.mimic is not None:
+    limit, reference, mimic = joint.limit, joint.reference, joint.mimic
+    if joint.type in {"revolute", "prismatic"} or limit:  # URDF requires effort and velocity of these
+        effort, velocity = (limit.effort or 0.0, limit.velocity or 0.0) if limit else (0.0, 0.0)
+        lower, upper = (limit.lower, limit.upper) if limit else (None, None)
+        lines.append(_values("limit", lower=lower, upper=upper, effort=effort, velocity=velocity))
+    if joint.dynamics:
+        lines.append(_values("dynamics", damping=joint.dynamics.damping, friction=joint.dynamics.friction))
+    if joint.safety:
+        gains = {key: getattr(joint.safety, key) for key in joint.safety.__slots__}
+        lines.append(_values("safety_controller", **gains))
+    if reference:
+        lines.append(_values("calibration", rising=reference.rising, falling=reference.falling))
+    if mimic is not None:
         multiplier, offset = number(joint.multiplier), number(joint.offset)
-        lines.append(f'    <mimic joint={quoted(joint.mimic)} multiplier="{multiplier}" offset="{offset}"/>')
+        lines.append(f'    <mimic joint={quoted(mimic)} multiplier="{multiplier}" offset="{offset}"/>')
     return lines
+
+
+def _values(tag: str, **values: float | None) -> str:
+    said = " ".join(f'{name}="{number(value)}"' for name, value in values.items() if value is not None)
+    return f"    <{tag} {said}/>"

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, Span, did_you_mean, finding
-from tfcompose.model import JOINTS, STATIC, Edge, Joint, Limit, Link, MountedSensor, Process
-from tfcompose.pose import Pose, norm
+from tfcompose.model import JOINTS, STATIC, Edge, Joint, Link, MountedSensor, Process
+from tfcompose.pose import Pose
 from tfcompose.resolve.bodies import Bodies, inertial_of
+from tfcompose.resolve.joints import FREE, joint_of
 from tfcompose.resolve.poses import Draft, pose_of, rotation_of
 from tfcompose.resolve.processes import driver_process
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from tfcompose.resolve.parts import Joined
     from tfcompose.resolve.presets import Sensor
     from tfcompose.validate.edges import EdgeKeys
-    from tfcompose.validate.joints import JointSpec
     from tfcompose.validate.spec import RobotSpec
 
 
@@ -56,7 +56,7 @@ class Drafts:
     def add_joints(self) -> None:
         """Take the edges between bodies."""
         for name, joint in self.spec.joints.items():
-            moving = _moving(name, joint, self.source)
+            moving = joint_of(name, joint, self.source.at_key(("joints", name)))
             self._add(("joints", name), joint.parent, joint.child, joint, joint=moving, joint_name=name)
 
     def add_sensor(self, sensor: Sensor) -> None:
@@ -129,6 +129,8 @@ class Drafts:
         owner: str | None = None,
         part: str | None = None,
     ) -> None:
+        free = joint if joint and joint.type in FREE else None
+        joint = None if free else joint
         owner = owner or keys.owner or (JOINTS if joint else STATIC)
         place: str | None = getattr(keys, "place", None)
         edge = Edge(
@@ -140,6 +142,7 @@ class Drafts:
             at=self.source.at((*at, "parent")),
             rate=keys.rate,
             joint=joint,
+            free=free,
             joint_name=joint_name,
             child_at=self.source.at((*at, "child")) if joint_name else None,
             owner_at=self.source.at((*at, "owner")) if keys.owner else None,
@@ -237,24 +240,3 @@ class Drafts:
         inertial = inertial_of(body.mass, (shape,)) if body.mass and not shape.mesh else None
         place = self.source.at_key(("sensors", sensor.name))
         self.links[frame] = Link(frame, place, (shape,), (shape,), inertial)
-
-
-def _moving(name: str, joint: JointSpec, source: Source) -> Joint | None:
-    kind: Any = joint.type
-    if kind == "fixed":
-        return None
-    length = norm(joint.axis)
-    axis = (joint.axis[0] / length, joint.axis[1] / length, joint.axis[2] / length)
-    said, mimic = joint.limit, joint.mimic
-    limit = Limit(said.lower, said.upper, said.effort, said.velocity) if said else None
-    return Joint(
-        name,
-        kind,
-        source.at_key(("joints", name)),
-        axis,
-        limit,
-        mimic.joint if mimic else None,
-        mimic.multiplier if mimic else 1.0,
-        mimic.offset if mimic else 0.0,
-        length,
-    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.model import BUILT_IN
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,7 +22,7 @@ def owner_cannot_publish(robot: Robot) -> Iterator[Diagnostic]:
     processes = {process.name: process for process in robot.processes}
     for edge in robot.edges:
         process = processes.get(edge.owner)
-        if process is None:
+        if process is None or (edge.free and edge.owner in BUILT_IN):  # TF715 says that
             continue
         reason = ""
         if process.kind == "guard":

@@ -23,7 +23,7 @@ def inertia_missing(robot: Robot) -> Iterator[Diagnostic]:
     for edge in robot.edges:
         if edge.kind == "static":
             fixed.setdefault(edge.parent, []).append(edge.child)
-    moving = [edge for edge in robot.edges if edge.joint and edge.child in robot.links]
+    moving = [edge for edge in robot.edges if (edge.joint or edge.free) and edge.child in robot.links]
     weighed = {edge.child: _weighs(robot, fixed, edge.child) for edge in moving}
     if not any(weighed.values()):
         return

@@ -1,0 +1,42 @@
+"""Joints: what is written becomes what can move."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.model import Dynamics, Joint, Limit, ReferencePositions, SafetyController
+from tfcompose.pose import norm
+
+if TYPE_CHECKING:
+    from tfcompose.diagnostic import Span
+    from tfcompose.validate.joints import JointSpec
+
+#: Types of which joint states say nothing: they have more than one position.
+FREE = frozenset({"planar", "floating"})
+
+
+def joint_of(name: str, written: JointSpec, at: Span) -> Joint | None:
+    """Return the joint with a unit axis, or None where it is fixed."""
+    kind: Any = written.type
+    if kind == "fixed":
+        return None
+    length = norm(written.axis)
+    x, y, z = written.axis
+    limit, mimic = written.limit, written.mimic
+    dynamics, safety, reference = written.dynamics, written.safety_controller, written.calibration
+    return Joint(
+        name=name,
+        type=kind,
+        at=at,
+        axis=(x / length, y / length, z / length),
+        limit=Limit(limit.lower, limit.upper, limit.effort, limit.velocity) if limit else None,
+        mimic=mimic.joint if mimic else None,
+        multiplier=mimic.multiplier if mimic else 1.0,
+        offset=mimic.offset if mimic else 0.0,
+        axis_length=length,
+        dynamics=Dynamics(dynamics.damping, dynamics.friction) if dynamics else None,
+        safety=SafetyController(**{key: getattr(safety, key) for key in SafetyController.__slots__})
+        if safety
+        else None,
+        reference=ReferencePositions(reference.rising, reference.falling) if reference else None,
+    )

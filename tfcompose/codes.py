@@ -111,6 +111,9 @@ CODES = {
     "TF714": "material_without_colour",
     "TF715": "joint_without_owner",
     "TF716": "soft_limit_outside",
+    "TF717": "interface_claimed_twice",
+    "TF718": "mimic_joint_commanded",
+    "TF719": "xml_block_out_of_place",
     # a URDF that somebody else wrote; meshes and packages
     "TF720": "unknown_urdf_word",
     "TF721": "bad_urdf_value",

@@ -7,13 +7,16 @@ places. Lengths are metres, angles radians, rates hertz; an edge's pose is the p
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+import re
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from tfcompose.plan import EdgeKind, GuardPolicy, ProcessKind, Ready, RosSettings, Simulation, StopRule
 from tfcompose.pose import angle_between
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from tfcompose.diagnostic import Span
     from tfcompose.pose import Pose, Vector
 
@@ -147,6 +150,61 @@ class Joint:
     dynamics: Dynamics | None = None
     safety: SafetyController | None = None
     reference: ReferencePositions | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Interface:
+    """An interface of ros2_control, with its parameters as texts."""
+
+    name: str
+    params: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """A joint, sensor or gpio of a hardware component."""
+
+    kind: str
+    name: str
+    at: Span
+    command: tuple[Interface, ...] = ()
+    state: tuple[Interface, ...] = ()
+    params: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Hardware:
+    """A hardware component of ros2_control: the plugin and what it drives."""
+
+    name: str
+    plugin: str
+    type: str
+    at: Span
+    params: dict[str, str] = field(default_factory=dict)
+    components: tuple[Component, ...] = ()
+    rw_rate: int | None = None
+    is_async: bool | None = None
+
+
+#: All that stands between quotes, or between two tags, but for blanks.
+_HELD = re.compile(r"""(=\s*["']\s*|>\s*)([^<>"'\s]+)(?=\s*["'<])""")
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Elements that stand in the URDF as the user wrote them."""
+
+    name: str
+    at: Span
+    text: str
+
+    def renamed(self, names: Mapping[str, str]) -> Block:
+        """Return the block with other names: of what an attribute or an element holds, if that is a name alone."""
+
+        def other(found: re.Match[str]) -> str:
+            return found[1] + names.get(found[2], found[2])
+
+        return replace(self, text=_HELD.sub(other, self.text))
 
 
 @dataclass(frozen=True, slots=True)
@@ -361,6 +419,8 @@ class Robot:
     written: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
     broken: frozenset[tuple[str, str]] = frozenset()
     parts: tuple[Part, ...] = ()
+    hardware: tuple[Hardware, ...] = ()
+    blocks: tuple[Block, ...] = ()
 
     def final(self, frame: str) -> str:
         """Return the frame's name on the live tree: with the prefix, unless it is shared."""

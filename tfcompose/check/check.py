@@ -57,6 +57,8 @@ from tfcompose.check.rules.tf713_material_with_two_colours import material_with_
 from tfcompose.check.rules.tf714_material_without_colour import material_without_colour
 from tfcompose.check.rules.tf715_joint_without_owner import joint_without_owner
 from tfcompose.check.rules.tf716_soft_limit_outside import soft_limit_outside
+from tfcompose.check.rules.tf717_interface_claimed_twice import interface_claimed_twice
+from tfcompose.check.rules.tf718_mimic_joint_commanded import mimic_joint_commanded
 from tfcompose.check.rules.tf812_start_order_loop import start_order_loop
 from tfcompose.check.rules.tf815_process_without_role import process_without_role
 from tfcompose.diagnostic import Diagnostic, Severity, Span, finding
@@ -137,6 +139,8 @@ RULES: tuple[Rule, ...] = (
     Rule("TF714", material_without_colour),
     Rule("TF715", joint_without_owner),
     Rule("TF716", soft_limit_outside, WARNING),
+    Rule("TF717", interface_claimed_twice),
+    Rule("TF718", mimic_joint_commanded),
     Rule("TF812", start_order_loop),
     Rule("TF815", process_without_role, WARNING),
 )

@@ -165,6 +165,10 @@ position stands in its last column. Copy all digits.""",
 It is the pose of a frame that is not there, or of one that is no mount. Its name may be misspelt, or it is out of
 date.""",
     "TF703": """A stand-in names a joint that does not move or does not exist.""",
+    "TF719": """An element of a raw XML block has no place there.
+
+A block stands beside links and joints in the URDF: <gazebo>, <transmission>, and what other programs read. Links and
+joints are written under links: and joints:, so that they are checked and have an owner.""",
     "TF720": """An element or an attribute is not one of URDF's.
 
 Readers pass over it without a word: with <orign> a joint is at its parent's origin. An error where a known name is

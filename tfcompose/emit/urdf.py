@@ -6,6 +6,7 @@ are fixed-axis angles, an axis is given in the joint's frame.
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.emit.bodies import link_lines, origin
@@ -44,8 +45,12 @@ def urdfs(robot: Robot, target: Target = AS_WRITTEN) -> tuple[str, str]:
         joint = _joint(edge, name, _kind(edge))
         whole += joint
         stock += joint if edge.owner in {STATIC, JOINTS} else _joint(edge, name, "floating")
-    end = ["</robot>", ""]
+    end = [*(import_module("tfcompose.emit.blocks").block_lines(robot) if _has_blocks(robot) else ()), "</robot>", ""]
     return "\n".join([*whole, *end]), "\n".join([*stock, *end])
+
+
+def _has_blocks(robot: Robot) -> bool:
+    return bool(robot.hardware or robot.blocks)
 
 
 def _below(root: str, children: dict[str, list[Edge]]) -> Iterator[Edge]:

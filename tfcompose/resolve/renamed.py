@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 from tfcompose.model import BUILT_IN
 
 if TYPE_CHECKING:
-    from tfcompose.model import Calibration, Edge, Joint, MountedSensor, Part, Process, Robot
+    from collections.abc import Iterator
+
+    from tfcompose.model import Block, Calibration, Edge, Hardware, Joint, Link, MountedSensor, Part, Process, Robot, Shape
     from tfcompose.plan import GuardPolicy
 
 
@@ -46,14 +48,29 @@ def renamed(robot: Robot, names: Names) -> Robot:
         robot,
         frames={names.frame(name): at for name, at in robot.frames.items()},
         edges=tuple(_edge(edge, names) for edge in robot.edges),
-        links={names.frame(name): replace(link, name=names.frame(name)) for name, link in robot.links.items()},
+        links={names.frame(name): _link(link, names) for name, link in robot.links.items()},
         processes=tuple(_process(process, names) for process in kept if process.kind != "guard"),
         base=robot.base and names.frame(robot.base),
         guard=_policy(robot.guard, robot, names),
         sensors=tuple(_sensor(sensor, names) for sensor in robot.sensors),
         broken=frozenset(broken),
         parts=tuple(_part(part, names) for part in robot.parts),
+        hardware=tuple(_hardware(hardware, names) for hardware in robot.hardware),
+        blocks=tuple(_blocks(robot, names)),
     )
+
+
+def _link(link: Link, names: Names) -> Link:
+    visuals = tuple(_shape(shape, names) for shape in link.visuals) if names.prefix else link.visuals
+    return replace(link, name=names.frame(link.name), visuals=visuals)
+
+
+def _shape(shape: Shape, names: Names) -> Shape:
+    """Return the shape with its material's name, which in URDF is one for the whole robot; colours name themselves."""
+    material = shape.material
+    if material is None or material.name.startswith("rgba"):
+        return shape
+    return replace(shape, material=replace(material, name=names.prefix + material.name))
 
 
 def _edge(edge: Edge, names: Names) -> Edge:
@@ -63,6 +80,7 @@ def _edge(edge: Edge, names: Names) -> Edge:
         child=names.frame(edge.child),
         owner=names.process(edge.owner),
         joint=_joint(edge.joint, names) if edge.joint else None,
+        free=_joint(edge.free, names) if edge.free else None,
         joint_name=names.joint(edge.joint_name),
         sensor=names.process(edge.sensor) if edge.sensor else None,
         calibration=_calibration(edge.calibration, names) if edge.calibration else None,
@@ -72,6 +90,19 @@ def _edge(edge: Edge, names: Names) -> Edge:
 
 def _joint(joint: Joint, names: Names) -> Joint:
     return replace(joint, name=names.joint(joint.name), mimic=names.joint(joint.mimic) if joint.mimic else None)
+
+
+def _hardware(hardware: Hardware, names: Names) -> Hardware:
+    """Return the hardware, and its sensors and gpios, under names that no other part has."""
+    inside = (replace(one, name=names.joint(one.name)) for one in hardware.components)
+    return replace(hardware, name=names.joint(hardware.name), components=tuple(inside))
+
+
+def _blocks(robot: Robot, names: Names) -> Iterator[Block]:
+    again = {frame: names.frame(frame) for frame in robot.frames}
+    again |= {edge.joint_name: names.joint(edge.joint_name) for edge in robot.edges if edge.joint_name}
+    for block in robot.blocks:
+        yield replace(block.renamed(again), name=f"{names.part}/{block.name}")
 
 
 def _calibration(calibration: Calibration, names: Names) -> Calibration:

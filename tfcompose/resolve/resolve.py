@@ -116,10 +116,28 @@ def resolve(
         written=_written(source, joined),
         broken=frozenset(broken),
         parts=tuple(alone for part in joined for alone in part.robot.parts),
+        hardware=tuple(one for part in joined if not part.said.namespace for one in part.robot.hardware),
+        blocks=tuple(one for part in joined if not part.said.namespace for one in part.robot.blocks),
     )
+    if spec.ros2_control or spec.xml:
+        robot, refused = _with_blocks(robot, spec, source)
+        found += refused
     robot = replace(robot, base=_base(robot, spec, source, found))
     isolated, refused = isolate(robot, spec.ros, source)
     return Resolved(isolated, (*found, *refused), tuple(allows))
+
+
+def _with_blocks(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Diagnostic]]:
+    """Return the robot with its hardware and raw blocks; what reads XML is loaded only here."""
+    work = import_module("tfcompose.resolve.blocks")
+    moving = [edge.joint.name for edge in robot.edges if edge.joint]
+    hardware = work.hardware_of(spec.ros2_control, source)
+    frames = [frame for frame in robot.frames if frame in robot.links or robot.parent_edge(frame)]
+    joints = [edge.joint_name for edge in robot.edges if edge.joint_name]
+    blocks, found = work.blocks_of(spec.xml, source, frames, joints)
+    known = {*moving, *(name for section, name in robot.broken if section == "joints")}
+    found += work.unknown_joints(hardware, known)
+    return replace(robot, hardware=(*hardware, *robot.hardware), blocks=(*blocks, *robot.blocks)), found
 
 
 def _has_calibrations(spec: RobotSpec) -> bool:

@@ -18,6 +18,7 @@ from tfcompose.validate.fields import (
     integer,
     text,
 )
+from tfcompose.validate.hardware import HARDWARE, HardwareSpec
 from tfcompose.validate.joints import JointSpec
 from tfcompose.validate.part import PartSpec
 from tfcompose.validate.posed import Turned
@@ -113,6 +114,15 @@ class RobotSpec(Model):
     )
     links: dict[str, LinkSpec] = key(mapping(LINK), {}, "bodies")
     joints: dict[str, JointSpec] = key(mapping(record(JointSpec)), {}, "edges between bodies")
+    ros2_control: dict[str, HardwareSpec] = key(
+        mapping(HARDWARE), {}, "what drives the joints: ros2_control's hardware"
+    )
+    xml: dict[str, str] = key(
+        mapping(TEXT),
+        {},
+        "raw URDF beside links and joints, by any name: <gazebo>, <transmission>, …",
+        ({"wheels": '<gazebo reference="wheel_left_link"><mu1>1.2</mu1></gazebo>'},),
+    )
     frames: dict[str, FrameSpec] = key(mapping(record(FrameSpec)), {}, "bare frames: the skeleton")
     sensors: dict[str, SensorSpec] = key(mapping(record(SensorSpec)), {})
     parts: dict[str, PartSpec] = key(mapping(record(PartSpec)), {}, "other robots as subtrees, or beside each other")

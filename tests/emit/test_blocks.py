@@ -1,0 +1,113 @@
+"""What stands beside links and joints: hardware as ros2_control reads it, raw blocks as they were written."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+import pytest
+
+from tfcompose.cli.compiling import library
+from tfcompose.compile import compile_robot
+from tfcompose.emit import emit
+
+HEAD = """tfcompose: 1
+robot: r
+links: {base_link: {}, wheel: {}}
+joints: {wheel_joint: {type: continuous, parent: base_link, child: wheel}}
+"""
+
+
+def urdfs(text: str) -> list[ET.Element]:
+    compiled = compile_robot(HEAD + text, "r.yaml", library())
+    assert not compiled.errors, compiled.errors
+    assert compiled.robot
+    files = {file.path: file.text for file in emit(compiled.robot)}
+    return [ET.fromstring(files[name]) for name in ("robot.full.urdf", "robot.urdf")]  # noqa: S314 (we wrote it)
+
+
+HARDWARE = """
+ros2_control:
+  base:
+    plugin: mock_components/GenericSystem
+    rw_rate: 100
+    is_async: true
+    params: {device: "/dev/tty & co", loop: true, gain: 0.50, count: 3, "a<b": "${2 * 3}"}
+    joints:
+      wheel_joint:
+        command: {velocity: {min: -1, max: 1}}
+        state: [position, velocity]
+        params: {encoder: 4096}
+    sensors: {force: {state: [force.x], params: {frame_id: wheel}}}
+    gpios: {lamp: {command: {digital: {data_type: bool, size: 4, initial_value: false}}}}
+"""
+
+EXPECTED = """<ros2_control name="base" type="system" rw_rate="100" is_async="true">
+<hardware><plugin>mock_components/GenericSystem</plugin><param name="device">/dev/tty &amp; co</param>
+<param name="loop">true</param><param name="gain">0.5</param><param name="count">3</param>
+<param name="a&lt;b">6</param></hardware>
+<joint name="wheel_joint"><command_interface name="velocity"><param name="min">-1</param><param name="max">1</param>
+</command_interface><state_interface name="position"/><state_interface name="velocity"/>
+<param name="encoder">4096</param></joint>
+<sensor name="force"><state_interface name="force.x"/><param name="frame_id">wheel</param></sensor>
+<gpio name="lamp"><command_interface name="digital" data_type="bool" size="4">
+<param name="initial_value">false</param></command_interface></gpio></ros2_control>"""
+
+
+def same(one: ET.Element, other: ET.Element) -> bool:
+    texts = [(element.text or "").strip() for element in (one, other)]
+    return (
+        (one.tag, one.attrib, texts[0], len(one)) == (other.tag, other.attrib, texts[1], len(other))
+        and all(same(*pair) for pair in zip(one, other, strict=True))
+    )  # fmt: skip
+
+
+def test_hardware_is_written_as_ros2_control_reads_it() -> None:
+    for urdf in urdfs(HARDWARE):
+        (found,) = urdf.findall("ros2_control")
+        assert same(found, ET.fromstring(EXPECTED)), ET.tostring(found)  # noqa: S314 (as above)
+
+
+def test_a_raw_block_is_written_as_it_stands_in_both_files() -> None:
+    block = '<gazebo reference="wheel">\n  <mu1>1.2</mu1> <!-- worn: 0.9 -->\n</gazebo>\n<gazebo/>'
+    text = "vars: {mu: 1.2}\nxml:\n  wheels: |\n" + "\n".join(
+        f"      {line}" for line in block.replace("1.2", "${mu}").splitlines()
+    )
+    for urdf in urdfs(text):
+        assert [one.get("reference") for one in urdf.findall("gazebo")] == ["wheel", None]
+        assert urdf.findtext("gazebo/mu1") == "1.2"
+    compiled = compile_robot(HEAD + text, "r.yaml", library())
+    assert compiled.robot
+    whole = next(file.text for file in emit(compiled.robot) if file.path == "robot.full.urdf")
+    assert "<!-- worn: 0.9 -->" in whole
+
+
+def test_an_overlay_takes_hardware_and_blocks_away() -> None:
+    text = HARDWARE + "xml: {a: <gazebo/>}\nprofiles: {bare: {ros2_control: {base: null}, xml: {a: null}}}\n"
+    compiled = compile_robot(HEAD + text, "r.yaml", library(), ["bare"])
+    assert not compiled.errors
+    assert compiled.robot
+    assert (compiled.robot.hardware, compiled.robot.blocks) == ((), ())
+
+
+@pytest.mark.parametrize(
+    ("written", "place"),
+    [
+        ("|\n    <gazebo reference='x'/>\n", (7, 24)),
+        ("|\n\n    <gazebo\n     reference='x'/>\n", (9, 17)),
+        (">\n    <gazebo reference='x'/>\n", (7, 24)),
+        ("<gazebo reference='x'/>\n", (6, 11)),
+        ("\"<gazebo reference='x'/>\\n<gazebo/>\"\n", (6, 11)),
+    ],
+)
+def test_a_finding_in_a_block_has_the_line_of_the_robot_file(written: str, place: tuple[int, int]) -> None:
+    compiled = compile_robot(HEAD + f"xml:\n  wheels: {written}", "r.yaml", library())
+    (found,) = compiled.errors
+    assert found.span
+    assert (found.code, found.span.line, found.span.column) == ("TF203", *place)
+
+
+def test_a_block_cannot_bring_entities_or_end_the_robot() -> None:
+    for evil in ("</robot><robot>", "<!DOCTYPE a [<!ENTITY b 'c'>]>", "]]>", "<a", "&nope;"):
+        compiled = compile_robot(HEAD + f"xml:\n  a: |\n    {evil}\n", "r.yaml", library())
+        assert {one.code for one in compiled.errors} <= {"TF018", "TF719"}, evil
+        assert compiled.errors, evil

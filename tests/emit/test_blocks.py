@@ -111,3 +111,33 @@ def test_a_block_cannot_bring_entities_or_end_the_robot() -> None:
         compiled = compile_robot(HEAD + f"xml:\n  a: |\n    {evil}\n", "r.yaml", library())
         assert {one.code for one in compiled.errors} <= {"TF018", "TF719"}, evil
         assert compiled.errors, evil
+
+
+def test_two_parts_of_a_kind_have_hardware_blocks_and_colours_of_their_own() -> None:
+    arm = """tfcompose: 1
+robot: arm
+links: {foot: {}, hand: {visual: {sphere: {radius: 1}, material: {name: paint, rgba: [%s, 0, 0, 1]}}}}
+joints: {wrist: {type: continuous, parent: foot, child: hand}, lid: {type: floating, parent: foot, child: a, owner: x}}
+frames: {a: {}}
+ros2_control: {motors: {plugin: x/Y, joints: {wrist: {command: [effort]}}}}
+xml: {g: '<gazebo reference="hand"><frame>foot</frame><word>footed</word></gazebo>'}
+processes: {x: {external: true}}
+"""
+    texts = {"red.yaml": arm % 1, "dark.yaml": arm % 0.2}
+    holder = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\nparts:\n" + "".join(
+        f"  {side}: {{spec: {file}, prefix: {side}_, parent: base_link}}\n"
+        for side, file in (("left", "red.yaml"), ("right", "dark.yaml"))
+    )
+    compiled = compile_robot(holder, "r.yaml", library(), read=texts.__getitem__)
+    assert not compiled.found, compiled.found
+    assert compiled.robot
+    urdf = ET.fromstring(next(f.text for f in emit(compiled.robot) if f.path == "robot.full.urdf"))  # noqa: S314 (ours)
+    names = [one.get("name") for one in urdf.findall("ros2_control")]
+    assert names == ["left_motors", "right_motors"]
+    assert [one.get("name") for one in urdf.findall("ros2_control/joint")] == ["left_wrist", "right_wrist"]
+    assert [one.get("reference") for one in urdf.findall("gazebo")] == ["left_hand", "right_hand"]
+    assert [one.findtext("frame") for one in urdf.findall("gazebo")] == ["left_foot", "right_foot"]
+    assert {one.findtext("word") for one in urdf.findall("gazebo")} == {"footed"}
+    assert {one.get("name") for one in urdf.iter("material")} == {"left_paint", "right_paint"}
+    kinds = {str(one.get("name")): one.get("type") for one in urdf.findall("joint")}
+    assert kinds["left_lid"] == kinds["right_lid"] == "floating"

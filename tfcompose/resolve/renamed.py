@@ -10,7 +10,19 @@ from tfcompose.model import BUILT_IN
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.model import Block, Calibration, Edge, Hardware, Joint, Link, MountedSensor, Part, Process, Robot, Shape
+    from tfcompose.model import (
+        Block,
+        Calibration,
+        Edge,
+        Hardware,
+        Joint,
+        Link,
+        MountedSensor,
+        Part,
+        Process,
+        Robot,
+        Shape,
+    )
     from tfcompose.plan import GuardPolicy
 
 

@@ -26,6 +26,7 @@ CODES = {
     "TF016": "bad_setting",
     "TF017": "unknown_rule",
     "TF018": "bad_xml",
+    "TF019": "file_not_there",
     # validate: keys, types, values
     "TF101": "unknown_key",
     "TF102": "missing_key",
@@ -138,6 +139,7 @@ CODES = {
     "TF813": "unknown_process",
     "TF814": "no_live_pose",
     "TF815": "process_without_role",
+    "TF816": "path_cannot_be_told",
     # the environment
     "TF901": "no_ros",
     "TF902": "bad_plan",

@@ -7,8 +7,9 @@ in hertz.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 from tfcompose.pose import Pose
 
@@ -27,6 +28,8 @@ ReadyKind = Literal["edges", "topic", "service", "lifecycle", "log", "exit", "ti
 #: ``${executable:PACKAGE/NAME}`` is a package's program, and ``${launch:PACKAGE/FILE}`` a package's launch file; the
 #: words after that are the launch file's arguments, ``name:=value``.
 PLACEHOLDERS = ("${python}", "${plan}", "${build_dir}", "${params_file}")
+
+_AT_START = re.compile(r"\$\{(?:file:|build_dir\}|params_file\})")
 
 EDGE_KINDS: tuple[EdgeKind, ...] = ("static", "joint", "dynamic")
 PROCESS_KINDS: tuple[ProcessKind, ...] = ("static", "joints", "guard", "simulate", "external", "run")
@@ -197,3 +200,11 @@ class Plan:
     def edges_of(self, owner: str) -> tuple[PlanEdge, ...]:
         """Return the edges that the process publishes, in the plan's order."""
         return tuple(edge for edge in self.edges if edge.owner == owner)
+
+
+def told_at_start(value: Any) -> bool:
+    """Return whether a value holds a path that only the launcher knows."""
+    if isinstance(value, str):
+        return bool(_AT_START.search(value))
+    items = value.values() if isinstance(value, dict) else value if isinstance(value, (list, tuple)) else ()
+    return any(told_at_start(item) for item in items)

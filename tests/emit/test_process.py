@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any
+import json
+import os
+from typing import TYPE_CHECKING, Any
 
 import pytest
 import yaml
 
 from tfcompose.cli.compiling import library
+from tfcompose.cli.disk import disk
 from tfcompose.compile import compile_robot
 from tfcompose.diagnostic import RejectedError
-from tfcompose.emit import emit
+from tfcompose.emit import Target, emit
 from tfcompose.plan import PlanProcess, Ready, StopRule
 from tfcompose.planfile import read_plan, write_plan
+from tfcompose.run.executable import filled_in, own_env
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from tfcompose.diagnostic import Diagnostic
 
 HEAD = "tfcompose: 1\nrobot: r\nros: {namespace: r1}\nframes: {map: {}}\nprocesses:\n"
 EXE = "run: {package: p, executable: e}"
@@ -135,3 +144,68 @@ def test_a_plan_with_another_value_is_refused(old: str, new: str) -> None:
     assert old in text
     with pytest.raises(RejectedError):
         read_plan(text.replace(old, new), "plan.json")
+
+
+FILES = """tfcompose: 1
+robot: r
+frames: {map: {}}
+processes:
+  a:
+    run: {package: p, executable: e, args: ["--map=${file(maps/a.yaml)}", "${build_dir}/x"]}
+    params: {n: 1, path: "${file(maps)}/b.yaml", deep: {all: ["${file(maps/a.yaml)}", c], m: 2}}
+    env: {URI: "file://${file(maps/a.yaml)}"}
+"""
+
+
+def built_at(tmp_path: Path, folder: str, text: str = FILES) -> list[Diagnostic] | tuple[str, PlanProcess]:
+    """Return the plan's text and its process, built to a folder beside the robot's; or what was found."""
+    (tmp_path / "robots/maps").mkdir(parents=True, exist_ok=True)
+    (tmp_path / "robots/maps/a.yaml").touch()
+    file = tmp_path / "robots/r.yaml"
+    compiled = compile_robot(text, str(file), library(), disk=disk())
+    if compiled.found:
+        return list(compiled.found)
+    assert compiled.robot
+    files = {file.path: file.text for file in emit(compiled.robot, Target(folder=str(tmp_path / folder)))}
+    assert yaml.safe_load(files["params/a.yaml"]) == {"/a": {"ros__parameters": {"n": 1, "deep": {"m": 2}}}}
+    return files["plan.json"], read_plan(files["plan.json"], "plan.json").process("a")
+
+
+def test_a_file_is_named_from_the_plans_folder_and_found_from_wherever_the_plan_is_started(tmp_path: Path) -> None:
+    built = built_at(tmp_path, "build/r")
+    assert isinstance(built, tuple)
+    text, process = built
+    assert str(tmp_path) not in text
+    filled = filled_in(process, tmp_path / "build/r/plan.json")
+    (tmp_path / "build/r").mkdir(parents=True)
+    paths = [filled[1].removeprefix("--map="), *(json.loads(word.partition(":=")[2]) for word in filled[-3::2])]
+    maps = tmp_path / "robots/maps"
+    assert [os.path.realpath(path) for path in (paths[0], paths[1], paths[2][0])] == [
+        str(maps / name) for name in ("a.yaml", "b.yaml", "a.yaml")
+    ]
+    assert filled[2] == str(tmp_path / "build/r/x")
+    uri = own_env(process, tmp_path / "build/r/plan.json")["URI"]
+    assert os.path.realpath(uri.removeprefix("file://")) == str(maps / "a.yaml")
+
+
+def test_the_same_robot_in_another_place_is_built_to_the_same_bytes(tmp_path: Path) -> None:
+    (tmp_path / "one").mkdir()
+    (tmp_path / "two").mkdir()
+    assert built_at(tmp_path / "one", "build/r") == built_at(tmp_path / "two", "build/r")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code"),
+    [
+        ('a.yaml)}", c', 'no.yaml)}", c', "TF019"),
+        ("file(maps)", "file(/maps)", "TF106"),
+        ("run: {package: p, executable: e", "run: {launch: p/e", "TF816"),
+        ('n: 1, path: "${file(maps)}/b.yaml", deep: {all: ["${file(maps/a.yaml)}", c], m: 2}', "", "TF816"),
+    ],
+)
+def test_a_file_that_is_not_there_or_cannot_be_told_is_a_finding(tmp_path: Path, old: str, new: str, code: str) -> None:
+    text = FILES.replace("${build_dir}/x", "${params_file}")
+    assert old in text
+    found = built_at(tmp_path, "build/r", text.replace(old, new))
+    assert isinstance(found, list)
+    assert code in [one.code for one in found]

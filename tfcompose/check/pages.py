@@ -87,6 +87,9 @@ Findings about text and keys (TF0 and TF1) always count.""",
     "TF018": """A file is not XML, not a robot, or declares entities.
 
 The place is where reading stopped. A URDF is one <robot>; with xacro the message is xacro's own.""",
+    "TF019": """A file or folder that ${file(…)} names is not there.
+
+A path is relative to the file that writes it, not to the folder that tfcompose is started in.""",
     "TF101": """A key is not known here.
 
 Probably it is misspelt; unknown keys are refused, because a key that is silently dropped is a frame in the wrong
@@ -232,6 +235,11 @@ Its owner is named: a process that somebody else starts may not be running, or i
     "TF814": """There is no live pose of one frame in another.
 
 A frame is unknown, the two are in two trees, their edges have no time in common, or nothing is published at all.""",
+    "TF816": """A path that is known at the start only stands where nobody can fill it in.
+
+${file(…)}, ${build_dir} and ${params_file} are filled in when the plan is started: in the arguments and the environment
+of a process, and in parameters of a process with one node that tfcompose starts itself. A launch file, a command or
+somebody else's process takes a path as an argument; and without parameters there is no ${params_file}.""",
     "TF901": """ROS 2 is missing, or cannot be used.""",
     "TF902": """A plan cannot be used: it is not one, not whole, or of another version.
 

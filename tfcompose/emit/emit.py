@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.emit.final import with_final_names
-from tfcompose.emit.params import params_file
+from tfcompose.emit.params import params_file, written_params
 from tfcompose.emit.plan import plan_of
 from tfcompose.emit.target import AS_WRITTEN, Target
 from tfcompose.emit.tree import tree
@@ -33,13 +33,10 @@ def emit(robot: Robot, target: Target = AS_WRITTEN) -> tuple[File, ...]:
     ``target`` says where they are written and how they address meshes.
     """
     live = with_final_names(robot)
-    params = tuple(
-        File(f"params/{process.name}.yaml", params_file({n.name: n.params for n in process.nodes if n.params}))
-        for process in robot.processes
-        if process.kind == "run" and any(node.params for node in process.nodes)
-    )
+    written = {process.name: written_params(process) for process in robot.processes}
+    params = tuple(File(f"params/{name}.yaml", params_file(nodes)) for name, nodes in written.items() if nodes)
     return (
-        File("plan.json", write_plan(plan_of(live))),
+        File("plan.json", write_plan(plan_of(live, target))),
         *_descriptions(robot, target),
         *(file for part in robot.parts for file in _descriptions(part.robot, target, f"{part.name}/")),
         File("tree.txt", tree(live)),

@@ -4,10 +4,33 @@ from __future__ import annotations
 
 import json
 import re
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.plan import told_at_start
+
+if TYPE_CHECKING:
+    from tfcompose.model import Process
 
 #: What JSON lets stand in a text and YAML takes for the end of a line, or does not allow at all.
 _ESCAPED = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
+
+
+def written_params(process: Process) -> dict[str, dict[str, Any]]:
+    """Return what the process's parameter file holds, by node: all but the paths that only the launcher knows."""
+    if process.kind != "run":
+        return {}
+    nodes = {node.name: _known(node.params) for node in process.nodes}
+    return {node: params for node, params in nodes.items() if params}
+
+
+def _known(params: dict[str, Any]) -> dict[str, Any]:
+    kept = {}
+    for key, value in params.items():
+        if not told_at_start(value):
+            kept[key] = value
+        elif isinstance(value, dict) and (rest := _known(value)):
+            kept[key] = rest
+    return kept
 
 
 def params_file(nodes: dict[str, dict[str, Any]]) -> str:

@@ -5,14 +5,22 @@ from __future__ import annotations
 import hashlib
 import json
 import posixpath
-from typing import TYPE_CHECKING
+import re
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.emit.numbers import clean
+from tfcompose.emit.params import written_params
+from tfcompose.emit.target import AS_WRITTEN, Target
 from tfcompose.model import JOINTS, STATIC
-from tfcompose.plan import DESCRIPTION, Joint, Plan, PlanEdge, PlanProcess
+from tfcompose.plan import DESCRIPTION, Joint, Plan, PlanEdge, PlanProcess, told_at_start
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from tfcompose.model import Edge, Process, Robot
+
+_FILE = re.compile(r"\$\{file:([^{}]*)\}")
 
 #: The modules behind tfcompose's own processes.
 MODULES = {
@@ -29,8 +37,8 @@ _PUBLISHERS = frozenset({"static", "joints"})
 _ORDER = {"static": 0, "joints": 1, "guard": 3}
 
 
-def plan_of(robot: Robot) -> Plan:
-    """Return the plan of a right robot."""
+def plan_of(robot: Robot, target: Target = AS_WRITTEN) -> Plan:
+    """Return the plan of a right robot; ``target`` says where it will be written."""
     nodes = {process.name: process.node for process in robot.processes}
     needed = _needed(robot)
     names = frozenset(process.name for process in needed)
@@ -48,7 +56,9 @@ def plan_of(robot: Robot) -> Plan:
         base=robot.base,
         ros=robot.ros,
         edges=edges,
-        processes=tuple(_process(process, robot, owned.get(process.name, []), names) for process in needed),
+        processes=tuple(
+            _at(target, _process(process, robot, owned.get(process.name, []), names)) for process in needed
+        ),
         guard=robot.guard,
     )
 
@@ -103,7 +113,7 @@ def _relative(file: str, to: str) -> str:
 
 
 def _process(process: Process, robot: Robot, owned: list[tuple[str, str]], names: frozenset[str]) -> PlanProcess:
-    has_params = process.kind == "run" and any(node.params for node in process.nodes)
+    has_params = process.kind == "run" and bool(written_params(process))
     simulation = process.simulate
     if simulation:
         simulation = type(simulation)(
@@ -155,7 +165,28 @@ def _argv(process: Process, robot: Robot, *, has_params: bool) -> tuple[str, ...
         ros_args += ["-p", "use_sim_time:=true"]
     if has_params:
         ros_args += ["--params-file", "${params_file}"]
+    for name, value in _told(process.params):
+        ros_args += ["-p", f"{name}:={json.dumps(value, ensure_ascii=False)}"]
     return (f"${{executable:{process.package}/{process.executable}}}", *process.argv, *ros_args)
+
+
+def _told(params: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the parameters, by their full names, with paths that only the launcher knows."""
+    for key, value in params.items():
+        if isinstance(value, dict):
+            yield from _told(value, f"{above}{key}.")
+        elif told_at_start(value):
+            yield f"{above}{key}", value
+
+
+def _at(target: Target, process: PlanProcess) -> PlanProcess:
+    """Return the process with each file's place seen from the plan's folder."""
+
+    def placed(text: str) -> str:
+        return _FILE.sub(lambda found: f"${{build_dir}}/{target.from_folder(found[1])}", text)
+
+    env = {name: placed(value) for name, value in process.env.items()}
+    return replace(process, argv=tuple(placed(word) for word in process.argv), env=env)
 
 
 def _names(process: Process, robot: Robot) -> list[str]:

@@ -36,10 +36,10 @@ class Target:
             return "file://" + _quoted(posixpath.normpath(posixpath.join(self.top, asset.path)))
         plain = "://" not in asset.uri and not asset.uri.startswith("/")
         if asset.path and (self.form == "relative" or plain):
-            return self._from_folder(asset.path)
+            return self.from_folder(asset.path)
         return asset.uri
 
-    def _from_folder(self, path: str) -> str:
+    def from_folder(self, path: str) -> str:
         """Return the path seen from the folder of the written files."""
         begin = posixpath.join(self.top, self.folder)
         return posixpath.relpath(posixpath.join(self.top, path), begin)

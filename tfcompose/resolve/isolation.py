@@ -7,20 +7,20 @@ remapped below the namespace for every process at once.
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
 from tfcompose.plan import RosSettings
+from tfcompose.resolve.filling import Filler
 
 if TYPE_CHECKING:
-    from tfcompose.load import Path, Source
-    from tfcompose.model import Process, Robot
+    from tfcompose.load import Source
+    from tfcompose.model import Robot
+    from tfcompose.resolve.packages import Disk
     from tfcompose.validate.spec import RosSpec
 
 TF_TOPICS = ("/tf", "/tf_static")
-_FRAME = re.compile(r"\$\{\s*frame\(\s*([^(){}]*?)\s*\)\s*\}")
 
 
 def settings_of(ros: RosSpec) -> RosSettings:
@@ -32,17 +32,18 @@ def settings_of(ros: RosSpec) -> RosSettings:
     return RosSettings(namespace, ros.domain_id, ros.discovery, ros.clock, prefix, tuple(ros.shared_frames))
 
 
-def isolate(robot: Robot, ros: RosSpec, source: Source) -> tuple[Robot, list[Diagnostic]]:
-    """Return the robot with its processes' topics moved and ``${frame(…)}`` in them replaced, and what is wrong."""
+def isolate(robot: Robot, ros: RosSpec, source: Source, disk: Disk | None = None) -> tuple[Robot, list[Diagnostic]]:
+    """Return the robot with its processes' topics moved, and frames and files in them named; and what is wrong."""
     found = _wrong(robot, ros, source)
     remap = {}
     if ros.isolate in {"topics", "both"} and robot.ros.namespace:
         remap = {topic: f"/{robot.ros.namespace}{topic}" for topic in TF_TOPICS}
     processes = []
+    filler = Filler(robot, source, disk)
     for process in robot.processes:
         moved = replace(process, remap=remap | process.remap)
-        processes.append(_named(moved, robot, source, found))
-    return replace(robot, processes=tuple(processes)), found
+        processes.append(filler.filled(moved))
+    return replace(robot, processes=tuple(processes)), [*found, *filler.found]
 
 
 def _wrong(robot: Robot, ros: RosSpec, source: Source) -> list[Diagnostic]:
@@ -57,33 +58,3 @@ def _wrong(robot: Robot, ros: RosSpec, source: Source) -> list[Diagnostic]:
             advice = did_you_mean(frame, robot.frames, "remove it")
             found.append(finding("TF203", f"shared_frames: no frame {frame}", place, help=advice))
     return found
-
-
-def _named(process: Process, robot: Robot, source: Source, found: list[Diagnostic]) -> Process:
-    """Return the process with every ``${frame(NAME)}`` replaced by that frame's final name."""
-    section: Path = ("processes", process.name)
-    if not source.has(section):
-        section = ("sensors", process.name, "driver")
-
-    def fill(value: Any, path: Path) -> Any:
-        if isinstance(value, str):
-            return _FRAME.sub(lambda hole: name_of(hole[1], path), value) if "${" in value else value
-        if isinstance(value, dict):
-            return {key: fill(item, (*path, key)) for key, item in value.items()}
-        if isinstance(value, (list, tuple)):
-            return type(value)(fill(item, (*path, index)) for index, item in enumerate(value))
-        return value
-
-    def name_of(frame: str, path: Path) -> str:
-        if frame not in robot.frames and not robot.excuses(frame):
-            advice = did_you_mean(frame, robot.frames)
-            found.append(finding("TF203", f"${{frame({frame})}}: no frame {frame}", source.at(path), help=advice))
-        return robot.final(frame)
-
-    return replace(
-        process,
-        nodes=tuple(replace(n, params=fill(n.params, (*n.path, "params"))) for n in process.nodes),
-        argv=fill(process.argv, (*section, "run")),
-        remap=fill(process.remap, (*section, "remap")),
-        env=fill(process.env, (*section, "env")),
-    )

@@ -123,7 +123,7 @@ def resolve(
         robot, refused = _with_blocks(robot, spec, source)
         found += refused
     robot = replace(robot, base=_base(robot, spec, source, found))
-    isolated, refused = isolate(robot, spec.ros, source)
+    isolated, refused = isolate(robot, spec.ros, source, disk)
     return Resolved(isolated, (*found, *refused), tuple(allows))
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from tfcompose.diagnostic import Diagnostic, finding
 from tfcompose.ros.environment import RosError
-from tfcompose.run.executable import NotFound, executable_of, filled_in, folder_of, not_found
+from tfcompose.run.executable import NotFound, executable_of, filled_in, folder_of, not_found, own_env
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -67,7 +67,7 @@ def _command_of(
 ) -> Command | NotFound | Diagnostic:
     own = process.kind != "run"
     try:
-        env = environment(base, ros, own=own) | process.env
+        env = environment(base, ros, own=own) | own_env(process, plan_file)
     except RosError as error:
         return finding("TF902", str(error), None)
     argv = filled_in(process, plan_file)

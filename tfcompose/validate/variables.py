@@ -60,7 +60,7 @@ def _filled(value: Any, path: Path, variables: _Variables) -> Any:
 
 
 #: What a process is told, and what is known only when frames are named, or when it is started.
-LATER = re.compile(r"\$\{\s*(?:frame\([^(){}]*\)|params_file|build_dir)\s*\}")
+LATER = re.compile(r"\$\{\s*(?:(?:frame|file)\([^(){}]*\)|params_file|build_dir)\s*\}")
 
 
 def _is_of_a_process(path: Path) -> bool:

@@ -1,0 +1,92 @@
+"""What stands in a process for frames and files: names as they are on the live tree, and places of files.
+
+A file's place is known only where the plan is written: ``${file:PATH}`` in the robot becomes a path from the plan's
+folder, ``${build_dir}/…``, which the launcher fills in. So a built set holds no absolute path, and can be moved
+together with the files that it names.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.plan import told_at_start
+from tfcompose.resolve.packages import beside
+
+if TYPE_CHECKING:
+    from tfcompose.load import Path, Source
+    from tfcompose.model import Node, Process, Robot
+    from tfcompose.resolve.packages import Disk
+
+_HOLE = re.compile(r"\$\{\s*(frame|file)\(\s*([^(){}]*?)\s*\)\s*\}")
+
+
+@dataclass(slots=True)
+class Filler:
+    """Fills in processes; ``found`` is what cannot be."""
+
+    robot: Robot
+    source: Source
+    disk: Disk | None
+    found: list[Diagnostic] = field(default_factory=list)
+
+    def filled(self, process: Process) -> Process:
+        """Return the process with every ``${frame(NAME)}`` and ``${file(PATH)}`` replaced."""
+        section: Path = ("processes", process.name)
+        if not self.source.has(section):
+            section = ("sensors", process.name, "driver")
+        done = replace(
+            process,
+            nodes=tuple(replace(n, params=self._fill(n.params, (*n.path, "params"))) for n in process.nodes),
+            argv=self._fill(process.argv, (*section, "run")),
+            remap=self._fill(process.remap, (*section, "remap")),
+            env=self._fill(process.env, (*section, "env")),
+        )
+        for node in done.nodes:
+            self._check_paths(done, node)
+        if not any(node.params for node in done.nodes) and any("${params_file}" in word for word in done.argv):
+            message = f"{process.name} is given ${{params_file}}, and has no parameters"
+            self.found.append(finding("TF816", message, self.source.at((*section, "run")), help="params: {…}"))
+        return done
+
+    def _fill(self, value: Any, path: Path) -> Any:
+        if isinstance(value, str):
+            return _HOLE.sub(lambda hole: self._meant(hole[1], hole[2], path), value) if "${" in value else value
+        if isinstance(value, dict):
+            return {key: self._fill(item, (*path, key)) for key, item in value.items()}
+        if isinstance(value, (list, tuple)):
+            return type(value)(self._fill(item, (*path, index)) for index, item in enumerate(value))
+        return value
+
+    def _meant(self, what: str, name: str, path: Path) -> str:
+        return self._frame(name, path) if what == "frame" else self._file(name, path)
+
+    def _frame(self, frame: str, path: Path) -> str:
+        if frame not in self.robot.frames and not self.robot.excuses(frame):
+            advice = did_you_mean(frame, self.robot.frames)
+            at = self.source.at(path)
+            self.found.append(finding("TF203", f"${{frame({frame})}}: no frame {frame}", at, help=advice))
+        return self.robot.final(frame)
+
+    def _file(self, name: str, path: Path) -> str:
+        at = self.source.at(path)
+        place = beside(name, at)
+        if name.startswith("/"):
+            advice = "a path from this file's folder; or write the path alone, which no other machine has"
+            self.found.append(finding("TF106", f"${{file({name})}} is an absolute path", at, help=advice))
+        elif self.disk and not (self.disk.is_file(place) or self.disk.is_folder(place)):
+            message = f"${{file({name})}}: {place} is not there"
+            self.found.append(finding("TF019", message, at, help="a path is relative to the file that writes it"))
+        return f"${{file:{place}}}"
+
+    def _check_paths(self, process: Process, node: Node) -> None:
+        """Find parameters with a path that only the launcher knows, where it has no way to tell the node."""
+        can = process.kind == "run" and process.package is not None and len(process.nodes) == 1
+        for key, value in node.params.items() if not can else ():
+            if told_at_start(value):
+                message = f"the parameter {key} of {process.name} holds a path that is known at the start only"
+                advice = "write it among the arguments of run"
+                place = self.source.at((*node.path, "params", key))
+                self.found.append(finding("TF816", message, place, help=advice))

@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING
 from tfcompose.emit.markup import escaped, quoted
 
 if TYPE_CHECKING:
-    from tfcompose.model import Component, Hardware, Interface, Robot
+    from collections.abc import Iterable
+
+    from tfcompose.model import Block, Component, Hardware, Interface
 
 #: What ros2_control reads as attributes of an interface, and not as parameters.
 _ATTRIBUTES = ("data_type", "size")
 
 
-def block_lines(robot: Robot) -> list[str]:
-    """Return the elements, line by line."""
-    lines = [line for hardware in robot.hardware for line in _hardware(hardware)]
-    return lines + [indent(dedent(block.text).strip("\n"), "  ") for block in robot.blocks]
+def block_lines(several: Iterable[Hardware], blocks: Iterable[Block]) -> list[str]:
+    """Return the elements, line by line; a raw block is as it was written, but for what it is indented by."""
+    lines = [line for hardware in several for line in _hardware(hardware)]
+    return lines + [indent(dedent(block.text).strip("\n"), "  ") for block in blocks]
 
 
 def _hardware(hardware: Hardware) -> list[str]:

@@ -11,7 +11,8 @@ from tfcompose.emit.params import params_file, written_params
 from tfcompose.emit.plan import plan_of
 from tfcompose.emit.target import AS_WRITTEN, Target
 from tfcompose.emit.tree import tree
-from tfcompose.emit.urdf import urdfs
+from tfcompose.emit.urdf import body_of, whole
+from tfcompose.emit.xacro import MACRO, caller, macro
 from tfcompose.plan import DESCRIPTION
 from tfcompose.planfile import write_plan
 
@@ -44,7 +45,12 @@ def emit(robot: Robot, target: Target = AS_WRITTEN) -> tuple[File, ...]:
     )
 
 
-def _descriptions(robot: Robot, target: Target, folder: str = "") -> tuple[File, File]:
+def _descriptions(robot: Robot, target: Target, folder: str = "") -> tuple[File, ...]:
     """Return what describes the robot, or a part that is a robot of its own, in a folder of its own."""
-    whole, stock = urdfs(robot, replace(target, folder=posixpath.join(target.folder, folder)))
-    return File(f"{folder}{DESCRIPTION}", whole), File(f"{folder}robot.urdf", stock)
+    body = body_of(robot, replace(target, folder=posixpath.join(target.folder, folder)))
+    return (
+        File(f"{folder}{DESCRIPTION}", whole(robot, body.full)),
+        File(f"{folder}robot.urdf", whole(robot, body.stock)),
+        File(f"{folder}robot.urdf.xacro", caller(robot)),
+        File(f"{folder}{MACRO}", macro(robot, body.full)),
+    )

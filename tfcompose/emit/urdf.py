@@ -6,6 +6,7 @@ are fixed-axis angles, an axis is given in the joint's frame.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -28,29 +29,44 @@ def urdf(robot: Robot, *, full: bool, target: Target = AS_WRITTEN) -> str:
     With ``full`` it holds every edge as it is, whoever publishes it. Without, it is for a stock robot_state_publisher:
     edges of other owners are floating joints, which that node leaves alone. ``target`` says how files are addressed.
     """
-    whole, stock = urdfs(robot, target)
-    return whole if full else stock
+    body = body_of(robot, target)
+    return whole(robot, body.full if full else body.stock)
 
 
-def urdfs(robot: Robot, target: Target = AS_WRITTEN) -> tuple[str, str]:
-    """Return both: with every edge as it is, and for a stock robot_state_publisher. They differ in few joints."""
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A robot's links and joints as lines: with every edge as it is, and for a stock robot_state_publisher."""
+
+    full: list[str]
+    stock: list[str]
+
+
+def body_of(robot: Robot, target: Target = AS_WRITTEN) -> Body:
+    """Return the links and joints below ``robot.base``. The two ways to write them differ in few joints."""
     if robot.base is None:
         raise ValueError(f"{robot.name} has no base")
     edges = list(_below(robot.base, robot.children()))
-    links = ['<?xml version="1.0"?>', f"<robot name={quoted(robot.name)}>"]
+    links: list[str] = []
     for frame in [robot.base, *(edge.child for edge in edges)]:
         links += link_lines(frame, robot.links.get(frame), target)
-    whole, stock = list(links), links
+    full, stock = list(links), links
     for edge, name in zip(edges, _joint_names(edges), strict=True):
         joint = _joint(edge, name, _kind(edge))
-        whole += joint
+        full += joint
         stock += joint if edge.owner in {STATIC, JOINTS} else _joint(edge, name, "floating")
-    end = [*(import_module("tfcompose.emit.blocks").block_lines(robot) if _has_blocks(robot) else ()), "</robot>", ""]
-    return "\n".join([*whole, *end]), "\n".join([*stock, *end])
+    return Body(full, stock)
 
 
-def _has_blocks(robot: Robot) -> bool:
-    return bool(robot.hardware or robot.blocks)
+def whole(robot: Robot, body: list[str]) -> str:
+    """Return the document with these links and joints, and with what stands beside them."""
+    beside = _blocks(robot) if robot.hardware or robot.blocks else ()
+    head = ('<?xml version="1.0"?>', f"<robot name={quoted(robot.name)}>")
+    return "\n".join([*head, *body, *beside, "</robot>", ""])
+
+
+def _blocks(robot: Robot) -> list[str]:
+    lines: list[str] = import_module("tfcompose.emit.blocks").block_lines(robot.hardware, robot.blocks)
+    return lines
 
 
 def _below(root: str, children: dict[str, list[Edge]]) -> Iterator[Edge]:

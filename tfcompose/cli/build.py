@@ -1,6 +1,6 @@
 """``tfcompose build``: the robot's files, all of them or nothing.
 
-Write plan.json, robot.urdf, robot.full.urdf and tree.txt, and parameter files where there are any: all, or nothing.
+Write plan.json, the URDF, xacro and tree.txt, and parameter files where there are any: all, or nothing.
 """
 
 from __future__ import annotations

@@ -42,6 +42,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 #: Packages from elsewhere, and the only parts that may import them.
 ONLY_IN: dict[str, set[str]] = {
     "yaml": {"load"},
+    "numpy": {"observe", "ros", "run"},
     "xacro": {"cli"},
     "trimesh": {"cli"},
     "rclpy": {"ros"},

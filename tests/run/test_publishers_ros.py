@@ -7,7 +7,7 @@ import signal
 import time
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
+from itertools import pairwise, repeat
 from statistics import median
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -22,12 +22,12 @@ from tfcompose.plan import Joint, PlanProcess, Simulation
 from tfcompose.pose import Pose, angle_between, normalised, quat_from_rpy
 from tfcompose.ros.graph import writers
 from tfcompose.ros.message import Transform, decode
-from tfcompose.ros.node import JOINT_STATES, LATCHED, open_node
+from tfcompose.ros.node import JOINT_STATES, LATCHED, latch, open_node
 from tfcompose.ros.stop import Stop
 from tfcompose.ros.tf import Received, Subscription, TFSubscription, wait
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
 pytestmark = pytest.mark.ros
 
@@ -146,6 +146,77 @@ def test_joint_states_that_cannot_be_believed_are_dropped_with_one_line(
     assert process.output.count("dropped a joint state") == 3
 
 
+def test_drivers_that_send_their_own_joints_each_move_them_all(
+    start: Callable[..., Any], ears: Ears, rover: Any, until: Callable[..., bool]
+) -> None:
+    start("tfcompose.run.joints", rover, "joints").until_says("edges")
+    subscription = TFSubscription(ears.node, static=False)
+    drivers = [ears.node.create_publisher(JointState, "/rover/joint_states", 10) for _ in range(2)]
+    seen: set[frozenset[str]] = set()
+
+    def both() -> bool:
+        for name, driver in zip(("left", "right"), drivers, strict=True):
+            driver.publish(JointState(name=[name], position=[1.0]))
+        wait(ears.node, [subscription], 0.1, Stop())
+        seen.update(frozenset(t.child for t in decode(each.data)) for each in subscription.take())
+        return len(seen) > 1
+
+    assert until(both)
+    assert seen == {frozenset({"left", "follower", "finger"}), frozenset({"right"})}
+
+
+def test_joints_that_no_joint_state_speaks_of_are_named_once_with_who_sends_the_others(
+    start: Callable[..., Any], ears: Ears, rover: Any
+) -> None:
+    process = start("tfcompose.run.joints", rover, "joints")
+    process.until_says("edges")
+    _answer(ears, TFSubscription(ears.node, static=False), JointState(name=["right"], position=[1.0]))
+    process.until_says("no joint state after 5 s for left: /rover/joint_states comes from ")
+    assert process.output.count("no joint state") == 1
+
+
+def test_without_any_joint_state_it_says_that_nobody_publishes_them(start: Callable[..., Any], rover: Any) -> None:
+    process = start("tfcompose.run.joints", rover, "joints")
+    process.until_says("no joint state after 5 s for left, right: nobody publishes /rover/joint_states\n")
+
+
+def test_publish_frequency_is_said_and_leaves_nothing_out_in_silence(
+    start: Callable[..., Any], ears: Ears, rover: Any
+) -> None:
+    process = start("tfcompose.run.joints", rover, "joints", "--ros-args", "-p", "publish_frequency:=10.0")
+    process.until_says("4 edges on /tf, from /rover/joint_states, at most 10 Hz")
+    subscription = TFSubscription(ears.node, static=False)
+    publisher = ears.node.create_publisher(JointState, "/rover/joint_states", 10)
+    message = JointState(name=["left"], position=[1.0])
+    _answer(ears, subscription, message, publisher)
+    for _ in range(3):
+        publisher.publish(message)
+    process.until_says("joint states come with more than 10 Hz: some are left out, as publish_frequency says")
+
+
+def test_a_parameter_of_another_type_is_refused_with_a_sentence(start: Callable[..., Any], rover: Any) -> None:
+    process = start("tfcompose.run.joints", rover, "joints", "--ros-args", "-p", "publish_frequency:=fast")
+    assert process.process.wait(UNTIL_S) == 1
+    process.close()
+    (line,) = process.errors
+    assert line.startswith("the parameter publish_frequency is not right: ")
+
+
+@pytest.mark.parametrize("name", ["static", "joints"])
+def test_another_description_changes_nothing_and_is_said_with_its_publisher(
+    start: Callable[..., Any], ears: Ears, write: Callable[..., Any], name: Literal["static", "joints"]
+) -> None:
+    process = start(f"tfcompose.run.{name}", write([], PlanProcess(name, name)), name)
+    process.until_says("edges on")
+    same = latch(ears.node, "/rover/robot_description", "<robot name='rover'/>")
+    other = latch(ears.node, "/rover/robot_description", "<robot name='stranger'/>")
+    process.until_says("/test/ears publishes another /rover/robot_description: ")
+    other.publish(String(data="<robot name='third'/>"))
+    take_for(ears.node, Subscription(ears.node, String, "/rover/robot_description", LATCHED), 0.5)
+    assert process.output.count("another") == 1
+    assert same
+
+
 @pytest.mark.parametrize("name", ["static", "joints"])
 def test_the_description_is_latched(
     start: Callable[..., Any], ears: Ears, write: Callable[..., Any], name: Literal["static", "joints"]
@@ -219,17 +290,47 @@ def test_simulated_time_comes_from_the_clock_topic(
     start("tfcompose.run.simulate", write([edge("odom base", "wheels")], process, clock="sim"), "wheels")
     subscription = TFSubscription(ears.node, static=False)
     clock = ears.node.create_publisher(Clock, "/clock", 10)
-    heard = []
-    for hundredths in (500, 503, 510, 530, 100, 110):  # 503 is within a period; 100 is a simulator that starts anew
-        message = Clock()
-        message.clock.sec, message.clock.nanosec = divmod(hundredths * 10_000_000, 1_000_000_000)
-        if hundredths == 503:
-            clock.publish(message)
+    # Whoever has just started may hear the clock before somebody hears it on /tf, and answers each time once.
+    _repeat(ears, subscription, (partial(clock.publish, _time(seconds)) for seconds in range(1000, 2000)))
+    for case, seconds in enumerate((5.0, 5.03, 5.1, 5.3, 1.0, 1.1)):
+        send = partial(clock.publish, _time(seconds))
+        if case == 1:  # within a period
+            send()
             assert take_for(ears.node, subscription, 0.3) == []
             continue
-        heard.append(_repeat(ears, subscription, partial(clock.publish, message)))
-    assert [transform.stamp_ns // 10_000_000 for transform in heard] == [500, 510, 530, 100, 110]
-    assert [math.atan2(t.xyz[1], t.xyz[0]) for t in heard] == pytest.approx([0, 0.1, 0.3, 0, 0.1])
+        found = _repeat(ears, subscription, repeat(send), round(seconds * 1e9))
+        expected = seconds - (5.0 if case < 4 else 1.0)  # 1.0 is a simulator that starts anew
+        assert math.atan2(found.xyz[1], found.xyz[0]) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("kind", ["simulate", "guard"])
+def test_that_simulated_time_does_not_come_is_said_once(
+    start: Callable[..., Any], ears: Ears, edge: Callable[..., Any], write: Callable[..., Any], kind: str
+) -> None:
+    simulated = Simulation("fixed", 10.0)
+    process = PlanProcess(kind, kind, simulate=simulated)  # type: ignore[arg-type]
+    started = start(f"tfcompose.run.{kind}", write([edge("odom base", kind)], process, clock="sim"), kind)
+    started.until_says("no time on /clock after 5 s: the plan's clock is sim, and nobody publishes it\n")
+    take_for(ears.node, TFSubscription(ears.node, static=False), 1.0)
+    assert started.output.count("/clock") == 1
+
+
+def test_joint_states_without_a_time_get_simulated_time(
+    start: Callable[..., Any], ears: Ears, edge: Callable[..., Any], write: Callable[..., Any]
+) -> None:
+    left = edge("base left", "joints", None, Joint("left", "continuous", Y))
+    file = write([left], PlanProcess("joints", "joints"), clock="sim")
+    start("tfcompose.run.joints", file, "joints").until_says("1 edge on /tf")
+    subscription = TFSubscription(ears.node, static=False)
+    states = ears.node.create_publisher(JointState, "/rover/joint_states", 10)
+    clock = ears.node.create_publisher(Clock, "/clock", 10)
+
+    def send(hundredths: int) -> None:
+        clock.publish(_time(7 + hundredths / 100))
+        states.publish(JointState(name=["left"], position=[1.0]))
+
+    found = _repeat(ears, subscription, (partial(send, hundredths) for hundredths in range(1000)))
+    assert 7e9 <= found.stamp_ns <= 17e9
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -285,14 +386,26 @@ def take_for(node: Any, subscription: Subscription, seconds: float) -> list[Rece
     return received
 
 
-def _repeat(ears: Ears, subscription: Subscription, send: Callable[[], None]) -> Transform:
-    """Send until something comes on /tf: best effort may lose what is sent before everybody knows everybody."""
+def _time(seconds: float) -> Clock:
+    message = Clock()
+    message.clock.sec, message.clock.nanosec = divmod(round(seconds * 1e9), 1_000_000_000)
+    return message
+
+
+def _repeat(
+    ears: Ears, subscription: Subscription, sends: Iterable[Callable[[], None]], stamp_ns: int | None = None
+) -> Transform:
+    """Send until something comes on /tf, with that stamp: best effort may lose messages."""
     end = time.monotonic() + UNTIL_S
-    while time.monotonic() < end:
+    for send in sends:
         send()
         wait(ears.node, [subscription], 0.2, Stop())
         for received in subscription.take():
-            return decode(received.data)[0]
+            (transform,) = decode(received.data)
+            if stamp_ns in (None, transform.stamp_ns):
+                return transform
+        if time.monotonic() > end:
+            break
     raise AssertionError("nothing came on /tf")
 
 

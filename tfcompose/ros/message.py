@@ -22,6 +22,7 @@ BIG_ENDIAN = b"\x00\x00\x00\x00"
 _HEADER = 4
 _SECOND_NS = 1_000_000_000
 _POSE = struct.Struct("<7d")
+_STAMP = 8
 _IDENTITY = _POSE.pack(*Pose().xyz, *Pose().quat_xyzw)
 # Stamp, two empty names of 5 bytes, 56 bytes of doubles, and no padding: no transform is shorter.
 _SHORTEST = 8 + 5 + 5 + 56
@@ -93,6 +94,17 @@ def encode(transforms: Sequence[Transform]) -> bytes:
         _POSE.pack_into(body, len(body) - _POSE.size, *transform.xyz, *transform.quat_xyzw)
         out += body
     return bytes(out)
+
+
+def places(transforms: Sequence[Transform]) -> list[tuple[int, int]]:
+    """Return where the encoded message holds each transform's stamp and its seven doubles, in bytes."""
+    found = []
+    at = len(LITTLE_ENDIAN) + 4
+    for transform in transforms:
+        stamp_at, at = at, at + _STAMP
+        at += len(_body(at, transform.parent, transform.child))
+        found.append((stamp_at, at - _POSE.size))
+    return found
 
 
 def decode(data: bytes) -> list[Transform]:

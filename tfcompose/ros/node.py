@@ -6,10 +6,10 @@ import faulthandler
 import os
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from rclpy.context import Context
-from rclpy.exceptions import NameValidationException
+from rclpy.exceptions import InvalidParameterTypeException, NameValidationException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -21,8 +21,10 @@ from tfcompose.ros.stop import Stop
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+T = TypeVar("T", bool, float)
+
 __all__ = ["JOINT_STATES", "LATCHED", "TF_PUBLISHER", "TF_READER", "TF_STATIC_PUBLISHER", "TF_STATIC_READER"]
-__all__ += ["Stop", "latch", "open_node", "qos"]
+__all__ += ["Stop", "latch", "open_node", "parameter", "qos"]
 
 
 #: How long a node's leaving may take, in seconds.
@@ -42,8 +44,9 @@ def qos(depth: int, durability: DurabilityPolicy, reliability: ReliabilityPolicy
 TF_PUBLISHER = TF_READER = qos(100, DurabilityPolicy.VOLATILE, ReliabilityPolicy.RELIABLE)
 TF_STATIC_PUBLISHER = qos(1, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
 TF_STATIC_READER = qos(100, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
-#: robot_state_publisher's subscription to ``joint_states``: matches any publisher of them.
-JOINT_STATES = qos(5, DurabilityPolicy.VOLATILE, ReliabilityPolicy.BEST_EFFORT)
+#: Matches any publisher of ``joint_states``, as robot_state_publisher's subscription does; that one keeps 5 messages,
+#: and loses those of a fast source while it does not run for a moment.
+JOINT_STATES = qos(50, DurabilityPolicy.VOLATILE, ReliabilityPolicy.BEST_EFFORT)
 #: A value for late joiners, such as ``robot_description``.
 LATCHED = qos(1, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
 
@@ -110,3 +113,16 @@ def latch(node: Node, topic: str, text: str) -> Any:
     publisher = node.create_publisher(String, topic, LATCHED)
     publisher.publish(String(data=text))
     return publisher
+
+
+def parameter(node: Node, name: str, default: T) -> T:
+    """Return the value that ``-p name:=…`` among the node's arguments gives, or the default.
+
+    Raises:
+        RosError: if the value has another type than the default.
+    """
+    try:
+        value: T = node.declare_parameter(name, default).value
+    except InvalidParameterTypeException as error:
+        raise RosError(f"the parameter {name} is not right: {' '.join(str(error).split())}") from None
+    return value

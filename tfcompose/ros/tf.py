@@ -108,6 +108,12 @@ class Subscription:
         )
         weakref.finalize(self, rcl.rcutils_uint8_array_fini, ctypes.byref(self._bytes))
 
+    @property
+    def topic(self) -> str:
+        """The topic's full name."""
+        name: str = self.subscription.topic_name
+        return name
+
     def take(self) -> list[Received]:
         """Return all that has come since the last time, oldest first, and wait for nothing.
 

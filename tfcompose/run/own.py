@@ -63,6 +63,11 @@ def say(line: str) -> None:
     sys.stdout.flush()
 
 
+def count(number: int, what: str) -> str:
+    """Return "1 edge", "2 edges"."""
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
 def read_own(argv: Sequence[str], kind: str) -> Own:
     """Return the process of that kind that ``argv`` names, with its plan.
 

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tfcompose.ros.clock import SimClock
-from tfcompose.ros.joint_states import JointStatePublisher, JointStateSubscription
+from tfcompose.ros.joint_states import JointStatePublisher
 from tfcompose.ros.message import Template, Transform, encode
-from tfcompose.ros.node import latch, open_node
+from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFPublisher, wait
-from tfcompose.run.motion import Joints, circle, read_positions
-from tfcompose.run.own import say
+from tfcompose.run.clock_watch import CLOCK_AFTER_S, no_clock
+from tfcompose.run.description import Description
+from tfcompose.run.joint_role import LOOK_EVERY_S, joints
+from tfcompose.run.motion import circle
+from tfcompose.run.own import count, say
 from tfcompose.run.watch import guard
 
 if TYPE_CHECKING:
@@ -21,13 +24,10 @@ if TYPE_CHECKING:
     from rclpy.node import Node
 
     from tfcompose.plan import Simulation
-    from tfcompose.ros.joint_states import Positions
     from tfcompose.ros.stop import Stop
     from tfcompose.run.own import Own
 
 _SECOND_NS = 1_000_000_000
-# Joint states come with one set of names from each driver; a source that never repeats itself must not fill the memory.
-_MOST_TEMPLATES = 64
 
 
 def static(own: Own, stop: Stop) -> None:
@@ -39,26 +39,14 @@ def static(own: Own, stop: Stop) -> None:
         publisher = TFPublisher(node, static=True)
         if edges:
             publisher.publish(encode(edges))
-        say(f"{_count(len(edges), 'edge')} on /tf_static")
-        latched = None
-        if not any(p.kind == "joints" and p.description == own.process.description for p in own.plan.processes):
-            latched = _latch_description(own, node)
-        stop.wait(None)
-        del latched
-
-
-def joints(own: Own, stop: Stop) -> None:
-    """Publish the moving edges of each message on ``joint_states``, with its stamp, and latch the description."""
-    with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
-        mover = _JointMover(own, node)
-        latched = _latch_description(own, node)
-        subscription = JointStateSubscription(node)
-        say(f"{_count(len(mover), 'edge')} on /tf, from {subscription.topic}")
+        say(f"{count(len(edges), 'edge')} on /tf_static")
+        if any(p.kind == "joints" and p.description == own.process.description for p in own.plan.processes):
+            stop.wait(None)
+            return
+        description = Description(own, node)
         while not stop.requested:
-            wait(node, [subscription], None, stop)
-            for state in subscription.take_positions():
-                mover.take(state)
-        del latched
+            wait(node, [description.subscription], LOOK_EVERY_S if description.looks else None, stop)
+            description.look()
 
 
 def simulate(own: Own, stop: Stop) -> None:
@@ -88,67 +76,6 @@ ROLES: dict[str, Callable[[Own, Stop], None]] = {
 }
 
 
-class _JointMover:
-    """From joint states to /tf."""
-
-    def __init__(self, own: Own, node: Node) -> None:
-        self._edges = [(edge.parent, edge.child) for edge in own.edges if edge.joint]
-        self._joints = Joints(own.edges)
-        self._sim = own.plan.ros.clock == "sim"
-        self._publisher = TFPublisher(node, static=False)
-        self._templates: dict[tuple[int, ...], Template] = {}
-        self._said: set[str] = set()
-
-    def __len__(self) -> int:
-        return len(self._edges)
-
-    def take(self, state: Positions | None) -> None:
-        """Publish what a joint state says; one that cannot be believed is dropped, with a line the first time."""
-        if state is None:
-            self._drop("its bytes are not one")
-            return
-        try:
-            sent = read_positions(state.names, state.positions, self._joints.names)
-        except ValueError as error:
-            self._drop(str(error))
-        else:
-            self._publish(sent, state.stamp_ns, state.received_ns)
-
-    def _publish(self, sent: dict[str, float], stamp_ns: int, received_ns: int) -> None:
-        poses = self._joints.poses(sent)
-        if not poses:
-            return
-        template = self._template(tuple(poses))
-        for index, pose in enumerate(poses.values()):
-            template.set_pose(index, pose)
-        # Messages sent by hand often have no stamp, and tf2 takes only the first transform of one time.
-        template.set_stamp(stamp_ns if stamp_ns or self._sim else received_ns)
-        self._publisher.publish(template.data)
-
-    def _template(self, indices: tuple[int, ...]) -> Template:
-        found = self._templates.get(indices)
-        if found is None:
-            if len(self._templates) >= _MOST_TEMPLATES:
-                self._templates.clear()
-            found = self._templates[indices] = Template([self._edges[index] for index in indices])
-        return found
-
-    def _drop(self, why: str) -> None:
-        if why not in self._said:
-            self._said.add(why)
-            say(f"dropped a joint state: {why} (said once)")
-
-
-def _latch_description(own: Own, node: Node) -> Any:
-    """Publish the description and return its publisher; without the file TF goes on, and a line says so."""
-    try:
-        text = own.description.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        say(f"no robot_description: {error}")
-        return None
-    return latch(node, "robot_description", text)
-
-
 def _body(own: Own, node: Node, simulation: Simulation) -> tuple[Callable[[float, int], None], str]:
     edges = own.edges
     template = Template([(edge.parent, edge.child) for edge in edges])
@@ -163,14 +90,17 @@ def _body(own: Own, node: Node, simulation: Simulation) -> tuple[Callable[[float
         template.set_stamp(stamp_ns)
         publisher.publish(template.data)
 
-    return publish, f"{_count(len(edges), 'edge')} on /tf"
+    return publish, f"{count(len(edges), 'edge')} on /tf"
 
 
 def _joint_states(node: Node, simulation: Simulation) -> tuple[Callable[[float, int], None], str]:
-    publisher = JointStatePublisher(node, simulation.joints)
-    return lambda _, stamp_ns: publisher.publish(
-        stamp_ns
-    ), f"{_count(len(simulation.joints), 'joint')} on {publisher.topic}"
+    publisher = JointStatePublisher(node, list(simulation.joints))
+    positions = list(simulation.joints.values())
+
+    def publish(_: float, stamp_ns: int) -> None:
+        publisher.publish(stamp_ns, positions)
+
+    return publish, f"{count(len(positions), 'joint')} on {publisher.topic}"
 
 
 def _wall_ticks(rate: float, stop: Stop) -> Iterator[tuple[float, int]]:
@@ -186,11 +116,16 @@ def _sim_ticks(node: Node, rate: float, stop: Stop) -> Iterator[tuple[float, int
     """Give the same by /clock: nothing while it stands, and a new start when it jumps back."""
     clock = SimClock(node)
     start_ns = last_ns = tick = 0
+    due: float | None = time.monotonic() + CLOCK_AFTER_S
     while not stop.requested:
-        wait(node, [clock.subscription], None, stop)
+        wait(node, [clock.subscription], due and max(0.0, due - time.monotonic()), stop)
         now_ns = clock.now_ns()
         if now_ns is None:
+            if due and time.monotonic() >= due:
+                due = None
+                say(no_clock(node))
             continue
+        due = None
         if now_ns < last_ns or tick == 0:
             start_ns, tick = now_ns, 0
         last_ns = now_ns
@@ -198,7 +133,3 @@ def _sim_ticks(node: Node, rate: float, stop: Stop) -> Iterator[tuple[float, int
         if elapsed_s * rate >= tick:
             yield elapsed_s, now_ns
             tick = math.floor(elapsed_s * rate) + 1
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"

@@ -11,6 +11,7 @@ from tfcompose.ros.graph import UNKNOWN_NODE, writers
 from tfcompose.ros.message import decode
 from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFSubscription, wait
+from tfcompose.run.clock_watch import ClockWatch
 from tfcompose.run.events import EVENTS_FD, Clear, Complete, Live, OwnerReady, to_line
 from tfcompose.run.judge import Judge, Message, Writer
 from tfcompose.run.own import say
@@ -54,10 +55,12 @@ def guard(own: Own, stop: Stop) -> None:
             if not judges:
                 judge.tick(now)
         say(f"watching {_counted(own.plan)}{'' if judges else ', and judging nobody'}")
+        clock = ClockWatch(own, node)
         while not stop.requested:
             wait(node, [each for watch in watches for each in (watch.fixed, watch.moving)], LOOK_EVERY_S, stop)
             for watch in watches:
                 watch.look()
+            clock.look()
 
 
 class _Watch:

@@ -1,0 +1,145 @@
+"""What ``joints`` costs and how late it is: ``python tests/benchmarks/bench_joints.py``, or name the file to pytest.
+
+A node of the benchmark sends joint states at 500 Hz and hears /tf. Figures are the process's CPU time (user and
+system) per second, and the time from a joint state's publishing to the transforms' being taken. Several runs; the least
+of each counts, since what else the machine does only adds.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tfcompose.plan import Joint, Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.planfile import write_plan
+from tfcompose.pose import Pose
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+RATE = 500
+SECONDS = 3.0
+RUNS = 3
+#: Joints: at most this part of a core, and this median, in seconds.
+LIMITS = {100: (0.12, 0.6e-3), 500: (0.25, 1e-3)}
+DOMAIN = "100"
+
+
+def cpu_s(pid: int) -> float:
+    """Return the seconds of CPU that the process has used, in all its threads."""
+    tasks = Path(f"/proc/{pid}/task").iterdir()
+    return sum(int((task / "schedstat").read_text().split()[0]) for task in tasks) / 1e9
+
+
+def pss_mb(pid: int) -> float:
+    """Return the memory of the process, shared pages divided among those who share them."""
+    lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
+    return next(int(line.split()[1]) / 1024 for line in lines if line.startswith("Pss:"))
+
+
+def plan_file(folder: Path, joints: int) -> Path:
+    """Write the plan of a robot with so many joints."""
+    edges = tuple(
+        PlanEdge(
+            f"link_{n}", f"link_{n + 1}", "joint", "joints", "/rover/joints", Pose((0.1, 0.0, 0.2)), None, ("r", 1),
+            Joint(f"joint_{n}", "revolute", (0.0, 0.0, 1.0)),
+        )
+        for n in range(joints)
+    )  # fmt: skip
+    processes = (PlanProcess("joints", "joints", nodes=("/rover/joints",)),)
+    file = folder / "plan.json"
+    file.write_text(write_plan(Plan("rover", "", "link_0", RosSettings("/rover"), edges, processes)))
+    return file
+
+
+def measure(joints: int, seconds: float = SECONDS) -> tuple[float, float, float, float]:
+    """Return the part of a core, the median and the 99th percentile of the delay in seconds, and MB."""
+    from tfcompose.ros.node import open_node  # noqa: PLC0415 (after ROS's variables are set)
+
+    with tempfile.TemporaryDirectory() as folder, open_node("bench", "/rover") as node:
+        command = [sys.executable, "-m", "tfcompose.run.joints", str(plan_file(Path(folder), joints)), "joints"]
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+        try:
+            return _measure(process.pid, _sender(node, joints), seconds)
+        finally:
+            process.terminate()
+            process.wait(10)
+
+
+def _sender(node: Any, joints: int) -> Callable[[], float | None]:
+    """Return what sends a joint state, waits for the rest of its period, and returns after how long it was answered."""
+    from rclpy.serialization import serialize_message  # noqa: PLC0415 (after ROS's variables are set)
+    from sensor_msgs.msg import JointState  # noqa: PLC0415 (the same)
+
+    from tfcompose.ros.stop import Stop  # noqa: PLC0415 (the same)
+    from tfcompose.ros.tf import TFSubscription, wait  # noqa: PLC0415 (the same)
+
+    message = JointState(name=[f"joint_{n}" for n in range(joints)], position=[0.01 * n for n in range(joints)])
+    data = bytearray(serialize_message(message))
+    publisher = node.create_publisher(JointState, "joint_states", 10)
+    heard, stop = TFSubscription(node, static=False), Stop()
+
+    def send() -> float | None:
+        start_ns, due, delay = time.time_ns(), time.monotonic() + 1 / RATE, None
+        struct.pack_into("<iI", data, 4, *divmod(start_ns, 1_000_000_000))
+        publisher.publish(bytes(data))
+        while (left := due - time.monotonic()) > 0:
+            wait(node, [heard], left, stop)
+            for _ in heard.take():
+                delay = (time.time_ns() - start_ns) / 1e9
+        return delay
+
+    return send
+
+
+def _measure(pid: int, send: Callable[[], float | None], seconds: float) -> tuple[float, float, float, float]:
+    end = time.monotonic() + 20
+    while send() is None:
+        if time.monotonic() > end:
+            raise TimeoutError("nothing came on /tf")
+    for _ in range(RATE):
+        send()
+    used, end, delays, sent = cpu_s(pid), time.monotonic() + seconds, [], 0
+    while time.monotonic() < end:
+        delay = send()
+        sent += 1
+        if delay is not None:
+            delays.append(delay)
+    used = cpu_s(pid) - used
+    return used * RATE / sent, median(delays), sorted(delays)[len(delays) * 99 // 100], pss_mb(pid)
+
+
+def best(joints: int) -> tuple[float, ...]:
+    """Return the least of each figure in several runs."""
+    runs = [measure(joints) for _ in range(RUNS)]
+    return tuple(min(values) for values in zip(*runs, strict=True))
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("joints", LIMITS)
+def test_joints_cost_little_and_are_in_time(joints: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", DOMAIN)
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    core, middle, _, _ = best(joints)
+    most, latest = LIMITS[joints]
+    assert core < most
+    assert middle < latest
+
+
+if __name__ == "__main__":
+    os.environ.update(ROS_DOMAIN_ID=DOMAIN, ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
+    for number in LIMITS:
+        core, middle, late, memory = best(number)
+        sys.stdout.write(
+            f"{number:4} joints × {RATE} Hz: {100 * core:5.1f} % of a core, {1e3 * middle:.2f} ms at the median,"
+            f" {1e3 * late:.2f} ms at the 99th percentile, {memory:.0f} MB\n"
+        )

@@ -22,7 +22,9 @@ from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
 from tfcompose.planfile import read_plan
 from tfcompose.pose import Pose
-from tfcompose.run.motion import Joints
+from tfcompose.ros.joint_message import encode_names, fill
+from tfcompose.ros.message import decode
+from tfcompose.run.joint_mover import JointMover, Told
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -85,7 +87,7 @@ class Own:
         self.base = plan.base
         self.edges = {edge.child: edge for edge in plan.edges}
         self.moving = [edge for edge in plan.edges if edge.joint]
-        self.joints = Joints(plan.edges)
+        self.mover = JointMover(plan.edges, print, lambda arrival: arrival, Told(ignore_timestamp=True))
 
     def positions(self, chance: random.Random) -> dict[str, float]:
         """Return a position for each joint: random, and what follows from it for those that mimic one."""
@@ -97,8 +99,11 @@ class Own:
 
     def poses(self, positions: Mapping[str, float]) -> dict[str, Any]:
         masters = {e.joint.name: positions[e.joint.name] for e in self.moving if e.joint and not e.joint.mimic}
-        moved = self.joints.poses(masters)
-        at = {edge.child: moved[index] for index, edge in enumerate(self.moving)}
+        state = encode_names(list(masters))
+        fill(state, 1, list(masters.values()))
+        answer = self.mover.answer(bytes(state), 0)
+        moved = decode(answer) if answer else []
+        at = {transform.child: Pose(transform.xyz, transform.quat_xyzw) for transform in moved}
         found: dict[str, Any] = {}
         for frame in self.edges:
             pose, step = Pose(), frame

@@ -15,7 +15,7 @@ from tfcompose.plan import EdgeKind, GuardPolicy, ProcessKind, Ready, RosSetting
 from tfcompose.pose import angle_between
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from tfcompose.diagnostic import Span
     from tfcompose.pose import Pose, Vector
@@ -236,13 +236,13 @@ class AsWritten:
     """The numbers of one value of a pose or joint limit as the file has them, in SI, each with its place.
 
     ``path`` leads to the value (``sensors``, ``camera``, ``rpy``); ``with_unit`` says of each number whether it stands
-    there with a unit.
+    there with a unit, and ``place`` where the number of an index stands.
     """
 
     path: tuple[str | int, ...]
     numbers: tuple[float, ...]
     with_unit: tuple[bool, ...]
-    places: tuple[Span, ...]
+    place: Callable[[int], Span] = field(compare=False, repr=False)
 
     @property
     def key(self) -> str:

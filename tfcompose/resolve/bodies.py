@@ -27,18 +27,26 @@ class Bodies:
     source: Source
     packages: Packages = field(default_factory=Packages)
     found: list[Diagnostic] = field(default_factory=list)
+    _known: dict[int, tuple[tuple[Shape, ...], tuple[Shape, ...], Inertial | None]] = field(default_factory=dict)
 
     def link(self, name: str, body: said.LinkSpec) -> Link:
         """Return the link with its shapes and, where it has a mass, its inertia."""
-        at: Path = ("links", name)
+        place = self.source.at_key(("links", name))
+        if id(body) not in self._known:  # aliases of one anchor are one object, and have the same shapes
+            self._known[id(body)] = self._parts(body, ("links", name))
+        visuals, collisions, inertial = self._known[id(body)]
+        if inertial and inertial.at:
+            inertial = replace(inertial, at=place)
+        return Link(name, place, visuals, collisions, inertial)
+
+    def _parts(self, body: said.LinkSpec, at: Path) -> tuple[tuple[Shape, ...], tuple[Shape, ...], Inertial | None]:
         visuals = self._shapes(body.visual, (*at, "visual"))
-        same = self.source.data["links"][name].get("collision") == "same"
+        same = self.source.data["links"][at[1]].get("collision") == "same"
         collisions = visuals if same else self._shapes(body.collision, (*at, "collision"))
-        place = self.source.at_key(at)
         inertial = None
         if body.inertial:
             inertial = self._inertial(body.inertial, visuals, collisions, (*at, "inertial"))
-        return Link(name, place, visuals, collisions, inertial)
+        return visuals, collisions, inertial
 
     def shape(self, shape: said.Shape, at: Path) -> Shape:
         """Return the shape, which must have a form."""

@@ -150,8 +150,8 @@ class Drafts:
             rate_at=self.source.at((*at, "rate")) if keys.rate else None,
             switched=parents[1:],
         )
-        relative_at = self.source.at((*at, "relative_to"))
-        place_at = self.source.at((*at, "place"))
+        relative_at = self.source.at((*at, "relative_to")) if keys.relative_to else None
+        place_at = self.source.at((*at, "place")) if place else None
         self.edges.append(Draft(edge, keys.relative_to, relative_at, place, place_at, at, part))
 
     def _kind(self, owner: str, keys: EdgeKeys, joint: Joint | None) -> EdgeKind:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from tfcompose.model import Shape
     from tfcompose.pose import Vector
 
+_UNMOVED = Pose()
+
 Tensor = tuple[float, float, float, float, float, float]
 
 
@@ -32,6 +34,8 @@ class Moments:
 
     def at(self, pose: Pose) -> Moments:
         """Return the same solid moved by the pose, in the axes of the pose's parent: R I R^T."""
+        if pose == _UNMOVED:
+            return self
         rows = matrix_from_quat(normalised(pose.quat_xyzw))
         xx, xy, xz, yy, yz, zz = self.tensor
         own = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
@@ -59,6 +63,8 @@ class Moments:
 
 def joined(parts: Sequence[Moments]) -> Moments:
     """Return the moments of what the parts make together; where they overlap, both count."""
+    if len(parts) == 1:
+        return parts[0]
     volume = math.fsum(part.volume for part in parts)
     x, y, z = (math.fsum(part.volume / volume * part.centre[axis] for part in parts) for axis in range(3))
     tensors = [part.about((x, y, z)) for part in parts]

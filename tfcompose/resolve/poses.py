@@ -123,9 +123,11 @@ class Solver:
         if len(self._open) >= _DEEPEST:
             raise _DeeperError(index)
         self._open.append(index)
-        solved = (
-            self._measured(draft, draft.measured) if draft.measured else replace(draft.edge, pose=self._said(draft))
-        )
+        solved = draft.edge
+        if draft.measured:
+            solved = self._measured(draft, draft.measured)
+        elif draft.relative_to or draft.place:
+            solved = replace(draft.edge, pose=self._said(draft))
         self._open.pop()
         self._solved[index] = solved
         return solved
@@ -213,5 +215,5 @@ class Solver:
 
 def _circle(drafts: list[Draft]) -> Diagnostic:
     names = ", ".join(draft.edge.name for draft in drafts)
-    at = next((draft.relative_at or draft.place_at or draft.edge.at for draft in drafts), None)
+    at = next((at for draft in drafts if (at := draft.relative_at or draft.place_at)), drafts[0].edge.at)
     return finding("TF404", f"these poses are given relative to each other: {names}", at)

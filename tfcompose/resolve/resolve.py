@@ -99,7 +99,7 @@ def resolve(
         *unknown_names(processes, source, known, missing),
     ]
     found = [one for one in found if not (one.code == "TF404" and broken)]  # an edge on the way may have been refused
-    edges = tuple(_with_rate(edge, everybody) for edge in edges)
+    edges = _with_rates(edges, everybody)
     robot = Robot(
         name=spec.robot,
         file=source.file,
@@ -176,14 +176,14 @@ def _guard(spec: RobotSpec, joined: list[Joined]) -> GuardPolicy:
     )
 
 
-def _with_rate(edge: Edge, processes: list[Process]) -> Edge:
-    """Give a moving edge without a rate its process's: that of ``joints``, or of the stand-in."""
-    if edge.rate is not None or edge.kind == "static":
-        return edge
-    owner = next((process for process in processes if process.name == edge.owner), None)
-    if owner is None:
-        return edge
-    return replace(edge, rate=owner.simulate.rate if owner.simulate else owner.rate)
+def _with_rates(edges: tuple[Edge, ...], processes: list[Process]) -> tuple[Edge, ...]:
+    """Give moving edges without a rate their process's: that of ``joints``, or of the stand-in."""
+    rates = {process.name: process.simulate.rate if process.simulate else process.rate for process in processes[::-1]}
+    return tuple(
+        edge if edge.rate is not None or edge.kind == "static" or rates.get(edge.owner) is None
+        else replace(edge, rate=rates[edge.owner])
+        for edge in edges
+    )  # fmt: skip
 
 
 def _with_positions(process: Process, edges: tuple[Edge, ...], source: Source, found: list[Diagnostic]) -> Process:

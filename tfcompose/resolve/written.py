@@ -14,7 +14,6 @@ from tfcompose.validate.quantity import NUMBER, Quantity, UnitError, quantity
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from tfcompose.diagnostic import Span
     from tfcompose.load import Path, Source
 
 _SECTIONS = ("frames", "links", "joints", "sensors", "parts", "processes")
@@ -56,7 +55,7 @@ def _take(item: Any, steps: Iterable[str | int], path: Path, source: Source, fou
     """Take the numbers at the steps of a list or mapping."""
     numbers: list[float] = []
     units: list[bool] = []
-    places: list[Span] = []
+    kept: list[str | int] = []
     for step in steps:
         number: Any = item[step]
         with_unit = False
@@ -68,9 +67,8 @@ def _take(item: Any, steps: Iterable[str | int], path: Path, source: Source, fou
         if isinstance(number, Quantity):
             number, with_unit = number.value, number.dimension != NUMBER
         if isinstance(number, (int, float)) and not isinstance(number, bool):
-            at = (*path, step)
             numbers.append(float(number))
             units.append(with_unit)
-            places.append(source.at(at))
+            kept.append(step)
     if numbers:
-        found.append(AsWritten(path, tuple(numbers), tuple(units), tuple(places)))
+        found.append(AsWritten(path, tuple(numbers), tuple(units), lambda index: source.at((*path, kept[index]))))

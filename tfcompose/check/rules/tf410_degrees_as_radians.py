@@ -32,8 +32,8 @@ def degrees_as_radians(robot: Robot) -> Iterator[Diagnostic]:
         is_limit = value.key == "limit"
         if value.key not in {"rpy", "look", "axis_angle", "limit"} or (is_limit and value.entry not in turning):
             continue
-        for number, with_unit, at in zip(value.numbers, value.with_unit, value.places, strict=True):
+        for index, (number, with_unit) in enumerate(zip(value.numbers, value.with_unit, strict=True)):
             size = abs(number)
             if not with_unit and (size in ROUND_LIMITS if is_limit else size in ROUND or size > TURN_RAD):
                 message = f"{value.entry}: {value.key} is {number:g} rad, {number / math.tau:.3g} turns"
-                yield finding("TF410", message, at, help=f"in degrees: {number:g} deg")
+                yield finding("TF410", message, value.place(index), help=f"in degrees: {number:g} deg")

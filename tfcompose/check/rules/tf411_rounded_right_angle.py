@@ -29,16 +29,16 @@ def rounded_right_angle(robot: Robot) -> Iterator[Diagnostic]:
     for value in robot.as_written:
         if value.key not in {"rpy", "look", "axis_angle"}:
             continue
-        rounded = [(n, at) for n, at in zip(value.numbers, value.places, strict=True) if _is_rounded(n)]
+        rounded = [(n, index) for index, n in enumerate(value.numbers) if _is_rounded(n)]
         if rounded:
-            number, at = rounded[0]
+            number, first = rounded[0]
             quarters = round(number / (math.pi / 2))
             sign = "-" if number < 0 else ""
             off = math.degrees(abs(number - quarters * math.pi / 2))
             said = ", ".join(dict.fromkeys(f"{n:g}" for n, _ in rounded))
             message = f"{value.entry}: {value.key} has {said}, {off:.2g} deg off {quarters * 90} deg"
             advice = f'write {quarters * 90} deg, or "${{{sign}{QUARTERS[abs(quarters)]}}}"'
-            yield finding("TF411", message, at, help=advice)
+            yield finding("TF411", message, value.place(first), help=advice)
 
 
 def _is_rounded(number: float) -> bool:

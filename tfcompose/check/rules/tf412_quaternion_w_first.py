@@ -37,7 +37,7 @@ def quaternion_w_first(robot: Robot) -> Iterator[Diagnostic]:
             advice = f"x, y, z, w: {_shown((second, third, fourth, first))}"
             if identity:
                 advice += "; if the half turn is meant, rpy: [180 deg, 0, 0]"
-            yield finding("TF412", message, value.places[0], help=advice)
+            yield finding("TF412", message, value.place(0), help=advice)
 
 
 def _degrees(w: float) -> str:

@@ -18,6 +18,7 @@ HERE = Path(__file__).parent
 ROBOTS = HERE.parents[1] / "robots"
 CASES = {
     "my_robot": ("my_robot.yaml",),
+    "two_rovers": ("two_rovers.yaml",),
     "autonomous_robot": ("autonomous_robot.yaml",),
     "autonomous_robot.demo": ("autonomous_robot.yaml", "--profile", "demo"),
 }
@@ -55,7 +56,7 @@ def test_build_writes_the_golden_files_byte_for_byte(case: str, tmp_path: Path) 
 def test_the_files_do_not_depend_on_folder_spelling_of_the_path_or_hash_seed(case: str, tmp_path: Path) -> None:
     file, *options = CASES[case]
     golden = contents(HERE / case)
-    shutil.copy(ROBOTS / file, tmp_path / file)
+    shutil.copytree(ROBOTS, tmp_path, dirs_exist_ok=True)
     assert build((file, *options), tmp_path / "a", ROBOTS, PYTHONHASHSEED="1") == golden
     assert build((str(ROBOTS / file), *options), tmp_path / "b", tmp_path, PYTHONHASHSEED="2") == golden
     assert build((f"../{tmp_path.name}/{file}", *options), tmp_path / "c", tmp_path) == golden

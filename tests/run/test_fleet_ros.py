@@ -1,0 +1,50 @@
+"""Two rovers from one file, isolated from each other, as they run: each on its own topics, one guard for both."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+pytestmark = pytest.mark.ros
+
+ROBOT = Path(__file__).parents[2] / "robots" / "two_rovers.yaml"
+STRANGER = """
+import sys, time
+from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.node import open_node
+from tfcompose.ros.tf import TFPublisher
+topic, parent, child = sys.argv[1:]
+with open_node("stranger", "", args=["-r", f"/tf:={topic}"]) as node:
+    publisher = TFPublisher(node, static=False)
+    for _ in range(400):
+        publisher.publish(encode([Transform(time.time_ns(), parent, child, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))]))
+        time.sleep(0.01)
+"""
+
+
+def test_each_rover_is_on_its_own_topics_and_what_belongs_to_the_other_is_an_offence(
+    start: Callable[..., Any], tmp_path: Path
+) -> None:
+    (tmp_path / "stranger.py").write_text(STRANGER, encoding="utf-8")
+    robot = start("tfcompose", "up", ROBOT)
+    robot.until_says("tree complete: 11 edges")
+    assert robot.output.count("tree complete") == 1
+    seen = start("tfcompose", "echo", "rover1/base_link", "rover1/laser_link", "--once", "--namespace", "rover1")
+    seen.until_says("xyz        [0.1000, 0.0000, 0.2000] m")
+    missing = start(
+        "tfcompose", "echo", "rover2/base_link", "rover2/laser_link", "--once", "--namespace", "rover1", "--timeout", 2
+    )
+    assert missing.process.wait(15) == 1
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    start("stranger", "/rover2/tf", "rover1/odom", "rover1/base_link", PYTHONPATH=path)
+    robot.until_says("/stranger")
+    offence = next(line for line in robot.lines if "/stranger" in line)
+    assert "TF803" in offence, robot.lines
+    code, _ = robot.end()
+    assert code == 0  # an edge that nobody declared is a warning

@@ -14,19 +14,17 @@ HERE = Path(__file__).parent
 FILES = [*sorted((HERE / "sound").glob("*.yaml")), *sorted((HERE.parents[1] / "robots").glob("*.yaml"))]
 
 
-def findings(text: str, *profiles: str) -> list[str]:
-    found = compile_robot(
-        text, "robot.yaml", library(), profiles, read=lambda file: Path(file).read_text("utf-8")
-    ).found
+def findings(text: str, *profiles: str, file: str = "robot.yaml") -> list[str]:
+    found = compile_robot(text, file, library(), profiles, read=lambda name: Path(name).read_text("utf-8")).found
     return [f"{one.code} {one.message}" for one in found]
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_a_sound_robot_has_no_findings_with_any_of_its_profiles(file: Path) -> None:
     text = file.read_text("utf-8")
-    assert findings(text) == []
+    assert findings(text, file=str(file)) == []
     for profile in profiles_of(load(text, "robot.yaml")):
-        assert findings(text, profile) == []
+        assert findings(text, profile, file=str(file)) == []
 
 
 IDLE = """

@@ -54,5 +54,5 @@ def test_each_broken_robot_is_refused_and_the_wrong_part_named(tmp_path: Path) -
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.stem)
 def test_a_robot_in_which_one_word_is_changed_is_refused(robot: Path, tmp_path: Path) -> None:
     broken = tmp_path / "robot.yaml"
-    broken.write_text(robot.read_text("utf-8").replace("links:", "lnks:", 1), encoding="utf-8")
+    broken.write_text(robot.read_text("utf-8").replace("\nrobot:", "\nrobt:", 1), encoding="utf-8")
     assert check(broken).returncode == 1

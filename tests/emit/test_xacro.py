@@ -47,7 +47,7 @@ xml:
 
 
 def files_of(text: str, folder: Path) -> dict[str, str]:
-    compiled = compile_robot(text, "r.yaml", PRESETS)
+    compiled = compile_robot(text, "r.yaml", PRESETS, read=lambda name: (ROBOTS / name).read_text("utf-8"))
     assert not compiled.errors, compiled.errors
     assert compiled.robot
     files = {file.path: file.text for file in emit(compiled.robot)}

@@ -55,7 +55,7 @@ FAR_M = 1e-9
 
 
 def robot_of(text: str) -> Robot:
-    compiled = compile_robot(text, "r.yaml", PRESETS)
+    compiled = compile_robot(text, "r.yaml", PRESETS, read=lambda name: (ROBOTS / name).read_text("utf-8"))
     assert not compiled.errors, compiled.errors
     assert compiled.robot
     return compiled.robot
@@ -67,7 +67,8 @@ def generated(seed: int, reader: str) -> Robot:
 
 
 def examples() -> list[Path]:
-    return sorted(ROBOTS.rglob("*.yaml"))
+    several = {"two_rovers"}  # robots beside each other, with joints of one name; rover.yaml is one of them
+    return sorted(file for file in ROBOTS.rglob("*.yaml") if file.stem not in several)
 
 
 def written(robot: Robot) -> dict[str, str]:

@@ -48,7 +48,7 @@ def isolate(robot: Robot, ros: RosSpec, source: Source, disk: Disk | None = None
 
 def _wrong(robot: Robot, ros: RosSpec, source: Source) -> list[Diagnostic]:
     found = []
-    named = robot.ros.namespace or robot.parts or (ros.isolate == "frames" and ros.frame_prefix)
+    named = robot.ros.namespace or source.data.get("parts") or (ros.isolate == "frames" and ros.frame_prefix)
     if ros.isolate != "none" and not named:
         message = f"isolate: {ros.isolate} needs a namespace"
         found.append(finding("TF304", message, source.at(("ros", "isolate")), help="ros: {namespace: robot1}"))

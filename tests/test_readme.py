@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from tfcompose.cli.parser import COMMANDS, parser_of
+from tfcompose.cli.shelves import library
 from tfcompose.codes import CODES
 
 ROOT = Path(__file__).parent.parent
@@ -87,10 +88,13 @@ def test_its_codes_are_known() -> None:
 
 
 def test_its_presets_are_those_that_come_with_it() -> None:
-    folder = ROOT / "tfcompose" / "presets"
-    known = sorted(path.relative_to(folder).with_suffix("").as_posix() for path in folder.glob("*/*.yaml"))
-    line = next(line for line in README.splitlines() if line.startswith("Presets: "))
-    assert re.findall(r"`([^`]+)`", line) == known
+    names = library().names
+    vendors = re.search(r"^Vendors: ([^.]*)\.$", README, re.MULTILINE)
+    assert vendors
+    assert re.findall(r"`([^`]+)`", vendors[1]) == sorted({name.partition("/")[0] for name in names})
+    shown = re.search(r"^A sensor's preset is (.*)$", README, re.MULTILINE)
+    assert shown
+    assert set(re.findall(r"`([a-z0-9]+/[a-z0-9-]+)`", shown[1])) <= set(names)
 
 
 def test_it_has_exactly_the_two_commands_that_ci_takes_out_of_it() -> None:

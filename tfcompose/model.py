@@ -298,6 +298,7 @@ class Edge:
     ``switched`` holds the further parents between which the owner may change it, as a tool changer does; ``parent`` is
     the nominal one.
     ``joint`` moves by joint states. ``free`` is a planar or floating joint, of which joint states say nothing.
+    ``other_axes``: the vendor calls the frame optical, and its z does not look forward.
     """
 
     parent: str
@@ -318,6 +319,7 @@ class Edge:
     calibration: Calibration | None = None
     switched: tuple[str, ...] = ()
     free: Joint | None = None
+    other_axes: bool = False
 
     @property
     def name(self) -> str:

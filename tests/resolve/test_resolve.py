@@ -161,7 +161,7 @@ def test_the_driver_publishes_the_frames_inside_unless_tfcompose_does_and_then_i
     )
     assert inner(default) == inner(by_driver) == {"c"}
     assert inner(ours) == {"static"}
-    assert "publish_tf" not in params_of(default) | params_of(by_driver)
+    assert params_of(default)["publish_tf"] is params_of(by_driver)["publish_tf"] is True
     assert params_of(ours)["publish_tf"] is False
     assert edge_of(default, "c_link").owner == "static"
 
@@ -196,7 +196,8 @@ def test_a_users_keys_stand_over_the_presets_driver() -> None:
 
 def test_a_sensors_frame_takes_the_units_own_value_and_name() -> None:
     robot = robot_of(
-        CAMERA % "frames: {c_color_frame: {xyz: [0, 0.0149, 0]}, c_color_optical_frame: {name: eye_optical}}"
+        CAMERA % "tf: tfcompose, driver: none, "
+        "frames: {c_color_frame: {xyz: [0, 0.0149, 0]}, c_color_optical_frame: {name: eye_optical}}"
     )
     assert edge_of(robot, "c_color_frame").pose == Pose((0, 0.0149, 0))
     assert edge_of(robot, "eye_optical").parent == "c_color_frame"

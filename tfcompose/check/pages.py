@@ -141,11 +141,19 @@ Frames of all robots in one file need different names, because listeners know fr
 prefix; or, if both mean one and the same frame, name it under ros: shared_frames.""",
     "TF601": """There is no such preset.
 
-tfcompose schema and the README list the presets that come with it.""",
+tfcompose presets lists those that come with it; preset_path names folders with your own, VENDOR/MODEL.yaml.""",
     "TF603": """A preset does not have this option, or not this value of it.""",
     "TF604": """A driver cannot do what is asked.
 
 It has no switch for its frames, there is no driver, or the parameter is one that tfcompose computes.""",
+    "TF605": """The preset does not know where a frame is, and a zero would be a lie.
+
+The vendor publishes no value, or only the device knows its own. Measure it, or read it from the running driver with
+tfcompose echo, and give it under sensors.NAME.frames; or choose options without that frame.""",
+    "TF606": """A preset contradicts itself: it names a frame or an option that it does not have, or is no tree.""",
+    "TF607": """A preset of your own has the name of one that comes with tfcompose, and stands before it.
+
+If that is meant, allow the finding; else give it another name, so that a reader knows which one is used.""",
     "TF610": """A calibration file, or a value in it, cannot be read.
 
 The note shows where. An entry holds numbers: no expressions, no units; of tags only xacro's !degrees and !radians.""",

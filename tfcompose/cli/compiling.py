@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.disk import disk
+from tfcompose.cli.shelves import library
 from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
 from tfcompose.compile import compile_robot
 from tfcompose.diagnostic import RejectedError
 from tfcompose.load import load, set_value, with_includes
-from tfcompose.resolve import Library
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -20,15 +19,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-PRESETS = os.path.join(os.path.dirname(os.path.dirname(__file__)), "presets")
-
-
-def library() -> Library:
-    """Return the presets that come with tfcompose."""
-    vendors = [vendor.path for vendor in os.scandir(PRESETS) if vendor.is_dir()]
-    files = [file.path for vendor in vendors for file in os.scandir(vendor) if file.name.endswith(".yaml")]
-    known = {os.path.relpath(file, PRESETS).replace(os.sep, "/").removesuffix(".yaml"): file for file in files}
-    return Library(tuple(sorted(known)), lambda name: (read_text(known[name]), f"presets/{name}.yaml"))
+__all__ = ["library", "overlays_of", "robot_or_code"]
 
 
 def overlays_of(arguments: Namespace) -> list[Source]:

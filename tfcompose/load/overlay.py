@@ -118,7 +118,7 @@ class _Merger:
                 _drop(dropped, data, inside, keys)
         for key, value in overlay[0].items():
             at, place = (*path, key), overlay[1].inside[key]
-            if value is None and path[:1] != ("profiles",):  # in a profile it is for later
+            if value is None and not _is_for_later(path):
                 self.note_removal(key in data, overlay[1].keys[key], at)
                 _drop(key, data, inside, keys)
             elif isinstance(value, dict):
@@ -145,6 +145,11 @@ class _Merger:
             message = f"{'.'.join(map(str, path))} is {_shown(new)} already"
             notes = [Note("here", old_place.span)]
             self.found.append(finding("TF014", message, place.span, notes=notes, help="remove it", severity="warning"))
+
+
+def _is_for_later(path: Path) -> bool:
+    """Whether what stands there is laid over something only later: a robot's profile, or a variant in a preset."""
+    return path[:1] == ("profiles",) or (path[:1] == ("options",) and path[2:3] == ("variants",))
 
 
 def _drop(key: str, *tables: dict[Any, Any]) -> None:

@@ -3,8 +3,8 @@
 ``tfcompose.resolve.urdf`` makes one of a URDF that somebody else wrote.
 """
 
+from tfcompose.resolve.library import Library
 from tfcompose.resolve.packages import Disk
-from tfcompose.resolve.presets import Library
 from tfcompose.resolve.resolve import Resolved, resolve
 
 __all__ = ["Disk", "Library", "Resolved", "resolve"]

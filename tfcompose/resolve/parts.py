@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from tfcompose.diagnostic import Span
     from tfcompose.load import Path
     from tfcompose.model import Robot
+    from tfcompose.resolve.library import Library
     from tfcompose.resolve.packages import Disk
-    from tfcompose.resolve.presets import Library
     from tfcompose.resolve.resolve import Resolved
     from tfcompose.validate.part import PartSpec
     from tfcompose.validate.spec import RobotSpec

@@ -186,7 +186,7 @@ class Solver:
             if frame == top:
                 break
             edge = self.drafts[index].edge
-            if edge.kind != "static":
+            if edge.kind != "static" and not (edge.sensor and not edge.given):  # a driver may send it again and again
                 note = Note(f"{edge.name} is published by {edge.owner}", edge.at)
                 what = f"the joint {edge.joint.name} moves" if edge.joint else f"the edge {edge.name} moves"
                 raise _UnsolvableError(finding("TF404", f"{what}, so the pose cannot be solved", at, notes=[note]))

@@ -8,15 +8,12 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 from tfcompose.diagnostic import Diagnostic, Note, did_you_mean, finding
 from tfcompose.model import BUILT_IN, GUARD, JOINTS, STATIC, Node, Process
 from tfcompose.plan import ProcessKind, Simulation
-from tfcompose.resolve.isolation import settings_of
 from tfcompose.resolve.nodes import full_name, nodes_of
 from tfcompose.resolve.poses import pose_of
-from tfcompose.resolve.presets import driver_parameters
 from tfcompose.resolve.running import how, program
 
 if TYPE_CHECKING:
     from tfcompose.load import Path, Source
-    from tfcompose.resolve.presets import Sensor
     from tfcompose.validate.process import ProcessSpec, Run, Simulate, Started
     from tfcompose.validate.spec import RobotSpec
 
@@ -60,7 +57,7 @@ def user_process(
         process, refused = _simulated(Process(name, "simulate", place, one), said.simulate, source)
         keys = how(said, spec.ros.namespace, ("after", "env", "host", "required"))
         return process and replace(process, **keys), [*found, *refused]
-    if _starts(said.run):
+    if starts(said.run):
         process = Process(name, "run", place, nodes)
         return replace(process, **how(said, spec.ros.namespace), **program(said.run, shell=bool(said.shell))), found
     if _was_refused(source.data["processes"][name].get("run")):
@@ -106,42 +103,8 @@ def _simulated(process: Process, simulate: Simulate, source: Source) -> tuple[Pr
     return replace(process, simulate=simulation), []
 
 
-def driver_process(
-    sensor: Sensor, spec: RobotSpec, source: Source, *, publishes: bool
-) -> tuple[Process | None, list[Diagnostic]]:
-    """Return the process of a sensor's driver, with the parameters that make it do what the spec says.
-
-    It is the preset's with the user's keys over it, the user's alone where the preset has none, or None.
-    """
-    driver, said = sensor.preset.driver, sensor.spec.driver
-    at: Path = ("sensors", sensor.name, "driver")
-    if said and said.process is not None:
-        return None, _named_driver(sensor, said.process, source)
-    if said and said.simulate:
-        advice = "driver: none, and tf: tfcompose, where there is no device"
-        return None, [finding("TF604", "a driver cannot be simulated", source.at_key((*at, "simulate")), help=advice)]
-    run, external = (said.run, bool(said.external)) if said else (None, False)
-    if driver is None and said is None:
-        return None, []
-    if not external and not _starts(run) and (run or driver is None):
-        place, advice = source.at_key((*at, "run")), "run: {package: …, executable: …}, or external: true"
-        return None, [finding("TF102", f"the driver of {sensor.name} does not say how it runs", place, help=advice)]
-    computed = driver_parameters(sensor, publishes=publishes, prefix=settings_of(spec.ros).frame_prefix)
-    own = f"{sensor.named(driver.namespace)}/{sensor.named(driver.node)}".strip("/") if driver else sensor.name
-    place, namespace = source.at_key(at[:2]), spec.ros.namespace
-    params = (said.params if said else {}) | computed
-    state = said.lifecycle if said else None
-    node = Node(full_name(namespace, (said.node if said else None) or own), place, at, params, state)
-    process = Process(sensor.name, "external" if external else "run", place, (node,))
-    process = replace(process, **how(said, namespace) if said else {})
-    if run:
-        process = replace(process, **program(run, shell=bool(said and said.shell)))
-    elif driver:
-        process = replace(process, package=driver.package, executable=driver.executable)
-    return process, _given_parameters(sensor, computed, source)
-
-
-def _starts(run: Run | None) -> TypeGuard[Run]:
+def starts(run: Run | None) -> TypeGuard[Run]:
+    """Return whether it says what to start."""
     return run is not None and bool(run.argv or run.launch or (run.package and run.executable))
 
 
@@ -150,36 +113,6 @@ def _was_refused(run: Any) -> bool:
     return isinstance(run, (str, list)) or (
         isinstance(run, dict) and ("launch" in run or {*run} >= {"package", "executable"})
     )
-
-
-def _named_driver(sensor: Sensor, name: str, source: Source) -> list[Diagnostic]:
-    """Return findings about a driver that is the name of a process: it must be one, and has its own keys."""
-    at: Path = ("sensors", sensor.name, "driver")
-    known = [*source.data.get("processes", {}), *source.data["sensors"], *BUILT_IN]
-    found = []
-    if name != "none" and name not in known:
-        advice = did_you_mean(name, known, f"processes: {{{name}: {{external: true}}}}")
-        found.append(
-            finding("TF813", f"the driver of {sensor.name} is {name}, which is no process", source.at(at), help=advice)
-        )
-    written = source.data["sensors"][sensor.name]["driver"]
-    for key in written if isinstance(written, dict) else ():
-        if key != "process":
-            place = source.at_key((*at, key))
-            advice = f"write it under processes: {name}"
-            found.append(finding("TF107", f"{key} and process exclude each other", place, help=advice))
-    return found
-
-
-def _given_parameters(sensor: Sensor, computed: dict[str, Any], source: Source) -> list[Diagnostic]:
-    """Return a finding for each parameter that the user gives and tfcompose computes."""
-    found = []
-    for key in sensor.spec.driver.params if sensor.spec.driver else ():
-        if key in computed:
-            message = f"{key} is computed by tfcompose for {sensor.spec.preset}: {computed[key]!r}"
-            place = source.at_key(("sensors", sensor.name, "driver", "params", key))
-            found.append(finding("TF604", message, place, help="remove it; options and tf set it"))
-    return found
 
 
 def name_clashes(processes: list[Process], spec: RobotSpec, source: Source) -> list[Diagnostic]:

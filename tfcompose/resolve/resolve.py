@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import posixpath
 from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -14,14 +15,16 @@ from tfcompose.resolve.edges import Drafts
 from tfcompose.resolve.isolation import isolate, settings_of
 from tfcompose.resolve.packages import Packages
 from tfcompose.resolve.poses import Solver
-from tfcompose.resolve.presets import Library, sensor_of
+from tfcompose.resolve.presets import sensor_of
 from tfcompose.resolve.processes import built_in, idle_rates, name_clashes, unknown_names, user_process
+from tfcompose.resolve.sensors import add_sensor
 from tfcompose.resolve.written import as_written
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tfcompose.load import Source
+    from tfcompose.resolve.library import Library
     from tfcompose.resolve.packages import Disk
     from tfcompose.resolve.parts import Joined, Parts
     from tfcompose.validate import Validated
@@ -69,11 +72,12 @@ def resolve(
     drafts.add_frames()
     drafts.add_links()
     drafts.add_joints()
+    presets = _with_path(library, spec, source)
     for name, said in spec.sensors.items():
-        sensor, refused = sensor_of(name, said, library, source)
+        sensor, refused = sensor_of(name, said, presets, source)
         found += refused
         if sensor:
-            drafts.add_sensor(sensor)
+            add_sensor(drafts, sensor)
         else:
             broken.add(("sensors", name))
     for part in [part for part in joined if not drafts.add_part(part)]:
@@ -138,6 +142,15 @@ def _with_blocks(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, 
     known = {*moving, *(name for section, name in robot.broken if section == "joints")}
     found += work.unknown_joints(hardware, known)
     return replace(robot, hardware=(*hardware, *robot.hardware), blocks=(*blocks, *robot.blocks)), found
+
+
+def _with_path(library: Library, spec: RobotSpec, source: Source) -> Library:
+    """Return the library with the user's folders before its own; a folder is relative to the file that names it."""
+    if not spec.preset_path:
+        return library
+    places = [source.at(("preset_path", index)).file for index in range(len(spec.preset_path))]
+    homes = ["" if file.startswith("--") else posixpath.dirname(file) for file in places]
+    return library.over(posixpath.join(home, folder) for home, folder in zip(homes, spec.preset_path, strict=True))
 
 
 def _has_calibrations(spec: RobotSpec) -> bool:

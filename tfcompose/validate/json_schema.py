@@ -18,10 +18,32 @@ def json_schema(language: str) -> dict[str, Any]:
     definitions: dict[str, Any] = {}
     _plain(root, definitions)
     own: dict[str, Any] = definitions.pop(root.__name__)
+    if language == "preset":
+        _laid_over(own, definitions)
     if language == "robot":
         own["patternProperties"] = {"^x-": {"description": "your own anchors; tfcompose does not read it"}}
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": f"tfcompose {language}, version 1"}
     return head | own | {"$defs": dict(sorted(definitions.items()))}
+
+
+def _laid_over(own: dict[str, Any], definitions: dict[str, Any]) -> None:
+    """Let a file that is laid over another one leave out what that one says, and remove it with null."""
+    own["required"] = ["preset"]
+    for model in (own, *definitions.values()):
+        if model is not own:
+            model.pop("required", None)
+        model["properties"] = {
+            name: schema if name == "preset" else _removable(schema) for name, schema in model["properties"].items()
+        }
+
+
+def _removable(schema: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of what may be null instead, and so may what is in it."""
+    told = {key: schema[key] for key in ("description", "examples", "default") if key in schema}
+    form = {key: value for key, value in schema.items() if key not in told}
+    if form.get("additionalProperties"):
+        form["additionalProperties"] = {"anyOf": [form["additionalProperties"], {"type": "null"}]}
+    return told | ({"anyOf": [form, {"type": "null"}]} if form else {})
 
 
 def _plain(described: Any, definitions: dict[str, Any]) -> Any:

@@ -37,6 +37,7 @@ class FrameOverride(Turned):
     """One frame of a sensor: its own value, or another name. What is left out is the preset's."""
 
     xyz: Vector | None = key(XYZ, None)
+    parent: str | None = key(TEXT, None, "the frame of this sensor that this unit's driver hangs it on")
     name: str | None = key(TEXT, None, "another name for this frame")
 
 
@@ -129,6 +130,12 @@ class RobotSpec(Model):
     processes: dict[str, ProcessSpec] = key(mapping(process(ProcessSpec)), {}, "what is started, or expected to run")
     profiles: dict[str, Any] = key(mapping(ANYTHING), {}, "named overlays, chosen with --profile")
     guard: GuardSpec = key(record(GuardSpec), GuardSpec())
+    preset_path: tuple[str, ...] = key(
+        listing(TEXT, single=True),
+        (),
+        "folders with presets of your own, VENDOR/MODEL.yaml; relative to this file",
+        (["presets"],),
+    )
     rules: dict[str, str] = key(
         mapping(choice("off", "warning", "error")), {}, "how much a finding matters, by its code", ({"TF405": "off"},)
     )

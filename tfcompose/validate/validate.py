@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.diagnostic import Diagnostic, Edit, Note, RejectedError, finding
 from tfcompose.load.overlay import CHOICES
 from tfcompose.validate.preset import PresetSpec
+from tfcompose.validate.preset_names import check_names
 from tfcompose.validate.schema import BROKEN, Model, Problem, Problems, record
 from tfcompose.validate.spec import RobotSpec
 from tfcompose.validate.variables import compute, unused
@@ -58,6 +59,8 @@ def validate_preset(source: Source) -> PresetSpec:
     """
     problems = Problems()
     preset = _read(PresetSpec, source.data, problems)
+    if preset is not BROKEN and not problems.all:
+        check_names(preset, problems)
     found = (*source.found, *(_finding(problem, source) for problem in _once(problems.all)))
     if found:
         raise RejectedError(found)

@@ -23,10 +23,11 @@ def optical_frame_not_rotated(robot: Robot) -> Iterator[Diagnostic]:
 
     By REP-103 an optical frame has z forward, x right and y down, and its body frame x forward, y left and z up. The
     rotation between the two is rpy [-90 deg, 0, -90 deg]. Without it, point clouds stand upright on their side. Rounded
-    constants (−1.57) are let through: they are off by 0.0011 rad each.
+    constants (−1.57) are let through: they are off by 0.0011 rad each. So are frames of a preset whose vendor has other
+    axes (RealSense T265).
     """
     for edge in robot.edges:
-        if edge.kind != "static" or not is_optical(edge.child) or is_optical(edge.parent):
+        if edge.kind != "static" or edge.other_axes or not is_optical(edge.child) or is_optical(edge.parent):
             continue
         off = angle_between(edge.pose.quat_xyzw, OPTICAL_XYZW)
         is_body = _stem(edge.child).startswith(_stem(edge.parent))

@@ -1,0 +1,230 @@
+"""One preset in full: as plain data, and as a page for people."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.emit.numbers import clean_quat, clean_rpy, number
+from tfcompose.pose import IDENTITY_XYZW
+from tfcompose.resolve.poses import rotation_of
+from tfcompose.resolve.presets import filled
+from tfcompose.validate.preset import Chosen
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tfcompose.resolve import Library
+    from tfcompose.validate.bodies import Shape
+    from tfcompose.validate.preset import Option, PresetDriver, PresetFrame, PresetSpec
+
+#: What stands in names where the sensor's name will.
+NAME = "NAME"
+
+
+def facts(name: str, library: Library) -> dict[str, Any]:
+    """Return the preset, with the default variant of each of its options, as plain data; what is unknown is null."""
+    plain = library.get(name)
+    defaults = {key: option.default for key, option in plain.options.items() if option.type == "choice"}
+    preset = library.get(name, defaults)
+    return {
+        "name": name,
+        "vendor": preset.vendor,
+        "model": preset.model,
+        "kind": preset.kind,
+        "about": preset.about,
+        "file": library.file(name),
+        "extends": preset.extends,
+        "mount": _named(preset.mount, preset),
+        "root": _named(preset.root or preset.mount, preset),
+        "options": {key: _option(option) for key, option in preset.options.items()},
+        "frames": [_frame(key, frame, preset) for key, frame in preset.frames.items()],
+        "body": _body(preset),
+        "driver": _driver(preset.driver, preset) if preset.driver else None,
+        "topics": [
+            {"topic": topic} | _shown(said, preset, ("type", "frame", "hard_coded", "rate", "when"))
+            for topic, said in preset.topics.items()
+        ],
+        "source": [_shown(fact, preset, ("repository", "path", "commit", "about")) for fact in preset.source],
+    }
+
+
+def text(preset: dict[str, Any]) -> str:
+    """Return the page."""
+    parts = [f"{preset['name']}  {preset['vendor']} {preset['model']}, {preset['kind']}\n{preset['about']}"]
+    if preset["options"]:
+        rows = [(key, _option_text(option)) for key, option in preset["options"].items()]
+        parts.append("options\n" + _table(rows))
+    parts.append(f"frames of a sensor {NAME}\n" + _tree(preset))
+    if preset["body"]:
+        parts.append(f"body\n  {_body_text(preset['body'])}")
+    parts.append("driver\n" + (_driver_text(preset) if preset["driver"] else "  none is known"))
+    if preset["topics"]:
+        parts.append("messages\n" + _table([_topic(topic) for topic in preset["topics"]]))
+    if preset["source"]:
+        parts.append("source\n" + "\n".join(_source(fact) for fact in preset["source"]))
+    return "\n\n".join(parts) + "\n"
+
+
+def _named(pattern: str, preset: PresetSpec) -> str:
+    return filled(pattern, NAME, preset.words)
+
+
+def _plain(value: Any, preset: PresetSpec) -> Any:
+    if isinstance(value, str):
+        return _named(value, preset)
+    if isinstance(value, Chosen):
+        said = {"option": value.option} if value.option else {"when": value.when}
+        return said if value.option else said | {"value": value.value, "otherwise": value.otherwise}
+    if isinstance(value, dict):
+        return {_named(key, preset): _plain(item, preset) for key, item in value.items()}
+    return [_plain(item, preset) for item in value] if isinstance(value, (list, tuple)) else value
+
+
+def _shown(model: Any, preset: PresetSpec, keys: tuple[str, ...]) -> dict[str, Any]:
+    """Return what is said under the keys, without what is empty."""
+    said = {key: _plain(getattr(model, key), preset) for key in keys}
+    return {key: value for key, value in said.items() if value not in (None, "", {}, [], False)}
+
+
+def _option(option: Option) -> dict[str, Any]:
+    values = list(option.variants) if option.type == "choice" else list(option.values)
+    said = {"type": option.type, "values": values, "default": option.default, "about": option.about}
+    return {key: value for key, value in said.items() if value not in ([], "", None)}
+
+
+def _frame(name: str, frame: PresetFrame, preset: PresetSpec) -> dict[str, Any]:
+    quat = rotation_of(frame, _named(name, preset)) or (IDENTITY_XYZW if frame.xyz is not None else None)
+    said: dict[str, Any] = {
+        "name": _named(name, preset),
+        "parent": _named(frame.parent, preset),
+        "xyz": list(frame.xyz) if frame.xyz is not None else None,
+        "quat_xyzw": list(clean_quat(quat)) if quat else None,
+        "nominal": frame.nominal,
+        "driver": frame.driver,
+    }
+    if frame.by_driver:
+        said["by_driver"] = {"parent": _named(frame.by_driver.parent, preset)}
+        if frame.by_driver.xyz:
+            said["by_driver"]["xyz"] = list(frame.by_driver.xyz)
+    return said | _shown(frame, preset, ("when", "about"))
+
+
+def _body(preset: PresetSpec) -> dict[str, Any] | None:
+    body = preset.body
+    if body is None:
+        return None
+    said = {"frame": _named(body.frame, preset), "shape": _shape(body.shape), "xyz": list(body.shape.xyz)}
+    return said | ({"mass": body.mass} if body.mass else {})
+
+
+def _shape(shape: Shape) -> dict[str, Any]:
+    if shape.cylinder:
+        return {"cylinder": {"radius": shape.cylinder.radius, "length": shape.cylinder.length}}
+    return {"sphere": {"radius": shape.sphere.radius}} if shape.sphere else {"box": list(shape.box or ())}
+
+
+def _driver(driver: PresetDriver, preset: PresetSpec) -> dict[str, Any]:
+    keys = ("package", "executable", "launch", "versions", "params", "args", "naming", "on", "about")
+    published = any(frame.driver for frame in preset.frames.values())
+    said = _shown(driver, preset, keys)
+    said["node"] = "/" + "/".join(_named(part, preset) for part in (driver.namespace, driver.node) if part)
+    said["tf"] = driver.tf if published else "tfcompose"
+    said["off"] = _plain(driver.off, preset) if published else None
+    said["claims"] = [_shown(claim, preset, ("parent", "child", "off", "about")) for claim in driver.claims]
+    return said
+
+
+def _table(rows: Sequence[tuple[str, ...]]) -> str:
+    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
+    lines = ("  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)) for row in rows)
+    return "\n".join(f"  {line}".rstrip() for line in lines)
+
+
+def _value(value: Any) -> str:
+    """Return a value as YAML on one line."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_value(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(_value(item) for item in value) + "]"
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return number(float(value))
+    return value if isinstance(value, str) and value else json.dumps(value)
+
+
+def _pairs(values: dict[str, Any]) -> str:
+    return ", ".join(f"{key}: {_value(value)}" for key, value in values.items())
+
+
+def _option_text(option: dict[str, Any]) -> str:
+    kind = {"set": "some of ", "choice": "one of ", "bool": "true or false", "text": "a text"}[option["type"]]
+    default = f", default {_value(option['default'])}" if "default" in option else ""
+    about = f": {option['about']}" if "about" in option else ""
+    return f"{kind}{', '.join(option.get('values', []))}{default}{about}"
+
+
+def _tree(preset: dict[str, Any]) -> str:
+    below: dict[str, list[dict[str, Any]]] = {}
+    for frame in preset["frames"]:
+        below.setdefault(frame["parent"], []).append(frame)
+    rows: list[tuple[str, ...]] = [(preset["mount"], "the mount", "", "", "")]
+
+    def add(parent: str, indent: str) -> None:
+        inside = below.get(parent, [])
+        for frame in inside:
+            last = frame is inside[-1]
+            rows.append((f"{indent}{'└── ' if last else '├── '}{frame['name']}", *_facts_of(frame)))
+            add(frame["name"], indent + ("    " if last else "│   "))
+
+    add(preset["mount"], "")
+    return _table(rows)
+
+
+def _facts_of(frame: dict[str, Any]) -> tuple[str, str, str, str]:
+    topic = {"static": "driver, /tf_static", "dynamic": "driver, /tf", None: "static"}[frame["driver"]]
+    when = f"with {_pairs(frame['when'])}" if "when" in frame else ""
+    if frame["xyz"] is None:
+        return "unknown", topic, when, "give its pose"
+    parts = [f"xyz {' '.join(map(number, frame['xyz']))}"] if any(frame["xyz"]) else []
+    rpy = clean_rpy(tuple(frame["quat_xyzw"]))
+    if any(rpy):
+        parts.append(f"rpy {' '.join(number(round(math.degrees(angle), 4)) for angle in rpy)} deg")
+    if "by_driver" in frame:
+        parts.append(f"the driver hangs it on {frame['by_driver']['parent']}")
+    return "nominal" if frame["nominal"] else "exact", topic, when, "  ".join(parts)
+
+
+def _body_text(body: dict[str, Any]) -> str:
+    mass = f", {number(body['mass'])} kg" if "mass" in body else ", no mass is known"
+    return f"{_pairs(body['shape'])} at {_value(body['xyz'])} in {body['frame']}{mass}"
+
+
+def _driver_text(preset: dict[str, Any]) -> str:
+    driver = preset["driver"]
+    rows = [("starts", f"{driver['package']} {driver.get('executable') or driver.get('launch')} as {driver['node']}")]
+    rows += [(word, driver[key]) for word, key in (("versions", "versions"), ("note", "about")) if key in driver]
+    rows += [("names", _pairs(driver["naming"]))] if "naming" in driver else []
+    inside = [frame["name"] for frame in preset["frames"] if frame["driver"]]
+    if inside:
+        rows.append(("publishes", f"{len(inside)} frames below {preset['root']}; by default tf: {driver['tf']}"))
+        rows.append(("switch", _pairs(driver["off"]) if driver["off"] else "there is none"))
+    else:
+        rows.append(("publishes", "no frame inside the sensor"))
+    for claim in driver["claims"]:
+        about = f" ({claim['about']})" if "about" in claim else ""
+        rows.append(("claims", f"{claim['parent']} → {claim['child']}{about}; tfcompose sets {_pairs(claim['off'])}"))
+    return _table(rows)
+
+
+def _topic(topic: dict[str, Any]) -> tuple[str, ...]:
+    rate = f"{number(float(topic['rate']))} Hz" if "rate" in topic else ""
+    frame = f"in {topic['frame']}" + (", which no parameter changes" if topic.get("hard_coded") else "")
+    when = f"with {_pairs(topic['when'])}" if "when" in topic else ""
+    return topic["topic"], topic["type"], rate, frame, when
+
+
+def _source(fact: dict[str, Any]) -> str:
+    return f"  {fact['repository']} {fact['path']} at {fact['commit']}" + (
+        f": {fact['about']}" if "about" in fact else ""
+    )

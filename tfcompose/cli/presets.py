@@ -1,0 +1,85 @@
+"""``tfcompose presets``: the sensors that are known, and one of them in full.
+
+List the presets of sensors by vendor, or show one: its frames with their values, which of them its driver publishes
+and the switch for that, the frame of each message, and where the figures are from.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from importlib import import_module
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.shelves import library
+from tfcompose.cli.terminal import complain, print_findings
+from tfcompose.diagnostic import RejectedError, did_you_mean
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+
+    from tfcompose.resolve import Library
+    from tfcompose.validate.preset import PresetSpec
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("name", nargs="?", metavar="NAME", help="a preset; or a vendor or a kind, to list only those")
+    parser.add_argument(
+        "--preset-path", action="append", default=[], metavar="DIR", help="a folder of your own before them; repeatable"
+    )
+    parser.add_argument("--format", choices=("text", "json"), default="text", help="default: text")
+
+
+def run(arguments: Namespace) -> int:
+    """Print the list or the page; exit code 1 if there is no such preset, or one that is wrong."""
+    known = library().over(arguments.preset_path)
+    name = arguments.name
+    try:
+        if name and known.file(name) and "/_" not in name:
+            return _show(name, known, arguments.format)
+        return _list(name, known, arguments.format)
+    except RejectedError as error:
+        print_findings(error.diagnostics, sys.stderr)
+        return 1
+
+
+def _show(name: str, known: Library, form: str) -> int:
+    page = import_module("tfcompose.cli.preset_page")
+    facts = page.facts(name, known)
+    sys.stdout.write(json.dumps(facts, indent=2, ensure_ascii=False) + "\n" if form == "json" else page.text(facts))
+    return 0
+
+
+def _list(only: str | None, known: Library, form: str) -> int:
+    presets = {name: known.get(name) for name in known.names}
+    chosen = {name: preset for name, preset in presets.items() if not only or only in _words(name, preset)}
+    if only and not chosen:
+        words = sorted({word for name, preset in presets.items() for word in _words(name, preset)})
+        complain(f"no preset, vendor or kind {only}; {did_you_mean(only, words, 'tfcompose presets lists them')}")
+        return 1
+    rows = [
+        {"name": name, "vendor": preset.vendor, "model": preset.model, "kind": preset.kind, "about": preset.about}
+        | ({"same_as": preset.extends} if preset.extends and "/_" not in preset.extends else {})
+        for name, preset in chosen.items()
+    ]
+    if form == "json":
+        sys.stdout.write(json.dumps(rows, indent=2, ensure_ascii=False) + "\n")
+        return 0
+    width = max((len(row["name"]) for row in rows), default=0)
+    blocks = []
+    for vendor, group in groupby(rows, lambda row: row["vendor"]):
+        lines = [f"  {row['name']:<{width}}  {row['kind']:<10}  {_about(row)}" for row in group]
+        blocks.append("\n".join([vendor, *lines]))
+    sys.stdout.write("\n\n".join(blocks) + f"\n\n{len(rows)} presets; tfcompose presets NAME shows one\n")
+    return 0
+
+
+def _about(row: dict[str, str]) -> str:
+    same = f" (= {row['same_as']})" if "same_as" in row else ""
+    return f"{row['model']}: {row['about']}{same}"
+
+
+def _words(name: str, preset: PresetSpec) -> tuple[str, ...]:
+    return (name, name.partition("/")[0], preset.kind)

@@ -156,16 +156,12 @@ def stranger(domain: int) -> Iterator[Callable[..., float]]:
         popen.stdout.close()
 
 
-def test_every_edge_is_announced_with_its_owner_and_the_tree_with_the_time_it_took(robot: Robot) -> None:
+def test_every_owner_is_announced_and_the_tree_with_the_time_it_took(robot: Robot) -> None:
     live = robot.lines("| live ")
-    owners = {
-        "static (/tfcompose_static)": 14,
-        "joints (/tfcompose_joints)": 2,
-        "base_drive (/diff_drive_controller)": 1,
-        "slam (/slam_toolbox)": 1,
-    }
-    assert {owner: sum(owner in line for line in live) for owner in owners} == owners
-    assert len(live) == 18
+    owners = ["static (/tfcompose_static)", "joints (/tfcompose_joints)", "base_drive (/diff_drive_controller)"]
+    for owner in [*owners, "slam (/slam_toolbox)"]:
+        assert len([line for line in live if owner in line]) == 1
+    assert len(live) == 4
     (complete,) = robot.lines("tree complete: 18 edges live after ")
     assert 0 < float(complete.split()[-2]) < 30
     assert robot.lines("TF8") == []

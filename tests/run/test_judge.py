@@ -61,6 +61,8 @@ class History:
     """A judge that looks every tenth of a second, and the publishers that it sees."""
 
     guard: GuardPolicy = field(default_factory=GuardPolicy)
+    processes: tuple[PlanProcess, ...] = PROCESSES
+    clock: str = "wall"
     settle_s: float = SETTLE_S
     gids: bool = True
     edges: tuple[PlanEdge, ...] = EDGES
@@ -72,7 +74,7 @@ class History:
     looked: float = field(init=False)
 
     def __post_init__(self) -> None:
-        plan = Plan("rover", "0", "base", RosSettings(), self.edges, PROCESSES, self.guard)
+        plan = Plan("rover", "0", "base", RosSettings(clock=self.clock), self.edges, self.processes, self.guard)
         self.judge = Judge(plan, self.settle_s, self.now, self.wall_ns())
         self.looked = self.now
 
@@ -92,13 +94,23 @@ class History:
     def leaves(self, publisher: Publisher) -> None:
         self.graph.remove(publisher)
 
-    def send(self, publisher: Publisher, edges: str, *, static: bool | None = None, ago: float = 0.0) -> History:
-        """Let a message arrive that was sent ``ago`` seconds before."""
+    def send(
+        self,
+        publisher: Publisher,
+        edges: str,
+        *,
+        static: bool | None = None,
+        ago: float = 0.0,
+        stamp_s: float | None = None,
+    ) -> History:
+        """Let a message arrive that was sent ``ago`` seconds before, stamped so."""
         publisher.sent += 1
-        pairs = [(names.split()[0], names.split()[1]) for names in edges.split(", ")]
+        pairs = tuple((names.split()[0], names.split()[1]) for names in edges.split(", "))
         kind = publisher.static if static is None else static
         gid = publisher.gid if self.gids else None
-        message = Message(pairs, kind, gid, self.wall_ns() - round(ago * 1e9), publisher.sent)
+        sent_ns = self.wall_ns() - round(ago * 1e9)
+        stamps = () if stamp_s is None else (round(stamp_s * 1e9),) * len(pairs)
+        message = Message(pairs, kind, gid, sent_ns, publisher.sent, stamps, self.wall_ns())
         self.events += self.judge.message(message, self.now)
         return self
 
@@ -248,6 +260,12 @@ def test_a_foreign_publisher_that_sends_every_five_seconds_is_reported_once(runn
     assert len(running.found()) == 1
     assert running.all(Recovered) == []
     assert len(running.wait(31).all(Recovered)) == 1
+
+
+def test_a_foreign_publisher_that_pauses_for_long_is_reported_again_when_it_goes_on(running: History) -> None:
+    rogue = running.joins("/rogue")
+    running.repeat(rogue, "map odom", 5).wait(40).repeat(rogue, "map odom", 5)
+    assert (len(running.found()), len(running.all(Recovered))) == (2, 1)
 
 
 def test_a_latched_offence_lasts_while_its_publisher_does(running: History) -> None:
@@ -578,3 +596,265 @@ def test_another_node_may_not_publish_a_switched_edge_on_any_of_its_parents() ->
     history.repeat(history.joins("/rogue"), "rack_1 tool", 10)
     assert [found.code for found in history.found()] == ["TF801"]
     assert "/rogue" in history.found()[0].message
+
+
+# The tree that is seen.
+
+
+@pytest.mark.parametrize("policy", [GuardPolicy(), GuardPolicy(allow=(("*", "*"),)), GuardPolicy("watch", "ignore")])
+def test_an_edge_that_closes_a_loop_is_an_error_whatever_is_allowed_and_the_loop_is_named(policy: GuardPolicy) -> None:
+    running = History(policy).clear()
+    running.repeat(running.joins("/rogue"), "base map", 5)
+    assert running.said() == ["TF820 /rogue publishes base → map, which closes the loop map → odom → base → map"]
+    assert running.found()[0].severity == "error"
+    assert "end /rogue" in running.found()[0].help
+
+
+def test_a_second_parent_among_its_own_descendants_is_a_loop(running: History) -> None:
+    running.repeat(running.joins("/rogue"), "base odom", 5)
+    assert running.said() == ["TF820 /rogue publishes base → odom, which closes the loop odom → base → odom"]
+
+
+def test_a_loop_through_several_strangers_is_found_when_the_last_edge_comes(running: History) -> None:
+    one, other = running.joins("/one"), running.joins("/other")
+    for _ in range(5):
+        running.send(one, "base cup").send(other, "cup map").wait(0.1)
+    assert next(said.partition(", which")[0] for said in running.said() if "TF820" in said) == (
+        "TF820 /other publishes cup → map"
+    )
+    assert "the loop map → odom → base → cup → map" in next(said for said in running.said() if "TF820" in said)
+
+
+def test_a_loop_among_frames_of_others_is_not_the_robots_business_where_these_are_allowed() -> None:
+    running = History(GuardPolicy(allow=(("cup", "saucer"), ("saucer", "cup")))).clear()
+    running.repeat(running.joins("/waiter"), "cup saucer, saucer cup", 10)
+    assert running.said() == []
+
+
+def test_an_edge_that_others_stopped_sending_closes_no_loop_any_more(running: History) -> None:
+    one = running.joins("/one")
+    running.repeat(one, "base cup", 3).leaves(one)
+    running.wait(12).repeat(running.joins("/other"), "cup map", 3)
+    assert [said[:5] for said in running.said()] == ["TF803", "TF803"]
+
+
+def test_a_stranger_that_sends_for_long_closes_a_loop_all_the_same(running: History) -> None:
+    one = running.joins("/one")
+    running.repeat(one, "base cup", 200)
+    running.send(running.joins("/other"), "cup map").send(one, "base cup").wait(0.2)
+    assert "TF820" in [said[:5] for said in running.said()]
+
+
+def test_a_loop_is_said_to_be_over_and_to_have_been_there_before_the_start(running: History) -> None:
+    rogue = running.joins("/rogue")
+    running.repeat(rogue, "base map", 5).leaves(rogue)
+    assert running.wait(4).all(Recovered) == [Recovered("base → map is no longer published by /rogue")]
+    early = History()
+    early.repeat(early.joins("/rogue"), "base map", 20)
+    assert early.all(Found) == []
+    assert isinstance(early.events[0], Taken)
+    assert early.said() == [
+        "TF807 base → map: published by /rogue before the start, which closes the loop map → odom → base → map"
+    ]
+
+
+def test_a_frame_in_itself_is_said_to_be_dropped_and_is_no_second_parent(running: History) -> None:
+    running.repeat(running.joins("/slam"), "odom odom", 5)
+    assert running.said() == ["TF821 /slam publishes odom → odom, a frame in itself, which tf2 drops"]
+    assert running.found()[0].severity == "warning"
+    assert not [event for event in running.events if type(event).__name__ == "Live"]
+
+
+def test_two_nodes_that_publish_one_allowed_frame_are_named(running: History) -> None:
+    running = History(GuardPolicy(allow=(("*", "person_*"),))).clear()
+    a, b = running.joins("/a"), running.joins("/b")
+    for _ in range(10):
+        running.send(a, "map person_1").send(b, "odom person_1").wait(0.1)
+    assert len(running.said()) in {1, 2}
+    assert "person_1 is published by /" in running.said()[0]
+    assert {"/a", "/b"} <= set(running.said()[0].replace(",", "").split())
+    assert {found.code for found in running.found()} == {"TF822"}
+
+
+def test_a_node_that_was_started_anew_is_no_second_writer() -> None:
+    running = History(GuardPolicy(allow=(("*", "person_*"),))).clear()
+    for _ in range(3):
+        tracker = running.joins("/tracker")
+        running.repeat(tracker, "map person_1", 5).leaves(tracker)
+    assert running.said() == []
+
+
+@pytest.mark.parametrize("static", [False, True])
+def test_a_best_effort_writer_is_reported_once(running: History, static: bool) -> None:  # noqa: FBT001
+    writer = Writer(b"w" * 16, "/slam", static, volatile=False, best_effort=True)
+    for _ in range(5):
+        running.events += running.judge.graph([writer], running.now)
+    topic = "/tf_static" if static else "/tf"
+    assert [(found.code, f"/slam writes {topic} best effort" in found.message) for found in running.found()] == [
+        ("TF826", True)
+    ]
+
+
+def test_only_the_plans_own_nodes_leak_to_the_global_topic() -> None:
+    plan = Plan("rover", "0", "base", RosSettings("/rover"), EDGES, PROCESSES)
+    judge = Judge(plan, SETTLE_S, 0.0, 0)
+    writers = [
+        Writer(bytes([n]) * 16, node, static=n == 1, volatile=False)
+        for n, node in enumerate(["/rover/ekf", "/rover/static", "/other/ekf", None, "/roverette/ekf"])
+    ]
+    events = [event for _ in range(3) for event in judge.leaks(writers, ("/rover/tf", "/rover/tf_static"))]
+    said = [event.found.message for event in events if isinstance(event, Found)]
+    assert said == [
+        "/rover/ekf writes the global /tf, and the plan keeps its own on /rover/tf",
+        "/rover/static writes the global /tf_static, and the plan keeps its own on /rover/tf_static",
+    ]
+
+
+def test_where_a_publisher_runs_is_a_note(running: History) -> None:
+    rogue = running.joins("/rogue")
+    running.events += running.judge.graph(
+        [Writer(rogue.gid, "/rogue", static=False, volatile=False, where="on another machine")], running.now
+    )
+    running.send(rogue, "map odom")
+    running.events += running.judge.tick(running.now + 0.1)
+    assert "/rogue runs on another machine" in [note.message for note in running.found()[0].notes]
+
+
+def test_the_process_that_can_be_stopped_is_named_only_where_it_is_sure() -> None:
+    running = History(processes=tuple(replace(one, nodes=(f"/{one.name}",)) for one in PROCESSES)).clear()
+    running.repeat(running.joins("/slam"), "odom base", 3)
+    running.repeat(running.joins("/rogue"), "base lidar", 3)
+    running.repeat(running.joins("/drive"), "base camera", 3)
+    found = [event for event in running.events if isinstance(event, Found)]
+    assert [(event.found.code, event.process) for event in found] == [("TF801", "slam"), ("TF801", ""), ("TF801", "")]
+
+
+# Stamps.
+
+
+def stamped(running: History, publisher: Publisher, edges: str, stamps: list[float]) -> History:
+    """Let the publisher send with these stamps, in seconds, ten times a second."""
+    for stamp in stamps:
+        running.send(publisher, edges, stamp_s=stamp).wait(0.1)
+    return running
+
+
+def wall(running: History) -> float:
+    return running.wall_ns() / 1e9
+
+
+def test_an_owner_that_stamps_with_another_clock_is_reported_and_when_it_is_right_again(running: History) -> None:
+    slam = running.joins("/slam")
+    stamped(running, slam, "map odom", [5 + n / 10 for n in range(10)])
+    (found,) = running.found()
+    assert (found.code, found.severity) == ("TF825", "error")
+    assert found.message.startswith("/slam stamps map → odom with 5.")
+    assert "simulated time" in found.message
+    for _ in range(40):
+        running.send(slam, "map odom", stamp_s=wall(running)).wait(0.1)
+    assert running.all(Recovered) == [Recovered("/slam stamps map → odom as it should again")]
+    assert len(running.found()) == 1
+
+
+@pytest.mark.parametrize(
+    ("off", "said"),
+    [
+        (-60.0, "60 s behind the system's time"),
+        (3600.0, "3.6e+03 s ahead of"),
+        (-9.0, ""),
+        (9.0, ""),
+        (None, "without"),
+    ],
+)
+def test_a_clock_that_is_more_than_ten_seconds_off_is_wrong(running: History, off: float | None, said: str) -> None:
+    slam = running.joins("/slam")
+    for _ in range(10):
+        running.send(slam, "map odom", stamp_s=0 if off is None else wall(running) + off).wait(0.1)
+    assert [found.code for found in running.found() if found.code != "TF823"] == (["TF825"] if said else [])
+    assert not said or said in running.said()[0]
+
+
+def test_one_stray_stamp_is_no_wrong_clock(running: History) -> None:
+    slam = running.joins("/slam")
+    for n in range(50):
+        running.send(slam, "map odom", stamp_s=wall(running) - 100 * (n % 10 == 0)).wait(0.1)
+    assert "TF825" not in {found.code for found in running.found()}
+
+
+def test_in_simulated_time_the_systems_time_is_the_wrong_one_and_clock_decides() -> None:
+    running = History(clock="sim").clear()
+    slam, drive = running.joins("/slam"), running.joins("/drive")
+    for n in range(20):
+        running.send(slam, "map odom", stamp_s=wall(running))
+        running.send(drive, "odom base", stamp_s=100 + n / 10).wait(0.1)
+    assert running.said() == []  # nothing on /clock, so nothing is known
+    for n in range(20):
+        running.judge.clock(round((102 + n / 10) * 1e9))
+        running.send(slam, "map odom", stamp_s=wall(running))
+        running.send(drive, "odom base", stamp_s=102 + n / 10).wait(0.1)
+    (found,) = running.found()
+    assert found.message == "/slam stamps map → odom with the system's time, and /clock says 102.2 s"
+
+
+def test_simulated_time_that_begins_again_takes_the_stamps_with_it() -> None:
+    running = History(clock="sim").clear()
+    drive = running.joins("/drive")
+    for n in range(60):
+        running.judge.clock(round((20 + n % 30 / 10) * 1e9))
+        running.send(drive, "odom base", stamp_s=20 + n % 30 / 10).wait(0.1)
+    assert running.said() == []
+
+
+def test_the_same_stamp_again_and_again_is_a_warning_and_now_and_then_is_nothing(running: History) -> None:
+    slam, drive = running.joins("/slam"), running.joins("/drive")
+    begun = wall(running)
+    for n in range(40):
+        running.send(slam, "map odom", stamp_s=begun + min(n, 5) / 10)
+        running.send(drive, "odom base", stamp_s=begun + (n - (n % 4 == 0)) / 10).wait(0.1)
+    assert [(found.code, found.severity) for found in running.found()] == [("TF823", "warning")]
+    assert "/slam sends map → odom with the same stamp again and again" in running.said()[0]
+
+
+@pytest.mark.parametrize(("steps", "codes"), [([-3.0], ["TF824"]), ([-0.2], []), ([-0.3] * 4, ["TF824"])])
+def test_stamps_that_go_back_are_a_warning_if_far_or_often(
+    running: History, steps: list[float], codes: list[str]
+) -> None:
+    slam = running.joins("/slam")
+    stamps = [wall(running) + n / 10 for n in range(10)]
+    for step in steps:
+        stamps += [stamps[-1] + step, stamps[-1]]
+    stamped(running, slam, "map odom, base camera", stamps)
+    assert [found.code for found in running.found() if found.code != "TF801"] == codes
+
+
+def test_the_stamps_of_fixed_edges_and_of_strangers_are_not_judged(running: History) -> None:
+    static, rogue = running.joins("/static", static=True), running.joins("/rogue")
+    for _ in range(10):
+        running.send(static, FIXED, stamp_s=0).send(rogue, "map odom", stamp_s=0).wait(0.1)
+    assert [found.code for found in running.found()] == ["TF801"]
+
+
+# Speed: what was judged once holds.
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.sampled_from("sdrjx"), st.sampled_from((0.0, 0.05, 0.1, 0.7))), max_size=60))
+def test_remembered_verdicts_are_those_that_would_be_given_anew(sends: list[tuple[str, float]]) -> None:
+    """The same history, judged with and without memory of what was judged before."""
+    said = []
+    for forgets in (False, True):
+        running = History(GuardPolicy(allow=(("map", "person"),))).clear()
+        senders = {
+            "s": (running.joins("/slam"), "map odom"),
+            "d": (running.joins("/drive"), "odom base, map person"),
+            "r": (running.joins("/rogue"), "map odom, base cup"),
+            "j": (running.joins("/slam"), "map odom"),
+            "x": (running.joins("/x"), "map person, cup map"),
+        }
+        for who, pause in sends:
+            if forgets:
+                running.judge._streams.clear()
+            running.send(*senders[who]).wait(pause)
+        running.wait(1)
+        said.append(running.events)
+    assert said[0] == said[1]

@@ -44,7 +44,7 @@ class History:
         looks = [(LOOK_S * n, "") for n in range(1, round(seconds / LOOK_S) + 1)]
         for at, child in sorted([*arrivals, *looks]):
             self.now = begun + at
-            self.events += self.live.arrived(child, self.now) if child else self.live.judge(self.now)
+            self.events += self.live.arrived((child,), self.now) if child else self.live.judge(self.now)
         self.now = begun + seconds
         return self
 
@@ -174,7 +174,7 @@ def test_a_guard_that_was_kept_from_looking_does_not_cry_wolf(
     history.events += history.live.judge(history.now)  # before what has come meanwhile is delivered
     history.run(late_s)
     for child in ["odom"] * 20 + ["base"] * 100:
-        history.live.arrived(child, history.now)
+        history.live.arrived((child,), history.now)
     history.steadily(6, 10, "odom", "base", "base", "base", "base", "base")
     assert history.said() == []
     assert len(history.run(2).said()) == 2
@@ -194,7 +194,7 @@ def test_jitter_and_looks_at_uneven_times_find_nothing(hertz: float, jitter: lis
         now += pause
         while sent < len(times) and times[sent] <= now:
             at = max(at, times[sent])
-            live.arrived("odom", now if pause > LOOK_S else at)
+            live.arrived(("odom",), now if pause > LOOK_S else at)
             sent += 1
         if sent < len(times):
             assert [event for event in live.judge(now) if isinstance(event, Found)] == []
@@ -205,11 +205,25 @@ def test_a_latching_owner_that_leaves_the_graph_is_reported_once_with_its_edges_
 ) -> None:
     live = watch(edge("base lidar", "static", None, "static"), edge("base imu", "static", None, "static")).live
     assert live.static_writers([]) == []
-    live.arrived("lidar", 1)
-    live.arrived("imu", 1)
+    live.arrived(("lidar",), 1)
+    live.arrived(("imu",), 1)
     assert live.static_writers(["/static", "/other"]) == []
     (found,) = live.static_writers(["/other"])
     assert isinstance(found, Found)
     assert found.found.message == "static (/static) is gone: nobody latches base → lidar, base → imu any more"
     assert live.static_writers([]) == []
     assert live.static_writers(["/static"]) == [Recovered("static (/static) is back")]
+
+
+def test_edges_may_come_together_apart_and_in_other_company(watch: Callable[..., History]) -> None:
+    history = watch(*(edge(f"base {child}", "drive", 4) for child in "abc"))
+    for _ in range(10):
+        for children in (("a", "b", "c"), ("a", "b"), ("b", "c"), ("c",), ("a", "c")):
+            history.live.arrived(children, history.now)
+            history.run(0.1)
+    assert history.said() == []
+    for _ in range(20):
+        history.live.arrived(("a", "b"), history.now)
+        history.run(0.1)
+    (said,) = history.said()
+    assert "nothing on base → c for" in said

@@ -248,6 +248,39 @@ A frame is unknown, the two are in two trees, their edges have no time in common
 ${file(…)}, ${build_dir} and ${params_file} are filled in when the plan is started: in the arguments and the environment
 of a process, and in parameters of a process with one node that tfcompose starts itself. A launch file, a command or
 somebody else's process takes a path as an argument; and without parameters there is no ${params_file}.""",
+    "TF820": """Somebody publishes an edge that closes a loop.
+
+The frames of the loop are each other's ancestors; tf2 finds no way through them, and every lookup that needs one fails.
+The finding names the loop and who closes it: end that node, or turn its edge round. That an edge is allowed, or need
+not be declared, does not make a loop right.""",
+    "TF821": """Somebody publishes a frame in itself.
+
+Parent and child have one name; tf2 drops the transform and writes an error for each. The node has two parameters for
+frames that are the same, probably.""",
+    "TF822": """Two nodes publish one frame that the plan does not have.
+
+It is allowed, or need not be declared, but tf2 takes whatever came last, so the frame jumps between the two.""",
+    "TF823": """An owner sends an edge with the same stamp again and again.
+
+tf2 keeps the first and drops the others, with a warning for each: it looks like a rate that is not there. The stamp is
+that of the measurement; where there is no new one, nothing needs to be sent.""",
+    "TF824": """An owner's stamps go back in time.
+
+tf2 sorts such a transform in behind newer ones, or drops it when it is older than its memory of 10 s. A bag is being
+played, a clock was set, or several threads stamp and send in another order. Where simulated time itself goes back,
+nothing is said.""",
+    "TF825": """An owner's stamps are of another clock than the plan's.
+
+They are more than 10 s off: simulated time in a plan on the system's time or the other way round, no stamp at all, or
+a host whose clock is not in sync. No lookup brings such an edge together with the others.""",
+    "TF826": """A node writes TF best effort.
+
+Listeners ask for reliable, so none of them accepts it, and nothing arrives. Publish as tf2_ros does: reliable, on
+/tf_static transient_local too.""",
+    "TF827": """A node of an isolated plan writes the global /tf or /tf_static.
+
+The plan keeps its transforms on topics of its own, so that robots do not hear each other; this node's go to all the
+others instead, and are missing here. Start it with the remappings /tf:=… and /tf_static:=….""",
     "TF901": """ROS 2 is missing, or cannot be used.""",
     "TF902": """A plan cannot be used: it is not one, not whole, or of another version.
 

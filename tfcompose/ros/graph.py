@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Literal
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from rclpy.node import Node
     from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -35,10 +37,28 @@ class Writer:
 def writers(node: Node, topic: str) -> list[Writer]:
     """Return the publishers of the topic that ``node`` has discovered until now, its own too, sorted by node and id.
 
-    A relative ``topic`` is taken in the node's namespace; remappings are not applied.
+    A relative ``topic`` is taken in the node's namespace, and the node's remappings are applied.
     """
-    found = [_writer(info) for info in node.get_publishers_info_by_topic(topic)]
-    return sorted(found, key=lambda writer: (writer.node, writer.gid))
+    return _sorted(node.get_publishers_info_by_topic(topic))
+
+
+def writers_unmapped(node: Node, topic: str) -> list[Writer]:
+    """Return the same for exactly this absolute topic, whatever the node's remappings are.
+
+    It is asked for by its DDS name, ``rt/…``; an rmw without DDS shows nobody.
+    """
+    return _sorted(node.get_publishers_info_by_topic(f"rt{topic}", no_mangle=True))
+
+
+def _sorted(infos: Iterable[TopicEndpointInfo]) -> list[Writer]:
+    return sorted(map(_writer, infos), key=lambda writer: (writer.node, writer.gid))
+
+
+def own_gid(node: Node, topic: str) -> bytes:
+    """Return the id of the node's own subscription to the topic, empty where the graph does not show it."""
+    infos = node.get_subscriptions_info_by_topic(topic)
+    own = (info for info in infos if (info.node_name, info.node_namespace) == (node.get_name(), node.get_namespace()))
+    return next((bytes(info.endpoint_gid[:16]) for info in own), b"")
 
 
 def _writer(info: TopicEndpointInfo) -> Writer:

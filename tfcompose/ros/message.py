@@ -115,13 +115,48 @@ def decode(data: bytes) -> list[Transform]:
     Raises:
         ValueError: with one sentence, if it is not one.
     """
+    reader = _Reader(data, _order(data))
+    return [reader.transform() for _ in range(reader.begin())]
+
+
+class Layout:
+    """What does not change from one message of a publisher to the next: the names, and where the stamps are.
+
+    ``edges`` holds each transform's parent and child, in order.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        """Take the layout of a message.
+
+        Raises:
+            ValueError: as ``decode`` does.
+        """
+        reader = _Reader(data, _order(data))
+        count, layout = reader.begin(), ""
+        edges: list[tuple[str, str]] = []
+        for _ in range(count):
+            layout += reader.names(edges)
+        self.edges: tuple[tuple[str, str], ...] = tuple(edges)
+        self._layout = struct.Struct(f"{_order(data)}4sI{layout}")
+        values = self._layout.unpack_from(data)
+        self._fixed = (values[:2], values[4::4], values[5::4])
+
+    def stamps(self, data: bytes) -> list[int] | None:
+        """Return each transform's stamp in nanoseconds, or None for a message of another layout."""
+        try:
+            values = self._layout.unpack_from(data)
+        except struct.error:
+            return None
+        if self._fixed != (values[:2], values[4::4], values[5::4]):
+            return None
+        seconds, nanoseconds = values[2::4], values[3::4]
+        return [s * _SECOND_NS + ns for s, ns in zip(seconds, nanoseconds, strict=True)]
+
+
+def _order(data: bytes) -> str:
     if data[:2] not in (LITTLE_ENDIAN[:2], BIG_ENDIAN[:2]) or len(data) < _HEADER:
         raise ValueError(f"the message starts with {data[:_HEADER].hex(' ') or 'nothing'}: that is not plain CDR")
-    reader = _Reader(data, "<" if data[1] else ">")
-    count = reader.count()
-    if count * _SHORTEST > len(data) - _HEADER:
-        raise ValueError(f"the message claims {count} transforms and has {len(data)} bytes")
-    return [reader.transform() for _ in range(count)]
+    return "<" if data[1] else ">"
 
 
 class _Reader:
@@ -129,6 +164,29 @@ class _Reader:
         self._data = data
         self._order = order
         self._at = _HEADER
+
+    def begin(self) -> int:
+        """Return the number of transforms."""
+        count = self.count()
+        if count * _SHORTEST > len(self._data) - _HEADER:
+            raise ValueError(f"the message claims {count} transforms and has {len(self._data)} bytes")
+        return count
+
+    def names(self, edges: list[tuple[str, str]]) -> str:
+        """Pass over a transform, note its parent and child, and return its layout: stamp, names, and gaps."""
+        start = self._at
+        self.numbers("iI", 4)
+        layout = f"{_gap(start, 4)}xiI"
+        names = []
+        for _ in range(2):
+            start = self._at
+            names.append(self.text())
+            begin = start + _gap(start, 4)
+            layout += f"{begin - start}x{self._at - begin}s"
+        edges.append((names[0], names[1]))
+        start = self._at
+        self.numbers("7d", 8)
+        return f"{layout}{self._at - start}x"
 
     def numbers(self, kinds: str, alignment: int) -> tuple[int | float, ...]:
         start = self._at + _gap(self._at, alignment)

@@ -53,9 +53,10 @@ class Complete:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A violation, once per case."""
+    """A violation, once per case; ``process`` is the plan's process that did it, where it can be stopped for it."""
 
     found: Diagnostic
+    process: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,7 @@
-"""Whether owners send what they own, often enough: a history of arrivals for each edge, judged at given times.
+"""Whether owners send what they own, often enough: histories of arrivals, judged at given times.
+
+Edges that have always come together share one history. At first those of one owner do, and a message that holds only
+some of them parts them; so a message costs what it tells, however many edges it holds.
 
 Times are monotonic seconds. What is measured is the time in which the guard looked: a guard that was kept from looking
 knows nothing of the time between, and blames nobody for it.
@@ -7,15 +10,15 @@ knows nothing of the time between, and blames nobody for it.
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
 from tfcompose.run.events import Complete, Found, GuardEvent, Live, OwnerReady, Recovered
+from tfcompose.run.silence import change_event, left
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Collection
 
     from tfcompose.plan import Plan, PlanEdge
 
@@ -34,7 +37,8 @@ LOOK_COUNTS_S = 0.25
 #: After so long without a look messages are lost, and come when the writer's next heartbeat does: 3 s in Fast DDS.
 STALLED_S = 1.0
 CATCH_UP_S = 3.5
-NAMED_AT_MOST = 6
+#: For so many combinations of edges their tracks are remembered.
+MOST_MESSAGES = 1000
 
 
 @dataclass(slots=True)
@@ -61,9 +65,14 @@ class Watched:
 
 @dataclass(slots=True)
 class Track:
-    """What is known of one planned edge. ``arrivals`` and ``heard`` are watched seconds, ``last`` is monotonic."""
+    """What is known of planned edges that come together: of one owner, kind and rate.
 
-    edge: PlanEdge
+    ``arrivals`` and ``heard`` are watched seconds, ``last`` is monotonic; ``delay_s`` is the age of the last stamp when
+    it came.
+    """
+
+    edges: tuple[PlanEdge, ...]
+    delay_s: float | None = None
     live: bool = False
     last: float = 0.0
     heard: float = 0.0
@@ -72,6 +81,11 @@ class Track:
     steady: bool = False
     slow: bool = False
     arrivals: deque[float] = field(default_factory=deque)
+
+    @property
+    def edge(self) -> PlanEdge:
+        """One of them."""
+        return self.edges[0]
 
     @property
     def silent_after(self) -> float | None:
@@ -112,30 +126,64 @@ class Liveness:
     """The planned edges and their owners."""
 
     def __init__(self, plan: Plan) -> None:
-        self.tracks = {edge.child: Track(edge) for edge in plan.edges}
-        self._rated = [track for track in self.tracks.values() if track.silent_after is not None]
+        self._order = {edge.child: index for index, edge in enumerate(plan.edges)}
+        together: dict[tuple[str, str, float | None], list[PlanEdge]] = {}
+        for edge in plan.edges:
+            together.setdefault((edge.owner, edge.kind, edge.rate), []).append(edge)
+        self.tracks = [Track(tuple(edges)) for edges in together.values()]
+        self._track_of = {edge.child: track for track in self.tracks for edge in track.edges}
+        self._of_message: dict[tuple[str, ...], list[Track]] = {}
         self._waiting = {name: {e.child for e in plan.edges_of(name)} for name in {e.owner for e in plan.edges}}
         self._complete = False
         self._gone: set[str] = set()
         self._watched = Watched()
 
-    def arrived(self, child: str, now: float) -> list[GuardEvent]:
-        """Note that the owner sent the edge, and return what that means."""
-        track = self.tracks[child]
-        track.arrived(self._watched.at(now), now)
-        if track.live:
-            return []
-        track.live = True
-        edge = track.edge
-        events: list[GuardEvent] = [Live(edge.parent, edge.child, edge.owner, edge.node)]
-        waiting = self._waiting[edge.owner]
-        waiting.discard(child)
+    def arrived(self, children: tuple[str, ...], now: float, delay_s: float | None = None) -> list[GuardEvent]:
+        """Note that owners sent these edges, in one message, and return what that means."""
+        seen, events = self._watched.at(now), []
+        for track in self._of_message.get(children) or self._parted(children):
+            track.arrived(seen, now)
+            track.delay_s = delay_s
+            if not track.live:
+                track.live = True
+                events += self._began(track)
+        return events
+
+    def _parted(self, children: tuple[str, ...]) -> list[Track]:
+        """Return the tracks of exactly these edges; tracks that hold others too are parted."""
+        wanted = set(children)
+        touched = {id(track): track for child in children for track in (self._track_of[child],)}
+        found = []
+        for track in touched.values():
+            rest = tuple(edge for edge in track.edges if edge.child not in wanted)
+            if rest:
+                part = replace(track, edges=rest, arrivals=deque(track.arrivals))
+                self.tracks.append(part)
+                self._track_of.update((edge.child, part) for edge in rest)
+                track.edges = tuple(edge for edge in track.edges if edge.child in wanted)
+                self._of_message.clear()
+            found.append(track)
+        if len(self._of_message) > MOST_MESSAGES:
+            self._of_message.clear()
+        self._of_message[children] = found
+        return found
+
+    def _began(self, track: Track) -> list[GuardEvent]:
+        """Return that the track's edges are live."""
+        owner = track.edge.owner
+        events: list[GuardEvent] = [Live(e.parent, e.child, e.owner, e.node) for e in track.edges]
+        waiting = self._waiting[owner]
+        waiting.difference_update(edge.child for edge in track.edges)
         if not waiting:
-            events.append(OwnerReady(edge.owner))
+            events.append(OwnerReady(owner))
         if not self._complete and not any(self._waiting.values()):
             self._complete = True
-            events.append(Complete(len(self.tracks)))
+            events.append(Complete(len(self._order)))
         return events
+
+    def seconds_since(self, track: Track, now: float) -> tuple[float, float | None]:
+        """Return the age of the track's last arrival, and its rate in hertz, None while there is too little to say."""
+        return now - track.last, track.rate(self._watched.at(now)) if track.silent_after is not None else None
 
     def look(self, now: float) -> None:
         """Note that the guard looks, and judge nobody."""
@@ -145,24 +193,28 @@ class Liveness:
         """Return which owners fell silent or slow since the last time, and came back: one event for each owner."""
         seen = self._watched.look(now)
         changed: dict[tuple[str, str], list[Track]] = {}
-        for track in self._rated:
-            change = _change(track, seen) if track.live else None
+        for track in self.tracks:
+            change = _change(track, seen) if track.live and track.silent_after is not None else None
             if change:
                 changed.setdefault((change, track.edge.owner), []).append(track)
-        return [_event(change, tracks, seen, now) for (change, _), tracks in changed.items()]
+        return [change_event(change, self._in_order(tracks), seen, now) for (change, _), tracks in changed.items()]
+
+    def _in_order(self, tracks: list[Track]) -> list[Track]:
+        """Return tracks by their first edge's place in the plan."""
+        return sorted(tracks, key=lambda track: self._order[track.edge.child])
 
     def static_writers(self, nodes: Collection[str]) -> list[GuardEvent]:
         """Take the nodes that write /tf_static now; an owner whose edges were live and that is gone is silent."""
         lost: dict[str, list[Track]] = {}
         events: list[GuardEvent] = []
-        for track in self.tracks.values():
+        for track in self._in_order(self.tracks):
             if track.edge.kind == "static" and track.live:
                 lost.setdefault(track.edge.owner, []).append(track)
         for owner, tracks in lost.items():
             edge = tracks[0].edge
             if edge.node not in nodes and owner not in self._gone:
                 self._gone.add(owner)
-                events.append(Found(_left(edge, tracks)))
+                events.append(Found(left(edge, tracks)))
             elif edge.node in nodes and owner in self._gone:
                 self._gone.discard(owner)
                 events.append(Recovered(f"{owner} ({edge.node}) is back"))
@@ -191,49 +243,3 @@ def _change(track: Track, seen: float) -> str | None:
         track.slow = False
         return "fast"
     return None
-
-
-def _event(change: str, tracks: list[Track], seen: float, now: float) -> GuardEvent:
-    verb = "is" if len(tracks) == 1 else "are"
-    match change:
-        case "silent":
-            return Found(_silent(tracks, now))
-        case "slow":
-            return Found(_slow(tracks, seen))
-        case "back":
-            quiet = now - min(track.silent_since for track in tracks)
-            return Recovered(f"{_named(tracks)} {verb} back after {quiet:.1f} s")
-        case _:
-            rate = min(track.rate(seen) or 0.0 for track in tracks)
-            return Recovered(f"{_named(tracks)} {verb} sent at {rate:.3g} Hz again")
-
-
-def _named(tracks: Sequence[Track]) -> str:
-    """Return the edges by name, the first few of them if they are many."""
-    names = [track.edge.name for track in tracks[:NAMED_AT_MOST]]
-    more = len(tracks) - len(names)
-    return ", ".join(names) + (f" and {more} more" if more else "")
-
-
-def _silent(tracks: list[Track], now: float) -> Diagnostic:
-    edge = tracks[0].edge
-    quiet = max(now - track.last for track in tracks)
-    message = f"{edge.owner} ({edge.node}) fell silent: nothing on {_named(tracks)} for {quiet:.1f} s"
-    notes = [Note(f"declared at {edge.rate:g} Hz in {edge.source[0]}:{edge.source[1]}")] if edge.rate else []
-    return finding("TF804", message, None, notes=notes, help=f"is {edge.node} still running, and does it get its data?")
-
-
-def _left(edge: PlanEdge, tracks: list[Track]) -> Diagnostic:
-    message = f"{edge.owner} ({edge.node}) is gone: nobody latches {_named(tracks)} any more"
-    advice = "listeners that are there keep these frames; those that join later do not get them"
-    return finding("TF804", message, None, help=advice)
-
-
-def _slow(tracks: list[Track], seen: float) -> Diagnostic:
-    edge = tracks[0].edge
-    rate = min(track.rate(seen) or 0.0 for track in tracks)
-    verb = "comes" if len(tracks) == 1 else "come"
-    message = f"{_named(tracks)} {verb} at {rate:.3g} Hz from {edge.owner} ({edge.node})"
-    message += f", declared are {edge.rate or 0.0:g} Hz"
-    notes = [Note(f"declared in {edge.source[0]}:{edge.source[1]}")]
-    return finding("TF805", message, None, severity="warning", notes=notes)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, Severity, finding
+from tfcompose.run.stamps import BACK, REPEATED, WRONG_CLOCK
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -14,6 +15,15 @@ if TYPE_CHECKING:
 
 LISTED_AT_MOST = 12
 NAMELESS = "a publisher without a node name"
+LOOP, SELF, TWO_WRITERS = "TF820", "TF821", "TF822"
+_WARNINGS = frozenset({SELF, TWO_WRITERS, REPEATED, BACK})
+_ADVICE = {
+    SELF: "no listener gets it; give the node's child frame another name, or switch its TF off",
+    TWO_WRITERS: "tf2 takes whatever came last: end one of them, or let each send a frame of its own",
+    REPEATED: "tf2 drops all but the first; stamp with the time of the measurement, or send when there is a new one",
+    BACK: "tf2 sorts it in behind newer ones, or drops it; is a bag being played, or was a clock set?",
+    WRONG_CLOCK: "no lookup brings it together with the rest: use_sim_time and ros.clock must agree, and hosts in sync",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +31,8 @@ class Offence:
     """One edge that was published by somebody who may not, or in a way that it may not.
 
     ``nodes`` are those of which one did it: a single one where the rmw says who sent a message, none where the sender
-    has no name. A ``namesake`` has the owner's name and is not the owner.
+    has no name. A ``namesake`` has the owner's name and is not the owner. ``loop`` holds the frames of a loop that the
+    edge closes, ``detail`` what was seen of stamps, or who the other writer is.
     """
 
     code: str
@@ -31,6 +42,8 @@ class Offence:
     static: bool
     edge: PlanEdge | None
     namesake: bool = False
+    loop: tuple[str, ...] = ()
+    detail: str = ""
 
     @property
     def who(self) -> str:
@@ -51,26 +64,36 @@ class Offence:
         return f"{self.parent} → {self.child}"
 
     @property
+    def of_stamps(self) -> bool:
+        """Whether it is about stamps, and over as soon as these are right."""
+        return self.code in {REPEATED, BACK, WRONG_CLOCK}
+
+    @property
     def over(self) -> str:
         """The sentence that says that it has ended."""
+        if self.of_stamps:
+            return f"{self.who} stamps {self.name} as it should again"
         return f"{self.name} is no longer published by {self.who}"
 
 
-def violation(offences: Sequence[Offence], guard: GuardPolicy) -> Diagnostic:
-    """Return the finding for offences of one kind by one node."""
+def violation(offences: Sequence[Offence], guard: GuardPolicy, where: str = "") -> Diagnostic:
+    """Return the finding for offences of one kind by one node, that runs ``where``."""
     first = offences[0]
-    severity: Severity = "warning" if first.code == "TF803" and guard.unknown_edges == "warn" else "error"
-    notes = [*_others(offences), *_declared(first)]
+    mild = first.code in _WARNINGS or (first.code == "TF803" and guard.unknown_edges == "warn")
+    severity: Severity = "warning" if mild else "error"
+    notes = [*_others(offences), *_declared(first), *_runs(first, where)]
     return finding(first.code, _message(offences), None, help=_help(first), notes=notes, severity=severity)
 
 
-def taken(offences: Sequence[Offence]) -> Diagnostic:
-    """Return the finding for edges that a node published before the start."""
+def taken(offences: Sequence[Offence], where: str = "") -> Diagnostic:
+    """Return the finding for edges that a node, that runs ``where``, published before the start."""
     first = offences[0]
     message = f"{first.name}{_more(offences)}: published by {first.who} before the start"
     if first.edge and not first.edge.may_hang_on(first.parent):
         message += f", and the plan hangs {first.child} on {' or '.join((first.edge.parent, *first.edge.switched))}"
-    notes = [*_others(offences), *_declared(first)]
+    if first.loop:
+        message += f", which closes the loop {_loop(first)}"
+    notes = [*_others(offences), *_declared(first), *_runs(first, where)]
     advice = f"end {first.whom}"
     if first.namesake:
         advice += ": is the robot running already?"
@@ -78,6 +101,19 @@ def taken(offences: Sequence[Offence]) -> Diagnostic:
         owner = f"processes: {{NAME: {{external: true, node: {first.nodes[0]}}}}}"
         advice += f", or let it own the edge: {owner}, and owner: NAME at the edge"
     return finding("TF807", message, None, help=advice, notes=notes)
+
+
+def best_effort_writer(node: str, topic: str) -> Diagnostic:
+    """Return the finding for a publisher that sends best effort, which no TF listener accepts."""
+    message = f"{node} writes {topic} best effort, so no listener receives it: they ask for reliable"
+    return finding("TF826", message, None, help="publish it reliable")
+
+
+def leak(node: str, topic: str, own: str) -> Diagnostic:
+    """Return the finding for a node of an isolated plan that writes a global TF topic."""
+    message = f"{node} writes the global {topic}, and the plan keeps its own on {own}"
+    advice = f"start it with the remapping {topic}:={own}, as tfcompose does with the processes that it starts"
+    return finding("TF827", message, None, help=advice)
 
 
 def volatile_writer(node: str, plan: Plan) -> Diagnostic:
@@ -93,6 +129,14 @@ def _message(offences: Sequence[Offence]) -> str:
     more = _more(offences)
     verb = "are" if more else "is"
     edge = first.edge
+    if first.loop:
+        return f"{first.who} publishes {first.name}{more}, which closes the loop {_loop(first)}"
+    if first.code == SELF:
+        return f"{first.who} publishes {first.name}{more}, a frame in itself, which tf2 drops"
+    if first.code == TWO_WRITERS:
+        return f"{first.name}{more} {verb} published by {first.who}, and {first.detail}"
+    if first.of_stamps:
+        return _of_stamps(first, more)
     if edge is None:
         return f"{first.name}{more} {verb} published by {first.who}, and nobody declared {'them' if more else 'it'}"
     if first.code == "TF802":
@@ -106,6 +150,22 @@ def _message(offences: Sequence[Offence]) -> str:
     return f"{first.name}{more} {verb} published by {first.who}; {owner}"
 
 
+def _loop(first: Offence) -> str:
+    return " → ".join(first.loop)
+
+
+def _of_stamps(first: Offence, more: str) -> str:
+    if first.code == REPEATED:
+        return f"{first.who} sends {first.name}{more} with the same stamp again and again: {first.detail}"
+    if first.code == BACK:
+        return f"{first.who} stamps {first.name}{more} back in time, by {first.detail}"
+    return f"{first.who} stamps {first.name}{more} {first.detail}"
+
+
+def _runs(first: Offence, where: str) -> list[Note]:
+    return [Note(f"{first.who} runs {where}")] if where and len(first.nodes) <= 1 else []
+
+
 def _more(offences: Sequence[Offence]) -> str:
     more = len(offences) - 1
     return f" and {more} more edge{'s' if more > 1 else ''}" if more else ""
@@ -115,6 +175,10 @@ def _help(first: Offence) -> str:
     if first.code == "TF803":
         allowed = f"{{parent: {first.parent}, child: {first.child}}}"
         return f"declare it under frames, or allow it: guard: {{allow: [{allowed}]}}"
+    if first.code in _ADVICE:
+        return _ADVICE[first.code]
+    if first.loop:
+        return f"end {first.whom}, or turn the edge round; while it is there, tf2 finds no way through these frames"
     if first.code == "TF809":
         return "static: true says that the owner sends it on /tf_static"
     return f"end {first.whom}, or switch its TF off; tf2 takes whatever came last"

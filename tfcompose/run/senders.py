@@ -21,23 +21,31 @@ class Message:
     """One TFMessage: its (parent, child) pairs, the topic's kind, who sent it, and when.
 
     ``gid`` is the publisher's id, or None where the rmw gives none; ``sequence`` counts its messages from 1.
+    ``stamps_ns`` are the transforms' stamps; ``received_ns`` is when it came, by this machine's system clock.
     """
 
-    edges: Sequence[tuple[str, str]]
+    edges: tuple[tuple[str, str], ...]
     static: bool
     gid: bytes | None
     source_ns: int
     sequence: int
+    stamps_ns: Sequence[int] = ()
+    received_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Writer:
-    """A publisher in the graph; ``node`` is None while its name is not known."""
+    """A publisher in the graph; ``node`` is None while its name is not known.
+
+    ``where`` says on which machine and as which process it runs, as far as that is known.
+    """
 
     gid: bytes
     node: str | None
     static: bool
     volatile: bool
+    best_effort: bool = False
+    where: str = ""
 
 
 @dataclass(slots=True)
@@ -77,6 +85,7 @@ class Senders:
     def __init__(self) -> None:
         self.writers: dict[bytes, Writer] = {}
         self._names: dict[bytes, str] = {}
+        self._where: dict[bytes, str] = {}
         self._heard: dict[bytes, Sender] = {}
 
     def heard(self, message: Message, now: float) -> None:
@@ -91,9 +100,14 @@ class Senders:
             self._heard[message.gid] = Sender(now, *first, *first)
 
     def graph(self, writers: Sequence[Writer]) -> None:
-        """Take who is in the graph now; the name of one that has left is not forgotten."""
+        """Take who is in the graph now; the name of one that has left is kept."""
         self.writers = {writer.gid: writer for writer in writers}
         self._names.update({writer.gid: writer.node for writer in writers if writer.node is not None})
+        self._where.update({writer.gid: writer.where for writer in writers if writer.where})
+
+    def where(self, gid: bytes | None) -> str:
+        """Return where the publisher runs, empty where that is not known."""
+        return "" if gid is None else self._where.get(gid, "")
 
     def sender(self, gid: bytes | None) -> Sender | None:
         """Return what is known of that publisher's messages."""

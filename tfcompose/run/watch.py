@@ -7,13 +7,14 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from tfcompose.ros.graph import UNKNOWN_NODE, writers
-from tfcompose.ros.message import decode
+from tfcompose.ros.clock import SimClock
 from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFSubscription, wait
 from tfcompose.run.clock_watch import ClockWatch
 from tfcompose.run.events import EVENTS_FD, Clear, Complete, Live, OwnerReady, to_line
-from tfcompose.run.judge import Judge, Message, Writer
+from tfcompose.run.hearing import Hearing
+from tfcompose.run.judge import Judge
+from tfcompose.run.neighbours import GLOBAL, Graph
 from tfcompose.run.own import say
 from tfcompose.run.topics import plans_by_topics, together
 
@@ -35,8 +36,6 @@ MODE = "TFCOMPOSE_GUARD"
 _SEEN = (Clear, Live, OwnerReady, Complete)
 DEFAULT_SETTLE_S = 1.0
 LOOK_EVERY_S = 0.1
-#: A longer frame name is cut; no planned one is that long.
-LONGEST_NAME = 1024
 
 
 def guard(own: Own, stop: Stop) -> None:
@@ -54,6 +53,8 @@ def guard(own: Own, stop: Stop) -> None:
             watches.append(_Watch(node, topics, judge, emit))
             if not judges:
                 judge.tick(now)
+        if GLOBAL not in plans:
+            watches[0].watch_global_topics()
         say(f"watching {_counted(own.plan)}{'' if judges else ', and judging nobody'}")
         clock = ClockWatch(own, node)
         while not stop.requested:
@@ -69,12 +70,19 @@ class _Watch:
     def __init__(self, node: Node, topics: tuple[str, str], judge: Judge, emit: Callable[[GuardEvent], None]) -> None:
         self.moving = TFSubscription(node, static=False, topic=topics[0])
         self.fixed = TFSubscription(node, static=True, topic=topics[1])
-        self._node = node
+        self._clock = SimClock(node) if judge.clocks.simulated else None
+        self._hearing = Hearing()
+        self._graph = Graph(node, topics)
         self._judge = judge
         self._emit = emit
+        self._leaks_to: tuple[str, str] | None = None
         self._due = 0.0
         self._malformed: set[bytes | None] = set()
         self._known: set[bytes | None] = set()
+
+    def watch_global_topics(self) -> None:
+        """Look for nodes of the plan on the global topics too, where they do not belong."""
+        self._leaks_to = self._graph.topics
 
     def look(self) -> None:
         """Take what has come, and from time to time the graph."""
@@ -83,12 +91,16 @@ class _Watch:
         strangers = {each.gid for each, _ in received} - self._known
         self._known |= strangers
         if strangers or now >= self._due:  # who sends once and goes is in the graph for a moment only
-            self._pass_on(self._judge.graph(_writers(self._node, self.fixed, self.moving), now))
+            self._pass_on(self._judge.graph(self._graph.writers(), now))
+        if self._clock:
+            self._judge.clock(self._clock.now_ns())
         for each, static in received:
             self._hear(each, now, static=static)
         if now >= self._due:
             self._due = now + LOOK_EVERY_S
             self._pass_on(self._judge.tick(now))
+            if self._leaks_to:
+                self._pass_on(self._judge.leaks(self._graph.global_writers(), self._leaks_to))
 
     def _received(self) -> Iterator[tuple[Received, bool]]:
         for subscription, static in ((self.fixed, True), (self.moving, False)):
@@ -97,34 +109,17 @@ class _Watch:
 
     def _hear(self, received: Received, now: float, *, static: bool) -> None:
         try:
-            edges = [(_plain(t.parent), _plain(t.child)) for t in decode(received.data)]
+            message = self._hearing.message(received, static=static)
         except ValueError as error:
             if received.gid not in self._malformed:
                 self._malformed.add(received.gid)
                 say(f"dropped a TF message: {error} (said once for each publisher)")
             return
-        message = Message(edges, static, received.gid, received.source_ns, received.sequence)
         self._pass_on(self._judge.message(message, now))
 
     def _pass_on(self, events: list[GuardEvent]) -> None:
         for event in events:
             self._emit(event)
-
-
-def _plain(frame: str) -> str:
-    """Return the frame's name as tf2 takes it, without a leading slash, and as it can be shown."""
-    name = frame.removeprefix("/")
-    if not name.isprintable():
-        name = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in name)
-    return name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}…"
-
-
-def _writers(node: Node, fixed: TFSubscription, moving: TFSubscription) -> list[Writer]:
-    return [
-        Writer(w.gid, None if w.node.endswith(UNKNOWN_NODE) else w.node, static, w.durability == "volatile")
-        for subscription, static in ((fixed, True), (moving, False))
-        for w in writers(node, subscription.subscription.topic_name)
-    ]
 
 
 def _counted(plan: Plan) -> str:

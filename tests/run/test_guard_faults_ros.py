@@ -1,0 +1,172 @@
+"""Faults of owners and strangers on the real thing: loops, stamps, QoS, leaks; the guard names each."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+
+pytestmark = pytest.mark.ros
+
+ROBOT = """
+tfcompose: 1
+robot: faulty
+ros: {discovery: localhost}
+links: {base_link: {}}
+frames:
+  map: {}
+  odom: {parent: map, owner: slam, rate: 10 Hz}
+  base_link: {parent: odom, owner: drive}
+processes:
+  slam: {simulate: {fixed: {}, rate: 10 Hz}}
+  drive: {external: true, node: /drive}
+guard: {allow: [{parent: map, child: "person_*"}]}
+"""
+ISOLATED = ROBOT.replace("discovery: localhost", "discovery: localhost, namespace: rover, isolate: topics")
+#: A node that sends edges at 20 Hz: full name, QoS, how it stamps, edges.
+NODE = """
+import os, signal, sys, time
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.node import open_node, qos
+from tfcompose.ros.typesupport import tf_message_type
+name, reliability, stamps, *edges = sys.argv[1:]
+signal.signal(signal.SIGTERM, lambda *_: sys.exit())
+begun = time.time_ns()
+def stamp(n):
+    now = time.time_ns()
+    return {"right": now, "frozen": begun, "since start": now - begun, "none": 0,
+            "back": now - 2 * 10**9 * (n % 10 == 9)}[stamps]
+namespace, _, name = name.rpartition("/")
+with open_node(name, namespace) as node:
+    profile = qos(100, DurabilityPolicy.VOLATILE, ReliabilityPolicy[reliability.upper()])
+    publisher = node.create_publisher(tf_message_type(), "/tf", profile)
+    print("ready", flush=True)
+    n = 0
+    while True:
+        n += 1
+        transforms = [Transform(stamp(n), *edge.split(), (1., 0., 0.), (0., 0., 0., 1.)) for edge in edges]
+        publisher.publish(encode(transforms))
+        time.sleep(0.05)
+"""
+
+
+class Running:
+    """A robot under ``up``, and the nodes that a test lets join."""
+
+    def __init__(self, folder: Path, text: str) -> None:
+        (folder / "robot.yaml").write_text(text, encoding="utf-8")
+        self.output = folder / "output.txt"
+        with self.output.open("wb") as out:
+            command = [sys.executable, "-m", "tfcompose", "up"]
+            self.popen = subprocess.Popen(command, cwd=folder, stdout=out, stderr=out)
+        self.nodes: list[subprocess.Popen[str]] = []
+
+    def joins(self, name: str, *edges: str, reliability: str = "reliable", stamps: str = "right") -> int:
+        """Let a node send these edges, and return its process id."""
+        command = [sys.executable, "-c", NODE, name, reliability, stamps, *edges]
+        node = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        self.nodes.append(node)
+        assert node.stdout
+        assert node.stdout.readline()
+        return node.pid
+
+    def leaves(self) -> None:
+        """Let all nodes leave."""
+        for node in self.nodes:
+            node.terminate()
+            node.wait(20)
+            if node.stdout:
+                node.stdout.close()
+        self.nodes.clear()
+
+    def says(self, *words: str, within: float = 20.0) -> str:
+        """Wait for a line with all the words, and return what follows it, too."""
+        end = time.monotonic() + within
+        while time.monotonic() < end:
+            lines = self.output.read_text(encoding="utf-8").splitlines()
+            for index, line in enumerate(lines):
+                if all(word in line for word in words):
+                    return "\n".join(lines[index : index + 8])
+            time.sleep(0.02)
+        pytest.fail(f"{words} not in\n{self.output.read_text(encoding='utf-8')}")
+
+    def end(self) -> int:
+        self.leaves()
+        self.popen.send_signal(signal.SIGINT)
+        try:
+            return self.popen.wait(20)
+        finally:
+            self.popen.kill()
+
+
+@pytest.fixture
+def up(domain: object, tmp_path: Path) -> Iterator[Callable[[str], Running]]:
+    """Start a robot and wait until it is watched."""
+    assert domain
+    robots: list[Running] = []
+
+    def start(text: str) -> Running:
+        robots.append(Running(tmp_path, text))
+        robots[0].says("watching", within=30)
+        return robots[0]
+
+    yield start
+    for robot in robots:
+        robot.end()
+
+
+def test_what_strangers_do_to_the_tree_is_named_as_what_it_is(up: Callable[[str], Running]) -> None:
+    robot = up(ROBOT)
+    robot.joins("/drive", "odom base_link")
+    robot.says("complete")
+    pid = robot.joins("/strange/loop", "base_link map")
+    said = robot.says("error[TF820]", "/strange/loop publishes base_link → map, which closes the loop")
+    assert "map → odom → base_link → map" in said
+    assert f"/strange/loop runs on this machine as pid {pid}: " in said
+    robot.joins("/strange/itself", "odom odom")
+    robot.says("warning[TF821]", "/strange/itself publishes odom → odom, a frame in itself, which tf2 drops")
+    robot.joins("/strange/best", "base_link cup", reliability="best_effort")
+    robot.says("error[TF826]", "/strange/best writes /tf best effort")
+    robot.joins("/tracker_a", "map person_1")
+    robot.joins("/tracker_b", "map person_1")
+    robot.says("warning[TF822]", "map → person_1 is published by /tracker_")
+    robot.leaves()
+    robot.says("over", "base_link → map is no longer published by /strange/loop")
+    assert "TF803" not in robot.output.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("stamps", "code", "said"),
+    [
+        ("since start", "error[TF825]", "simulated time, or time since a start"),
+        ("none", "error[TF825]", "without a stamp"),
+        ("frozen", "warning[TF823]", "with the same stamp again and again"),
+        ("back", "warning[TF824]", "back in time, by "),
+    ],
+)
+def test_an_owner_whose_stamps_are_wrong_is_named(
+    up: Callable[[str], Running], stamps: str, code: str, said: str
+) -> None:
+    robot = up(ROBOT)
+    robot.joins("/drive", "odom base_link", stamps=stamps)
+    robot.says(code, "/drive", "odom → base_link", said)
+    robot.says("complete")
+
+
+def test_a_node_of_an_isolated_plan_that_writes_the_global_topic_is_named(up: Callable[[str], Running]) -> None:
+    robot = up(ISOLATED)
+    robot.joins("/other_robot/drive", "odom base_link")
+    robot.joins("/rover/drive", "odom base_link")
+    robot.says("error[TF827]", "/rover/drive writes the global /tf, and the plan keeps its own on /rover/tf")
+    said = robot.output.read_text(encoding="utf-8")
+    assert ("/other_robot" in said, said.count("TF827")) == (False, 1)

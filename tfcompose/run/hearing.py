@@ -1,0 +1,69 @@
+"""What a received TF message says, read fast where a publisher sends the same edges again and again."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.ros.message import Layout
+from tfcompose.run.senders import Message
+
+if TYPE_CHECKING:
+    from tfcompose.ros.tf import Received
+
+#: A longer frame name is cut; no planned one is that long.
+LONGEST_NAME = 1024
+#: What is remembered: so many layouts of one publisher with one length, and so many in all.
+_LIKE, _MOST = 8, 1024
+#: A message with more transforms is read anew each time.
+_LONGEST = 2000
+
+_Edges = tuple[tuple[str, str], ...]
+
+
+class Hearing:
+    """The layouts of the messages that were heard."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[bytes | None, int], list[tuple[Layout, _Edges]]] = {}
+        self._count = 0
+
+    def message(self, received: Received, *, static: bool) -> Message:
+        """Return the message, with frames named as tf2 takes them.
+
+        Raises:
+            ValueError: with one sentence, if it is no TFMessage.
+        """
+        data = received.data
+        like = self._known.get((received.gid, len(data)), ())
+        for layout, edges in like:
+            stamps = layout.stamps(data)
+            if stamps is not None:
+                return _message(received, edges, stamps, static=static)
+        layout = Layout(data)
+        edges = tuple((_plain(parent), _plain(child)) for parent, child in layout.edges)
+        if len(edges) <= _LONGEST:
+            self._remember((received.gid, len(data)), (layout, edges))
+        return _message(received, edges, layout.stamps(data) or [], static=static)
+
+    def _remember(self, key: tuple[bytes | None, int], one: tuple[Layout, _Edges]) -> None:
+        if self._count >= _MOST:
+            self._known.clear()
+            self._count = 0
+        like = self._known.setdefault(key, [])
+        if len(like) >= _LIKE:
+            self._count -= len(like)
+            like.clear()
+        like.append(one)
+        self._count += 1
+
+
+def _message(received: Received, edges: _Edges, stamps: list[int], *, static: bool) -> Message:
+    return Message(edges, static, received.gid, received.source_ns, received.sequence, stamps, received.received_ns)
+
+
+def _plain(frame: str) -> str:
+    """Return the frame's name as tf2 takes it, without a leading slash, and as it can be shown."""
+    name = frame.removeprefix("/")
+    if not name.isprintable():
+        name = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in name)
+    return name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}…"

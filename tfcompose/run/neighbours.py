@@ -1,0 +1,56 @@
+"""Who publishes TF, as the graph shows it to the guard."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.ros.graph import UNKNOWN_NODE, own_gid, writers, writers_unmapped
+from tfcompose.ros.origin import origin
+from tfcompose.run.senders import Writer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rclpy.node import Node
+
+    from tfcompose.ros.graph import Writer as Found
+
+#: The names that no namespace moves: (moving, fixed).
+GLOBAL = ("/tf", "/tf_static")
+
+
+class Graph:
+    """The publishers on a plan's topics (moving, fixed), and on the global ones."""
+
+    def __init__(self, node: Node, topics: tuple[str, str]) -> None:
+        self.topics = topics
+        self._node = node
+        self._where: dict[bytes, str] = {}
+        self._own = b""
+
+    def writers(self) -> list[Writer]:
+        """Return who publishes on the plan's topics now."""
+        return self._on(writers, self.topics)
+
+    def global_writers(self) -> list[Writer]:
+        """Return who publishes on the global topics now."""
+        return self._on(writers_unmapped, GLOBAL)
+
+    def _on(self, look: Callable[[Node, str], list[Found]], topics: tuple[str, str]) -> list[Writer]:
+        moving, fixed = topics
+        pairs = ((True, fixed), (False, moving))
+        return [self._writer(one, static=static) for static, topic in pairs for one in look(self._node, topic)]
+
+    def _writer(self, one: Found, *, static: bool) -> Writer:
+        where = self._where.get(one.gid)
+        if where is None:
+            where = self._where[one.gid] = origin(one.gid, self._own_gid())
+        node = None if one.node.endswith(UNKNOWN_NODE) else one.node
+        volatile, best_effort = one.durability == "volatile", one.reliability == "best_effort"
+        return Writer(one.gid, node, static, volatile, best_effort, where)
+
+    def _own_gid(self) -> bytes:
+        """Return an id of this process's: that of its reader."""
+        if not self._own:
+            self._own = own_gid(self._node, self.topics[0])
+        return self._own

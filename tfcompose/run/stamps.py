@@ -1,0 +1,97 @@
+"""Stamps, judged for each publisher: the wrong clock, the same one again, and back in time.
+
+A stamp is compared with the plan's clock: the system's, or simulated time as it comes on /clock.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+_SECOND_NS = 1_000_000_000
+#: tf2's buffers keep 10 s: what is farther off than that cannot be looked up together with the rest.
+WRONG_BY_NS = 10 * _SECOND_NS
+#: So many in a row are no accident; so many that are right end it.
+WRONG_IN_A_ROW = 3
+#: Each fault counts up by so many, each right message down by one; at so many the fault is reported.
+REPEAT_COUNTS, REPEATS = 2, 10
+STEP_COUNTS, BACK_STEPS = 4, 12
+#: One step back by so much is enough.
+LARGE_STEP_NS = _SECOND_NS
+
+REPEATED, BACK, WRONG_CLOCK = "TF823", "TF824", "TF825"
+
+
+@dataclass(slots=True)
+class Clocks:
+    """What time it is: the system's time when a message came, and the newest on /clock (None: nothing came yet)."""
+
+    simulated: bool
+    sim_ns: int | None = None
+
+    def reference_ns(self, received_ns: int) -> int | None:
+        """Return the time that stamps should have, or None if that is not known."""
+        return self.sim_ns if self.simulated else received_ns or None
+
+
+@dataclass(slots=True)
+class Stamps:
+    """The stamps of one publisher's messages with the same edges."""
+
+    last: Sequence[int] = ()
+    repeats: int = 0
+    back: int = 0
+    wrong: int = 0
+
+    def judge(self, stamps_ns: Sequence[int], received_ns: int, clocks: Clocks) -> tuple[str, str]:
+        """Take a message's stamps and return the fault's code and what was seen; empty where all is well."""
+        last, self.last = self.last, stamps_ns
+        off = self._clock(stamps_ns, received_ns, clocks)
+        step = self._step(stamps_ns, last) if last else ("", "")
+        # Who repeats a stamp for long is off at last, and that follows from it; who has none is said to have none.
+        if off and (step[0] != REPEATED or not stamps_ns[0]):
+            return WRONG_CLOCK, off
+        return step
+
+    def _step(self, stamps_ns: Sequence[int], last: Sequence[int]) -> tuple[str, str]:
+        steps = [new - old for new, old in zip(stamps_ns, last, strict=False)]
+        least = min(steps)
+        if least > 0:
+            self.repeats, self.back = max(0, self.repeats - 1), max(0, self.back - 1)
+        elif least == 0:
+            self.repeats = min(self.repeats + REPEAT_COUNTS, 2 * REPEATS)
+            if self.repeats >= REPEATS:
+                return REPEATED, f"{stamps_ns[steps.index(0)] / 1e9:.3f} s"
+        else:
+            self.back = min(self.back + (BACK_STEPS if -least >= LARGE_STEP_NS else STEP_COUNTS), 2 * BACK_STEPS)
+            if self.back >= BACK_STEPS:
+                return BACK, f"{-least / 1e9:.3g} s"
+        return "", ""
+
+    def _clock(self, stamps_ns: Sequence[int], received_ns: int, clocks: Clocks) -> str:
+        reference = clocks.reference_ns(received_ns)
+        if reference is None:
+            return ""
+        worst = max(stamps_ns, key=lambda stamp: abs(stamp - reference))
+        if abs(worst - reference) <= WRONG_BY_NS:
+            self.wrong = 0
+            return ""
+        self.wrong = min(self.wrong + 1, WRONG_IN_A_ROW)
+        return _said(worst, reference, received_ns, clocks) if self.wrong >= WRONG_IN_A_ROW else ""
+
+
+def _said(stamp_ns: int, reference_ns: int, received_ns: int, clocks: Clocks) -> str:
+    off = abs(stamp_ns - reference_ns) / 1e9
+    way = "ahead of" if stamp_ns > reference_ns else "behind"
+    if stamp_ns == 0:
+        return "without a stamp"
+    if clocks.simulated:
+        if received_ns and abs(stamp_ns - received_ns) <= WRONG_BY_NS:
+            return f"with the system's time, and /clock says {reference_ns / 1e9:.1f} s"
+        return f"with {stamp_ns / 1e9:.1f} s, {off:.3g} s {way} /clock"
+    if stamp_ns < _SECOND_NS * 10**9:  # before 2001: no time of day
+        return f"with {stamp_ns / 1e9:.1f} s, which is simulated time, or time since a start"
+    return f"{off:.3g} s {way} the system's time"

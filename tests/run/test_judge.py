@@ -858,3 +858,16 @@ def test_remembered_verdicts_are_those_that_would_be_given_anew(sends: list[tupl
         running.wait(1)
         said.append(running.events)
     assert said[0] == said[1]
+
+
+def test_edges_that_waited_for_a_name_share_a_history_all_the_same(running: History) -> None:
+    rates = tuple(
+        PlanEdge("base", f"part_{n}", "dynamic", "drive", "/drive", Pose(), 10.0, ("r.yaml", 1)) for n in range(99)
+    )
+    running = History(edges=rates).clear()
+    drive, names = running.joins(None), ", ".join(f"base part_{n}" for n in range(99))
+    running.repeat(drive, names, 3)
+    drive.node = "/drive"
+    running.repeat(drive, names, 10)
+    assert len(running.judge.live.tracks) == 1
+    assert len(running.all(Live)) == 99

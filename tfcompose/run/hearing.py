@@ -12,19 +12,20 @@ if TYPE_CHECKING:
 
 #: A longer frame name is cut; no planned one is that long.
 LONGEST_NAME = 1024
-#: What is remembered: so many layouts of one publisher with one length, and so many in all.
+#: What is remembered: so many layouts of one publisher with one length and first edge, and so many in all.
 _LIKE, _MOST = 8, 1024
 #: A message with more transforms is read anew each time.
 _LONGEST = 2000
 
 _Edges = tuple[tuple[str, str], ...]
+_Key = tuple[bytes | None, int, bytes]
 
 
 class Hearing:
     """The layouts of the messages that were heard."""
 
     def __init__(self) -> None:
-        self._known: dict[tuple[bytes | None, int], list[tuple[Layout, _Edges]]] = {}
+        self._known: dict[_Key, list[tuple[Layout, _Edges]]] = {}
         self._count = 0
 
     def message(self, received: Received, *, static: bool) -> Message:
@@ -34,7 +35,8 @@ class Hearing:
             ValueError: with one sentence, if it is no TFMessage.
         """
         data = received.data
-        like = self._known.get((received.gid, len(data)), ())
+        key = (received.gid, len(data), _first_names(data))
+        like = self._known.get(key, ())
         for layout, edges in like:
             stamps = layout.stamps(data)
             if stamps is not None:
@@ -42,10 +44,10 @@ class Hearing:
         layout = Layout(data)
         edges = tuple((_plain(parent), _plain(child)) for parent, child in layout.edges)
         if len(edges) <= _LONGEST:
-            self._remember((received.gid, len(data)), (layout, edges))
+            self._remember(key, (layout, edges))
         return _message(received, edges, layout.stamps(data) or [], static=static)
 
-    def _remember(self, key: tuple[bytes | None, int], one: tuple[Layout, _Edges]) -> None:
+    def _remember(self, key: _Key, one: tuple[Layout, _Edges]) -> None:
         if self._count >= _MOST:
             self._known.clear()
             self._count = 0
@@ -55,6 +57,13 @@ class Hearing:
             like.clear()
         like.append(one)
         self._count += 1
+
+
+def _first_names(data: bytes) -> bytes:
+    """Return the names of the first transform, where the bytes are little-endian; others are slower to read."""
+    begin = 20 + int.from_bytes(data[16:20], "little")
+    at = begin + -begin % 4
+    return data[20:begin] + data[at + 4 : at + 4 + int.from_bytes(data[at : at + 4], "little")]
 
 
 def _message(received: Received, edges: _Edges, stamps: list[int], *, static: bool) -> Message:

@@ -166,14 +166,14 @@ class Judge:
 
     def _see_again(self, now: float) -> list[GuardEvent]:
         """Judge what waited for a name."""
-        events: list[GuardEvent] = []
+        arrived: dict[bytes | None, list[str]] = {}
         for sight, since in list(self._pending.items()):
             nodes = self._senders.nodes(sight.gid, static=sight.static)
             if (nodes and sight.gid is not None) or now - since >= self._patience_s(sight, nodes):
                 del self._pending[sight]
                 if self._judge(sight, nodes, now)[1]:
-                    events += self.live.arrived((sight.child,), now)
-        return events
+                    arrived.setdefault(sight.gid, []).append(sight.child)
+        return [event for children in arrived.values() for event in self.live.arrived(tuple(children), now)]
 
     def _judge_stamps(self, stream: _Stream, message: Message, now: float) -> float | None:
         """Judge the stamps of an owner's message, and return the age of the first in seconds, where it is known."""

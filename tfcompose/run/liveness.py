@@ -68,10 +68,12 @@ class Track:
     """What is known of planned edges that come together: of one owner, kind and rate.
 
     ``arrivals`` and ``heard`` are watched seconds, ``last`` is monotonic; ``delay_s`` is the age of the last stamp when
-    it came.
+    it came, ``silent_after`` how long the edges may be quiet, in seconds, or None if they say no rate.
     """
 
     edges: tuple[PlanEdge, ...]
+    silent_after: float | None = field(init=False)
+    _window: float = field(init=False)
     delay_s: float | None = None
     live: bool = False
     last: float = 0.0
@@ -87,12 +89,12 @@ class Track:
         """One of them."""
         return self.edges[0]
 
-    @property
-    def silent_after(self) -> float | None:
-        """How long this edge may be quiet, or None if it says no rate."""
-        if self.edge.kind == "static" or not self.edge.rate:
-            return None
-        return max(SILENT_AT_LEAST_S, SILENT_PERIODS / self.edge.rate)
+    def __post_init__(self) -> None:
+        rate = self.edge.rate
+        self._window = max(WINDOW_S, WINDOW_PERIODS / (rate or WINDOW_PERIODS))
+        self.silent_after = None
+        if rate and self.edge.kind != "static":
+            self.silent_after = max(SILENT_AT_LEAST_S, SILENT_PERIODS / rate)
 
     def arrived(self, seen: float, now: float) -> None:
         """Note an arrival. An edge that was silent is steady again with two arrivals close enough to each other."""
@@ -112,10 +114,6 @@ class Track:
         longest = max(b - a for a, b in pairwise(times))
         rest = times[-1] - times[0] - longest
         return (len(times) - 2) / rest if rest > 0 else None
-
-    @property
-    def _window(self) -> float:
-        return max(WINDOW_S, WINDOW_PERIODS / (self.edge.rate or WINDOW_PERIODS))
 
     def _forget(self, seen: float) -> None:
         while len(self.arrivals) > FEWEST_ARRIVALS and seen - self.arrivals[0] > self._window:

@@ -75,7 +75,8 @@ class Stamps:
         reference = clocks.reference_ns(received_ns)
         if reference is None:
             return ""
-        worst = max(stamps_ns, key=lambda stamp: abs(stamp - reference))
+        oldest, newest = min(stamps_ns), max(stamps_ns)
+        worst = newest if newest - reference > reference - oldest else oldest
         if abs(worst - reference) <= WRONG_BY_NS:
             self.wrong = 0
             return ""

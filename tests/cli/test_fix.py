@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 
 HEAD = "tfcompose: 1  # version\nrobot: r\n"
 PRESETS = library()
-ROBOTS = [file.read_text("utf-8") for file in (Path(__file__).parents[2] / "robots").glob("*.yaml")]
+EXAMPLES_OF_ROBOTS = [file.read_text("utf-8") for file in (Path(__file__).parents[2] / "robots").glob("*.yaml")]
+#: Those of one file.
+ROBOTS = [text for text in EXAMPLES_OF_ROBOTS if "\nparts:" not in text]
 
 
 def lint(file: str, read: Callable[[str], str]) -> list[Diagnostic]:

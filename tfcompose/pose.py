@@ -8,7 +8,7 @@ axes x, y, z in that order, as in URDF and tf2's ``setRPY``.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -20,8 +20,7 @@ IDENTITY_XYZW: Quaternion = (0.0, 0.0, 0.0, 1.0)
 OPTICAL_XYZW: Quaternion = (-0.5, 0.5, -0.5, 0.5)
 
 
-@dataclass(frozen=True, slots=True)
-class Pose:
+class Pose(NamedTuple):
     """The pose of B in A: ``xyz`` in metres, ``quat_xyzw`` a unit quaternion."""
 
     xyz: Vector = (0.0, 0.0, 0.0)

@@ -32,12 +32,14 @@ def numbers(values: tuple[float, ...]) -> str:
     return " ".join(map(number, values))
 
 
+@lru_cache(maxsize=_REMEMBERED)
 def clean_xyz(xyz: Vector) -> Vector:
     """Return the lengths rounded to a picometre, which removes what adding and turning left behind."""
     x, y, z = xyz
     return (round(x, METRE_DECIMALS) + 0.0, round(y, METRE_DECIMALS) + 0.0, round(z, METRE_DECIMALS) + 0.0)
 
 
+@lru_cache(maxsize=_REMEMBERED)
 def clean_quat(quat_xyzw: Quaternion) -> Quaternion:
     """Return the quaternion rounded to 14 decimals, so that one rotation has one text.
 

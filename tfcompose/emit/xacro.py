@@ -41,7 +41,9 @@ def macro_name(robot: str) -> str:
 def macro(robot: Robot, body: list[str]) -> str:
     """Return the file with the robot's macro; ``body`` are its links and joints as URDF has them."""
     name, base = macro_name(robot.name), robot.base or ""
-    text = _NAME.sub(r"\1${prefix}", _EVALUATED.sub(r"$\1", "\n".join([*body, *_hardware(robot)])))
+    text = "\n".join([*body, *_hardware(robot)])
+    text = _EVALUATED.sub(r"$\1", text) if "$" in text else text
+    text = _NAME.sub(r"\1${prefix}", text)
     text = "\n".join([_RELATIVE.sub(r"\1${meshes}", text), *_blocks(robot)])
     more = " meshes:=''" if "${meshes}" in text else ""
     told = "\n     meshes: what relative addresses of meshes begin with, as file:///…/" if more else ""

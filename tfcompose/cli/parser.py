@@ -34,6 +34,9 @@ COMMANDS = {
 }
 
 
+#: Commands that run until somebody ends them.
+LASTING = frozenset({"up", "echo"})
+
 #: The exit code of a command whose output nobody reads any more: what a shell says of a program ended by SIGPIPE.
 UNREAD = 141
 
@@ -102,8 +105,17 @@ def _no_command(command: str) -> int:
 
 
 def _run(command: str, words: list[str]) -> int:
-    # Look for circles of garbage rarely: a compiler makes none, and looking costs a tenth of its time.
+    # Looking for circles of garbage costs a fifth of a large build: nobody looks before it is over, and rarely later.
     gc.set_threshold(200_000, 50, 1000)
+    if command not in LASTING:
+        gc.disable()
+    try:
+        return _run_command(command, words)
+    finally:
+        gc.enable()
+
+
+def _run_command(command: str, words: list[str]) -> int:
     module = import_module(f"tfcompose.cli.{command}")
     parser = parser_of(command)
     if not {"-h", "--help"}.isdisjoint(words):  # argparse would say nothing of a reader that is gone

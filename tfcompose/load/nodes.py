@@ -116,16 +116,15 @@ class Reader:
 
     def _scalar(self, event: yaml.ScalarEvent) -> None:
         place = Place((self.file, event.start_mark, event.end_mark))
-        top = self._stack[-1] if self._stack else None
         before = len(self.found)
         value = self.value_of(event, place)
         if event.anchor:
             self._anchors[event.anchor] = _Part(value, place, found=self.found[before:])
-        if top and top.waits_for_key:
+        if self._stack and self._stack[-1].waits_for_key:
             del self.found[before:]
             key = value if isinstance(value, str) and event.tag in {None, "!", STR} else None
             is_merge = key == "<<" and event.implicit[0]
-            self._key(top, key, place, "a number, true, false or null", is_merge=is_merge)
+            self._key(self._stack[-1], key, place, "a number, true, false or null", is_merge=is_merge)
         else:
             self._put(value, place, 1, 0)
 

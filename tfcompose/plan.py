@@ -84,8 +84,23 @@ class PlanEdge:
 
 
 @dataclass(frozen=True, slots=True)
+class Sweep:
+    """How a simulated joint moves: to and fro between two positions (rad or m) once in ``period_s``.
+
+    Without them it turns round and round, once in that time.
+    """
+
+    period_s: float
+    lower: float | None = None
+    upper: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Simulation:
-    """A stand-in for an owner: a body on a circle, one that stays, or joint states."""
+    """A stand-in for an owner: a body on a circle, one that stays, or joint states.
+
+    ``joints`` are where joints begin (rad or m), and stay unless ``sweep`` says how they move.
+    """
 
     kind: Literal["circle", "fixed", "joints"]
     rate: float
@@ -93,6 +108,7 @@ class Simulation:
     speed: float = 0.0
     pose: Pose = field(default_factory=Pose)
     joints: dict[str, float] = field(default_factory=dict)
+    sweep: dict[str, Sweep] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

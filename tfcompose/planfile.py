@@ -23,6 +23,7 @@ from tfcompose.plan import (
     RosSettings,
     Simulation,
     StopRule,
+    Sweep,
 )
 from tfcompose.planfields import floats, get, one_of, optional, rows, texts
 from tfcompose.pose import Pose, norm
@@ -81,7 +82,9 @@ def _block(key: str, rows: list[dict[str, Any]]) -> str:
     return f'  "{key}": [\n' + ",\n".join(f"    {_json(row)}" for row in rows) + "\n  ]"
 
 
-def _fields(value: Joint | GuardPolicy | PlanProcess | Ready | RosSettings | Simulation | StopRule) -> dict[str, Any]:
+def _fields(
+    value: Joint | GuardPolicy | PlanProcess | Ready | RosSettings | Simulation | StopRule | Sweep,
+) -> dict[str, Any]:
     return {name: getattr(value, name) for name in value.__slots__}
 
 
@@ -115,6 +118,7 @@ def _process_to_json(process: PlanProcess) -> dict[str, Any]:
         row["simulate"] = _fields(simulation)
         pose = row["simulate"].pop("pose")
         row["simulate"] |= {"xyz": pose.xyz, "quat_xyzw": pose.quat_xyzw}
+        row["simulate"]["sweep"] = {name: _fields(sweep) for name, sweep in simulation.sweep.items()}
     return row
 
 
@@ -160,7 +164,7 @@ def _edge_from_json(data: dict[str, Any], where: str) -> PlanEdge:
 
 
 def _simulation_from_json(data: dict[str, Any], where: str) -> Simulation:
-    joints = get(data, "joints", dict, where)
+    joints, sweeps = get(data, "joints", dict, where), get(data, "sweep", dict, where)
     return Simulation(
         kind=one_of(data, "kind", ("circle", "fixed", "joints"), where),
         rate=get(data, "rate", float, where),
@@ -168,7 +172,16 @@ def _simulation_from_json(data: dict[str, Any], where: str) -> Simulation:
         speed=get(data, "speed", float, where),
         pose=_pose_from_json(data, where),
         joints={name: get(joints, name, float, where) for name in joints},
+        sweep={name: _sweep_from_json(get(sweeps, name, dict, where), where) for name in sweeps},
     )
+
+
+def _sweep_from_json(data: dict[str, Any], where: str) -> Sweep:
+    lower, upper = optional(data, "lower", float, where), optional(data, "upper", float, where)
+    period_s = get(data, "period_s", float, where)
+    if period_s <= 0 or (lower is None) != (upper is None):
+        raise ValueError(f"{where}: a sweep needs a period above 0, and either both ends or none")
+    return Sweep(period_s, lower, upper)
 
 
 def _stop_from_json(data: dict[str, Any], where: str) -> StopRule:

@@ -1,13 +1,15 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from tfcompose.run.motion import circle
+from tfcompose.plan import Sweep
+from tfcompose.run.motion import circle, swept
 
 
 @given(st.floats(0.1, 5), st.floats(-3, 3).filter(lambda speed: abs(speed) > 0.01), st.floats(0, 100))
@@ -21,3 +23,31 @@ def test_on_the_circle_a_body_looks_where_it_goes(radius: float, speed: float, t
 
 def test_the_circle_starts_on_the_x_axis() -> None:
     assert circle(2.0, 0.5, 0.0).xyz == (2, 0, 0)
+
+
+ranges = st.tuples(st.floats(-3, 3), st.floats(0.01, 3)).map(lambda pair: (pair[0], pair[0] + pair[1]))
+
+
+@given(ranges, st.floats(0, 1), st.floats(0.5, 20))
+def test_a_sweep_reaches_both_ends_and_no_further_from_where_it_begins(
+    ends: tuple[float, float], at: float, period_s: float
+) -> None:
+    lower, upper = ends
+    start = lower + at * (upper - lower)
+    sweep = Sweep(period_s, lower, upper)
+    places = [swept(sweep, start, period_s * n / 1000) for n in range(1001)]
+    assert places[0] == pytest.approx(start, abs=1e-6)
+    assert places[-1] == pytest.approx(places[0], abs=1e-6)
+    assert lower - 1e-9 <= min(places) < lower + 1e-4 * (upper - lower)
+    assert upper - 1e-4 * (upper - lower) < max(places) <= upper + 1e-9
+    steps = [abs(b - a) * 1000 / period_s for a, b in pairwise(places)]
+    assert max(steps) <= math.pi * (upper - lower) / period_s + 1e-9
+
+
+def test_a_joint_without_ends_turns_round_and_round() -> None:
+    places = [swept(Sweep(4.0), 1.0, seconds) for seconds in (0.0, 1.0, 2.0, 3.0, 4.0)]
+    assert places == pytest.approx([1.0, 1.0 + math.pi / 2, 1.0 - math.pi, 1.0 - math.pi / 2, 1.0])
+
+
+def test_a_sweep_between_two_places_that_are_one_stays() -> None:
+    assert swept(Sweep(1.0, 0.2, 0.2), 0.0, 0.3) == 0.2

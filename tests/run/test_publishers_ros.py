@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from tfcompose.plan import Joint, PlanProcess, Simulation
+from tfcompose.plan import Joint, PlanProcess, Simulation, Sweep
 from tfcompose.pose import Pose, angle_between, normalised, quat_from_rpy
 from tfcompose.ros.graph import writers
 from tfcompose.ros.message import Transform, decode
@@ -280,6 +280,21 @@ def test_simulated_joint_states_are_published(start: Callable[..., Any], ears: E
     message = deserialize_message(take(ears.node, subscription, 3)[-1].data, JointState)
     assert dict(zip(message.name, message.position, strict=True)) == {"left": 0.5, "right": -1.0}
     assert 0 <= time.time_ns() - message.header.stamp.sec * 1e9 < 60e9
+
+
+def test_swept_joints_move_within_their_limits_and_the_others_stay(
+    start: Callable[..., Any], ears: Ears, write: Callable[..., Any]
+) -> None:
+    simulated = Simulation("joints", 50.0, joints={"lift": 0.2, "grip": 0.5}, sweep={"lift": Sweep(1.0, 0.1, 0.5)})
+    file = write([], PlanProcess("wheels", "simulate", simulate=simulated))
+    start("tfcompose.run.simulate", file, "wheels").until_says("2 joints on /rover/joint_states, simulated at 50 Hz")
+    subscription = Subscription(ears.node, JointState, "/rover/joint_states", JOINT_STATES)
+    messages = [deserialize_message(each.data, JointState) for each in take(ears.node, subscription, 75)]
+    assert {tuple(message.name) for message in messages} == {("lift", "grip")}
+    assert {message.position[1] for message in messages} == {0.5}
+    lifts = [message.position[0] for message in messages]
+    assert 0.1 <= min(lifts) < 0.15
+    assert 0.45 < max(lifts) <= 0.5
 
 
 def test_simulated_time_comes_from_the_clock_topic(

@@ -116,14 +116,7 @@ def _process(process: Process, robot: Robot, owned: list[tuple[str, str]], names
     has_params = process.kind == "run" and bool(written_params(process))
     simulation = process.simulate
     if simulation:
-        simulation = type(simulation)(
-            simulation.kind,
-            simulation.rate,
-            simulation.radius,
-            simulation.speed,
-            clean(simulation.pose),
-            simulation.joints,
-        )
+        simulation = replace(simulation, pose=clean(simulation.pose))
     return PlanProcess(
         name=process.name,
         kind=process.kind,

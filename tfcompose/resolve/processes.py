@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 from tfcompose.diagnostic import Diagnostic, Note, did_you_mean, finding
+from tfcompose.load.overlay import SIMULATIONS
 from tfcompose.model import BUILT_IN, GUARD, JOINTS, STATIC, Node, Process
 from tfcompose.plan import ProcessKind, Simulation
 from tfcompose.resolve.nodes import full_name, nodes_of
@@ -96,7 +97,9 @@ def _simulated(process: Process, simulate: Simulate, source: Source) -> tuple[Pr
     elif simulate.fixed:
         simulation = Simulation("fixed", simulate.rate, pose=pose_of(simulate.fixed))
     elif simulate.joints is not None:
-        simulation = Simulation("joints", simulate.rate, joints=dict(simulate.joints))
+        simulation = Simulation("joints", simulate.rate)
+    elif SIMULATIONS & source.data["processes"][process.name]["simulate"].keys():
+        return None, []  # it was refused already
     else:
         message = f"{process.name}: simulate needs circle, fixed or joints"
         return None, [finding("TF102", message, source.at_key(("processes", process.name, "simulate")))]

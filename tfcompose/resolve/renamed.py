@@ -126,7 +126,9 @@ def _process(process: Process, names: Names) -> Process:
     if simulate and not (
         names.alone or process.part
     ):  # joint states are sent under the names that joints have in the whole
-        simulate = replace(simulate, joints={names.joint(name): q for name, q in simulate.joints.items()})
+        joints = {names.joint(name): q for name, q in simulate.joints.items()}
+        sweep = {names.joint(name): how for name, how in simulate.sweep.items()}
+        simulate = replace(simulate, joints=joints, sweep=sweep)
     return replace(
         process,
         name=names.process(process.name),

@@ -18,6 +18,7 @@ from tfcompose.resolve.poses import Solver
 from tfcompose.resolve.presets import sensor_of
 from tfcompose.resolve.processes import built_in, idle_rates, name_clashes, unknown_names, user_process
 from tfcompose.resolve.sensors import add_sensor
+from tfcompose.resolve.simulated import with_positions
 from tfcompose.resolve.written import as_written
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ def resolve(
         found += refused
     solver = Solver(measured, drafts.frames)
     edges = solver.solve()
-    processes = [_with_positions(process, edges, source, found) for process in (*processes, *drafts.drivers)]
+    processes = [with_positions(process, spec, edges, source, found) for process in (*processes, *drafts.drivers)]
     everybody = [*processes, *(process for part in joined for process in part.robot.processes)]
     known = frozenset(name for _, name in broken) | {process.name for process in everybody}
     missing = tuple(name for section, name in broken if section == "parts")
@@ -197,20 +198,6 @@ def _with_rates(edges: tuple[Edge, ...], processes: list[Process]) -> tuple[Edge
         else replace(edge, rate=rates[edge.owner])
         for edge in edges
     )  # fmt: skip
-
-
-def _with_positions(process: Process, edges: tuple[Edge, ...], source: Source, found: list[Diagnostic]) -> Process:
-    """Give a stand-in for joint states a position for every joint that needs one."""
-    if process.simulate is None or process.simulate.kind != "joints":
-        return process
-    joints = [edge.joint.name for edge in edges if edge.joint and edge.joint.mimic is None]
-    for name in process.simulate.joints:
-        if name not in joints:
-            place = source.at_key(("processes", process.name, "simulate", "joints", name))
-            advice = did_you_mean(name, joints, f"there is {', '.join(joints)}" if joints else "no joint moves")
-            found.append(finding("TF703", f"no moving joint {name}", place, help=advice))
-    positions = {name: process.simulate.joints.get(name, 0.0) for name in joints}
-    return replace(process, simulate=replace(process.simulate, joints=positions))
 
 
 def _base(robot: Robot, spec: RobotSpec, source: Source, found: list[Diagnostic]) -> str | None:

@@ -14,7 +14,7 @@ from tfcompose.ros.tf import TFPublisher, wait
 from tfcompose.run.clock_watch import CLOCK_AFTER_S, no_clock
 from tfcompose.run.description import Description
 from tfcompose.run.joint_role import LOOK_EVERY_S, joints
-from tfcompose.run.motion import circle
+from tfcompose.run.motion import circle, swept
 from tfcompose.run.own import count, say
 from tfcompose.run.watch import guard
 
@@ -95,12 +95,12 @@ def _body(own: Own, node: Node, simulation: Simulation) -> tuple[Callable[[float
 
 def _joint_states(node: Node, simulation: Simulation) -> tuple[Callable[[float, int], None], str]:
     publisher = JointStatePublisher(node, list(simulation.joints))
-    positions = list(simulation.joints.values())
+    moves = [(start, simulation.sweep.get(name)) for name, start in simulation.joints.items()]
 
-    def publish(_: float, stamp_ns: int) -> None:
-        publisher.publish(stamp_ns, positions)
+    def publish(time_s: float, stamp_ns: int) -> None:
+        publisher.publish(stamp_ns, [swept(sweep, start, time_s) if sweep else start for start, sweep in moves])
 
-    return publish, f"{count(len(positions), 'joint')} on {publisher.topic}"
+    return publish, f"{count(len(moves), 'joint')} on {publisher.topic}"
 
 
 def _wall_ticks(rate: float, stop: Stop) -> Iterator[tuple[float, int]]:

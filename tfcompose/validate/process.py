@@ -76,13 +76,37 @@ class Circle(Model):
     speed: float = key(TURN_RATE_, 0.5)
 
 
+SWEEP = "sweep"
+
+
+def _positions() -> Type:
+    """Return the type of ``zero``, ``sweep``, or joints with a position or ``sweep``."""
+    words = choice("zero", SWEEP)
+    word = choice(SWEEP)
+    one = Type(
+        lambda value, path, problems: (word if isinstance(value, str) and value.isalpha() else POSITION).read(
+            value, path, problems
+        ),
+        {"anyOf": [word, POSITION]},
+    )
+    several = mapping(one)
+
+    def read(value: Any, path: Path, problems: Problems) -> Any:
+        if not isinstance(value, str):
+            return several.read(value, path, problems)
+        said = words.read(value, path, problems)
+        return {} if said == "zero" else said
+
+    return Type(read, {"anyOf": [words, several]})
+
+
 class Simulate(Model):
     """A stand-in for the owner: one of circle, fixed and joints."""
 
     circle: Circle | None = key(record(Circle), None, "drives its edge on a circle")
     fixed: Posed | None = key(record(Posed), None, "sends one pose again and again")
-    joints: dict[str, float] | None = key(
-        mapping(POSITION, short="zero"), None, "zero, or joints with positions; the others are at 0"
+    joints: dict[str, float | str] | str | None = key(
+        _positions(), None, "zero, sweep, or joints with a position or sweep; the others are at 0"
     )
     rate: float = key(RATE_, 20.0)
 

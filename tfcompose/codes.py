@@ -59,6 +59,7 @@ CODES = {
     "TF311": "switched_edge_static",
     "TF312": "part_with_other_settings",
     "TF313": "part_without_one_root",
+    "TF314": "publish_frequency_too_low",
     # poses and conventions
     "TF401": "optical_frame_not_rotated",
     "TF402": "quaternion_not_unit",

@@ -245,6 +245,30 @@ def test_rates_come_from_the_edge_or_from_the_process_behind_it() -> None:
     assert [edge_of(robot, child).rate for child in ("odom", "base_link", "w")] == [5, 20, 30]
 
 
+def test_joints_is_told_its_parameters_on_its_command_line() -> None:
+    joint = "joints: {j: {type: continuous, parent: base_link, child: w}}\nframes: {w: {}}\n"
+    robot = robot_of(joint + "processes: {joints: {params: {publish_frequency: 30, ignore_timestamp: true}}}\n")
+    plan = next(file.text for file in emit(robot) if file.path == "plan.json")
+    argv = read_plan(plan, "plan.json").process("joints").argv
+    assert argv[5:] == ("--ros-args", "-p", "ignore_timestamp:=true", "-p", "publish_frequency:=30.0")
+
+
+@pytest.mark.parametrize(
+    ("params", "code", "words"),
+    [
+        ("publish_frequency: fast", "TF103", "30.0"),
+        ("publish_frequency: true", "TF103", "30.0"),
+        ("publish_frequency: 0", "TF106", "leave it out"),
+        ("ignore_timestamp: 1", "TF103", "ignore_timestamp: true"),
+        ("publish_frequenzy: 1", "TF101", "did you mean publish_frequency?"),
+    ],
+)
+def test_joints_takes_no_other_parameters_and_no_other_values(params: str, code: str, words: str) -> None:
+    (found,) = compiled(f"processes: {{joints: {{params: {{{params}}}}}}}\n").errors
+    assert found.code == code
+    assert words in (found.help or "")
+
+
 def test_names_are_below_the_namespace_unless_they_begin_with_a_slash() -> None:
     robot = robot_of("ros: {namespace: fleet/r1}\nprocesses: {a: {external: true}, b: {external: true, node: /b}}\n")
     nodes = {process.name: process.node for process in robot.processes}

@@ -24,6 +24,7 @@ from tfcompose.check.rules.tf308_driver_publishes_too import driver_publishes_to
 from tfcompose.check.rules.tf309_many_static_publishers import many_static_publishers
 from tfcompose.check.rules.tf310_switched_edge_without_owner import switched_edge_without_owner
 from tfcompose.check.rules.tf311_switched_edge_static import switched_edge_static
+from tfcompose.check.rules.tf314_publish_frequency_too_low import publish_frequency_too_low
 from tfcompose.check.rules.tf401_optical_frame_not_rotated import optical_frame_not_rotated
 from tfcompose.check.rules.tf410_degrees_as_radians import degrees_as_radians
 from tfcompose.check.rules.tf411_rounded_right_angle import rounded_right_angle
@@ -106,6 +107,7 @@ RULES: tuple[Rule, ...] = (
     Rule("TF309", many_static_publishers, WARNING),
     Rule("TF310", switched_edge_without_owner),
     Rule("TF311", switched_edge_static),
+    Rule("TF314", publish_frequency_too_low),
     Rule("TF401", optical_frame_not_rotated),
     Rule("TF410", degrees_as_radians, WARNING),
     Rule("TF411", rounded_right_angle, WARNING),

@@ -145,7 +145,9 @@ def _argv(process: Process, robot: Robot, *, has_params: bool) -> tuple[str, ...
     if process.kind == "external":
         return ()
     if process.kind != "run":
-        return ("${python}", "-m", MODULES[process.kind], "${plan}", process.name)
+        told = [word for name, value in _own_params(process) for word in ("-p", f"{name}:={json.dumps(value)}")]
+        own = ("${python}", "-m", MODULES[process.kind], "${plan}", process.name)
+        return (*own, "--ros-args", *told) if told else own
     if process.launch is not None:
         return (f"${{launch:{process.launch}}}", *process.argv)
     if process.package is None:
@@ -161,6 +163,13 @@ def _argv(process: Process, robot: Robot, *, has_params: bool) -> tuple[str, ...
     for name, value in _told(process.params):
         ros_args += ["-p", f"{name}:={json.dumps(value, ensure_ascii=False)}"]
     return (f"${{executable:{process.package}/{process.executable}}}", *process.argv, *ros_args)
+
+
+def _own_params(process: Process) -> list[tuple[str, Any]]:
+    """Return the parameters of one of tfcompose's own processes; a number is a double, as its parameter is."""
+    return [
+        (name, value if isinstance(value, bool) else float(value)) for name, value in sorted(process.params.items())
+    ]
 
 
 def _told(params: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 
 from tfcompose.diagnostic import Diagnostic, Note, did_you_mean, finding
 from tfcompose.load.overlay import SIMULATIONS
-from tfcompose.model import BUILT_IN, GUARD, JOINTS, STATIC, Node, Process
-from tfcompose.plan import ProcessKind, Simulation
-from tfcompose.resolve.nodes import full_name, nodes_of
+from tfcompose.model import BUILT_IN, JOINTS, STATIC, Node, Process
+from tfcompose.plan import Simulation
+from tfcompose.resolve.built_in import built_in_keys
+from tfcompose.resolve.nodes import nodes_of
 from tfcompose.resolve.poses import pose_of
 from tfcompose.resolve.running import how, program
 
@@ -17,23 +18,6 @@ if TYPE_CHECKING:
     from tfcompose.load import Path, Source
     from tfcompose.validate.process import ProcessSpec, Run, Simulate, Started
     from tfcompose.validate.spec import RobotSpec
-
-_BUILT_IN_KEYS = frozenset({"rate", "remap", "env", "host", "after"})
-_KINDS: dict[str, ProcessKind] = {STATIC: "static", JOINTS: "joints", GUARD: "guard"}
-
-
-def built_in(spec: RobotSpec, source: Source) -> list[Process]:
-    """Return tfcompose's own processes, with what stands of them under ``processes``."""
-    own = []
-    for name in BUILT_IN:
-        said = spec.processes.get(name)
-        at = source.at_key(("processes", name)) if said else source.at_key(("robot",))
-        process = Process(name, _KINDS[name], at, (Node(full_name(spec.ros.namespace, f"tfcompose_{name}"), at),))
-        if said:
-            given = {key: getattr(said, key) for key in _BUILT_IN_KEYS}
-            process = replace(process, **given)
-        own.append(process)
-    return own
 
 
 def user_process(
@@ -43,12 +27,7 @@ def user_process(
     at: Path = ("processes", name)
     place = source.at_key(at)
     if name in BUILT_IN:
-        wrong = [key for key in source.data["processes"][name] if key not in _BUILT_IN_KEYS]
-        advice = f"its keys can be: {', '.join(sorted(_BUILT_IN_KEYS))}"
-        return None, [
-            finding("TF101", f"{name} is built in and has no {key}", source.at_key((*at, key)), help=advice)
-            for key in wrong
-        ]
+        return None, built_in_keys(name, said, source)
     nodes, found = nodes_of(name, said, spec.ros.namespace, source)
     if said.external:
         keys = how(said, spec.ros.namespace, ("after", "host", "required", "ready"))

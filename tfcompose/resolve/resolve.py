@@ -11,12 +11,13 @@ from tfcompose.diagnostic import Allow, Diagnostic, did_you_mean, finding
 from tfcompose.model import Edge, Process, Robot
 from tfcompose.plan import GuardPolicy
 from tfcompose.resolve.bodies import Bodies, with_colours
+from tfcompose.resolve.built_in import built_in
 from tfcompose.resolve.edges import Drafts
 from tfcompose.resolve.isolation import isolate, settings_of
 from tfcompose.resolve.packages import Packages
 from tfcompose.resolve.poses import Solver
 from tfcompose.resolve.presets import sensor_of
-from tfcompose.resolve.processes import built_in, idle_rates, name_clashes, unknown_names, user_process
+from tfcompose.resolve.processes import idle_rates, name_clashes, unknown_names, user_process
 from tfcompose.resolve.sensors import add_sensor
 from tfcompose.resolve.simulated import with_positions
 from tfcompose.resolve.written import as_written

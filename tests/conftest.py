@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.waiting import until
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.planfile import write_plan
 from tfcompose.pose import Pose
@@ -163,16 +164,6 @@ def python() -> Callable[[str], str]:
         return subprocess.run(command, check=True, capture_output=True, text=True, timeout=2 * TIMEOUT_S).stdout
 
     return run
-
-
-def until(condition: Callable[[], object], timeout_s: float = TIMEOUT_S) -> bool:
-    """Look every few milliseconds until the condition holds; return whether it did in time."""
-    end = time.monotonic() + timeout_s
-    while not condition():
-        if time.monotonic() > end:
-            return False
-        time.sleep(0.005)
-    return True
 
 
 @pytest.fixture(name="until")

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING
 import psutil
 import pytest
 
+from tests.waiting import until
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
@@ -69,15 +71,6 @@ class Hider:
         return getattr(self.finder, name)
 sys.meta_path[:] = [Hider(finder) for finder in sys.meta_path]
 """
-
-
-def until(condition: Callable[[], object], seconds: float = 20.0) -> bool:
-    end = time.monotonic() + seconds
-    while not condition():
-        if time.monotonic() > end:
-            return False
-        time.sleep(0.005)
-    return True
 
 
 def first_on_the_path(folder: Path) -> dict[str, str]:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import psutil
 import pytest
 
+from tests.waiting import until
 from tfcompose.ros.message import decode
 from tfcompose.ros.node import open_node
 from tfcompose.ros.stop import Stop
@@ -56,15 +57,6 @@ with open_node(name, "/strange") as node:
         if kind == "moving":
             publisher.publish(encode(transforms))
 """
-
-
-def until(condition: Callable[[], object], seconds: float = 20.0) -> bool:
-    end = time.monotonic() + seconds
-    while not condition():
-        if time.monotonic() > end:
-            return False
-        time.sleep(0.005)
-    return True
 
 
 @dataclass

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import psutil
 import pytest
 
+from tests.waiting import until
 from tfcompose.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.planfile import write_plan
 from tfcompose.run.events import Clear, Complete, Live, OwnerReady, to_line
@@ -74,13 +75,6 @@ def plan_of(*processes: PlanProcess) -> Plan:
     return Plan("rover", "", None, RosSettings(), (), processes, GuardPolicy())
 
 
-def until(condition: Callable[[], bool], seconds: float = 15.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "it did not come to pass in time"
-        time.sleep(0.005)
-
-
 def gone(pid: int) -> bool:
     try:
         return bool(psutil.Process(pid).status() == psutil.STATUS_ZOMBIE)
@@ -138,7 +132,7 @@ def logged(told: list[Notice], process: str) -> list[str]:
 @pytest.mark.parametrize("number", [SIGINT, SIGTERM, SIGHUP])
 def test_a_signal_ends_everything_with_0_and_no_process_is_left(launch: Callable[..., Launcher], number: int) -> None:
     launcher = launch(guard(Clear()), program("a", PARENT), program("b", PARENT))
-    until(lambda: len(launcher.pids()) == 4)
+    assert until(lambda: len(launcher.pids()) == 4)
     below = launcher.below()
     assert set(launcher.pids()) < set(below)
     os.kill(launcher.popen.pid, number)
@@ -151,7 +145,7 @@ def test_sigkill_of_the_launcher_takes_its_children_along_within_2_s(
     launch: Callable[..., Launcher], keeper: str
 ) -> None:
     launcher = launch(program("a", PARENT), program("b", DEAF))
-    until(lambda: len(launcher.pids()) == 3)
+    assert until(lambda: len(launcher.pids()) == 3)
     below, children = launcher.below(), launcher.below()
     (shell,) = [pid for pid in launcher.below(recursive=False) if psutil.Process(pid).name() == "sh"]
     if "told" in keeper:
@@ -159,11 +153,11 @@ def test_sigkill_of_the_launcher_takes_its_children_along_within_2_s(
     if "dead" in keeper:
         children = launcher.below(recursive=False)
         os.kill(shell, SIGKILL)
-        until(lambda: gone(shell))
+        assert until(lambda: gone(shell))
     launcher.popen.kill()
     launcher.popen.wait()
     try:
-        until(lambda: all(gone(pid) for pid in children), 2)
+        assert until(lambda: all(gone(pid) for pid in children), 2)
         assert len(children) == (3 if "dead" in keeper else 4)
     finally:
         for pid in below:
@@ -189,7 +183,7 @@ def test_a_child_that_heeds_neither_sigint_nor_sigterm_is_killed(tmp_path: Path)
 def test_what_a_process_leaves_in_its_group_ends_with_it(tmp_path: Path) -> None:
     code, told = run(tmp_path, program("a", PARENT.replace("time.sleep(30)\n", "")))
     assert code == 0
-    until(lambda: gone(int(logged(told, "a")[0].split()[2])))  # it has been killed; init may still have to bury it
+    assert until(lambda: gone(int(logged(told, "a")[0].split()[2])))  # init may still have to bury it
 
 
 def test_a_process_that_left_its_group_is_not_waited_for(tmp_path: Path) -> None:
@@ -336,7 +330,7 @@ def test_an_error_in_the_launcher_itself_leaves_no_process(tmp_path: Path) -> No
 
     with pytest.raises(ZeroDivisionError):
         supervise(plan_of(program("a", PARENT)), tmp_path / "plan.json", report=report)
-    until(lambda: all(gone(pid) for pid in pids), 2)
+    assert until(lambda: all(gone(pid) for pid in pids), 2)
     assert len(pids) == 2
 
 

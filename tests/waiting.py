@@ -1,0 +1,21 @@
+"""How tests wait: for what is to come to pass, and no longer."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+TIMEOUT_S = 20.0
+
+
+def until(condition: Callable[[], object], timeout_s: float = TIMEOUT_S) -> bool:
+    """Look every few milliseconds until the condition holds; return whether it did in time."""
+    end = time.monotonic() + timeout_s
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.005)
+    return True

@@ -51,8 +51,6 @@ class Moving:
         self._turned = _rows([multiply(pose.quat_xyzw, (*axis, 0.0)) for pose, axis in turns], 4)
         self._start = _rows([pose.xyz for pose, _ in slides], 3)
         self._along = _rows([rotate(pose.quat_xyzw, axis) for pose, axis in slides], 3)
-        #: The indices of the joints that move, and the time of the last message, which its user keeps.
-        self.joints = frozenset(one.joint for one in ordered)
 
     def message(self, positions: NDArray[np.float64], stamp_ns: int) -> bytes:
         """Return the TFMessage for these positions, in the order of the names, at this time in nanoseconds.

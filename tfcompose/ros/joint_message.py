@@ -40,8 +40,8 @@ class Names:
     raw: bytes
 
     def fit(self, data: bytes) -> bool:
-        """Return whether the message has exactly these names, and what is read by them."""
-        return data.startswith(self.raw, _FRAME_AT) and data[1] == (self.order == "<")
+        """Return whether the message has exactly these names; in the other byte order its lengths read differently."""
+        return data.startswith(self.raw, _FRAME_AT)
 
     def stamp_ns(self, data: bytes) -> int:
         """Return the message's time in nanoseconds."""

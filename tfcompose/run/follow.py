@@ -25,13 +25,13 @@ class Followed:
 
 
 class Joints:
-    """Joints and their mimics.
+    """Joints, each of a type that has a single position, and their mimics.
 
     A joint that mimics another follows it, also through a chain and in any order: multiplier · q + offset at each step.
     As in robot_state_publisher, a position that was sent for the mimic itself wins over the one it would follow. Only
     what a message says is determined by it: a joint that it says nothing about was measured at another time, and that
-    message's stamp would be false for it. A joint without a single position (URDF: ``fixed``, ``floating``,
-    ``planar``) is never determined, and neither are joints that follow each other in a circle.
+    message's stamp would be false for it. Joints that follow each other in a circle are never
+    determined.
     """
 
     def __init__(self, joints: Sequence[Joint]) -> None:
@@ -47,8 +47,6 @@ class Joints:
         return [one for one in found if one is not None]
 
     def _followed(self, index: int, joint: Joint, columns: dict[str, int]) -> Followed | None:
-        if joint.type not in TURNING + SLIDING:
-            return None
         multiplier, offset, name = 1.0, 0.0, joint.name
         for _ in range(len(self._mimics) + 1):
             if name in columns:

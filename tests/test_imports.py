@@ -178,3 +178,10 @@ def test_reading_and_supervising_a_plan_loads_nothing_from_elsewhere_and_no_comp
     loaded = loaded_by("import tfcompose.planfile, tfcompose.run.supervisor")
     assert not foreign(loaded, bare)
     assert not {name for name in loaded for stage in (*STAGES, "emit") if name.startswith(f"tfcompose.{stage}")}
+
+
+def test_the_buffer_loads_neither_ros_nor_numpy_until_arrays_are_asked_for(bare: set[str]) -> None:
+    one = "from tfcompose.observe import Buffer; from tfcompose.pose import Pose; b = Buffer(); "
+    one += "b.set('a', 'b', Pose(), 1, static=False); b.lookup_transform('a', 'b', 0)"
+    assert not foreign(loaded_by(one), bare)
+    assert "numpy" in foreign(loaded_by(one + "; b.lookup_many('a', 'b', [1])"), bare)

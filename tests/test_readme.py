@@ -102,3 +102,13 @@ def test_it_has_exactly_the_two_commands_that_ci_takes_out_of_it() -> None:
     assert len(commands) == 2
     assert commands[0].endswith("tfcompose up robots/autonomous_robot.yaml --profile demo")
     assert commands[1].endswith("pytest")
+
+
+def test_its_python_programs_run_and_give_what_they_say() -> None:
+    section = README.partition("## The buffer in Python\n")[2].partition("\n## ")[0]
+    imports, program = re.findall(r"^```python\n(.*?)^```", section, re.MULTILINE | re.DOTALL)
+    after = "print(round(pose.xyz[0], 9), stamp_ns, xyz.shape, quat_xyzw.shape, round(points[0, 0], 9))"
+    done = subprocess.run(
+        [sys.executable, "-c", imports + program + after], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert done.stdout == "4.7 9000000000 (80, 3) (80, 4) 3.7\n"

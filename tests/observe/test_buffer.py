@@ -101,13 +101,13 @@ def test_rotations_are_interpolated_as_scipy_does() -> None:
     slerp = Slerp([0, 1], Rotation.from_quat([a, b]))
     for part in (0.0, 0.25, 0.5, 0.9, 1.0):
         expected: Quaternion = tuple(slerp(part).as_quat())
-        found = between((0, 0, 0, *a), (0, 0, 0, *b), part)
+        found = between((0, 0, 0, *a, 0, 0, 0, *b), part)
         assert angle_between((found[3], found[4], found[5], found[6]), expected) < 1e-12
 
 
 def test_interpolation_takes_the_short_way_whatever_the_signs() -> None:
     x, y, z, w = quat_from_rpy(0, 0, 0.2)
-    middle = unit(between(IDENTITY, (0, 0, 0, -x, -y, -z, -w), 0.5))
+    middle = unit(between((*IDENTITY, 0, 0, 0, -x, -y, -z, -w), 0.5))
     assert middle[3:] == pytest.approx(quat_from_rpy(0, 0, 0.1), abs=1e-12)
 
 

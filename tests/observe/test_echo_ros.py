@@ -7,15 +7,18 @@ import math
 import signal
 import subprocess
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from tfcompose.plan import PlanProcess, Simulation
 from tfcompose.pose import Pose, quat_from_rpy
+from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.node import open_node
+from tfcompose.ros.tf import TFPublisher
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from pathlib import Path
     from typing import Protocol
 
@@ -112,3 +115,115 @@ def test_where_nothing_is_published_it_says_so() -> None:
     done = echo("odom", "base_link", "--once", "--timeout", "0.5")
     assert done.returncode == 1
     assert "no TF message came" in done.stderr
+
+
+class Talker:
+    """Sends TF from the test: latched what is fixed, again and again what moves."""
+
+    def __init__(self, node: Any, namespace: str = "") -> None:
+        self._publishers = [
+            TFPublisher(node, static=static, topic=f"{namespace}{topic}")
+            for static, topic in ((False, "/tf"), (True, "/tf_static"))
+        ]
+
+    def say(self, parent: str, child: str, x: float, stamp_ns: int = 0) -> None:
+        data = encode([Transform(stamp_ns, parent, child, (x, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
+        self._publishers[stamp_ns == 0].publish(data)
+
+    def until_heard(self, until: Callable[..., bool]) -> None:
+        assert until(lambda: all(each.publisher.get_subscription_count() for each in self._publishers))
+
+
+@pytest.fixture
+def running(domain: Any) -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Start ``tfcompose echo`` and do not wait."""
+    started: list[subprocess.Popen[str]] = []
+
+    def run(*arguments: str) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", "tfcompose", "echo", *arguments]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        started.append(subprocess.Popen(command, text=True, env=domain.environment, **pipes))  # type: ignore[call-overload]
+        return started[-1]
+
+    yield run
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize(
+    ("at", "x", "when"),
+    [("101.25", "1.25", "at 101.250000000"), ("-0.5", "2.50", "at 102.500000000"), ("103", "3.00", "at 103.000000000")],
+)
+def test_at_a_time_the_pose_is_interpolated_and_printed_with_as_many_decimals_as_asked(
+    running: Callable[..., subprocess.Popen[str]], until: Callable[..., bool], at: str, x: str, when: str
+) -> None:
+    process = running("odom", "/base_link", "--at", at, "--precision", "2", *(["--once"] if at[0] == "-" else []))
+    with open_node("talks", "") as node:
+        talker = Talker(node)
+        talker.until_heard(until)
+        for second in range(4):
+            talker.say("odom", "base_link", float(second), (100 + second) * 10**9)
+        output, errors = process.communicate(timeout=20)
+    assert (process.returncode, errors) == (0, "")
+    lines = output.splitlines()
+    if at[0] != "-":  # from the newest so far, whichever it was when the first came
+        assert when in lines[0]
+        assert lines[1:3] == [f"  xyz        [{x}, 0.00, 0.00] m", "  quat_xyzw  [0.00, 0.00, 0.00, 1.00]"]
+        assert lines[4] == "             [0, 0, 0] deg"
+
+
+def test_a_time_that_is_over_is_a_miss_with_the_milliseconds(
+    running: Callable[..., subprocess.Popen[str]], until: Callable[..., bool]
+) -> None:
+    process = running("odom", "base_link", "--at", "99.9", "--timeout", "1")
+    with open_node("talks", "") as node:
+        talker = Talker(node)
+        talker.until_heard(until)
+        for second in range(4):
+            talker.say("odom", "base_link", float(second), (100 + second) * 10**9)
+        _, errors = process.communicate(timeout=20)
+    assert process.returncode == 1
+    assert (
+        "odom → base_link at 99.900000000 s would be extrapolation into the past: its oldest sample is 100 ms" in errors
+    )
+
+
+def test_under_a_namespace_only_its_topics_are_heard(
+    running: Callable[..., subprocess.Popen[str]], until: Callable[..., bool]
+) -> None:
+    with open_node("talks", "") as node:
+        ours, others = Talker(node, "/robot1"), Talker(node)
+        others.say("odom", "base_link", 9.0)
+        ours.say("odom", "base_link", 1.0)
+        process = running("odom", "base_link", "--once", "--namespace", "robot1", "--format", "json")
+        ours.until_heard(until)
+        output, errors = process.communicate(timeout=20)
+    assert (process.returncode, errors) == (0, "")
+    row = json.loads(output)
+    assert (row["xyz"], row["stamp_ns"]) == ([1.0, 0.0, 0.0], None)
+
+
+def test_when_the_time_starts_again_it_says_so(
+    running: Callable[..., subprocess.Popen[str]], until: Callable[..., bool]
+) -> None:
+    process = running("odom", "base_link", "--timeout", "1", "--rate", "100")
+    with open_node("talks", "") as node:
+        talker = Talker(node)
+        talker.until_heard(until)
+        talker.say("odom", "base_link", 1.0, 100 * 10**9)
+        talker.say("odom", "base_link", 1.0, 1 * 10**9)
+        _, errors = process.communicate(timeout=20)
+    assert process.returncode == 1
+    assert "what came for base_link was too old to be taken: did a bag or a simulation start again?" in errors
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("--at", "soon"), ("--at", "3000000000"), ("--at", "1.0000000001"), ("--precision", "-1"), ("--rate", "0")],
+)
+def test_an_option_that_cannot_be_read_is_wrong_use(words: tuple[str, str]) -> None:
+    done = echo("odom", "base_link", *words)
+    assert done.returncode == 2
+    assert words[1] in done.stderr
+    assert "Traceback" not in done.stderr

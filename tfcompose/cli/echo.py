@@ -1,14 +1,16 @@
 """``tfcompose echo``: where one frame is in another, now.
 
 Print the pose of B in A from the live tree: position in metres, quaternion x y z w, roll pitch yaw about fixed axes in
-radians and degrees. Where there is none it says why, with exit code 1.
+radians and degrees. Where there is none it says why, with exit code 1. Without --once it goes on until Ctrl-C.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import sys
 import time
+from argparse import ArgumentTypeError
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
 
 #: A stamp that is older is taken to be of another clock than the wall's.
 _CLOCKS_AGREE_S = 1e6
+#: A double has no more.
+_MOST_DIGITS = 15
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -40,6 +44,16 @@ def arguments(parser: ArgumentParser) -> None:
         "--timeout", type=positive, default=5.0, metavar="S", help="end after S seconds without a new pose; default: 5"
     )
     parser.add_argument("--rate", type=positive, default=1.0, metavar="HZ", help="poses a second; default: 1")
+    parser.add_argument(
+        "--at",
+        type=_time,
+        default=0,
+        metavar="TIME",
+        help="the pose at that time, in seconds since the epoch (once), or so many seconds before the newest: -0.5",
+    )
+    parser.add_argument(
+        "--precision", type=_digits, default=4, metavar="N", help="decimals of metres and radians in text; default: 4"
+    )
     parser.add_argument("--namespace", default="", metavar="NS", help="listen to /NS/tf and /NS/tf_static")
     parser.add_argument(
         "--format", choices=("text", "json"), default="text", help="json: one object a line; default: text"
@@ -56,8 +70,9 @@ def run(arguments: Namespace) -> int:
     with Stop() as stop:
         module = import_module("tfcompose.observe.echo")
         asked = module.Asked(
-            arguments.a, arguments.b, arguments.once, arguments.rate, arguments.timeout, arguments.namespace
-        )
+            arguments.a.removeprefix("/"), arguments.b.removeprefix("/"), arguments.once, arguments.rate,
+            arguments.timeout, arguments.namespace, arguments.at,
+        )  # fmt: skip
 
         def say(pose: Pose, stamp_ns: int | None) -> None:
             sys.stdout.write(_written(arguments, clean(pose), stamp_ns))
@@ -78,8 +93,33 @@ def run(arguments: Namespace) -> int:
 def _written(arguments: Namespace, pose: Pose, stamp_ns: int | None) -> str:
     if arguments.format == "json":
         return pose_json(arguments.a, arguments.b, pose, stamp_ns=stamp_ns)
-    if stamp_ns is None:
-        return pose_text(arguments.a, arguments.b, pose, ", fixed")
-    age_s = (time.time_ns() - stamp_ns) / 1e9
-    ago = f", {age_s:.2f} s ago" if 0 <= age_s < _CLOCKS_AGREE_S else ""
-    return pose_text(arguments.a, arguments.b, pose, f" at {stamp_ns // 10**9}.{stamp_ns % 10**9:09d}{ago}")
+    when = ", fixed"
+    if stamp_ns is not None:
+        age_s = (time.time_ns() - stamp_ns) / 1e9
+        ago = f", {age_s:.2f} s ago" if 0 <= age_s < _CLOCKS_AGREE_S else ""
+        when = f" at {stamp_ns // 10**9}.{stamp_ns % 10**9:09d}{ago}"
+    return pose_text(arguments.a, arguments.b, pose, when, arguments.precision)
+
+
+def _time(text: str) -> int:
+    """Read seconds as nanoseconds, exactly.
+
+    Raises:
+        ArgumentTypeError: if it is no number, or more than a stamp can hold.
+    """
+    match = re.fullmatch(r"(-?)(\d{1,10})(?:\.(\d{1,9}))?", text)
+    if match is None or int(match[2]) >= 1 << 31:
+        raise ArgumentTypeError(f"{text} is no time in seconds, such as 1713000000.25 or -0.5")
+    stamp_ns = int(match[2]) * 10**9 + int((match[3] or "").ljust(9, "0"))
+    return -stamp_ns if match[1] else stamp_ns
+
+
+def _digits(text: str) -> int:
+    """Read a number of decimals.
+
+    Raises:
+        ArgumentTypeError: if it is not from 0 to 15.
+    """
+    if not text.isdecimal() or int(text) > _MOST_DIGITS:
+        raise ArgumentTypeError(f"{text} is no number of decimals, 0 to {_MOST_DIGITS}")
+    return int(text)

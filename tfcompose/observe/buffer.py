@@ -16,10 +16,10 @@ Times are integer nanoseconds throughout.
 
 from __future__ import annotations
 
-from time import monotonic_ns
-from typing import TYPE_CHECKING, Any, TypeVar
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Literal
 
-from tfcompose.observe.core import CACHE_NS, BufferCore, Refusal, Row
+from tfcompose.observe.core import CACHE_NS, BufferCore, Row
 from tfcompose.observe.exceptions import (
     ConnectivityException,
     ExtrapolationException,
@@ -29,27 +29,27 @@ from tfcompose.observe.exceptions import (
     TransformException,
 )
 from tfcompose.observe.frames import FrameInfo, as_string, as_yaml, frame_info
-from tfcompose.observe.rotation import Seven, product, unit
-from tfcompose.observe.stamped import nanoseconds, time_of, transform_stamped
+from tfcompose.observe.lookups import Lookups
+from tfcompose.observe.refusal import Refusal
+from tfcompose.observe.stamped import nanoseconds
+from tfcompose.observe.transforms import arrays, transform_for
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from numpy.typing import ArrayLike, NDArray
+
+    from tfcompose.observe.trajectory import Trajectory
 
 __all__ = ["CACHE_NS", "Buffer", "BufferCore", "FrameInfo", "Refusal", "Row"]
 __all__ += ["ConnectivityException", "ExtrapolationException", "InvalidArgumentException", "LookupException"]
 __all__ += ["TimeoutException", "TransformException"]
 
-_Answer = TypeVar("_Answer")
 
-# How often a waiting buffer looks for messages itself, in seconds.
-_POLL_S = 0.005
-
-
-class Buffer(BufferCore):
+class Buffer(Lookups):
     """tf2_ros's ``Buffer``: takes and gives messages, and waits.
 
     Args:
         cache_time: how long samples are kept, a duration; default 10 s.
+        node: an rclpy node; when its clock goes back, all moving edges are forgotten. (A listener sees to that, too.)
 
     Frames, times and durations are given as to tf2; see ``stamped`` for what a time may be. All lookups raise
 
@@ -59,9 +59,10 @@ class Buffer(BufferCore):
     - ``ExtrapolationException`` if an edge between them has no samples around that time.
     """
 
-    def __init__(self, cache_time: Any = None) -> None:
+    def __init__(self, cache_time: Any = None, node: Any = None) -> None:
         super().__init__(CACHE_NS if cache_time is None else nanoseconds(cache_time))
-        self._pollers: list[Callable[[], object]] = []
+        if node is not None:
+            self._jump = import_module("tfcompose.ros.listening").on_clock_jump(node, self.time_jump_callback)
 
     def set_transform(self, transform: Any, authority: str = "default_authority") -> bool:
         """Take a TransformStamped of a moving edge; return False if it was refused."""
@@ -71,58 +72,56 @@ class Buffer(BufferCore):
         """Take a TransformStamped of a fixed edge; return False if it was refused."""
         return not self.insert([_row(transform)], static=True, authority=authority)
 
-    def lookup_transform(self, target_frame: str, source_frame: str, time: Any, timeout: Any = 0) -> Any:
-        """Return the pose of ``source_frame`` in ``target_frame`` at a time as a TransformStamped.
+    def transform(self, object_stamped: Any, target_frame: str, timeout: Any = 0) -> Any:
+        """Return a message of the same type in another frame, at the time of its own stamp.
 
-        It takes coordinates in the source frame to the target frame. The stamp is the time asked for, or what time 0
-        stands for. With a ``timeout`` it waits so long for the transform to come.
+        Known are PointStamped, Vector3Stamped, PoseStamped, PoseWithCovarianceStamped and PointCloud2 (needs numpy).
+
+        Raises:
+            TypeException: if it is of another type.
         """
-        time_ns = nanoseconds(time)
-        if timeout == 0:
-            pose, stamp_ns = self._pose(target_frame, source_frame, time_ns)
-        else:
-            pose, stamp_ns = self._wait(lambda: self._pose(target_frame, source_frame, time_ns), timeout)
-        return transform_stamped(target_frame, source_frame, stamp_ns, pose)
+        move = transform_for(object_stamped)
+        header = object_stamped.header
+        return move(object_stamped, self.lookup_transform(target_frame, header.frame_id, header.stamp, timeout))
 
-    def lookup_transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
-        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str,
-        timeout: Any = 0,
-    ) -> Any:  # fmt: skip
-        """Return the pose of the source frame at one time in the target frame at another.
+    def transform_full(
+        self, object_stamped: Any, target_frame: str, target_time: Any, fixed_frame: str, timeout: Any = 0
+    ) -> Any:
+        """Return a message in another frame at another time, between which ``fixed_frame`` stands still.
 
-        Between the times ``fixed_frame`` is taken to stand still. The stamp is that of the target.
+        Raises:
+            TypeException: if it is of a type that ``transform`` does not know.
         """
-        times = nanoseconds(target_time), nanoseconds(source_time)
-        pose, stamp_ns = self._wait(
-            lambda: self._full_pose(target_frame, times[0], source_frame, times[1], fixed_frame), timeout
+        move = transform_for(object_stamped)
+        header = object_stamped.header
+        return move(
+            object_stamped,
+            self.lookup_transform_full(target_frame, target_time, header.frame_id, header.stamp, fixed_frame, timeout),
         )
-        return transform_stamped(target_frame, source_frame, stamp_ns, pose)
 
-    def can_transform(
-        self, target_frame: str, source_frame: str, time: Any, timeout: Any = 0, return_debug_tuple: bool = False  # noqa: FBT001, FBT002 (tf2's)
-    ) -> Any:  # fmt: skip
-        """Return whether ``lookup_transform`` would answer; with ``return_debug_tuple`` also why not."""
-        time_ns = nanoseconds(time)
-        reason = self._reason(lambda: self._pose(target_frame, source_frame, time_ns), timeout)
-        return (not reason, reason) if return_debug_tuple else not reason
+    def transform_points(self, cloud: ArrayLike, target: str, source: str, stamp: Any = 0) -> NDArray[Any]:
+        """Return points given in ``source`` in ``target``, at a time (0: the newest common one). Needs numpy.
 
-    def can_transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
-        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str,
-        timeout: Any = 0, return_debug_tuple: bool = False,  # noqa: FBT001, FBT002 (the same)
-    ) -> Any:  # fmt: skip
-        """Return whether ``lookup_transform_full`` would answer; with ``return_debug_tuple`` also why not."""
-        times = nanoseconds(target_time), nanoseconds(source_time)
-        reason = self._reason(
-            lambda: self._full_pose(target_frame, times[0], source_frame, times[1], fixed_frame), timeout
-        )
-        return (not reason, reason) if return_debug_tuple else not reason
+        ``cloud`` is N×3, or of any shape (…, 3), in metres; so is the result. float32 stays float32.
 
-    def get_latest_common_time(self, target_frame: str, source_frame: str) -> Any:
-        """Return the newest time that all moving edges between the two have reached; 0 where none moves."""
-        if target_frame == source_frame:
-            return time_of(self._newest_ns(target_frame))
-        with self._lock:
-            return time_of(self._chain(target_frame, source_frame).common_ns())
+        Raises:
+            InvalidArgumentException: if the last dimension is not 3.
+        """
+        pose, _ = self._pose(target, source, nanoseconds(stamp))
+        moved: NDArray[Any] = arrays("points").moved_points(cloud, pose)
+        return moved
+
+    def lookup_many(
+        self, target: str, source: str, stamps: ArrayLike, outside: Literal["raise", "nan"] = "raise"
+    ) -> Trajectory:
+        """Return the poses of ``source`` in ``target`` at many times at once. Needs numpy.
+
+        ``stamps`` are N integers, nanoseconds; 0 is the newest common time. What comes back is (``xyz`` N×3 in metres,
+        ``quat_xyzw`` N×4), and has ``matrices()`` (N×4×4): row by row what ``lookup`` returns. For a time that an edge
+        does not know, ``outside`` decides: raise ``ExtrapolationException``, or give a row of NaN.
+        """
+        found: Trajectory = arrays("trajectory").lookup_many(self, target, source, stamps, outside)
+        return found
 
     def all_frames(self) -> list[FrameInfo]:
         """Return what is known of each frame, in the order in which they were first heard of."""
@@ -140,44 +139,6 @@ class Buffer(BufferCore):
     def time_jump_callback(self, time_jump: object = None) -> None:  # noqa: ARG002 (what rclpy's clock gives)
         """Forget all samples of moving edges, since the clock went back."""
         self.clear()
-
-    def _full_pose(self, target: str, target_ns: int, source: str, source_ns: int, fixed: str) -> tuple[Seven, int]:
-        with self._lock:
-            for frame in (target, source, fixed):
-                self._require(frame)
-            first, _ = self._pose(fixed, source, source_ns)
-            second, stamp_ns = self._pose(target, fixed, target_ns)
-        return unit(product(second, first)), stamp_ns
-
-    def _reason(self, attempt: Callable[[], object], timeout: Any) -> str:
-        try:
-            self._wait(attempt, timeout)
-        except TransformException as error:
-            return str(error)
-        return ""
-
-    def _wait(self, attempt: Callable[[], _Answer], timeout: Any) -> _Answer:
-        """Return the answer as soon as there is one; raise what it raised last when the time is over.
-
-        Where a listener has no thread of its own the caller may be the one who would take its messages, so they are
-        taken here.
-        """
-        end_ns = monotonic_ns() + nanoseconds(timeout)
-        while True:
-            with self._news:
-                try:
-                    return attempt()
-                except InvalidArgumentException:
-                    raise
-                except TransformException:
-                    left_s = (end_ns - monotonic_ns()) / 1e9
-                    if left_s <= 0:
-                        raise
-                self._waiting += 1
-                self._news.wait(min(left_s, _POLL_S) if self._pollers else left_s)
-                self._waiting -= 1
-            for poll in tuple(self._pollers):
-                poll()
 
 
 def _row(transform: Any) -> Row:

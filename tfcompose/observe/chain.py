@@ -54,7 +54,7 @@ def _links(passed: Sequence[tuple[History, bool]]) -> list[Link]:
         if not history.static:
             links.append((history, None, backwards))
             continue
-        pose = inverse(history.poses[-1]) if backwards else history.poses[-1]
+        pose = inverse(history.pose(-1)) if backwards else history.pose(-1)
         before = links[-1][1] if links else None
         if before is not None:
             links[-1] = (None, product(pose, before), False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import Enum
 from math import isfinite, sqrt
 from threading import Condition, RLock
 from typing import TYPE_CHECKING
@@ -17,6 +16,7 @@ from tfcompose.observe.exceptions import (
     TransformException,
 )
 from tfcompose.observe.history import History
+from tfcompose.observe.refusal import DENORMALISED, Refusal, refusal
 from tfcompose.observe.rotation import IDENTITY, Seven
 from tfcompose.observe.walk import newest_ways, ways_at
 from tfcompose.pose import Pose
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 CACHE_NS = 10_000_000_000
-#: A quaternion whose squared length is off by this much is refused.
-DENORMALISED = 0.01
 # Closer to 1 than this a sum of four squares cannot be told from 1.
 _ROUNDING = 1e-15
 # So many chains are remembered at most.
@@ -35,17 +33,6 @@ _SECOND_NS = 1_000_000_000
 
 #: One transform: parent, child, seconds, nanoseconds, x y z in metres, quaternion x y z w.
 Row = tuple[str, str, int, int, float, float, float, float, float, float, float]
-
-
-class Refusal(Enum):
-    """Why a transform was not taken; the values are the words of tf2's log."""
-
-    SELF = "TF_SELF_TRANSFORM"
-    NO_CHILD = "TF_NO_CHILD_FRAME_ID"
-    NO_PARENT = "TF_NO_FRAME_ID"
-    NOT_FINITE = "TF_NAN_INPUT"
-    DENORMALISED = "TF_DENORMALIZED_QUATERNION"
-    OLD = "TF_OLD_DATA"
 
 
 class BufferCore:
@@ -103,7 +90,7 @@ class BufferCore:
                 if not (
                     -DENORMALISED < off < DENORMALISED and isfinite(x + y + z) and parent and child and child != parent
                 ):
-                    reason = _refusal(parent, child, (x, y, z, qx, qy, qz, qw))
+                    reason = refusal(parent, child, (x, y, z, qx, qy, qz, qw))
                     if reason:
                         refused.append((child, reason))
                         continue
@@ -114,14 +101,14 @@ class BufferCore:
                 if history is None or history.static is not static:
                     history = self._new_history(child, static=static)
                 outcome = history.insert(sec * _SECOND_NS + nsec, parent, (x, y, z, qx, qy, qz, qw), self.cache_ns)
+                if outcome != "taken" or history.mixed:
+                    self._names.setdefault(child)
+                    self._names.setdefault(parent)
                 if outcome == "old":
                     refused.append((child, Refusal.OLD))
                     continue
                 if outcome == "changed":
                     self._changed(history)
-                if outcome == "changed" or history.mixed:
-                    self._names.setdefault(child)
-                    self._names.setdefault(parent)
                 history.authority = authority
             if self._waiting:
                 self._news.notify_all()
@@ -178,21 +165,47 @@ class BufferCore:
             return str(error)
         return ""
 
+    def at_rest(self) -> RLock:
+        """Return a context in which nothing is taken, by any thread."""
+        return self._lock
+
+    def chain_for_all_times(self, target: str, source: str) -> Chain | None:
+        """Return the chain between two frames, or None where a frame has had several parents within the cache.
+
+        Raises:
+            LookupException, ConnectivityException, InvalidArgumentException: as ``lookup`` for time 0.
+        """
+        if self._mixed:
+            return None
+        return self._chain(target, source) if target != source else Chain((), ())
+
     def _pose(self, target: str, source: str, stamp_ns: int) -> tuple[Seven, int]:
         """Return what ``lookup`` does, as numbers."""
         with self._lock:
             if target == source:
                 return IDENTITY, stamp_ns or self._newest_ns(target)
             chain = self._chains.get((target, source)) or self._chain(target, source, stamp_ns)
-            if chain.fixed is not None:
-                return chain.fixed, stamp_ns
             at_ns = stamp_ns or chain.common_ns()
             if self._mixed and at_ns:
-                chain = Chain(*ways_at(self._histories, target, source, at_ns))
+                return self._pose_at(target, source, at_ns), at_ns
+            if chain.fixed is not None:
+                return chain.fixed, stamp_ns
             pose = chain.at(at_ns)
             if pose is None:
-                raise ExtrapolationException(self._why_not(chain, target, source, stamp_ns))
+                try:
+                    pose = self._pose_at(target, source, at_ns)
+                except ExtrapolationException as error:
+                    if stamp_ns:
+                        raise
+                    raise ExtrapolationException(reasons.no_common_time(chain.moving)) from error
             return pose, at_ns
+
+    def _pose_at(self, target: str, source: str, stamp_ns: int) -> Seven:
+        """Return the pose by the parents of that time; in a loop of frames the other way round may be the one."""
+        pose = Chain(*ways_at(self._histories, target, source, stamp_ns)).at(stamp_ns)
+        if pose is None:
+            raise ExtrapolationException(f"{source} has no pose in {target} at {reasons.seconds(stamp_ns)}")
+        return pose
 
     def _chain(self, target: str, source: str, stamp_ns: int = 0) -> Chain:
         """Return the chain between the two; the one by newest parents, if there is any, is remembered."""
@@ -215,18 +228,6 @@ class BufferCore:
         if frame not in self._names:
             raise LookupException(reasons.unknown_frame(frame, self._names))
 
-    def _why_not(self, chain: Chain, target: str, source: str, stamp_ns: int) -> str:
-        """Return why the chain has no pose at that time."""
-        if not stamp_ns:
-            behind = min(chain.moving, key=lambda history: history.newest_ns)
-            ahead = max(chain.moving, key=lambda history: history.oldest_ns)
-            return reasons.no_common_time(ahead, behind)
-        try:
-            ways_at(self._histories, target, source, stamp_ns)
-        except TransformException as error:
-            return str(error)
-        return f"{source} has no pose in {target} at {reasons.seconds(stamp_ns)}"
-
     def _new_history(self, child: str, *, static: bool) -> History:
         """Return the samples of a frame that is new, or fixed from now on, or moving from now on."""
         history = self._histories[child] = History(child, static=static)
@@ -241,17 +242,3 @@ class BufferCore:
     def _newest_ns(self, frame: str) -> int:
         history = self._histories.get(frame)
         return history.newest_ns if history and not history.static and len(history) else 0
-
-
-def _refusal(parent: str, child: str, pose: Seven) -> Refusal | None:
-    """Return why a transform is not taken; as in tf2 the first that holds counts."""
-    if parent == child:
-        return Refusal.SELF
-    if not child:
-        return Refusal.NO_CHILD
-    if not parent:
-        return Refusal.NO_PARENT
-    if not all(map(isfinite, pose)):
-        return Refusal.NOT_FINITE
-    x, y, z, w = pose[3:]
-    return None if abs(x * x + y * y + z * z + w * w - 1) < DENORMALISED else Refusal.DENORMALISED

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tfcompose.observe.buffer import Buffer, TransformException
+from tfcompose.observe.refusal import Refusal
 from tfcompose.ros.decoder import Decoder
 from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFSubscription, wait
@@ -20,7 +21,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What to echo: the pose of ``b`` in ``a``; once, or ``rate`` times a second; ``timeout_s`` without one ends it."""
+    """What to echo: the pose of ``b`` in ``a``; once, or ``rate`` times a second; ``timeout_s`` without one ends it.
+
+    ``at_ns`` is the time of the pose, in nanoseconds since the epoch; from 0 down it is counted from the newest.
+    """
 
     a: str
     b: str
@@ -28,6 +32,7 @@ class Asked:
     rate: float
     timeout_s: float
     namespace: str
+    at_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,54 +48,73 @@ def echo(asked: Asked, say: Callable[[Pose, int | None], None], stop: Stop) -> M
     A pose whose time is that of the last one is not new and not given again. Return None after one pose with ``once``,
     or when ``stop`` is requested; else why there was no new one for so long.
     """
-    buffer, decoder = Buffer(), Decoder()
+    ear = _Ear(asked)
     prefix = f"/{asked.namespace.strip('/')}" if asked.namespace else ""
     with open_node("tfcompose_echo", asked.namespace.strip("/")) as node:
         topics = [(True, f"{prefix}/tf_static"), (False, f"{prefix}/tf")]
         subscriptions = [(TFSubscription(node, static=static, topic=topic), static) for static, topic in topics]
         begun = last = time.monotonic()
-        next_at, messages, reason = begun, 0, ""
+        next_at = begun
         said_ns: int | None = None
         while not stop.requested:
             wait(node, [subscription for subscription, _ in subscriptions], 0.05, stop)
-            messages += sum(
-                _take(buffer, decoder, subscription, static=static) for subscription, static in subscriptions
-            )
+            for subscription, static in subscriptions:
+                ear.take(subscription, static=static)
             now = time.monotonic()
             if now < next_at:
                 continue
             try:
-                pose, stamp_ns = buffer.latest(asked.a, asked.b)
+                pose, stamp_ns = ear.pose()
             except TransformException as error:
                 reason = str(error)
             else:
                 if stamp_ns is None or stamp_ns != said_ns:
                     say(pose, stamp_ns)
-                    if asked.once:
+                    if asked.once or asked.at_ns > 0:
                         return None
                     said_ns, last, next_at = stamp_ns, now, now + 1 / asked.rate
                     continue
-                reason = f"nothing new came on {buffer.behind(asked.a, asked.b)} for {now - last:.1f} s"
+                reason = f"nothing new came on {ear.buffer.behind(asked.a, asked.b)} for {now - last:.1f} s"
             if now - last > asked.timeout_s:
-                return Missed(_why(reason, messages, now - begun))
+                return Missed(ear.why(reason, now - begun))
     return None
 
 
-def _take(buffer: Buffer, decoder: Decoder, subscription: TFSubscription, *, static: bool) -> int:
-    count = 0
-    for received in subscription.take():
-        count += 1
-        try:
-            buffer.insert(decoder.rows(received.data), static=static)
-        except ValueError:
-            continue
-    return count
+class _Ear:
+    """What was heard, and what follows from it."""
 
+    def __init__(self, asked: Asked) -> None:
+        self.buffer = Buffer()
+        self._asked = asked
+        self._decoder = Decoder()
+        self._messages = 0
+        self._too_old: str | None = None
 
-def _why(reason: str, messages: int, seconds: float) -> str:
-    if messages:
-        return reason
-    return (
-        f"no TF message came for {seconds:.1f} s; is the robot running, "
-        "and with the same ROS_DOMAIN_ID and discovery range?"
-    )
+    def take(self, subscription: TFSubscription, *, static: bool) -> None:
+        for received in subscription.take():
+            self._messages += 1
+            try:
+                refused = self.buffer.insert(self._decoder.rows(received.data), static=static)
+            except ValueError:
+                continue
+            self._too_old = next((child for child, why in refused if why is Refusal.OLD), self._too_old)
+
+    def pose(self) -> tuple[Pose, int | None]:
+        a, b, at_ns = self._asked.a, self._asked.b, self._asked.at_ns
+        if at_ns > 0:
+            return self.buffer.lookup(a, b, at_ns)
+        pose, stamp_ns = self.buffer.latest(a, b)
+        return self.buffer.lookup(a, b, stamp_ns + at_ns) if stamp_ns and at_ns else (pose, stamp_ns)
+
+    def why(self, reason: str, seconds: float) -> str:
+        """Return the reason with what explains it."""
+        if not self._messages:
+            return (
+                f"no TF message came for {seconds:.1f} s; is the robot running, "
+                "and with the same ROS_DOMAIN_ID and discovery range?"
+            )
+        if self._too_old is None:
+            return reason
+        return (
+            f"{reason}; what came for {self._too_old} was too old to be taken: did a bag or a simulation start again?"
+        )

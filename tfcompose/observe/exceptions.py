@@ -27,3 +27,7 @@ class InvalidArgumentException(TransformException):
 
 class TimeoutException(TransformException):
     """Raised by nothing here; it is there for programs that catch it."""
+
+
+class TypeException(Exception):
+    """Raised when a message of that type cannot be transformed; as in tf2 it is no TransformException."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from bisect import bisect_right
 from typing import Literal
 
@@ -19,6 +20,7 @@ class History:
 
     ``parent`` is that of the newest sample, and empty where all samples were cleared; ``mixed`` says that samples have
     different parents. Of samples of one time only the first and the last that came are kept: no answer depends on more.
+    Times and poses are kept as plain numbers, seven for a pose, which takes a quarter of the memory of objects.
     """
 
     __slots__ = ("authority", "child", "mixed", "parent", "parents", "poses", "stamps", "start", "static")
@@ -37,8 +39,8 @@ class History:
         self.parent = ""
         self.mixed = False
         self.start = 0
-        self.stamps: list[int] = []
-        self.poses: list[Seven] = []
+        self.stamps = array("q")
+        self.poses = array("d")
         self.parents: list[str] = []
 
     @property
@@ -58,7 +60,7 @@ class History:
         stamps = self.stamps
         if not stamps:
             stamps.append(stamp_ns)
-            self.poses.append(pose)
+            self.poses.extend(pose)
             self.parents.append(parent)
             self.parent = parent
             return "changed"
@@ -71,13 +73,18 @@ class History:
             return "old"
         if stamp_ns > newest:
             stamps.append(stamp_ns)
-            self.poses.append(pose)
+            self.poses.extend(pose)
             self.parents.append(parent)
         else:
             self._sort_in(stamp_ns, parent, pose)
         if parent != self.parent or self.mixed:
             return self._of_several_parents()
         return "taken"
+
+    def pose(self, index: int) -> Seven:
+        """Return the pose of one sample; −1 is the newest."""
+        x, y, z, qx, qy, qz, qw = self.poses[7 * index : 7 * index + 7 or None]
+        return x, y, z, qx, qy, qz, qw
 
     def at(self, stamp_ns: int) -> Seven | None:
         """Return the pose at that time (0: the newest), between two samples of one parent interpolated.
@@ -86,18 +93,19 @@ class History:
         """
         stamps = self.stamps
         if self.static or not stamp_ns:
-            return self.poses[-1] if stamps else None
+            return self.pose(-1) if stamps else None
         index = bisect_right(stamps, stamp_ns, self.start)
         if index == len(stamps):
-            return self.poses[-1] if stamps and stamps[-1] == stamp_ns else None
+            return self.pose(-1) if stamps and stamps[-1] == stamp_ns else None
         if index == self.start:
             return None
         before = stamps[index - 1]
         if before == stamp_ns:
-            return self.poses[self.start if before == stamps[self.start] else index - 1]
+            return self.pose(self.start if before == stamps[self.start] else index - 1)
         if self.mixed and self.parents[index - 1] != self.parents[index]:
-            return self.poses[index - 1]
-        return between(self.poses[index - 1], self.poses[index], (stamp_ns - before) / (stamps[index] - before))
+            return self.pose(index - 1)
+        part = (stamp_ns - before) / (stamps[index] - before)
+        return between(self.poses[7 * index - 7 : 7 * index + 7], part)
 
     def parent_at(self, stamp_ns: int) -> str:
         """Return the parent of the pose that ``at`` gives, or nothing where that is None."""
@@ -111,8 +119,9 @@ class History:
         return self.parents[self.start if first else index - 1]
 
     def _replace(self, stamp_ns: int, parent: str, pose: Seven) -> Outcome:
-        same = self.poses == [pose] and self.parent == parent
-        self.stamps, self.poses, self.parents, self.parent = [stamp_ns], [pose], [parent], parent
+        poses = array("d", pose)
+        same = self.poses == poses and self.parent == parent
+        self.stamps, self.poses, self.parents, self.parent = array("q", [stamp_ns]), poses, [parent], parent
         return "taken" if same else "changed"
 
     def _sort_in(self, stamp_ns: int, parent: str, pose: Seven) -> None:
@@ -120,13 +129,13 @@ class History:
         begin = end
         while begin > self.start and self.stamps[begin - 1] == stamp_ns:
             begin -= 1
-            if self.poses[begin] == pose and self.parents[begin] == parent:
+            if self.pose(begin) == pose and self.parents[begin] == parent:
                 return
         if end - begin > 1:
-            self.poses[end - 1], self.parents[end - 1] = pose, parent
+            self.poses[7 * end - 7 : 7 * end], self.parents[end - 1] = array("d", pose), parent
             return
         self.stamps.insert(end, stamp_ns)
-        self.poses.insert(end, pose)
+        self.poses[7 * end : 7 * end] = array("d", pose)
         self.parents.insert(end, parent)
 
     def _of_several_parents(self) -> Outcome:
@@ -142,5 +151,5 @@ class History:
             start += 1
         self.start = start
         if start > _COMPACT:
-            del self.stamps[:start], self.poses[:start], self.parents[:start]
+            del self.stamps[:start], self.poses[: 7 * start], self.parents[:start]
             self.start = 0

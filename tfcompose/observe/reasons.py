@@ -64,11 +64,15 @@ def outside(history: History, stamp_ns: int) -> str:
     )
 
 
-def no_common_time(history: History, behind: History) -> str:
-    """Return that ``history`` has nothing at the newest time of the edge that is behind."""
-    edge, other = f"{history.parent} → {history.child}", f"{behind.parent} → {behind.child}"
-    ahead = _ms(history.oldest_ns - behind.newest_ns)
-    return f"{edge} begins {ahead} after the last of {other}: they have no time in common (extrapolation into the past)"
+def no_common_time(moving: Sequence[History]) -> str:
+    """Return which edge has nothing at the newest time of the edge that is behind."""
+    behind = min(moving, key=lambda history: history.newest_ns)
+    ahead = max(moving, key=lambda history: history.oldest_ns)
+    gap = _ms(ahead.oldest_ns - behind.newest_ns)
+    return (
+        f"{ahead.parent} → {ahead.child} begins {gap} after the last of {behind.parent} → {behind.child}: "
+        "they have no time in common (extrapolation into the past)"
+    )
 
 
 def seconds(stamp_ns: int) -> str:

@@ -6,6 +6,10 @@
 from __future__ import annotations
 
 from math import acos, sin, sqrt
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 Seven = tuple[float, float, float, float, float, float, float]
 
@@ -63,21 +67,19 @@ def unit(a: Seven) -> Seven:
     return (x, y, z, qx * scale, qy * scale, qz * scale, qw * scale)
 
 
-def between(a: Seven, b: Seven, part: float) -> Seven:
-    """Return the pose that is ``part`` (0 to 1) of the way from ``a`` to ``b``.
+def between(two: Sequence[float], part: float) -> Seven:
+    """Return the pose that is ``part`` (0 to 1) of the way from the first to the second of two, 14 numbers.
 
     Positions go straight and rotations on the great circle, the short way (Shoemake, 1985), as in tf2.
     """
-    ax, ay, az, aqx, aqy, aqz, aqw = a
-    bx, by, bz, bqx, bqy, bqz, bqw = b
+    ax, ay, az, aqx, aqy, aqz, aqw, bx, by, bz, bqx, bqy, bqz, bqw = two
     dot = aqx * bqx + aqy * bqy + aqz * bqz + aqw * bqw
     cosine = -dot if dot < 0 else dot
-    if cosine > _CHORD:
-        p, q = 1 - part, part
-    else:
+    p, q = 1 - part, part
+    if cosine < _CHORD:
         angle = acos(cosine)
         whole = 1 / sin(angle)
-        p, q = sin((1 - part) * angle) * whole, sin(part * angle) * whole
+        p, q = sin(p * angle) * whole, sin(part * angle) * whole
     if dot < 0:
         q = -q
     return (

@@ -10,15 +10,18 @@ if TYPE_CHECKING:
     from tfcompose.pose import Pose
 
 
-def pose_text(parent: str, child: str, pose: Pose, when: str = "") -> str:
-    """Return the pose of ``child`` in ``parent``: metres, quaternion x y z w, fixed-axis angles in both units."""
+def pose_text(parent: str, child: str, pose: Pose, when: str = "", decimals: int = 4) -> str:
+    """Return the pose of ``child`` in ``parent``: metres, quaternion x y z w, fixed-axis angles in both units.
+
+    Degrees have two decimals fewer.
+    """
     degrees = tuple(math.degrees(angle) for angle in pose.rpy)
     return (
         f"pose of {child} in {parent}{when}\n"
-        f"  xyz        [{_row(pose.xyz)}] m\n"
-        f"  quat_xyzw  [{_row(pose.quat_xyzw)}]\n"
-        f"  rpy        [{_row(pose.rpy)}] rad\n"
-        f"             [{_row(degrees, 2)}] deg\n"
+        f"  xyz        [{_row(pose.xyz, decimals)}] m\n"
+        f"  quat_xyzw  [{_row(pose.quat_xyzw, decimals)}]\n"
+        f"  rpy        [{_row(pose.rpy, decimals)}] rad\n"
+        f"             [{_row(degrees, max(decimals - 2, 0))}] deg\n"
     )
 
 
@@ -29,5 +32,5 @@ def pose_json(parent: str, child: str, pose: Pose, **more: float | None) -> str:
     return json.dumps(row | more, ensure_ascii=False) + "\n"
 
 
-def _row(values: tuple[float, ...], decimals: int = 4) -> str:
+def _row(values: tuple[float, ...], decimals: int) -> str:
     return ", ".join(f"{round(value, decimals) + 0.0:.{decimals}f}" for value in values)

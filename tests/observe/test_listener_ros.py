@@ -1,0 +1,224 @@
+"""Programs written for tf2_ros run with this package's classes, and the listener takes what tf2's would."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+import rclpy
+from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.time import Time
+
+from tfcompose.observe import Buffer, LookupException, TransformException, TransformListener
+from tfcompose.plan import PlanProcess, Simulation
+from tfcompose.pose import Pose
+from tfcompose.ros.graph import writers
+from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.node import open_node
+from tfcompose.ros.tf import TFPublisher
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from tfcompose.plan import PlanEdge
+
+pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
+
+PROGRAMS = Path(__file__).parent / "programs"
+S = 1_000_000_000
+UNIT = (0.0, 0.0, 0.0, 1.0)
+
+
+@pytest.fixture
+def rover(write: Callable[..., Path], start: Callable[..., Any], edge: Callable[..., PlanEdge]) -> None:
+    """A base that stands at x = 2 in odom, with a laser 0.3 m above it."""
+    edges = [edge("odom base_link", "drive"), edge("base_link laser_link", pose=Pose((0.0, 0.0, 0.3)))]
+    drive = PlanProcess("drive", "simulate", simulate=Simulation("fixed", 50.0, pose=Pose((2.0, 0.0, 0.0))))
+    plan = write(edges, PlanProcess("static", "static"), drive)
+    for module, name in (("static", "static"), ("simulate", "drive")):
+        start(f"tfcompose.run.{module}", plan, name).until_says("edge")
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Callable[..., str]:
+    """Run a program with nothing but its imports of tf2_ros changed; return its output."""
+
+    def run(name: str, *arguments: str) -> str:
+        lines = (PROGRAMS / f"{name}.py").read_text("utf-8").splitlines(keepends=True)
+        changed = [line.replace("from tf2_ros import", "from tfcompose.observe import") for line in lines]
+        assert not any("tf2_ros" in line for line in changed)
+        assert sum(a != b for a, b in zip(lines, changed, strict=True)) == 1
+        file = tmp_path / f"{name}.py"
+        file.write_text("".join(changed), "utf-8")
+        done = subprocess.run(
+            [sys.executable, file, *arguments], capture_output=True, text=True, timeout=30, check=False
+        )
+        assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
+        return done.stdout
+
+    return run
+
+
+@pytest.mark.usefixtures("rover")
+def test_a_listener_program_runs_after_changing_its_imports(program: Callable[..., str]) -> None:
+    """Its wait for the next sample is in a timer's callback, which keeps the executor from hearing it."""
+    said = [line for line in program("listener").splitlines() if not line.startswith("not yet: no frame")]
+    assert said[0] == "laser_link in base_link: (0.000, 0.000, 0.300) base_link laser_link"
+    assert said[-2:] == ["point in odom: (4.000, 0.000, 0.300)", "end"]
+
+
+@pytest.mark.usefixtures("rover")
+@pytest.mark.parametrize("arguments", [(), ("--thread",)])
+def test_a_program_moves_clouds_at_their_own_time(program: Callable[..., str], arguments: tuple[str, ...]) -> None:
+    said = [line for line in program("cloud", *arguments).splitlines() if not line.startswith("not yet: ")]
+    assert said == ["cloud in odom: 2.000 keep", "same time: True", "end"]
+
+
+@pytest.fixture
+def node(domain: object) -> Iterator[Any]:
+    assert domain
+    with open_node("asks", "/test") as opened:
+        yield opened
+
+
+@pytest.fixture
+def executor(node: Any) -> Iterator[Callable[[float], None]]:
+    """Spin the node's executor for some seconds."""
+    spinner = SingleThreadedExecutor(context=node.context)
+    spinner.add_node(node)
+    yield lambda seconds: spinner.spin_once(timeout_sec=seconds)
+    spinner.shutdown()
+
+
+def one(x: float, stamp_ns: int, parent: str = "odom", child: str = "base_link") -> bytes:
+    return encode([Transform(stamp_ns, parent, child, (x, 0.0, 0.0), UNIT)])
+
+
+def test_a_node_that_is_handed_over_is_fed_by_its_executor(
+    node: Any, executor: Callable[[float], None], until: Callable[..., bool]
+) -> None:
+    buffer = Buffer()
+    listener = TransformListener(buffer, node)
+    with open_node("talks", "/test") as other:
+        moving, fixed = TFPublisher(other, static=False), TFPublisher(other, static=True)
+        assert until(lambda: moving.publisher.get_subscription_count() == 1)
+        fixed.publish(one(0.5, 0, "base_link", "laser"))
+        moving.publish(one(1.0, 5 * S))
+
+        def both() -> bool:
+            executor(0.05)
+            return bool(buffer.can_transform("odom", "laser", Time()))
+
+        assert until(both)
+    found = buffer.lookup_transform("odom", "laser", Time())
+    assert type(found).__module__.startswith("geometry_msgs")
+    assert (found.transform.translation.x, found.header.stamp.sec) == (1.5, 5)
+    listener.close()
+    listener.close()
+
+
+def test_the_subscriptions_are_those_of_tf2(node: Any) -> None:
+    listener = TransformListener(Buffer(), node)
+    profiles = {name: node.get_subscriptions_info_by_topic(name)[0].qos_profile for name in ("/tf", "/tf_static")}
+    listener.close()
+    assert {profile.reliability.name for profile in profiles.values()} == {"RELIABLE"}
+    assert profiles["/tf"].durability.name == "VOLATILE"
+    assert profiles["/tf_static"].durability.name == "TRANSIENT_LOCAL"
+
+
+def test_a_listener_without_a_node_hears_a_namespace_from_its_own_thread(until: Callable[..., bool]) -> None:
+    before = threading.active_count()
+    buffer = Buffer()
+    with open_node("talks", "") as other, TransformListener(buffer, namespace="robot1"):
+        publisher = TFPublisher(other, static=True, topic="/robot1/tf_static")
+        publisher.publish(one(0.5, 0))
+        assert buffer.lookup_transform("odom", "base_link", 0, timeout=10 * S).transform.translation.x == 0.5
+        assert [writer.node for writer in writers(other, "/robot1/tf_static")] == ["/talks"]
+    assert until(lambda: threading.active_count() == before), "the listener's thread has ended"
+
+
+def test_a_wait_ends_when_the_transform_comes_and_not_later() -> None:
+    buffer = Buffer()
+    timer = threading.Timer(0.2, lambda: buffer.set("odom", "base_link", Pose(), S, static=False))
+    timer.start()
+    begun = time.monotonic()
+    buffer.lookup_transform("odom", "base_link", Time(), timeout=Duration(seconds=10))
+    assert 0.15 < time.monotonic() - begun < 2
+    begun = time.monotonic()
+    with pytest.raises(LookupException, match="no frame laser"):
+        buffer.lookup_transform("odom", "laser", Time(), timeout=Duration(seconds=0.3))
+    assert 0.25 < time.monotonic() - begun < 2
+    timer.join()
+
+
+def test_bytes_that_are_no_message_and_transforms_that_tf2_refuses_are_said_once_and_the_listener_lives_on(
+    node: Any, until: Callable[..., bool], capfd: pytest.CaptureFixture[str]
+) -> None:
+    buffer = Buffer()
+    listener = TransformListener(buffer, node)
+    bad = [b"\0\1\0\0\xff\xff\xff\xff", one(0, S, "base_link", "base_link"), one(float("nan"), S)]
+    with open_node("talks", "/test") as other:
+        publisher = TFPublisher(other, static=False)
+        assert until(lambda: publisher.publisher.get_subscription_count() == 1)
+        for data in (*bad, *bad, one(1.0, S)):
+            publisher.publish(data)
+        assert buffer.lookup_transform("odom", "base_link", 0, timeout=10 * S).transform.translation.x == 1.0
+    listener.close()
+    said = capfd.readouterr().err
+    assert said.count("no TFMessage") == 1
+    assert said.count("TF_SELF_TRANSFORM: a transform of base_link was dropped: it is its own parent") == 1
+    assert said.count("TF_NAN_INPUT") == 1
+
+
+def test_when_the_clock_goes_back_moving_edges_are_forgotten(node: Any) -> None:
+    buffer = Buffer()
+    listener = TransformListener(buffer, node)
+    clock = node.get_clock()
+    clock._set_ros_time_is_active(True)  # noqa: FBT003 (rclpy's)
+    clock.set_ros_time_override(Time(seconds=100, clock_type=clock.clock_type))
+    buffer.set("odom", "base_link", Pose(), 100 * S, static=False)
+    buffer.set("base_link", "laser", Pose(), 0, static=True)
+    clock.set_ros_time_override(Time(seconds=101, clock_type=clock.clock_type))
+    assert buffer.can_transform("odom", "laser", Time())
+    clock.set_ros_time_override(Time(seconds=5, clock_type=clock.clock_type))
+    assert not buffer.can_transform("odom", "laser", Time())
+    assert buffer.can_transform("base_link", "laser", Time())
+    assert buffer.set("odom", "base_link", Pose(), 5 * S, static=False), "what comes now is not too old"
+    listener.close()
+
+
+def test_a_program_that_never_closes_its_listener_ends(domain: Any) -> None:
+    code = "from tfcompose.observe import Buffer, Listener; Listener(Buffer()); print('up', flush=True)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=20, check=False, env=domain.environment
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "up\n", "")
+
+
+def test_a_wait_is_ended_by_ctrl_c(domain: Any) -> None:
+    code = (
+        "from tfcompose.observe import Buffer, Listener\nbuffer = Buffer()\nListener(buffer)\nprint('up', flush=True)\n"
+        "try:\n    buffer.lookup_transform('a', 'b', 0, 60 * 10**9)\nexcept KeyboardInterrupt:\n    print('out')"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=domain.environment
+    ) as it:
+        assert it.stdout
+        assert it.stdout.readline() == "up\n"
+        it.send_signal(signal.SIGINT)
+        assert it.stdout.read() == "out\n"
+        assert it.wait(10) == 0
+
+
+def test_rclpy_is_not_started_by_importing_the_classes() -> None:
+    code = "import tfcompose.observe, sys; print([m for m in ('rclpy', 'numpy') if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+    assert issubclass(LookupException, TransformException)
+    assert rclpy is not None

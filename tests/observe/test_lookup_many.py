@@ -24,7 +24,7 @@ def drive(turn: float = 0.1) -> Buffer:
     return buffer
 
 
-@pytest.mark.parametrize("turn", [0.1, 9.0], ids=["small angles between samples", "large ones"])
+@pytest.mark.parametrize("turn", [0.1, 25.0], ids=["small angles between samples", "large ones"])
 @pytest.mark.parametrize("order", ["ascending", "shuffled"])
 def test_the_rows_are_the_lookups_in_the_order_of_the_times(turn: float, order: str) -> None:
     buffer = drive(turn)

@@ -17,7 +17,7 @@ from tfcompose.observe import (
 )
 from tfcompose.observe.refusal import Refusal
 from tfcompose.observe.stamped import Header, Quaternion, Time, Transform, TransformStamped, Vector3
-from tfcompose.pose import Pose
+from tfcompose.pose import Pose, angle_between, quat_from_rpy
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -76,6 +76,8 @@ def test_a_quaternion_a_little_off_is_brought_to_length_1() -> None:
     buffer = Buffer()
     assert buffer.set("a", "b", Pose((0, 0, 0), (0, 0, 0.6, 0.803)), S, static=False)
     assert math.hypot(*buffer.lookup("a", "b")[0].quat_xyzw) == pytest.approx(1, abs=1e-15)
+    buffer.set("b", "c", at(100), 0, static=True)
+    assert math.hypot(*buffer.lookup("a", "c")[0].xyz) == pytest.approx(100, abs=1e-12), "turning does not stretch"
 
 
 def test_data_older_than_the_cache_is_refused_and_the_rest_of_the_message_is_taken() -> None:
@@ -177,6 +179,10 @@ def test_the_newest_common_time_passes_by_fixed_edges_and_time_zero() -> None:
     assert buffer.get_latest_common_time("map", "laser").nanoseconds == 4 * S
     assert buffer.get_latest_common_time("base", "laser").nanoseconds == 0
     assert buffer.get_latest_common_time("base", "base").nanoseconds == 4.5 * S
+    buffer.set("laser", "mirror", at(0.1), 0, static=False)
+    assert buffer.get_latest_common_time("map", "mirror").nanoseconds == 4 * S
+    assert buffer.get_latest_common_time("laser", "mirror").nanoseconds == 0
+    assert x_of(buffer, "laser", "mirror") == 0.1
 
 
 @pytest.mark.parametrize("name", ["", "/base"])
@@ -210,9 +216,25 @@ def test_between_two_times_the_fixed_frame_stands_still() -> None:
     assert "extrapolation into the future" in reason
 
 
+def test_between_two_times_rotations_count_in_the_order_of_the_frames() -> None:
+    buffer = Buffer()
+    for second, yaw in ((1, 0.7), (2, math.pi / 2)):
+        buffer.set("odom", "base", Pose((2.0, 0.0, 0.0), quat_from_rpy(0, 0, yaw)), second * S, static=False)
+    buffer.set("base", "laser", Pose((1.0, 0.0, 0.0), quat_from_rpy(0, math.pi / 2, 0)), 0, static=True)
+    found = buffer.lookup_transform_full("laser", 2 * S, "base", S, "odom").transform
+    expected = buffer.lookup("laser", "odom", 2 * S)[0] @ buffer.lookup("odom", "base", S)[0]
+    xyz = found.translation.x, found.translation.y, found.translation.z
+    assert xyz == pytest.approx(expected.xyz, abs=1e-12)
+    turn = found.rotation.x, found.rotation.y, found.rotation.z, found.rotation.w
+    assert angle_between(turn, expected.quat_xyzw) < 1e-12
+    other = buffer.lookup("odom", "base", S)[0] @ buffer.lookup("laser", "odom", 2 * S)[0]
+    assert angle_between(turn, other.quat_xyzw) > 0.5, "in the other order it would be another rotation"
+
+
 def test_clear_forgets_what_moves_and_keeps_what_is_fixed_and_the_names() -> None:
     buffer = moving(("odom", "base", 1.0, 5.0))
     buffer.set("base", "laser", at(0.1), 0, static=True)
+    assert x_of(buffer, "odom", "laser") == 1.1
     buffer.clear()
     assert buffer.frames == {"odom", "base", "laser"}
     assert x_of(buffer, "base", "laser") == 0.1

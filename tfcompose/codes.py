@@ -60,6 +60,8 @@ CODES = {
     "TF312": "part_with_other_settings",
     "TF313": "part_without_one_root",
     "TF314": "publish_frequency_too_low",
+    "TF315": "joint_outside_description",
+    "TF316": "shared_frame_in_description",
     # poses and conventions
     "TF401": "optical_frame_not_rotated",
     "TF402": "quaternion_not_unit",

@@ -346,7 +346,8 @@ class Process:
     """A process of the plan, before it is a command line.
 
     It runs a ``package``'s ``executable``, a ``launch`` file (``package/file``), or else the command ``argv``, which
-    for the others holds the arguments. ``part`` is the ``Part`` that it belongs to, if any.
+    for the others holds the arguments. ``part`` is the ``Part`` that it belongs to, if any. ``describes`` says that its
+    parameter ``robot_description`` is the URDF for a stock robot_state_publisher.
     """
 
     name: str
@@ -371,6 +372,7 @@ class Process:
     simulate: Simulation | None = None
     rate: float | None = None
     part: str = ""
+    describes: bool = False
 
     @property
     def node(self) -> str:

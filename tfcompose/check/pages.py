@@ -154,6 +154,14 @@ tfcompose echo, and give it under sensors.NAME.frames; or choose options without
     "TF607": """A preset of your own has the name of one that comes with tfcompose, and stands before it.
 
 If that is meant, allow the finding; else give it another name, so that a reader knows which one is used.""",
+    "TF315": """A joint is not in the description that a stock robot_state_publisher gets.
+
+ros: {state_publisher: stock} hands everything below the base to it, and nothing else publishes joints then. Choose a
+base above the joint, or leave joints to tfcompose.""",
+    "TF316": """A shared frame is in the description that a stock robot_state_publisher gets.
+
+It writes its frame_prefix in front of every frame, shared or not. Leave joints to tfcompose, which knows the
+difference.""",
     "TF610": """A calibration file, or a value in it, cannot be read.
 
 The note shows where. An entry holds numbers: no expressions, no units; of tags only xacro's !degrees and !radians.""",

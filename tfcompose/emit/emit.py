@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import posixpath
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.emit.final import with_final_names
 from tfcompose.emit.params import params_file, written_params
@@ -17,7 +17,7 @@ from tfcompose.plan import DESCRIPTION
 from tfcompose.planfile import write_plan
 
 if TYPE_CHECKING:
-    from tfcompose.model import Robot
+    from tfcompose.model import Process, Robot
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,15 +34,28 @@ def emit(robot: Robot, target: Target = AS_WRITTEN) -> tuple[File, ...]:
     ``target`` says where they are written and how they address meshes.
     """
     live = with_final_names(robot)
-    written = {process.name: written_params(process) for process in robot.processes}
-    params = tuple(File(f"params/{name}.yaml", params_file(nodes)) for name, nodes in written.items() if nodes)
+    descriptions = {
+        part: _descriptions(robot_of, target, f"{part}/" if part else "") for part, robot_of in _alone(robot)
+    }
+    stock = {part: files[1].text for part, files in descriptions.items()}
     return (
         File("plan.json", write_plan(plan_of(live, target))),
-        *_descriptions(robot, target),
-        *(file for part in robot.parts for file in _descriptions(part.robot, target, f"{part.name}/")),
+        *(file for files in descriptions.values() for file in files),
         File("tree.txt", tree(live)),
-        *params,
+        *(_params(process, nodes, stock) for process in robot.processes if (nodes := written_params(process))),
     )
+
+
+def _alone(robot: Robot) -> list[tuple[str, Robot]]:
+    """Return what has a description of its own: the robot, and each part that is a robot, by its name."""
+    return [("", robot), *((part.name, part.robot) for part in robot.parts)]
+
+
+def _params(process: Process, nodes: dict[str, dict[str, Any]], stock: dict[str, str]) -> File:
+    """Return the process's parameters; a stock publisher's with the description that is meant for it."""
+    if process.describes:
+        nodes = {node: params | {"robot_description": stock[process.part]} for node, params in nodes.items()}
+    return File(f"params/{process.name}.yaml", params_file(nodes))
 
 
 def _descriptions(robot: Robot, target: Target, folder: str = "") -> tuple[File, ...]:

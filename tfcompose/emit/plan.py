@@ -70,8 +70,9 @@ def _needed(robot: Robot) -> list[Process]:
     """
     owners = {edge.owner for edge in robot.edges}
     idle = {process.name for process in robot.processes if process.kind in _PUBLISHERS and process.name not in owners}
+    own = {process.name for process in robot.processes if process.kind == "joints"} - idle
     for name in {_below(process.part, STATIC) for process in robot.processes}:
-        if _below(name.removesuffix(STATIC).rstrip("/"), JOINTS) in idle:
+        if _below(name.removesuffix(STATIC).rstrip("/"), JOINTS) not in own:
             idle.discard(name)
     return sorted((p for p in robot.processes if p.name not in idle), key=lambda process: _ORDER.get(process.kind, 2))
 

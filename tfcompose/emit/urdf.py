@@ -6,7 +6,7 @@ are fixed-axis angles, an axis is given in the joint's frame.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -42,14 +42,20 @@ class Body:
 
 
 def body_of(robot: Robot, target: Target = AS_WRITTEN) -> Body:
-    """Return the links and joints below ``robot.base``. The two ways to write them differ in few joints."""
+    """Return the links and joints below ``robot.base``. The two ways to write them differ in few joints.
+
+    For a stock publisher the root has no inertia: it has no use for one, and KDL, which it reads URDF with, takes none
+    there and warns at each start.
+    """
     if robot.base is None:
         raise ValueError(f"{robot.name} has no base")
     edges = list(_below(robot.base, robot.children()))
     links: list[str] = []
-    for frame in [robot.base, *(edge.child for edge in edges)]:
-        links += link_lines(frame, robot.links.get(frame), target)
-    full, stock = list(links), links
+    for edge in edges:
+        links += link_lines(edge.child, robot.links.get(edge.child), target)
+    root = robot.links.get(robot.base)
+    full = link_lines(robot.base, root, target) + links
+    stock = link_lines(robot.base, root and replace(root, inertial=None), target) + links
     for edge, name in zip(edges, _joint_names(edges), strict=True):
         joint = _joint(edge, name, _kind(edge))
         full += joint

@@ -158,6 +158,7 @@ class _Part:
             "namespace": "/".join(part.strip("/") for part in parts if part.strip("/")),
             "frame_prefix": f"{self.outer_prefix}{self.prefix}",
             "shared_frames": [name for name in ros.shared_frames if name in _named_in(inner.data)],
+            "state_publisher": ros.state_publisher if self.alone else "tfcompose",
             "isolate": ros.isolate if self.prefix else _topics_only(ros.isolate),
             **{key: getattr(ros, key) for key in _SHARED_SETTINGS if getattr(ros, key) is not None},
         }

@@ -125,12 +125,23 @@ def resolve(
         hardware=tuple(one for part in joined if not part.said.namespace for one in part.robot.hardware),
         blocks=tuple(one for part in joined if not part.said.namespace for one in part.robot.blocks),
     )
+    return Resolved(_completed(robot, spec, source, disk, found), tuple(found), tuple(allows))
+
+
+def _completed(
+    robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None, found: list[Diagnostic]
+) -> Robot:
+    """Return the robot with what stands beside links and joints, its base, and its processes' topics and publishers."""
     if spec.ros2_control or spec.xml:
         robot, refused = _with_blocks(robot, spec, source)
         found += refused
     robot = replace(robot, base=_base(robot, spec, source, found))
-    isolated, refused = isolate(robot, spec.ros, source, disk)
-    return Resolved(isolated, (*found, *refused), tuple(allows))
+    if spec.ros.state_publisher == "stock":
+        robot, refused = import_module("tfcompose.resolve.stock").with_stock(robot)
+        found += refused
+    robot, refused = isolate(robot, spec.ros, source, disk)
+    found += refused
+    return robot
 
 
 def _with_blocks(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Diagnostic]]:

@@ -91,6 +91,11 @@ class RosSpec(Model):
     domain_id: int | None = key(integer(0, 232), None, "left out: the environment's")
     discovery: str | None = key(choice("localhost", "subnet", "off"), None, "left out: the environment's")
     clock: str = key(choice("wall", "sim"), "wall", "one clock for the whole plan")
+    state_publisher: str = key(
+        choice("tfcompose", "stock"),
+        "tfcompose",
+        "stock: robot_state_publisher publishes all below base that is ours",
+    )
 
 
 class RobotSpec(Model):

@@ -21,13 +21,14 @@ def root_link_with_inertia(robot: Robot) -> Iterator[Diagnostic]:
 
     KDL takes no inertia for a tree's root: it warns at each start, and leaves the mass out of dynamics. Put a bodiless
     root above: ``base: base_footprint`` with ``base_link: {parent: base_footprint}``. Where nothing uses KDL (tfcompose
-    itself does not) the inertia of the root is right, and is left alone.
+    itself does not) the inertia of the root is right, and is left alone; ``robot.urdf``, which is for a stock
+    robot_state_publisher, is written without it.
     """
     root = robot.links.get(robot.base or "")
     if root is None or root.inertial is None:
         return
     for process in robot.processes:
-        if process.package in READERS:
+        if process.package in READERS and not process.describes:  # what tfcompose starts gets a root without one
             message = f"the root link {root.name} has an inertia, which {process.package} leaves out"
             notes = [Note(f"{process.name} is started here", process.at)]
             advice = f"a fixed frame above {root.name}, without a body"

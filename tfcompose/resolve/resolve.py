@@ -128,9 +128,7 @@ def resolve(
     return Resolved(_completed(robot, spec, source, disk, found), tuple(found), tuple(allows))
 
 
-def _completed(
-    robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None, found: list[Diagnostic]
-) -> Robot:
+def _completed(robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None, found: list[Diagnostic]) -> Robot:
     """Return the robot with what stands beside links and joints, its base, and its processes' topics and publishers."""
     if spec.ros2_control or spec.xml:
         robot, refused = _with_blocks(robot, spec, source)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.ros.graph import UNKNOWN_NODE, writers
 from tfcompose.ros.node import LATCHED, latch
 from tfcompose.ros.text import TextSubscription
+from tfcompose.run.addresses import with_whole_addresses
 from tfcompose.run.own import say
 
 if TYPE_CHECKING:
@@ -33,11 +34,12 @@ class Description:
         self._named: set[bytes | None] = set()
         self._unnamed: dict[bytes | None, float] = {}
         try:
-            self._text = own.description.read_text(encoding="utf-8")
+            text = own.description.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             say(f"no robot_description: {error}")
             self._text = ""
         else:
+            self._text = with_whole_addresses(text, own.description.parent)
             self._publisher = latch(node, TOPIC, self._text)
         self.subscription = TextSubscription(node, TOPIC, LATCHED)
 

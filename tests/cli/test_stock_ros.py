@@ -1,0 +1,118 @@
+"""A plan with a stock robot_state_publisher, which a node stands in for that does what that one is known to do."""
+
+from __future__ import annotations
+
+import os
+import stat
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rclpy.serialization import deserialize_message
+from std_msgs.msg import String
+
+from tfcompose.ros.graph import writers
+from tfcompose.ros.node import LATCHED, open_node
+from tfcompose.ros.stop import Stop
+from tfcompose.ros.tf import Subscription, wait
+
+pytestmark = pytest.mark.ros
+
+ROBOT = """
+tfcompose: 1
+robot: rover
+ros: {state_publisher: stock, discovery: localhost, frame_prefix: r1/, namespace: rover}
+links:
+  base_link: {visual: {box: [1, 1, 1]}, inertial: {mass: 3}}
+  wheel: {visual: {mesh: mesh.stl}}
+joints: {wheel_joint: {type: continuous, parent: base_link, child: wheel}}
+frames:
+  odom: {}
+  base_link: {parent: odom, owner: drive, rate: 20 Hz}
+  mast: {parent: base_link, xyz: [0, 0, 1]}
+  swing: {parent: mast, owner: drive, rate: 20 Hz}
+  lamp: {parent: swing, xyz: [0.1, 0, 0]}
+processes:
+  drive: {simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}
+  wheels: {simulate: {joints: zero, rate: 20 Hz}}
+xml: {note: "<gazebo><a>it's: a \\"quote\\" # no comment \\u00e9</a></gazebo>"}
+"""
+#: Fixed joints once, moving ones with each joint state, floating ones never; and the description on its topic.
+STAND_IN = """#!{python}
+import sys, xml.etree.ElementTree as ET
+from rclpy.parameter import Parameter
+from tfcompose.pose import Pose, quat_from_rpy
+from tfcompose.ros.joint_states import JointStateSubscription
+from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.node import latch, open_node
+from tfcompose.ros.stop import Stop
+from tfcompose.ros.tf import TFPublisher, wait
+at = sys.argv.index("--ros-args")
+with Stop() as stop, open_node("robot_state_publisher", "", args=sys.argv[at + 1:]) as node:
+    for name, kind in (("robot_description", Parameter.Type.STRING), ("frame_prefix", Parameter.Type.STRING)):
+        node.declare_parameter(name, kind)
+    node.declare_parameter("publish_frequency", 20.0)
+    text = node.get_parameter("robot_description").value
+    prefix = node.get_parameter("frame_prefix").value
+    assert node.get_parameter("publish_frequency").value == 1000.0
+    description = latch(node, "robot_description", text)
+    kinds = {{"fixed": [], "moving": [], "floating": []}}
+    for joint in ET.fromstring(text).findall("joint"):
+        kind = joint.get("type") if joint.get("type") in kinds else "moving"
+        kinds[kind].append([prefix + joint.find(end).get("link") for end in ("parent", "child")])
+    still = [Transform(0, parent, child, (0, 0, 0), (0, 0, 0, 1)) for parent, child in kinds["fixed"]]
+    fixed, moving = TFPublisher(node, static=True), TFPublisher(node, static=False)
+    fixed.publish(encode(still))
+    states = JointStateSubscription(node)
+    while not stop.requested:
+        wait(node, [states], None, stop)
+        for state in states.take_positions():
+            at_zero = ((0, 0, 0), (0, 0, 0, 1))
+            moving.publish(encode([Transform(state.stamp_ns, *ends, *at_zero) for ends in kinds["moving"]]))
+"""
+
+
+def test_the_tree_is_whole_everybody_publishes_their_own_and_the_description_is_the_full_one(
+    tmp_path: Path, domain: Any
+) -> None:
+    program = tmp_path / "prefix/lib/robot_state_publisher/robot_state_publisher"
+    program.parent.mkdir(parents=True)
+    program.write_text(STAND_IN.format(python=sys.executable))
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    (tmp_path / "robot.yaml").write_text(ROBOT, encoding="utf-8")
+    (tmp_path / "mesh.stl").write_text("solid\nendsolid\n")
+    env = {**domain.environment, "AMENT_PREFIX_PATH": str(tmp_path / "prefix")}
+    before = os.environ.get("PYTHONPATH", "")
+    env["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parents[2]), before])
+    command = [sys.executable, "-m", "tfcompose", "up", "--for", "8"]
+    up = subprocess.Popen(command, cwd=tmp_path, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    try:
+        heard, nodes = description()
+        output, _ = up.communicate(timeout=60)
+    finally:
+        up.kill()
+        up.wait()
+    assert up.returncode == 0, output
+    built = (tmp_path / "build/rover/robot.full.urdf").read_text("utf-8")
+    assert heard == built.replace('"../../mesh.stl"', f'"file://{tmp_path}/mesh.stl"')
+    assert 'type="floating"' not in built.partition('name="swing"')[0].partition("<joint")[2]
+    assert nodes == {"/rover/tfcompose_static"}
+    assert "error" not in output, output
+
+
+def description() -> tuple[str, set[str]]:
+    """Return what is heard on the topic, and who sends it."""
+    with open_node("listener", "/strange") as node:
+        subscription = Subscription(node, String, "/rover/robot_description", LATCHED)
+        received: list[Any] = []
+        end = time.monotonic() + 30
+        while not received and time.monotonic() < end:
+            wait(node, [subscription], 1.0, Stop())
+            received += subscription.take()
+        time.sleep(1.0)  # somebody else might begin later
+        assert received
+        text = deserialize_message(received[0].data, String).data
+        return text, {writer.node for writer in writers(node, "/rover/robot_description")}

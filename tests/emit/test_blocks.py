@@ -81,6 +81,15 @@ def test_a_raw_block_is_written_as_it_stands_in_both_files() -> None:
     assert "<!-- worn: 0.9 -->" in whole
 
 
+def test_one_block_needs_no_name_and_keeps_its_lines() -> None:
+    for urdf in urdfs("xml: |\n  <gazebo reference='wheel'/>\n"):
+        assert [one.get("reference") for one in urdf.findall("gazebo")] == ["wheel"]
+    compiled = compile_robot(HEAD + "xml: |\n  <gazebo/>\n  <gazebo reference='x'/>\n", "r.yaml", library())
+    assert [(one.code, one.span and (one.span.line, one.span.column)) for one in compiled.errors] == [
+        ("TF203", (7, 22))
+    ]
+
+
 def test_an_overlay_takes_hardware_and_blocks_away() -> None:
     text = HARDWARE + "xml: {a: <gazebo/>}\nprofiles: {bare: {ros2_control: {base: null}, xml: {a: null}}}\n"
     compiled = compile_robot(HEAD + text, "r.yaml", library(), ["bare"])

@@ -1,4 +1,4 @@
-"""``ros2_control`` in the language: which plugin drives which joints, and what it takes and gives.
+"""``ros2_control`` and ``xml`` in the language: what drives the joints, and what stands beside them as it is.
 
 Words follow ros2_control's own: a hardware component is a system, an actuator or a sensor; a joint, sensor or gpio has
 command interfaces and state interfaces, each with parameters.
@@ -88,3 +88,12 @@ def _hardware(value: Any, path: Path, problems: Problems) -> Any:
 
 
 HARDWARE = Type(_hardware, HardwareSpec)
+
+
+def _xml(value: Any, path: Path, problems: Problems) -> Any:
+    """Read raw blocks by name; one text alone is a block without a name."""
+    return {"": value} if isinstance(value, str) else _BLOCKS.read(value, path, problems)
+
+
+_BLOCKS = mapping(TEXT)
+XML = Type(_xml, {"anyOf": [{"type": "string"}, _BLOCKS.schema]})

@@ -18,7 +18,7 @@ from tfcompose.validate.fields import (
     integer,
     text,
 )
-from tfcompose.validate.hardware import HARDWARE, HardwareSpec
+from tfcompose.validate.hardware import HARDWARE, XML, HardwareSpec
 from tfcompose.validate.joints import JointSpec
 from tfcompose.validate.part import PartSpec
 from tfcompose.validate.posed import Turned
@@ -124,9 +124,9 @@ class RobotSpec(Model):
         mapping(HARDWARE), {}, "what drives the joints: ros2_control's hardware"
     )
     xml: dict[str, str] = key(
-        mapping(TEXT),
+        XML,
         {},
-        "raw URDF beside links and joints, by any name: <gazebo>, <transmission>, …",
+        "raw URDF beside links and joints: <gazebo>, <transmission>, …; a text, or texts by any name",
         ({"wheels": '<gazebo reference="wheel_left_link"><mu1>1.2</mu1></gazebo>'},),
     )
     frames: dict[str, FrameSpec] = key(mapping(record(FrameSpec)), {}, "bare frames: the skeleton")

@@ -52,7 +52,7 @@ def files_of(text: str, folder: Path) -> dict[str, str]:
     assert compiled.robot
     files = {file.path: file.text for file in emit(compiled.robot)}
     for name, content in files.items():
-        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).parent.mkdir(exist_ok=True, parents=True)
         (folder / name).write_text(content, encoding="utf-8")
     return files
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import random
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from tests.readers.readers import Body, Drake, MuJoCo, Pinocchio, Reader, Yourdf
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
+from tfcompose.plan import RosSettings
 from tfcompose.planfile import read_plan
 from tfcompose.pose import Pose
 from tfcompose.ros.joint_message import encode_names, fill
@@ -184,14 +186,16 @@ def test_a_reader_finds_every_frame_and_every_body_of_a_generated_robot(seed: in
 @pytest.mark.parametrize("name", READERS)
 @pytest.mark.parametrize("file", examples(), ids=lambda file: file.stem)
 def test_a_reader_finds_every_frame_and_every_body_of_an_example(file: Path, name: str) -> None:
-    robot = robot_of(file.read_text("utf-8"))
-    files = written(robot)
-    if name == "mujoco":
-        reader: Reader = MuJoCo(files["robot.full.urdf"], robot.base or "", 'boundmass="1e-6" boundinertia="1e-9"')
-    else:
-        reader = READERS[name](files["robot.full.urdf"], robot.base or "")
-        compare_bodies(robot, name, reader)
-    compare_poses(robot, reader, files)
+    whole = robot_of(file.read_text("utf-8"))
+    alone = [replace(part.robot, ros=RosSettings()) for part in whole.parts]  # each has a description of its own
+    for robot in alone or [whole]:
+        files = written(robot)
+        if name == "mujoco":
+            reader: Reader = MuJoCo(files["robot.full.urdf"], robot.base or "", 'boundmass="1e-6" boundinertia="1e-9"')
+        else:
+            reader = READERS[name](files["robot.full.urdf"], robot.base or "")
+            compare_bodies(robot, name, reader)
+        compare_poses(robot, reader, files)
 
 
 BOX = {"visual": {"box": [1, 1, 1]}, "inertial": {"mass": 1}}

@@ -44,12 +44,13 @@ xml: {note: "<gazebo><a>it's: a \\"quote\\" # no comment \\u00e9</a></gazebo>"}
 STAND_IN = """#!{python}
 import sys, xml.etree.ElementTree as ET
 from rclpy.parameter import Parameter
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
 from tfcompose.pose import Pose, quat_from_rpy
-from tfcompose.ros.joint_states import JointStateSubscription
 from tfcompose.ros.message import Transform, encode
-from tfcompose.ros.node import latch, open_node
+from tfcompose.ros.node import JOINT_STATES, latch, open_node
 from tfcompose.ros.stop import Stop
-from tfcompose.ros.tf import TFPublisher, wait
+from tfcompose.ros.tf import Subscription, TFPublisher, wait
 at = sys.argv.index("--ros-args")
 with Stop() as stop, open_node("robot_state_publisher", "", args=sys.argv[at + 1:]) as node:
     for name, kind in (("robot_description", Parameter.Type.STRING), ("frame_prefix", Parameter.Type.STRING)):
@@ -66,12 +67,13 @@ with Stop() as stop, open_node("robot_state_publisher", "", args=sys.argv[at + 1
     still = [Transform(0, parent, child, (0, 0, 0), (0, 0, 0, 1)) for parent, child in kinds["fixed"]]
     fixed, moving = TFPublisher(node, static=True), TFPublisher(node, static=False)
     fixed.publish(encode(still))
-    states = JointStateSubscription(node)
+    states = Subscription(node, JointState, "joint_states", JOINT_STATES)
     while not stop.requested:
         wait(node, [states], None, stop)
-        for state in states.take_positions():
-            at_zero = ((0, 0, 0), (0, 0, 0, 1))
-            moving.publish(encode([Transform(state.stamp_ns, *ends, *at_zero) for ends in kinds["moving"]]))
+        for received in states.take():
+            stamp = deserialize_message(received.data, JointState).header.stamp
+            at_zero = (stamp.sec * 10**9 + stamp.nanosec, (0, 0, 0), (0, 0, 0, 1))
+            moving.publish(encode([Transform(at_zero[0], *ends, *at_zero[1:]) for ends in kinds["moving"]]))
 """
 
 

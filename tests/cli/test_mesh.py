@@ -117,3 +117,30 @@ def test_a_mass_over_a_mesh_is_spread_by_its_triangles_and_trimesh_is_loaded_onl
     robot = workspace / "src/robots/r.yaml"
     robot.write_text(ROBOT + "    inertial: {mass: 6 kg}\n")
     assert loaded() == "True"
+
+
+@pytest.mark.parametrize(
+    ("hidden", "content", "code", "words"),
+    [
+        ("trimesh", None, "TF905", "pip install 'tfcompose[mesh]'"),
+        ("", "no mesh at all", "TF725", "has no volume"),
+    ],
+)
+def test_a_mass_that_cannot_be_spread_is_a_finding(
+    workspace: Path, hidden: str, content: str | None, code: str, words: str
+) -> None:
+    robot = workspace / "src/robots/r.yaml"
+    robot.write_text(ROBOT + "    inertial: {mass: 6 kg}\n")
+    if content:
+        (workspace / "src/robots/meshes/a b.stl").write_text(content)
+    hide = f"import sys; sys.modules[{hidden!r}] = None; " if hidden else "import sys; "
+    code_run = f"{hide}import tfcompose.cli as c; sys.exit(c.main(['build', 'src/robots/r.yaml']))"
+    env = os.environ | {"AMENT_PREFIX_PATH": f"{workspace}/install"}
+    done = subprocess.run(
+        [sys.executable, "-c", code_run], capture_output=True, text=True, cwd=workspace, env=env, check=False
+    )
+    assert done.returncode == 1
+    assert f"r.yaml:10:5: error[{code}] meshes/a b.stl: " in done.stderr
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (workspace / "build").exists()

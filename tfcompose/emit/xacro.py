@@ -21,8 +21,8 @@ _NAMESPACE = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
 _EVALUATED = re.compile(r"(\$+[{(])")
 #: Where the lines of links, joints and hardware hold a name, as they are written here; raw blocks are not among them.
 _NAME = re.compile(
-    r"^(  <(?:link|joint|ros2_control) name=.|    <(?:(?:parent|child) link|mimic joint|(?:joint|sensor|gpio) name)=.)",
-    re.MULTILINE,
+    r"\n(?:  <(?:link|joint|ros2_control) name=.|"
+    r"    <(?:(?:parent|child) link|mimic joint|(?:joint|sensor|gpio) name)=.)"
 )
 #: Addresses that begin at the written file.
 _RELATIVE = re.compile(r"(<(?:mesh|texture) filename=.)(?!/|[A-Za-z][A-Za-z0-9+.-]*://)")
@@ -41,10 +41,11 @@ def macro_name(robot: str) -> str:
 def macro(robot: Robot, body: list[str]) -> str:
     """Return the file with the robot's macro; ``body`` are its links and joints as URDF has them."""
     name, base = macro_name(robot.name), robot.base or ""
-    text = "\n".join([*body, *_hardware(robot)])
+    text = "\n".join(["", *body, *_hardware(robot)])
     text = _EVALUATED.sub(r"$\1", text) if "$" in text else text
-    text = _NAME.sub(r"\1${prefix}", text)
-    text = "\n".join([_RELATIVE.sub(r"\1${meshes}", text), *_blocks(robot)])
+    text = _NAME.sub(_with_prefix, text)
+    text = _RELATIVE.sub(r"\1${meshes}", text) if " filename=" in text else text
+    text = "\n".join([text, *_blocks(robot)])[1:]
     more = " meshes:=''" if "${meshes}" in text else ""
     told = "\n     meshes: what relative addresses of meshes begin with, as file:///…/" if more else ""
     return f"""<?xml version="1.0"?>
@@ -63,6 +64,10 @@ def macro(robot: Robot, body: list[str]) -> str:
 </xacro:macro>
 </robot>
 """
+
+
+def _with_prefix(found: re.Match[str]) -> str:
+    return f"{found[0]}${{prefix}}"
 
 
 def caller(robot: Robot) -> str:

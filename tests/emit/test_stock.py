@@ -33,7 +33,7 @@ processes:
   drive: {external: true}
   slam: {external: true}
   camera: {external: true}
-  joints: {env: {A: b}}
+  joints: {env: {A: b}, params: {ignore_timestamp: true}}
 xml: {note: "<gazebo><a>it's: a \\"quote\\" # no comment \\u00e9</a></gazebo>"}
 """
 
@@ -80,6 +80,7 @@ def test_its_parameters_hold_robot_urdf_word_for_word_and_the_prefix() -> None:
     assert (node, rest) == ("/rover/robot_state_publisher", [])
     assert params["ros__parameters"] == {
         "publish_frequency": 1000.0,
+        "ignore_timestamp": True,
         "frame_prefix": "r1/",
         "robot_description": files["robot.urdf"],
     }

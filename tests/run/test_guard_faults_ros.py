@@ -6,9 +6,11 @@ import signal
 import subprocess
 import sys
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -170,3 +172,30 @@ def test_a_node_of_an_isolated_plan_that_writes_the_global_topic_is_named(up: Ca
     robot.says("error[TF827]", "/rover/drive writes the global /tf, and the plan keeps its own on /rover/tf")
     said = robot.output.read_text(encoding="utf-8")
     assert ("/other_robot" in said, said.count("TF827")) == (False, 1)
+
+
+def test_what_the_guard_knows_and_finds_is_on_the_diagnostics_page(up: Callable[[str], Running]) -> None:
+    robot = up(ROBOT)
+    robot.joins("/drive", "odom base_link")
+    robot.says("complete")
+    robot.joins("/rogue", "map odom")
+    robot.says("TF801")
+    pages: list[Any] = []
+    rclpy.init()
+    try:
+        reader: Any = rclpy.create_node("reader")
+        reader.create_subscription(DiagnosticArray, "/diagnostics", pages.append, 10)
+        end = time.monotonic() + 20
+        while not pages and time.monotonic() < end:
+            rclpy.spin_once(reader, timeout_sec=0.5)
+        reader.destroy_node()
+    finally:
+        rclpy.shutdown()
+    lines = {line.name: line for line in pages[0].status}
+    tree, slam = lines["tfcompose faulty: tree"], lines["tfcompose faulty: slam"]
+    assert (tree.level, tree.hardware_id) == (DiagnosticStatus.ERROR, "faulty")
+    assert "TF801 map → odom is published by /rogue" in tree.message
+    assert slam.level == DiagnosticStatus.OK
+    assert [pair.key for pair in slam.values] == ["map → odom"]
+    assert " Hz" in slam.values[0].value
+    assert "from /slam" in slam.values[0].value

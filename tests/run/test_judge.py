@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.pose import Pose
 from tfcompose.run.events import Clear, Complete, Found, GuardEvent, Live, OwnerReady, Recovered, Taken
+from tfcompose.run.health import statuses
 from tfcompose.run.judge import Judge, Message, Writer
 
 if TYPE_CHECKING:
@@ -871,3 +872,42 @@ def test_edges_that_waited_for_a_name_share_a_history_all_the_same(running: Hist
     running.repeat(drive, names, 10)
     assert len(running.judge.live.tracks) == 1
     assert len(running.all(Live)) == 99
+
+
+# What is known, edge by edge.
+
+
+def test_each_edge_has_its_publisher_rate_age_and_delay_and_is_not_seen_before_it_came() -> None:
+    rated = tuple(replace(one, rate=10.0) if one.owner == "slam" else one for one in EDGES)
+    running = History(edges=rated).clear()
+    slam, static = running.joins("/slam"), running.joins("/static", static=True)
+    running.send(static, FIXED)
+    for _ in range(30):
+        running.send(slam, "map odom", stamp_s=wall(running) - 0.25).wait(0.1)
+    running.wait(0.2)
+    health = {one.edge.child: one for one in running.judge.health(running.now)}
+    odom = health["odom"]
+    assert odom.publisher == "/slam"
+    assert odom.rate is not None
+    assert odom.age_s is not None
+    assert odom.delay_s is not None
+    assert [round(value, 2) for value in (odom.rate, odom.age_s, odom.delay_s)] == [10.0, 0.3, 0.25]
+    assert (health["lidar"].text, health["base"].text) == ("latched, from /static", "not seen yet")
+    levels = {line.name: line.level for line in statuses("rover", list(health.values()), running.judge.wrong())}
+    assert levels == {
+        "tfcompose rover: tree": 0,
+        "tfcompose rover: slam": 0,
+        "tfcompose rover: drive": 3,
+        "tfcompose rover: joints": 3,
+        "tfcompose rover: static": 0,
+    }
+
+
+def test_what_is_wrong_now_is_on_the_page_and_gone_when_it_is_over(running: History) -> None:
+    rogue = running.joins("/rogue")
+    running.repeat(rogue, "map odom, base cup", 3)
+    lines = statuses("rover", running.judge.health(running.now), running.judge.wrong())
+    assert (lines[0].level, [key for key, _ in lines[0].values]) == (2, ["TF801", "TF803"])
+    running.leaves(rogue)
+    running.wait(5)
+    assert running.judge.wrong() == []

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 
 from tfcompose.run.cases import Case, Cases, Start
 from tfcompose.run.events import Clear, Found, GuardEvent
+from tfcompose.run.health import EdgeHealth
 from tfcompose.run.law import Law, Sight
 from tfcompose.run.liveness import Liveness
-from tfcompose.run.offences import Offence, best_effort_writer, leak, volatile_writer
+from tfcompose.run.offences import Offence, best_effort_writer, leak, violation, volatile_writer
 from tfcompose.run.senders import Message, Senders, Writer
 from tfcompose.run.stamps import Clocks, Stamps
 
@@ -138,6 +139,24 @@ class Judge:
             self._law.changes += 1
             events.append(Clear())
         return events
+
+    def health(self, now: float) -> list[EdgeHealth]:
+        """Return what is known of each planned edge, in the plan's order."""
+        found = {}
+        for track in self.live.tracks:
+            age_s, rate = self.live.seconds_since(track, now) if track.live else (None, None)
+            for edge in track.edges:
+                names = self._senders.nodes(self._law.owners.current(edge.child), static=edge.kind == "static")
+                publisher = names[0] if len(names) == 1 else edge.node
+                found[edge.child] = EdgeHealth(
+                    edge, publisher if track.live else "", rate, age_s, track.delay_s, track.silent, track.slow
+                )
+        return [found[edge.child] for edge in self.plan.edges]
+
+    def wrong(self) -> list[Diagnostic]:
+        """Return what was told and is not over, worst first; silence and low rates are part of ``health``."""
+        told = [violation([case.offence], self.plan.guard) for case in self.cases.open.values() if case.told]
+        return sorted(told, key=lambda one: (one.severity, one.code))
 
     # What is seen.
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from tfcompose.ros.clock import SimClock
 from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFSubscription, wait
+from tfcompose.run.bulletin import Bulletin
 from tfcompose.run.clock_watch import ClockWatch
 from tfcompose.run.events import EVENTS_FD, Clear, Complete, Live, OwnerReady, to_line
 from tfcompose.run.hearing import Hearing
@@ -57,10 +58,12 @@ def guard(own: Own, stop: Stop) -> None:
             watches[0].watch_global_topics()
         say(f"watching {_counted(own.plan)}{'' if judges else ', and judging nobody'}")
         clock = ClockWatch(own, node)
+        bulletin = Bulletin(node, own.plan.robot)
         while not stop.requested:
             wait(node, [each for watch in watches for each in (watch.fixed, watch.moving)], LOOK_EVERY_S, stop)
             for watch in watches:
                 watch.look()
+            bulletin.look([watch.judge for watch in watches])
             clock.look()
 
 
@@ -73,7 +76,7 @@ class _Watch:
         self._clock = SimClock(node) if judge.clocks.simulated else None
         self._hearing = Hearing()
         self._graph = Graph(node, topics)
-        self._judge = judge
+        self.judge = judge
         self._emit = emit
         self._leaks_to: tuple[str, str] | None = None
         self._due = 0.0
@@ -91,16 +94,16 @@ class _Watch:
         strangers = {each.gid for each, _ in received} - self._known
         self._known |= strangers
         if strangers or now >= self._due:  # who sends once and goes is in the graph for a moment only
-            self._pass_on(self._judge.graph(self._graph.writers(), now))
+            self._pass_on(self.judge.graph(self._graph.writers(), now))
         if self._clock:
-            self._judge.clock(self._clock.now_ns())
+            self.judge.clock(self._clock.now_ns())
         for each, static in received:
             self._hear(each, now, static=static)
         if now >= self._due:
             self._due = now + LOOK_EVERY_S
-            self._pass_on(self._judge.tick(now))
+            self._pass_on(self.judge.tick(now))
             if self._leaks_to:
-                self._pass_on(self._judge.leaks(self._graph.global_writers(), self._leaks_to))
+                self._pass_on(self.judge.leaks(self._graph.global_writers(), self._leaks_to))
 
     def _received(self) -> Iterator[tuple[Received, bool]]:
         for subscription, static in ((self.fixed, True), (self.moving, False)):
@@ -115,7 +118,7 @@ class _Watch:
                 self._malformed.add(received.gid)
                 say(f"dropped a TF message: {error} (said once for each publisher)")
             return
-        self._pass_on(self._judge.message(message, now))
+        self._pass_on(self.judge.message(message, now))
 
     def _pass_on(self, events: list[GuardEvent]) -> None:
         for event in events:

@@ -49,6 +49,7 @@ ONLY_IN: dict[str, set[str]] = {
     "tf2_msgs": {"ros"},
     "geometry_msgs": {"ros"},
     "sensor_msgs": {"ros"},
+    "lifecycle_msgs": {"ros"},
     "std_msgs": {"ros"},
     "builtin_interfaces": {"ros"},
     "rosgraph_msgs": {"ros"},

@@ -146,6 +146,7 @@ CODES = {
     "TF814": "no_live_pose",
     "TF815": "process_without_role",
     "TF816": "path_cannot_be_told",
+    "TF817": "process_not_ready",
     "TF820": "live_loop",
     "TF821": "self_transform",
     "TF822": "two_writers",

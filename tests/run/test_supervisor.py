@@ -317,7 +317,8 @@ def test_output_that_nobody_reads_any_more_ends_everything_with_141_and_nothing_
             raise BrokenPipeError
 
     assert supervise(plan_of(program("a", PARENT)), tmp_path / "plan.json", report=report) == 141
-    assert [type(notice) for notice in told] == [ProcessState, ProcessState, LogLine]
+    assert isinstance(told[-1], LogLine)
+    assert len([notice for notice in told if isinstance(notice, LogLine)]) == 1
 
 
 def test_an_error_in_the_launcher_itself_leaves_no_process(tmp_path: Path) -> None:

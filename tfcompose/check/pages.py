@@ -256,6 +256,10 @@ A frame is unknown, the two are in two trees, their edges have no time in common
 ${file(…)}, ${build_dir} and ${params_file} are filled in when the plan is started: in the arguments and the environment
 of a process, and in parameters of a process with one node that tfcompose starts itself. A launch file, a command or
 somebody else's process takes a path as an argument; and without parameters there is no ${params_file}.""",
+    "TF817": """A process is not ready in time.
+
+The finding says what its ``ready`` waits for, what was seen instead, and what the process said last. Processes that
+wait for it wait on.""",
     "TF820": """Somebody publishes an edge that closes a loop.
 
 The frames of the loop are each other's ancestors; tf2 finds no way through them, and every lookup that needs one fails.

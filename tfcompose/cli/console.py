@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
+import re
 from functools import singledispatchmethod
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
+from tfcompose.cli.start_table import table_of
 from tfcompose.cli.terminal import line_of
 from tfcompose.render.text import BOLD, GREEN, PLAIN, RED, YELLOW, render_text
 from tfcompose.run.notice import (
+    AllReady,
+    AllStarted,
     Ended,
     FindingShown,
     LogLine,
     OwnerLive,
+    ProcessReady,
     ProcessState,
     RecoveredShown,
+    Replanned,
     Stopping,
     TreeComplete,
     Waiting,
 )
 
 if TYPE_CHECKING:
-    from typing import TextIO
+    from collections.abc import Callable
 
+    from tfcompose.cli.status import Status
     from tfcompose.plan import Plan
     from tfcompose.run.notice import Notice
 
@@ -31,18 +38,43 @@ OURS = "tfcompose"
 NAMED_AT_MOST = 4
 #: States that need no line of their own: the edges say more.
 QUIET = frozenset({"STARTING", "STOPPED"})
+_PAINT = re.compile(r"\033\[[0-9;]*m")
 
 
 def _counted(number: int, word: str) -> str:
     return f"{number} {word}{'' if number == 1 else 's'}"
 
 
-class Console:
-    """Writes notices as lines: ``name | text``, coloured on a terminal."""
+class Output(Protocol):
+    """Where lines go; ``log`` says that a process wrote it."""
 
-    def __init__(self, plan: Plan, stream: TextIO, *, colour: bool) -> None:
+    def write(self, text: str, *, log: bool = False) -> None:
+        """Write the text.
+
+        Raises:
+            OSError: if nobody reads any more.
+        """
+
+
+class Console:
+    """Writes notices as lines: ``name | text``, coloured on a terminal.
+
+    ``keep`` is given each line without colours, and what it returns is said; ``status`` is kept below the lines.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        output: Output,
+        *,
+        colour: bool,
+        keep: Callable[[str, str], str | None] | None = None,
+        status: Status | None = None,
+    ) -> None:
         names = [process.name for process in plan.processes]
-        self._stream = stream
+        self._output = output
+        self._keep = keep
+        self._status = status
         self._colour = colour
         self._width = max(len(name) for name in [*names, OURS])
         self._colours = {name: COLOURS[index % len(COLOURS)] for index, name in enumerate(names)}
@@ -54,8 +86,20 @@ class Console:
         Raises:
             OSError: if nobody reads any more.
         """
+        if self._status:
+            self._status.take(notice)
         self._write(notice)
-        self._stream.flush()
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Bring the line below the lines up to date.
+
+        Raises:
+            OSError: if nobody reads any more.
+        """
+        text = self._status.drawn() if self._status else ""
+        if text:
+            self._output.write(text, log=True)
 
     @singledispatchmethod
     def _write(self, notice: object) -> None:
@@ -63,7 +107,7 @@ class Console:
 
     @_write.register
     def _(self, notice: LogLine) -> None:
-        self._line(notice.process, notice.text, self._colours.get(notice.process, ""))
+        self._line(notice.process, notice.text, self._colours.get(notice.process, ""), log=True)
 
     @_write.register
     def _(self, notice: ProcessState) -> None:
@@ -73,7 +117,8 @@ class Console:
         if notice.state == "RUNNING":
             text = f"started {notice.process} (pid {notice.pid})"
         elif notice.state == "EXPECTED":
-            text = f"expecting {notice.process} ({', '.join(self._nodes[notice.process])}): somebody else starts it"
+            nodes = ", ".join(self._nodes.get(notice.process, ()))
+            text = f"expecting {notice.process} ({nodes}): somebody else starts it"
         elif notice.detail:
             text += f": {notice.detail}"
         self._say(text)
@@ -83,6 +128,29 @@ class Console:
         edges = _counted(len(notice.edges), "edge") if len(notice.edges) > NAMED_AT_MOST else ", ".join(notice.edges)
         owner = f"{notice.owner} ({notice.node})"
         self._say(f"{self._paint('live', GREEN)}  {owner}: {edges}  {notice.seconds:.2f} s")
+
+    @_write.register
+    def _(self, notice: ProcessReady) -> None:
+        self._say(f"{self._paint('ready', GREEN)} {notice.process}: {notice.seen}  {notice.seconds:.2f} s")
+
+    @_write.register
+    def _(self, notice: AllStarted) -> None:
+        if notice.waiting:
+            self._say(f"not started yet: {', '.join(notice.waiting)}")
+
+    @_write.register
+    def _(self, notice: AllReady) -> None:
+        if len(notice.rows) > 1:
+            for line in table_of(notice):
+                self._say(line)
+
+    @_write.register
+    def _(self, notice: Replanned) -> None:
+        parts = (("changed", notice.changed), ("new", notice.added), ("gone", notice.removed))
+        said = "; ".join(f"{word}: {', '.join(names)}" for word, names in parts if names)
+        self._say(f"another plan: {said or 'nothing to restart'}")
+        if notice.held:
+            self._say(self._paint(held(notice.held), YELLOW))
 
     @_write.register
     def _(self, notice: TreeComplete) -> None:
@@ -117,9 +185,21 @@ class Console:
     def _say(self, text: str) -> None:
         self._line(OURS, text, BOLD)
 
-    def _line(self, name: str, text: str, colour: str) -> None:
+    def _line(self, name: str, text: str, colour: str, *, log: bool = False) -> None:
         printable = "".join(c if c.isprintable() or c in "\t\033" else "\N{REPLACEMENT CHARACTER}" for c in text)
-        self._stream.write(f"{self._paint(f'{name:<{self._width}} |', colour)} {printable}\n")
+        fault = self._keep(name, _PAINT.sub("", printable)) if self._keep else None
+        clear = self._status.cleared() if self._status else ""
+        head = self._paint(f"{name:<{self._width}} |", colour)
+        self._output.write(f"{clear}{head} {printable}\n", log=log)
+        if fault:
+            self._output.write(f"{self._paint(f'{OURS:<{self._width}} |', BOLD)} {self._paint(fault, YELLOW)}\n")
 
     def _paint(self, text: str, *codes: str) -> str:
         return f"{''.join(codes)}{text}{PLAIN}" if self._colour else text
+
+
+def held(edges: tuple[str, ...]) -> str:
+    """Return what is to be said of fixed edges that vanished."""
+    named = ", ".join(edges[:NAMED_AT_MOST])
+    more = f" and {len(edges) - NAMED_AT_MOST} more" if len(edges) > NAMED_AT_MOST else ""
+    return f"listeners that run keep {named}{more}: tf2 forgets no fixed frame; restart RViz and whoever looks them up"

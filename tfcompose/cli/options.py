@@ -43,6 +43,17 @@ def positive(text: str) -> float:
     return value
 
 
+def counted(text: str) -> int:
+    """Read a whole number of 0 or more.
+
+    Raises:
+        ArgumentTypeError: if it is none.
+    """
+    if not text.isascii() or not text.isdigit() or len(text) > 9:  # noqa: PLR2004 (a billion lines)
+        raise ArgumentTypeError(f"{text} is not a whole number of 0 or more")
+    return int(text)
+
+
 def not_negative(text: str) -> float:
     """Read a number that is 0 or more.
 

@@ -77,3 +77,8 @@ def _full_name(namespace: str, name: str) -> str:
     if name == UNKNOWN_NODE:
         return UNKNOWN_NODE
     return f"{namespace.rstrip('/')}/{name}"
+
+
+def services(node: Node) -> list[str]:
+    """Return the full names of the services that ``node`` has discovered until now, sorted."""
+    return sorted(name for name, _ in node.get_service_names_and_types())

@@ -1,7 +1,7 @@
 """One child process: it dies with the launcher, leads a process group of its own, and is read without waiting.
 
-The kernel sends a child SIGKILL when the launcher dies (PR_SET_PDEATHSIG), but not the child's own children. For those
-there is the keeper, a shell that knows the groups and kills them when the launcher is gone.
+The kernel sends a child SIGKILL when the launcher dies (PR_SET_PDEATHSIG), but not the child's own children; for
+those there is the keeper.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import ctypes
 import os
 import signal
 import subprocess
+import time
 from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -18,7 +19,7 @@ from typing import TYPE_CHECKING
 from tfcompose.ros.stop import SIGNALS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Collection, Iterator
     from io import FileIO
     from typing import IO
 
@@ -27,7 +28,10 @@ if TYPE_CHECKING:
 #: A line longer than this comes in pieces; bytes.
 LINE_LIMIT = 64 * 1024
 #: What is read at once, so that a process that floods leaves time for the others; bytes.
-READ_SIZE = 16 * 1024
+READ_SIZE = 64 * 1024
+#: What a process may write: so much at once, and so much a second; more is read, counted and thrown away; bytes.
+BURST = 8_000_000
+PER_SECOND = 1_000_000
 #: What is read from a process that has ended, at most: more than a pipe holds, less than for ever; bytes.
 DRAIN_LIMIT = 1024 * 1024
 
@@ -36,6 +40,7 @@ LAST_LINES = 8
 LAST_LINE_LENGTH = 300
 
 _PR_SET_PDEATHSIG = 1
+_PR_SET_CHILD_SUBREAPER = 36
 _LIBC = ctypes.CDLL(None, use_errno=True)
 
 
@@ -70,11 +75,40 @@ def _text(line: bytes) -> str:
     return line.removesuffix(b"\r").decode(errors="replace")
 
 
+class Bucket:
+    """How much more of a process's output is taken now, for all its pipes together; and what was thrown away."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._left: float = BURST
+        self._at = clock()
+        self.thrown = 0
+
+    def take(self, size: int) -> bool:
+        """Return whether so many bytes are taken."""
+        now = self._clock()
+        self._left = min(BURST, self._left + (now - self._at) * PER_SECOND)
+        self._at = now
+        # Once it is empty, it is filled a little, so that what is kept comes in pieces that can be read.
+        if self._left < (PER_SECOND if self.thrown else size):
+            self.thrown += size
+            return False
+        self._left -= size
+        return True
+
+
 class Pipe:
     """The end of a pipe that the launcher reads. ``sink`` is given each line."""
 
-    def __init__(self, file: IO[bytes] | FileIO, sink: Callable[[str], None], limit: int = LINE_LIMIT) -> None:
+    def __init__(
+        self,
+        file: IO[bytes] | FileIO,
+        sink: Callable[[str], None],
+        limit: int = LINE_LIMIT,
+        bucket: Bucket | None = None,
+    ) -> None:
         self.file = file
+        self._bucket = bucket
         self._sink = sink
         self._lines = Lines(limit)
         os.set_blocking(file.fileno(), False)
@@ -84,6 +118,12 @@ class Pipe:
         data = self.file.read(READ_SIZE)
         if data is None:
             return None
+        bucket = self._bucket
+        if bucket and data and not bucket.take(len(data)):
+            return len(data)
+        if bucket and bucket.thrown:
+            thrown, bucket.thrown = bucket.thrown, 0
+            self._sink(f"… {thrown:,} bytes of output were thrown away here: more came than a log can hold")
         for line in self._lines.feed(data) if data else self._lines.end():
             self._sink(line)
         return len(data)
@@ -109,6 +149,7 @@ class Child:
     pipes: list[Pipe] = field(default_factory=list)
     last_out: deque[str] = field(default_factory=lambda: deque(maxlen=LAST_LINES))
     last_err: deque[str] = field(default_factory=lambda: deque(maxlen=LAST_LINES))
+    bucket: Bucket = field(default_factory=Bucket)
 
     @property
     def last_lines(self) -> tuple[str, ...]:
@@ -160,30 +201,20 @@ def kill_group(pid: int, number: int) -> None:
         os.killpg(pid, number)
 
 
-class Keeper:
-    """Outlives the launcher by a moment, and kills the groups that it was told last."""
+@contextlib.contextmanager
+def subreaper() -> Iterator[None]:
+    """Have what children leave behind become this process's own children, instead of init's, during the block."""
+    _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 1)
+    try:
+        yield
+    finally:
+        _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 0)
 
-    _SCRIPT = "trap '' INT TERM HUP; while read -r line; do groups=$line; done; for g in $groups; do kill -9 -$g; done"
 
-    def __init__(self) -> None:
-        self._shell = subprocess.Popen(
-            ["/bin/sh", "-c", self._SCRIPT],
-            bufsize=0,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
-
-    def keep(self, pids: Iterable[int]) -> None:
-        """Say which groups there are now."""
-        line = " ".join(map(str, pids)) + "\n"
-        if self._shell.stdin:
-            with contextlib.suppress(BrokenPipeError):
-                self._shell.stdin.write(line.encode())
-
-    def close(self) -> None:
-        """Let it go; the groups that it was told last are killed."""
-        if self._shell.stdin:
-            self._shell.stdin.close()
-        self._shell.wait()
+def bury_adopted(known: Collection[int]) -> None:
+    """Take the exit codes of children that have ended and are not known: those that were left to this process."""
+    with contextlib.suppress(ChildProcessError):
+        while found := os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT):
+            if found.si_pid in known:
+                return
+            os.waitpid(found.si_pid, 0)

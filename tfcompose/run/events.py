@@ -66,10 +66,26 @@ class Recovered:
     message: str
 
 
-GuardEvent = Clear | Taken | Live | OwnerReady | Complete | Found | Recovered
+@dataclass(frozen=True, slots=True)
+class GateOpen:
+    """What a process's gate waits for is there; ``seen`` says what."""
+
+    process: str
+    seen: str
+
+
+@dataclass(frozen=True, slots=True)
+class GateShut:
+    """What a process's gate waits for is not there yet; ``seen`` says what is there instead."""
+
+    process: str
+    seen: str
+
+
+GuardEvent = Clear | Taken | Live | OwnerReady | Complete | Found | Recovered | GateOpen | GateShut
 
 _KINDS: dict[str, type[GuardEvent]] = {
-    kind.__name__: kind for kind in (Clear, Taken, Live, OwnerReady, Complete, Found, Recovered)
+    kind.__name__: kind for kind in (Clear, Taken, Live, OwnerReady, Complete, Found, Recovered, GateOpen, GateShut)
 }
 
 
@@ -89,10 +105,11 @@ def from_line(line: str) -> GuardEvent:
     if kind is None:
         raise ValueError(f"not an event: {line!r}")
     if "found" in data:
-        data["found"] = _diagnostic(data["found"])
+        data["found"] = diagnostic(data["found"])
     return kind(**data)
 
 
-def _diagnostic(data: dict[str, Any]) -> Diagnostic:
+def diagnostic(data: dict[str, Any]) -> Diagnostic:
+    """Return the finding that ``asdict`` took apart, without places."""
     notes = tuple(Note(note["message"]) for note in data["notes"])
     return Diagnostic(data["code"], data["name"], data["severity"], data["message"], None, notes, data["help"])

@@ -158,6 +158,15 @@ class Judge:
         told = [violation([case.offence], self.plan.guard) for case in self.cases.open.values() if case.told]
         return sorted(told, key=lambda one: (one.severity, one.code))
 
+    def absent(self, owner: str) -> None:
+        """Take the owner as stopped on purpose; who publishes its edges next is no second one."""
+        edges = self.plan.edges_of(owner)
+        if edges:
+            self.live.absent(owner)
+        for edge in edges:
+            self._law.owners.forget(edge.child)
+        self._law.changes += 1
+
     # What is seen.
 
     def _verdict(self, stream: _Stream, message: Message, now: float) -> None:

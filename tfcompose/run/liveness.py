@@ -134,12 +134,30 @@ class Liveness:
         self._waiting = {name: {e.child for e in plan.edges_of(name)} for name in {e.owner for e in plan.edges}}
         self._complete = False
         self._gone: set[str] = set()
+        self._absent: set[str] = set()
         self._watched = Watched()
+
+    def absent(self, owner: str) -> None:
+        """Take the owner as stopped on purpose: nobody misses its edges, and none of them is live."""
+        self._absent.add(owner)
+        self._gone.discard(owner)
+        self._complete = False
+        tracks = [track for track in self.tracks if track.edge.owner == owner]
+        self._waiting[owner] = {edge.child for track in tracks for edge in track.edges}
+        for track in tracks:
+            track.live = track.silent = track.slow = track.steady = False
+            track.arrivals.clear()
+
+    def present(self, owner: str) -> None:
+        """Take the owner as started: its edges are to be seen anew."""
+        self._absent.discard(owner)
 
     def arrived(self, children: tuple[str, ...], now: float, delay_s: float | None = None) -> list[GuardEvent]:
         """Note that owners sent these edges, in one message, and return what that means."""
         seen, events = self._watched.at(now), []
         for track in self._of_message.get(children) or self._parted(children):
+            if track.edge.owner in self._absent:
+                continue
             track.arrived(seen, now)
             track.delay_s = delay_s
             if not track.live:

@@ -12,25 +12,24 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.run.events import Clear, Complete, Found, Live, OwnerReady, Recovered, Taken
-from tfcompose.run.failures import (
-    ended_by_itself,
-    how_ended,
-    in_short,
-    never_clear,
-    never_seen,
-    not_started,
-    signal_name,
-)
+from tfcompose.run.events import Clear, Complete, Found, GateOpen, GateShut, Live, OwnerReady, Recovered, Taken
+from tfcompose.run.failures import in_short, never_clear, never_seen, not_started, signal_name
+from tfcompose.run.gates import kind_of, look, opened, order_gate, say_progress
+from tfcompose.run.lives import asked, exited, follow, lose
 from tfcompose.run.notice import Missing, OwnerLive, RecoveredShown, TreeComplete, Waiting
+from tfcompose.run.orders import Absent
 from tfcompose.run.state import (
-    MAX_RESTARTS,
     UNREAD,
     Action,
+    Asked,
     Begin,
+    Down,
     Event,
     Exited,
     Kill,
+    LogSeen,
+    NewPlan,
+    Order,
     OutputLost,
     Signalled,
     Started,
@@ -40,7 +39,7 @@ from tfcompose.run.state import (
     TimeUp,
     Tracked,
 )
-from tfcompose.run.timing import STOP_SIGNALS, backoff_s, by_owner, stop_level, waiting_due
+from tfcompose.run.timing import backoff_s, by_owner, stop_level, stop_signals, waiting_due
 from tfcompose.run.turn import Turn
 
 if TYPE_CHECKING:
@@ -66,64 +65,82 @@ def _react(turn: Turn, event: Event) -> None:
         case Begin():
             _begin(turn)
         case Started(name, pid):
-            turn.enter(name, "RUNNING", pid=pid)
+            _started(turn, name, pid)
         case StartFailed(name, why):
             turn.enter(name, "FATAL", why)
             turn.fail(not_started(name, why))
         case Exited():
-            _exited(turn, event)
+            exited(turn, event)
+        case Taken(found):
+            _taken(turn, found)
+        case _:
+            _asked_to_end(turn, event)
+            if turn.state.stop is None:
+                _asked_or_seen(turn, event)
+
+
+def _asked_to_end(turn: Turn, event: Event) -> None:
+    match event:
+        case Down():
+            turn.stop(Stop("signal", 0, 1, turn.now), "tfcompose down")
         case Signalled(number):
             _signalled(turn, signal_name(number))
         case OutputLost():
             turn.stop(Stop("failure", UNREAD), "nobody reads the output any more")
         case TimeUp():
             _time_up(turn)
-        case Taken(found):
-            _taken(turn, found)
-        case _ if turn.state.stop is None:  # the guard's other events, and Tick
+        case _:
+            pass
+
+
+def _asked_or_seen(turn: Turn, event: Event) -> None:
+    match event:
+        case Asked():
+            asked(turn, event)
+        case NewPlan():
+            follow(turn, event)
+        case GateOpen(process, seen) | LogSeen(process, seen) if process in turn.state.tracked:
+            if kind_of(turn.state.tracked[process].process) not in ("edges", "exit", "time"):
+                opened(turn, process, seen)
+        case GateShut(process, seen) if process in turn.state.tracked:
+            turn.track(process, replace(turn.state.tracked[process], seen=seen))
+        case OwnerReady(process) if process in turn.state.tracked:
+            _owner_ready(turn, process)
+        case _:  # the guard's other events, and Tick
             _guard_said(turn, event)
+
+
+def _owner_ready(turn: Turn, process: str) -> None:
+    if kind_of(turn.state.tracked[process].process) == "edges":
+        opened(turn, process, "its edges are live")
+    edges = turn.state.plan.edges_of(process)
+    if edges:
+        names = tuple(edge.name for edge in edges)
+        turn.tell(OwnerLive(process, edges[0].node, names, turn.now - (turn.state.begun or 0.0)))
 
 
 def _begin(turn: Turn) -> None:
     guard = turn.state.guard
     judges = guard is not None and turn.state.plan.guard.mode != "off"
     turn.know(begun=turn.now, clear=None if judges else turn.now)
-    for name, tracked in turn.state.tracked.items():
-        if tracked.state == "EXPECTED":
-            turn.enter(name, "EXPECTED")
     if guard:
         turn.start(guard)
+    for name, tracked in turn.state.tracked.items():
+        if tracked.state == "EXPECTED":
+            turn.enter(name, "EXPECTED", began=turn.now)
+            order_gate(turn, turn.state.tracked[name])
 
 
-def _exited(turn: Turn, event: Exited) -> None:
-    name, how = event.name, how_ended(event.returncode)
-    tracked = turn.state.tracked[name]
-    if turn.state.stop:
-        turn.enter(name, "STOPPED", how)
-        return
-    process = tracked.process
-    done = event.returncode == 0 and process.kind == "run"
-    if name != turn.state.guard and (process.restart == "always" or (process.restart == "on-failure" and not done)):
-        _restart_later(turn, tracked, event)
-        return
-    turn.enter(name, "EXITED", how)
-    if not done:
-        early = name == turn.state.guard and turn.state.clear is None
-        when = " before it said whether somebody publishes the plan's edges already" if early else ""
-        turn.fail(ended_by_itself(name, event.returncode, when, event.last_lines))
-
-
-def _restart_later(turn: Turn, tracked: Tracked, event: Exited) -> None:
-    name, times = event.name, turn.state.times
-    failures = 1 if turn.now - tracked.since >= times.steady_s else tracked.failures + 1
-    how = how_ended(event.returncode)
-    if failures > MAX_RESTARTS:
-        turn.enter(name, "FATAL", how)
-        when = f", after {MAX_RESTARTS} restarts"
-        turn.fail(ended_by_itself(name, event.returncode, when, event.last_lines))
-        return
-    delay = backoff_s(times, failures)
-    turn.enter(name, "BACKOFF", f"{how}; restart {failures} of {MAX_RESTARTS} in {delay:g} s", failures=failures)
+def _started(turn: Turn, name: str, pid: int) -> None:
+    turn.enter(name, "RUNNING", pid=pid, began=turn.now)
+    if name != turn.state.guard:
+        order_gate(turn, turn.state.tracked[name])
+    elif turn.state.clear is not None:  # it joins the others
+        for other in turn.state.tracked.values():
+            if other.process.owns and other.state not in ("STARTING", "RUNNING", "EXPECTED"):
+                turn.actions.append(Order(Absent(other.process.name)))
+            if not other.ready and other.state in ("RUNNING", "EXPECTED"):
+                order_gate(turn, other)
 
 
 def _signalled(turn: Turn, name: str) -> None:
@@ -159,14 +176,10 @@ def _guard_said(turn: Turn, event: Event) -> None:
             turn.know(clear=turn.now if turn.state.clear is None else turn.state.clear)
         case Live(child=child):
             turn.know(live=turn.state.live | {child})
-        case OwnerReady(process) if process in turn.state.tracked:
-            turn.track(process, replace(turn.state.tracked[process], ready=True))
-            edges = turn.state.plan.edges_of(process)
-            if edges:
-                turn.tell(OwnerLive(process, edges[0].node, tuple(edge.name for edge in edges), seconds))
+            if not turn.state.missing:
+                _complete(turn, len(turn.state.plan.edges))
         case Complete(edges):
-            turn.know(complete=True)
-            turn.tell(TreeComplete(edges, seconds))
+            _complete(turn, edges)
         case Found(found):
             turn.show(found)
             if found.severity == "error" and turn.state.plan.guard.on_violation == "stop":
@@ -175,6 +188,12 @@ def _guard_said(turn: Turn, event: Event) -> None:
             turn.tell(RecoveredShown(message, seconds))
         case _:
             pass
+
+
+def _complete(turn: Turn, edges: int) -> None:
+    if not turn.state.complete:
+        turn.know(complete=True)
+        turn.tell(TreeComplete(edges, turn.now - (turn.state.begun or 0.0)))
 
 
 # What follows.
@@ -189,17 +208,22 @@ def _settle(turn: Turn) -> None:
         turn.fail(never_clear(state.guard or "guard", state.times.clear_s))
     if turn.state.stop is None:
         _go_on(turn)
-    if turn.state.stop:
-        _stop_on(turn, turn.state.stop)
+    _stop_on(turn)
+    if turn.state.stop and not any(one.alive for one in turn.state.tracked.values()):
+        turn.finish(turn.state.stop.exit_code)
 
 
 def _go_on(turn: Turn) -> None:
+    look(turn)
     tracked = turn.state.tracked
     for name, one in tracked.items():
-        fresh = one.state == "STOPPED" and turn.state.clear is not None and _may_start(turn, one)
+        if one.state not in ("STOPPED", "BACKOFF"):
+            continue
+        fresh = one.state == "STOPPED" and one.wanted and turn.state.clear is not None and _may_start(turn, one)
         again = one.state == "BACKOFF" and turn.now >= one.since + backoff_s(turn.state.times, one.failures)
         if fresh or again:
             turn.start(name)
+    say_progress(turn)
     due = waiting_due(turn.state)
     if due is not None and turn.now >= due:
         missing = turn.state.missing
@@ -219,23 +243,21 @@ def _may_start(turn: Turn, one: Tracked) -> bool:
 
 def _is_there(turn: Turn, name: str, what: str) -> bool:
     other = turn.state.tracked[name]
-    if what == "done":
-        return other.state == "EXITED"
-    started = other.was_started or other.state == "EXPECTED"
-    if what == "ready" and turn.state.guard and other.process.owns:
-        return started and other.ready
-    return started
+    if what == "ready":
+        return other.ready
+    return other.state == "EXITED" if what == "done" else other.was_started or other.state == "EXPECTED"
 
 
-def _stop_on(turn: Turn, stop: Stop) -> None:
+def _stop_on(turn: Turn) -> None:
+    """Tell processes that are to end, in reverse order of their start, and more firmly where that did not help."""
     alive = [one for one in turn.state.tracked.values() if one.alive]
     for one in sorted(alive, key=lambda one: -one.order):
-        level = stop_level(turn.state, stop, one, turn.now)
+        level = stop_level(turn.state, one, turn.now)
         if one.state == "STARTING" or level <= one.level:
             continue
-        name, number = one.process.name, STOP_SIGNALS[level - 1]
-        turn.actions.append(Kill(name, number))
-        before = f"still there after {STOP_SIGNALS[one.level - 1].name}: " if one.level else ""
-        turn.enter(name, "STOPPING", before + number.name, pid=one.pid, level=level)
-    if not alive:
-        turn.finish(stop.exit_code)
+        name, signals = one.process.name, stop_signals(one.process)
+        if one.level == 0 and one.leaving:
+            lose(turn, one)
+        turn.actions.append(Kill(name, signals[level - 1]))
+        before = f"still there after {signals[one.level - 1].name}: " if one.level else ""
+        turn.enter(name, "STOPPING", before + signals[level - 1].name, pid=one.pid, level=level)

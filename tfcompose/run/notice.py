@@ -43,6 +43,51 @@ class OwnerLive:
 
 
 @dataclass(frozen=True, slots=True)
+class ProcessReady:
+    """A process that waited for something of its own is ready, ``seconds`` after the start; ``seen`` says by what."""
+
+    process: str
+    seen: str
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class AllStarted:
+    """Whatever can be started was; ``waiting`` are processes that wait for others to be ready, or done."""
+
+    started: int
+    waiting: tuple[str, ...]
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class StartRow:
+    """When a process was started and ready, in seconds after the start; None: somebody else started it."""
+
+    process: str
+    started: float | None
+    ready: float
+
+
+@dataclass(frozen=True, slots=True)
+class AllReady:
+    """Every process is ready and every edge live, ``seconds`` after the start."""
+
+    rows: tuple[StartRow, ...]
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Replanned:
+    """A changed plan is followed from now on: the names of processes, and the frames that listeners will still hold."""
+
+    changed: tuple[str, ...] = ()
+    added: tuple[str, ...] = ()
+    removed: tuple[str, ...] = ()
+    held: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class TreeComplete:
     """Every edge of the plan is live, ``seconds`` after the start."""
 
@@ -96,4 +141,18 @@ class Ended:
     exit_code: int
 
 
-Notice = LogLine | ProcessState | OwnerLive | TreeComplete | Waiting | FindingShown | RecoveredShown | Stopping | Ended
+Notice = (
+    LogLine
+    | ProcessState
+    | OwnerLive
+    | ProcessReady
+    | AllStarted
+    | AllReady
+    | Replanned
+    | TreeComplete
+    | Waiting
+    | FindingShown
+    | RecoveredShown
+    | Stopping
+    | Ended
+)

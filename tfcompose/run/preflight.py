@@ -42,15 +42,24 @@ def started_by_us(plan: Plan) -> list[PlanProcess]:
     return [process for process in plan.processes if process.kind != "external"]
 
 
-def commands_of(
-    plan: Plan, processes: list[PlanProcess], plan_file: Path, base: Mapping[str, str], environment: Environment
+def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
+    plan: Plan,
+    processes: list[PlanProcess],
+    plan_file: Path,
+    base: Mapping[str, str],
+    environment: Environment,
+    built_in: Path | None = None,
 ) -> tuple[dict[str, Command], list[Diagnostic]]:
-    """Return each process's command, and what is wrong; with anything wrong, nothing should be started."""
+    """Return each process's command, and what is wrong; with anything wrong, nothing should be started.
+
+    ``built_in`` is the folder that the plan was built in, where ``plan_file`` is a copy of it.
+    """
+    folder = built_in or plan_file.absolute().parent
     found = _never_started(plan)
     commands: dict[str, Command] = {}
     missing = []
     for process in processes:
-        command = _command_of(process, plan.ros, plan_file.absolute(), base, environment)
+        command = _command_of(process, plan.ros, (plan_file.absolute(), folder), base, environment)
         if isinstance(command, Diagnostic):
             found.append(command)
         elif isinstance(command, NotFound):
@@ -63,17 +72,21 @@ def commands_of(
 
 
 def _command_of(
-    process: PlanProcess, ros: RosSettings, plan_file: Path, base: Mapping[str, str], environment: Environment
+    process: PlanProcess,
+    ros: RosSettings,
+    files: tuple[Path, Path],
+    base: Mapping[str, str],
+    environment: Environment,
 ) -> Command | NotFound | Diagnostic:
     own = process.kind != "run"
     try:
-        env = environment(base, ros, own=own) | own_env(process, plan_file)
+        env = environment(base, ros, own=own) | own_env(process, *files)
     except RosError as error:
         return finding("TF902", str(error), None)
-    argv = filled_in(process, plan_file)
+    argv = filled_in(process, *files)
     if not argv:
         return finding("TF902", f"the plan does not say how {process.name} is started", None)
-    folder = folder_of(process, plan_file.parent)
+    folder = folder_of(process, files[1])
     program = executable_of(process, argv[0], folder, env)
     return program if isinstance(program, NotFound) else Command((program, *argv[1:]), env, folder, own)
 

@@ -25,6 +25,7 @@ class Signals:
 
     def __init__(self) -> None:
         self._taken: deque[int] = deque()
+        self._children_changed = False
         self._stack = contextlib.ExitStack()
         self.fd = -1
 
@@ -62,3 +63,10 @@ class Signals:
             number = self._taken.popleft()
             if number != signal.SIGCHLD:
                 yield number
+            else:
+                self._children_changed = True
+
+    def children_changed(self) -> bool:
+        """Return whether SIGCHLD was among those that ``taken`` has passed since the last call."""
+        changed, self._children_changed = self._children_changed, False
+        return changed

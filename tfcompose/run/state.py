@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Literal
 from tfcompose.run.events import GuardEvent
 
 if TYPE_CHECKING:
+    from tfcompose.diagnostic import Diagnostic
     from tfcompose.plan import Plan, PlanEdge, PlanProcess
     from tfcompose.run.notice import Notice, StateName
+    from tfcompose.run.orders import GuardOrder
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +35,13 @@ class Times:
     """the longest wait before a restart"""
     steady_s: float = 10.0
     """a run as long as this makes earlier failures forgotten"""
+    ready_s: float = 30.0
+    """for a process to be ready, where it says by what and not until when"""
     same_signal_s: float = 0.2
     """two signals closer than this are one: ``timeout`` and closing terminals send theirs twice"""
 
+
+Verb = Literal["stop", "start", "restart"]
 
 MAX_RESTARTS = 5
 #: The exit code when nobody reads the output any more: what a shell says of a program that SIGPIPE ended.
@@ -97,7 +103,51 @@ class TimeUp:
     """The time that was asked for is over."""
 
 
-Event = Begin | Started | StartFailed | Exited | Signalled | OutputLost | Tick | TimeUp | GuardEvent
+@dataclass(frozen=True, slots=True)
+class LogSeen:
+    """A process wrote the line that its gate waits for."""
+
+    process: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Somebody asks for one process to be stopped, started or restarted; ``refusal`` says when not to ask."""
+
+    name: str
+    verb: Verb
+
+
+@dataclass(frozen=True, slots=True)
+class Down:
+    """Somebody asks for everything to be stopped."""
+
+
+@dataclass(frozen=True, slots=True)
+class NewPlan:
+    """From now on another plan holds; ``changed`` are the processes that must be started anew for it."""
+
+    plan: Plan
+    changed: frozenset[str]
+    held: tuple[str, ...] = ()
+
+
+Event = (
+    Begin
+    | Started
+    | StartFailed
+    | Exited
+    | Signalled
+    | OutputLost
+    | Tick
+    | TimeUp
+    | LogSeen
+    | Asked
+    | Down
+    | NewPlan
+    | GuardEvent
+)
 
 
 # What is to be done.
@@ -132,7 +182,22 @@ class Finish:
     exit_code: int
 
 
-Action = Start | Kill | Tell | Finish
+@dataclass(frozen=True, slots=True)
+class Order:
+    """Tell the guard."""
+
+    order: GuardOrder
+
+
+@dataclass(frozen=True, slots=True)
+class TellLate:
+    """Tell the person that a process is not ready in time, with what it said last."""
+
+    name: str
+    found: Diagnostic
+
+
+Action = Start | Kill | Tell | TellLate | Order | Finish
 
 
 # What is known.
@@ -143,7 +208,9 @@ class Tracked:
     """One process. ``since`` is when it came into its state, or when it was sent its last signal.
 
     ``order`` counts the starts of all processes, 0 for one that was never started; ``failures`` the short runs in a
-    row; ``level`` how often it was told to stop, each time more firmly.
+    row; ``restarts`` all starts but the first; ``level`` how often it was told to stop, each time more firmly.
+    ``leaving`` says what follows once it has stopped: "stop" and it stays so, "again" and it is started, "drop" and it
+    is forgotten. ``seen`` is what its gate saw last, ``late`` whether it was said to be late.
     """
 
     process: PlanProcess
@@ -154,6 +221,13 @@ class Tracked:
     failures: int = 0
     level: int = 0
     ready: bool = False
+    wanted: bool = True
+    leaving: Literal["", "stop", "again", "drop"] = ""
+    restarts: int = 0
+    began: float = 0.0
+    ready_since: float | None = None
+    seen: str = ""
+    late: bool = False
 
     @property
     def alive(self) -> bool:
@@ -191,6 +265,8 @@ class State:
     shown: frozenset[str] = frozenset()
     waiting: frozenset[str] = frozenset()
     waiting_said: float | None = None
+    all_started: bool = False
+    all_ready: bool = False
     stop: Stop | None = None
     finished: bool = False
 

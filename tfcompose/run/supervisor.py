@@ -8,20 +8,31 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
 import os
+import re
 import selectors
 import signal
 import subprocess
 import time
 from collections import deque
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
+from tfcompose.diagnostic import Note
 from tfcompose.ros.environment import child_environment
-from tfcompose.run.child import LAST_LINE_LENGTH, Child, Keeper, Pipe, has_ended, kill_group, spawn
+from tfcompose.run.answers import answer
+from tfcompose.run.child import LAST_LINE_LENGTH, Child, Pipe, bury_adopted, has_ended, kill_group, spawn, subreaper
+from tfcompose.run.control import Control
 from tfcompose.run.events import EVENTS_FD, from_line
+from tfcompose.run.keeper import Keeper
+from tfcompose.run.leftovers import end as end_leftovers
+from tfcompose.run.leftovers import leftovers
 from tfcompose.run.machine import step
 from tfcompose.run.notice import Ended, FindingShown, LogLine
+from tfcompose.run.orders import JOINS, ORDERS_FD, order_line
+from tfcompose.run.place import RUN_ID
 from tfcompose.run.preflight import commands_of
 from tfcompose.run.signals import Signals
 from tfcompose.run.state import (
@@ -29,31 +40,42 @@ from tfcompose.run.state import (
     Exited,
     Finish,
     Kill,
+    LogSeen,
+    Order,
     OutputLost,
     Signalled,
     Start,
     Started,
     StartFailed,
     Tell,
+    TellLate,
     Tick,
     TimeUp,
     initial,
 )
 from tfcompose.run.timing import wake_time
+from tfcompose.run.told import told_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
+    from socket import socket
 
     from tfcompose.plan import Plan
     from tfcompose.run.notice import Notice, Stream
+    from tfcompose.run.outlet import Outlet
     from tfcompose.run.preflight import Command, Environment
     from tfcompose.run.state import Action, Event, State, Times
 
 #: The loop looks at its children at least this often, whatever signals say; seconds.
 LONGEST_SLEEP_S = 1.0
+#: So much of a line is compared with what a gate waits for, in characters.
+LONGEST_MATCHED = 4000
 #: The guard's lines hold findings with notes, so they may be longer than a log's; bytes.
 EVENT_LIMIT = 1024 * 1024
+
+#: The answer, what it means for the machine, and another plan's file and commands.
+Answer = tuple[dict[str, Any], "Event | None", "tuple[Path, dict[str, Command]] | None"]
 
 
 def supervise(  # noqa: PLR0913 (all but two are named, and most have what a user wants as default)
@@ -65,30 +87,56 @@ def supervise(  # noqa: PLR0913 (all but two are named, and most have what a use
     base_env: Mapping[str, str] | None = None,
     environment: Environment = child_environment,
     times: Times | None = None,
+    session: Session | None = None,
 ) -> int:
     """Run the plan until it ends, and return the exit code: 0 after a clean end, 1 after a failure or a finding.
 
     SIGINT, SIGTERM and SIGHUP end it. ``report`` is given everything that a person should know, in order; an OSError
     from it means that nobody reads it any more, and ends the plan. ``duration_s`` is how long to run after
-    the look before the start, in seconds. Must be called in the main thread.
+    the look before the start, in seconds. ``session`` is what the run has on this machine besides its processes. Must
+    be called in the main thread.
     """
     state = initial(plan, times)
     processes = [one.process for one in state.tracked.values() if one.state != "EXPECTED"]
     base = os.environ if base_env is None else base_env
-    commands, found = commands_of(plan, processes, plan_file, base, environment)
+    built_in = session.base if session else None
+    commands, found = commands_of(plan, processes, plan_file, base, environment, built_in)
     if found:
         for one in found:
             report(FindingShown(one))
         report(Ended(1))
         return 1
     with contextlib.ExitStack() as stack:
-        supervisor = _Supervisor(state, commands, report, stack)
+        ask = partial(answer, base=base, environment=environment)
+        supervisor = _Supervisor(state, commands, report, session or Session(plan_file), ask, stack)
         return supervisor.run(duration_s)
 
 
+@dataclass(slots=True)
+class Session:
+    """What a run has on this machine: the plan's file, its id, the control socket, and an output that does not wait.
+
+    ``base`` is the folder that the plan was built in, where ``plan_file`` is a copy. With an id, what the run's
+    processes leave behind is ended with it, also what left their groups. ``refresh`` is called now and then.
+    """
+
+    plan_file: Path
+    run_id: str = ""
+    base: Path | None = None
+    listener: socket | None = None
+    outlet: Outlet | None = None
+    refresh: Callable[[], None] | None = None
+
+
 class _Supervisor:
-    def __init__(
-        self, state: State, commands: dict[str, Command], report: Callable[[Notice], None], stack: contextlib.ExitStack
+    def __init__(  # noqa: PLR0913, PLR0917 (made in one place)
+        self,
+        state: State,
+        commands: dict[str, Command],
+        report: Callable[[Notice], None],
+        session: Session,
+        ask: Callable[..., Answer],
+        stack: contextlib.ExitStack,
     ) -> None:
         self._state = state
         self._commands = commands
@@ -96,10 +144,22 @@ class _Supervisor:
         self._children: dict[str, Child] = {}
         self._events: deque[Event] = deque()
         self._exit_code: int | None = None
+        self._due: float | None = None
+        self._look_at = 0.0
+        self._owing: int | None = None
         self._selector = stack.enter_context(selectors.DefaultSelector())
         self._signals = stack.enter_context(Signals())
         self._selector.register(self._signals.fd, selectors.EVENT_READ, self._signals.woken)
-        self._keeper = Keeper()
+        self._session = session
+        self._ask = ask
+        self._orders: int | None = None
+        self._control: Control | None = None
+        if session.listener:
+            self._control = Control(session.listener, self._selector, self._answer)
+            stack.callback(self._control.close)
+        if session.run_id:
+            stack.enter_context(subreaper())
+        self._keeper = Keeper(session.run_id)
         stack.callback(self._keeper.close)
         stack.callback(self._abandon)
 
@@ -107,16 +167,63 @@ class _Supervisor:
         self._handle(Begin())
         while self._exit_code is None:
             end = self._end(duration_s)
+            self._watch_outlet()
             for key, _ in self._selector.select(self._sleep_s(end)):
                 key.data()
             for number in self._signals.taken():
                 self._handle(Signalled(number))
-            for child in [child for child in self._children.values() if has_ended(child.popen.pid)]:
-                self._ended(child)
+            if self._signals.children_changed() or time.monotonic() >= self._look_at:
+                self._look_at = time.monotonic() + LONGEST_SLEEP_S
+                for child in [child for child in self._children.values() if has_ended(child.popen.pid)]:
+                    self._ended(child)
+                if self._session.run_id:
+                    bury_adopted({child.popen.pid for child in self._children.values()} | {self._keeper.pid})
             if end is not None and time.monotonic() >= end:
                 self._handle(TimeUp())
-            self._handle(Tick())
+            elif (self._due or math.inf) <= time.monotonic():
+                self._handle(Tick())
+            if self._session.refresh and self._report:
+                self._refresh(self._session.refresh)
         return self._exit_code
+
+    def _watch_outlet(self) -> None:
+        """Have the output written on when its reader is ready again, if something is owed."""
+        outlet = self._session.outlet
+        if outlet is None or outlet.owes == (self._owing is not None):
+            return
+        if outlet.owes:
+            self._owing = outlet.fd
+            self._selector.register(outlet.fd, selectors.EVENT_WRITE, self._push)
+        elif self._owing is not None:
+            self._selector.unregister(self._owing)
+            self._owing = None
+
+    def _refresh(self, refresh: Callable[[], None]) -> None:
+        try:
+            refresh()
+        except OSError:
+            self._lose_output()
+
+    def _push(self) -> None:
+        try:
+            if self._session.outlet:
+                self._session.outlet.push()
+        except OSError:
+            self._lose_output()
+
+    def _lose_output(self) -> None:
+        if self._owing is not None:
+            self._selector.unregister(self._owing)
+        self._session.outlet = self._report = self._owing = None
+        self._handle(OutputLost())
+
+    def _answer(self, request: dict[str, Any]) -> dict[str, Any]:
+        said, event, planned = self._ask(request, self._state, self._session.plan_file)
+        if planned:
+            self._session.plan_file, self._commands = planned
+        if event:
+            self._handle(event)
+        return said
 
     def _end(self, duration_s: float | None) -> float | None:
         """Return when the time is up: it counts from the end of the look before the start."""
@@ -126,7 +233,7 @@ class _Supervisor:
         return state.clear + duration_s
 
     def _sleep_s(self, end: float | None) -> float:
-        due = [at for at in (wake_time(self._state), end) if at is not None]
+        due = [at for at in (self._due, end) if at is not None]
         return min(LONGEST_SLEEP_S, max(0.0, min(due, default=float("inf")) - time.monotonic()))
 
     def _handle(self, event: Event) -> None:
@@ -135,6 +242,7 @@ class _Supervisor:
             self._state, actions = step(self._state, self._events.popleft(), time.monotonic())
             for action in actions:
                 self._do(action)
+        self._due = wake_time(self._state)
 
     def _do(self, action: Action) -> None:
         match action:
@@ -144,12 +252,21 @@ class _Supervisor:
                 kill_group(self._children[name].popen.pid, number)
             case Tell(notice):
                 self._tell(notice)
+            case Order(order):
+                self._order(order_line(order))
+            case TellLate(name, found) if name in self._children:
+                notes = [Note(f"{name}: {line}") for line in self._children[name].last_lines]
+                self._tell(FindingShown(replace(found, notes=(*found.notes, *notes))))
+            case TellLate(_, found):
+                self._tell(FindingShown(found))
             case Finish(exit_code):
                 self._exit_code = exit_code
             case _:
                 pass
 
     def _tell(self, notice: Notice) -> None:
+        if self._control and not isinstance(notice, LogLine):
+            self._control.tell(told_line(notice, time.time()), keep=True)
         if self._report is None:
             return
         try:
@@ -157,6 +274,12 @@ class _Supervisor:
         except OSError:
             self._report = None
             self._events.append(OutputLost())
+
+    def _order(self, line: str) -> None:
+        """Tell the guard; one that is not there, or stuck, is told nothing."""
+        with contextlib.suppress(OSError):
+            if self._orders is not None:
+                os.write(self._orders, line.encode())
 
     # A process's life.
 
@@ -171,25 +294,40 @@ class _Supervisor:
 
     def _spawn_guard(self, name: str) -> None:
         read_fd, write_fd = os.pipe()
+        orders_fd, self._orders = os.pipe()
+        os.set_blocking(self._orders, False)
         events = io.FileIO(read_fd)
         command = self._commands[name]
+        env = {EVENTS_FD: str(write_fd), ORDERS_FD: str(orders_fd)}
+        if self._state.clear is not None:
+            env[JOINS] = "1"
         try:
-            child = self._spawn(name, replace(command, env=command.env | {EVENTS_FD: str(write_fd)}), (write_fd,))
+            child = self._spawn(name, replace(command, env=command.env | env), (write_fd, orders_fd))
         except BaseException:
             events.close()
+            self._close_orders()
             raise
         finally:
             os.close(write_fd)
+            os.close(orders_fd)
         self._watch(child, Pipe(events, self._guard_said, EVENT_LIMIT))
 
+    def _close_orders(self) -> None:
+        if self._orders is not None:
+            os.close(self._orders)
+            self._orders = None
+
     def _spawn(self, name: str, command: Command, pass_fds: tuple[int, ...] = ()) -> Child:
+        run_id = self._session.run_id
+        if run_id:
+            command = replace(command, env=command.env | {RUN_ID: run_id})
         child = Child(name, spawn(command, pass_fds))
         self._children[name] = child
         self._keep()
         out, err = child.popen.stdout, child.popen.stderr
         if out and err:
-            self._watch(child, Pipe(out, self._logger(child, "stdout")))
-            self._watch(child, Pipe(err, self._logger(child, "stderr")))
+            self._watch(child, Pipe(out, self._logger(child, "stdout"), bucket=child.bucket))
+            self._watch(child, Pipe(err, self._logger(child, "stderr"), bucket=child.bucket))
         self._events.append(Started(name, child.popen.pid))
         return child
 
@@ -208,10 +346,14 @@ class _Supervisor:
 
     def _logger(self, child: Child, stream: Stream) -> Callable[[str], None]:
         last = child.last_err if stream == "stderr" else child.last_out
+        ready = self._state.tracked[child.name].process.ready
+        gate = re.compile(ready.text) if ready and ready.kind == "log" else None
 
         def log(text: str) -> None:
             last.append(text[:LAST_LINE_LENGTH])
             self._tell(LogLine(child.name, stream, text))
+            if gate and not self._state.tracked[child.name].ready and gate.search(text[:LONGEST_MATCHED]):
+                self._handle(LogSeen(child.name, text[:LAST_LINE_LENGTH]))
 
         return log
 
@@ -230,6 +372,8 @@ class _Supervisor:
             self._drain(child, pipe)
         returncode = child.popen.wait()
         del self._children[child.name]
+        if child.name == self._state.guard:
+            self._close_orders()
         self._keep()
         self._handle(Exited(child.name, returncode, child.last_lines))
 
@@ -244,7 +388,10 @@ class _Supervisor:
             for pipe in child.pipes:
                 pipe.file.close()
         self._children.clear()
+        self._close_orders()
         self._keep()
+        if self._session.run_id:
+            end_leftovers(leftovers(self._session.run_id), 1.0)
 
 
 def _reason(error: Exception) -> str:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from signal import SIGINT, SIGKILL, SIGTERM
+from signal import SIGKILL, SIGTERM, Signals
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from tfcompose.plan import PlanEdge
-    from tfcompose.run.state import State, Stop, Times, Tracked
+from tfcompose.run.gates import late_at, opens_at
 
-#: What a process is told, each when the one before did not help.
-STOP_SIGNALS = (SIGINT, SIGTERM, SIGKILL)
+if TYPE_CHECKING:
+    from tfcompose.plan import PlanEdge, PlanProcess
+    from tfcompose.run.state import State, Times, Tracked
+
+
+def stop_signals(process: PlanProcess) -> tuple[Signals, ...]:
+    """Return what the process is told, each when the one before did not help: its own signal, SIGTERM, SIGKILL."""
+    return tuple(dict.fromkeys((Signals[process.stop.signal], SIGTERM, SIGKILL)))[
+        : 1 + 2 * (process.stop.signal != "SIGKILL")
+    ]
 
 
 def backoff_s(times: Times, failures: int) -> float:
@@ -34,24 +40,29 @@ def waiting_due(state: State) -> float | None:
     return None if missing == state.waiting else state.waiting_said + state.times.waiting_s
 
 
-def stop_level(state: State, stop: Stop, one: Tracked, now: float) -> int:
-    """Return how many of ``STOP_SIGNALS`` the process should have been sent by now.
+def stop_level(state: State, one: Tracked, now: float) -> int:
+    """Return how many of its ``stop_signals`` the process should have been sent by now.
 
-    The first is due when nothing runs that waits for the process, each further one a while after the one before; a
-    second signal to the launcher makes the second due at once, everywhere, and a third the third.
+    The first is due when nothing runs that waits for the process, or when it alone is to end; each further one a while
+    after the one before. A second signal to the launcher makes the second due at once, everywhere, and a third the
+    third.
     """
     due = _firmer_at(state.times, one)
     level = one.level + 1 if due is not None and now >= due else one.level
-    if level == 0 and not _is_needed(state, one):
+    if level == 0 and (one.leaving or (state.stop and not _is_needed(state, one))):
         level = 1
-    if stop.signals > 1:
-        level = max(level, stop.signals)
-    return min(level, len(STOP_SIGNALS))
+    if state.stop and state.stop.signals > 1:
+        level = max(level, state.stop.signals)
+    return min(level, len(stop_signals(one.process)))
 
 
 def _firmer_at(times: Times, one: Tracked) -> float | None:
-    waits = {1: times.interrupt_s, 2: times.terminate_s}
-    return one.since + waits[one.level] if one.state == "STOPPING" and one.level in waits else None
+    """Return when the next signal is due: the plan's time counts for each, or else the launcher's."""
+    if one.state != "STOPPING" or not 0 < one.level < len(stop_signals(one.process)):
+        return None
+    own = one.process.stop.timeout_s
+    default = times.interrupt_s if one.level == 1 else times.terminate_s
+    return one.since + (default if own is None else own)
 
 
 def _is_needed(state: State, one: Tracked) -> bool:
@@ -68,8 +79,8 @@ def wake_time(state: State) -> float | None:
         if one.state == "BACKOFF":
             due.append(one.since + backoff_s(times, one.failures))
         firmer = _firmer_at(times, one)
-        if firmer is not None:
-            due.append(firmer)
+        gate = [at for at in (firmer, opens_at(one), late_at(state, one)) if at is not None]
+        due += gate if state.stop is None else gate[: firmer is not None]
     if state.stop is None and state.begun is not None:
         if state.clear is None:
             due.append(state.begun + times.clear_s)

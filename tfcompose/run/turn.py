@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from tfcompose.run.failures import in_short
 from tfcompose.run.notice import Ended, FindingShown, Notice, ProcessState, StateName, Stopping
-from tfcompose.run.state import Action, Finish, Start, State, Stop, Tell, Tracked
+from tfcompose.run.orders import Present
+from tfcompose.run.state import Action, Finish, Order, Start, State, Stop, Tell, Tracked
 
 if TYPE_CHECKING:
     from tfcompose.diagnostic import Diagnostic
@@ -33,17 +34,21 @@ class Turn:
         """Tell the person."""
         self.actions.append(Tell(notice))
 
-    def enter(self, name: str, state: StateName, detail: str = "", **changes: int | None) -> None:
+    def enter(self, name: str, state: StateName, detail: str = "", **changes: float | None) -> None:
         """Put the process into the state, since now, and tell."""
         pid = changes.pop("pid", None)
         one = replace(self.state.tracked[name], state=state, since=self.now, pid=pid, **changes)  # type: ignore[arg-type]
         self.track(name, one)
-        self.tell(ProcessState(name, state, pid, detail))
+        self.tell(ProcessState(name, state, one.pid, detail))
 
     def start(self, name: str) -> None:
         """Have the process started."""
         order = 1 + max(one.order for one in self.state.tracked.values())
-        self.enter(name, "STARTING", order=order)
+        before = self.state.tracked[name]
+        again = before.order > 0
+        self.enter(name, "STARTING", order=order, level=0, restarts=before.restarts + again)
+        if again and before.process.owns and self.state.guard not in (None, name):
+            self.actions.append(Order(Present(name)))
         self.actions.append(Start(name))
 
     def show(self, found: Diagnostic) -> None:

@@ -22,6 +22,10 @@ class Turns:
             self._gids.popitem(last=False)
         return current, before
 
+    def forget(self, child: str) -> None:
+        """Take whoever sends the frame next as the first."""
+        self._gids.pop(child, None)
+
     def known(self, child: str) -> bool:
         """Whether somebody has sent the frame."""
         return child in self._gids

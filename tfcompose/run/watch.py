@@ -12,10 +12,13 @@ from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFSubscription, wait
 from tfcompose.run.bulletin import Bulletin
 from tfcompose.run.clock_watch import ClockWatch
-from tfcompose.run.events import EVENTS_FD, Clear, Complete, Live, OwnerReady, to_line
+from tfcompose.run.events import EVENTS_FD, Clear, Complete, GateOpen, GateShut, Live, OwnerReady, to_line
+from tfcompose.run.gatekeeper import Gates
 from tfcompose.run.hearing import Hearing
+from tfcompose.run.heeding import Orders
 from tfcompose.run.judge import Judge
 from tfcompose.run.neighbours import GLOBAL, Graph
+from tfcompose.run.orders import JOINS
 from tfcompose.run.own import say
 from tfcompose.run.topics import plans_by_topics, together
 
@@ -31,36 +34,37 @@ if TYPE_CHECKING:
     from tfcompose.run.own import Own
 
 SETTLE = "TFCOMPOSE_SETTLE_S"
-#: The guard's mode, where it is another than the plan's.
-MODE = "TFCOMPOSE_GUARD"
 #: What a guard says that is switched off: it looks, and judges nobody.
-_SEEN = (Clear, Live, OwnerReady, Complete)
+_SEEN = (Clear, Live, OwnerReady, Complete, GateOpen, GateShut)
 DEFAULT_SETTLE_S = 1.0
 LOOK_EVERY_S = 0.1
 
 
 def guard(own: Own, stop: Stop) -> None:
     """Watch /tf and /tf_static until a signal comes."""
-    judges = os.environ.get(MODE, own.plan.guard.mode) != "off"
-    settle_s = float(os.environ.get(SETTLE, DEFAULT_SETTLE_S)) if judges else 0.0
+    judges = own.plan.guard.mode != "off"
+    joins = bool(os.environ.get(JOINS))
+    settle_s = float(os.environ.get(SETTLE, DEFAULT_SETTLE_S)) if judges and not joins else 0.0
     plans = plans_by_topics(own.plan, own.process)
     emit = together(_emitter(judges=judges), list(plans.values()))
     with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
         now = time.monotonic()
         watches = []
         for topics, plan in plans.items():
-            # One that judges nobody takes every owner as the plan's, whenever it began.
-            judge = Judge(plan, settle_s, now, time.time_ns() if judges else 0)
+            # One that judges nobody, or joins, takes every owner as the plan's, whenever it began.
+            judge = Judge(plan, settle_s, now, 0 if joins or not judges else time.time_ns())
             watches.append(_Watch(node, topics, judge, emit))
-            if not judges:
-                judge.tick(now)
+            if joins or not judges:
+                watches[-1].begin(now)
         if GLOBAL not in plans:
             watches[0].watch_global_topics()
+        orders = Orders([watch.judge for watch in watches], Gates(node, emit))
         say(f"watching {_counted(own.plan)}{'' if judges else ', and judging nobody'}")
         clock = ClockWatch(own, node)
         bulletin = Bulletin(node, own.plan.robot)
         while not stop.requested:
             wait(node, [each for watch in watches for each in (watch.fixed, watch.moving)], LOOK_EVERY_S, stop)
+            orders.take()
             for watch in watches:
                 watch.look()
             bulletin.look([watch.judge for watch in watches])
@@ -86,6 +90,10 @@ class _Watch:
     def watch_global_topics(self) -> None:
         """Look for nodes of the plan on the global topics too, where they do not belong."""
         self._leaks_to = self._graph.topics
+
+    def begin(self, now: float) -> None:
+        """Look at nothing before the start: it was long ago, or is nobody's business."""
+        self._pass_on(self.judge.tick(now))
 
     def look(self) -> None:
         """Take what has come, and from time to time the graph."""

@@ -1,0 +1,101 @@
+"""``up -d``: the launcher goes on in the background, and this command follows it until the robot is up."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.console import Console
+from tfcompose.cli.keeping import left_behind
+from tfcompose.cli.missing import say_missing
+from tfcompose.cli.running import events
+from tfcompose.cli.terminal import coloured, complain
+from tfcompose.run.logs import Logs
+from tfcompose.run.notice import AllReady, AllStarted, Ended
+from tfcompose.run.supervisor import supervise
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+    from tfcompose.plan import Plan
+    from tfcompose.run.place import Lock, Place
+    from tfcompose.run.supervisor import Session
+
+
+def detach(plan: Plan, place: Place, lock: Lock, session: Session, arguments: Namespace) -> int:
+    """Start the launcher as a process of its own; return 0 when all is started, or ready; 1 when it is not."""
+    for line in left_behind(place, session.run_id):
+        complain(line)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    pid = os.fork()
+    if pid == 0:
+        code = 1
+        try:
+            lock.signed()
+            code = _launcher(plan, place, session, arguments.duration)
+        finally:
+            os._exit(code)
+    if session.listener:
+        session.listener.close()
+    return _follow(plan, place, pid, arguments)
+
+
+def _launcher(plan: Plan, place: Place, session: Session, duration_s: float | None) -> int:
+    """Run as a process without a terminal; what Python itself says goes beside the logs."""
+    os.setsid()
+    place.logs.mkdir(parents=True, exist_ok=True)
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    said = os.open(place.logs / "launcher.err", os.O_CREAT | os.O_WRONLY | os.O_TRUNC, 0o640)
+    for fd, to in ((0, nowhere), (1, said), (2, said)):
+        os.dup2(to, fd)
+    os.close(nowhere)
+    os.close(said)
+    logs = Logs(place.logs)
+    console = Console(plan, _Nowhere(), colour=False, keep=logs.write)
+    try:
+        return supervise(plan, session.plan_file, report=console, duration_s=duration_s, session=session)
+    finally:
+        logs.close()
+
+
+class _Nowhere:
+    def write(self, text: str, *, log: bool = False) -> None:
+        """Do nothing: the logs have it."""
+
+
+class _Here:
+    def write(self, text: str, *, log: bool = False) -> None:
+        """Write to standard output."""
+        del log
+        sys.stdout.write(text)
+        sys.stdout.flush()
+
+
+def _follow(plan: Plan, place: Place, pid: int, arguments: Namespace) -> int:
+    console = Console(plan, _Here(), colour=coloured(sys.stdout))
+    goal = AllReady if arguments.wait else AllStarted
+    with contextlib.suppress(OSError):
+        try:
+            for notice, _ in events(place, arguments.timeout if arguments.wait else None):
+                console(notice)
+                if isinstance(notice, Ended):
+                    return _ended(pid)
+                if isinstance(notice, goal):
+                    sys.stdout.write(f"{place.name} runs in the background: pid {pid}; tfcompose ps, logs -f, down\n")
+                    return 0
+        except TimeoutError:
+            say_missing(place, arguments.timeout)
+            return 1
+        except KeyboardInterrupt:
+            complain(f"{place.name} goes on in the background: pid {pid}; tfcompose down ends it")
+            return 130
+    complain(f"the launcher has ended: {place.logs / 'launcher.err'} may say why")
+    return 1
+
+
+def _ended(pid: int) -> int:
+    """Return the exit code of the launcher, which has ended."""
+    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])

@@ -1,0 +1,114 @@
+"""``up --dry-run``: what would be started, for people who review it. The same plan gives the same text everywhere."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.up import PLAN, as_asked, plan_in
+from tfcompose.planfile import read_plan
+from tfcompose.ros.environment import FASTDDS_PROFILE, child_environment
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Iterator
+
+    from tfcompose.plan import Plan, PlanProcess
+
+
+def dry_run(arguments: Namespace) -> int:
+    """Print the processes of a robot or a built plan; exit code as for ``build``. Nothing is written."""
+    if arguments.file.endswith(".json"):
+        read = plan_in(Path(arguments.file))
+        if isinstance(read, int):
+            return read
+        plan, files = read, _files_beside(read, Path(arguments.file).parent)
+    else:
+        compiled = import_module("tfcompose.cli.compiling").robot_or_code(arguments.file, arguments)
+        if isinstance(compiled, int):
+            return compiled
+        files = {file.path: file.text for file in import_module("tfcompose.emit").emit(compiled) if file.text}
+        plan = read_plan(files[PLAN], PLAN)
+    plan = as_asked(plan, arguments)
+    sys.stdout.write("\n".join(_lines(plan, files)) + "\n")
+    return 0
+
+
+def _files_beside(plan: Plan, folder: Path) -> dict[str, str]:
+    files = {}
+    for process in plan.processes:
+        if process.params_file is not None:
+            try:
+                files[process.params_file] = (folder / process.params_file).read_text("utf-8")
+            except (OSError, UnicodeDecodeError):
+                files[process.params_file] = "(cannot be read)"
+    return files
+
+
+def _lines(plan: Plan, files: dict[str, str]) -> Iterator[str]:
+    ros = plan.ros
+    domain = "the environment's" if ros.domain_id is None else ros.domain_id
+    yield f"robot {plan.robot}: {len(plan.processes)} processes, {len(plan.edges)} edges, domain: {domain}"
+    for process in plan.processes:
+        yield ""
+        yield from _process(plan, process, files)
+
+
+def _process(plan: Plan, process: PlanProcess, files: dict[str, str]) -> Iterator[str]:
+    yield f"{process.name} ({process.kind})"
+    if process.kind != "external":
+        yield f"  command  {' '.join(map(_quoted, process.argv))}"
+    nodes = [name + (f" → {process.lifecycle[name]}" if name in process.lifecycle else "") for name in process.nodes]
+    if nodes:
+        yield f"  nodes    {', '.join(nodes)}"
+    for name, value in _environment(plan, process).items():
+        yield f"  env      {name}={_quoted(value)}"
+    if process.cwd is not None:
+        yield f"  folder   {process.cwd}"
+    for old, new in process.remap.items():
+        yield f"  remap    {old} → {new}"
+    if process.params_file is not None:
+        yield f"  params   {process.params_file}"
+        yield from (f"    | {line}" for line in files.get(process.params_file, "").splitlines())
+    yield from _times(process)
+    for edge in plan.edges_of(process.name):
+        rate = f", {edge.rate:g} Hz" if edge.rate else ""
+        yield f"  edge     {edge.name} ({edge.kind}{rate})"
+
+
+def _times(process: PlanProcess) -> Iterator[str]:
+    if process.after:
+        yield f"  after    {', '.join(f'{name} is {what}' for name, what in process.after.items())}"
+    ready = process.ready
+    if ready:
+        what = {"exit": f"code {ready.number:g}", "time": f"{ready.number:g} s"}.get(ready.kind, ready.text)
+        late = f", late after {ready.timeout_s:g} s" if ready.timeout_s is not None else ""
+        yield f"  ready    {ready.kind} {what}{late}".rstrip()
+    if process.restart != "no":
+        most = "" if process.max_restarts is None else f", {process.max_restarts} times in a row"
+        yield f"  restart  {process.restart}{most}"
+    if process.required:
+        yield "  required"
+    if process.stop.signal != "SIGINT" or process.stop.timeout_s is not None:
+        patience = "" if process.stop.timeout_s is None else f", {process.stop.timeout_s:g} s"
+        yield f"  stop     {process.stop.signal}{patience}"
+    if process.host is not None:
+        yield f"  host     {process.host}"
+
+
+def _environment(plan: Plan, process: PlanProcess) -> dict[str, str]:
+    """Return what is added to the environment."""
+    if process.kind == "external":
+        return {}
+    env = child_environment({}, plan.ros, own=process.kind != "run") | process.env
+    profile = str(FASTDDS_PROFILE)
+    return {name: value.replace(profile, "${tfcompose}/ros/fastdds.xml") for name, value in sorted(env.items())}
+
+
+def _quoted(word: str) -> str:
+    plain = word.replace("${", "").replace("}", "").replace("_", "").replace("-", "")
+    return (
+        word if plain and all(c.isalnum() or c in "/.:=@%+," for c in plain) else "'" + word.replace("'", "'\\''") + "'"
+    )

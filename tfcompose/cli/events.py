@@ -1,0 +1,60 @@
+"""``tfcompose events``: what happens in a running robot.
+
+Print what the launcher has told since the start, and then each event as it comes, until the robot ends.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.console import Console
+from tfcompose.cli.running import add_robot, chosen, events
+from tfcompose.cli.terminal import coloured, complain
+from tfcompose.plan import Plan, RosSettings
+from tfcompose.run.told import told_line
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Add the command's arguments."""
+    add_robot(parser)
+    parser.add_argument("--format", choices=("text", "json"), default="text", help="json: one object a line")
+
+
+def run(arguments: Namespace) -> int:
+    """Print events until the robot ends; exit code 0, 1 where none runs."""
+    place = chosen(arguments.robot)
+    if isinstance(place, int):
+        return place
+    lines = _Timed()
+    console = Console(Plan(place.name, "", None, RosSettings(), (), ()), lines, colour=coloured(sys.stdout))
+    try:
+        for notice, at in events(place):
+            if arguments.format == "json":
+                sys.stdout.write(f"{told_line(notice, at)}\n")
+            else:
+                lines.at = at
+                console(notice)
+            sys.stdout.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        complain(f"{place.name} does not answer: {error}")
+        return 1
+    return 0
+
+
+class _Timed:
+    """Standard output, with the time before each line."""
+
+    at = 0.0
+
+    def write(self, text: str, *, log: bool = False) -> None:
+        """Write a line."""
+        del log
+        stamp = time.strftime("%H:%M:%S", time.localtime(self.at))
+        sys.stdout.write(f"{stamp}.{int(self.at * 1000) % 1000:03d} {text}")

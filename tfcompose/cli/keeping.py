@@ -1,0 +1,52 @@
+"""The copy of a plan that a run is made from, and what earlier runs left behind."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.terminal import UNREADABLE, complain
+from tfcompose.planfile import write_plan
+from tfcompose.run.leftovers import leftovers
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from tfcompose.plan import Plan
+    from tfcompose.run.place import Place
+
+PLAN = "plan.json"
+
+
+def kept(plan: Plan, file: Path, place: Place, *, alone: bool) -> Path | int:
+    """Copy the plan, and what stands beside it, to where the run is; return the copy, or an exit code with a complaint.
+
+    A build then does not reach into a run. ``alone`` removes the copies of earlier runs.
+    """
+    parts = {PLAN: write_plan(plan).encode()}
+    try:
+        for name in (plan.description, *(process.params_file for process in plan.processes)):
+            if name is not None and (file.parent / name).is_file():
+                parts[name] = (file.parent / name).read_bytes()
+        digest = hashlib.sha256(repr(sorted(parts.items())).encode()).hexdigest()[:16]
+        folder = place.folder / f"plan-{digest}"
+        if alone:
+            for old in place.folder.glob("plan-*"):
+                shutil.rmtree(old, ignore_errors=True)
+        for name, data in parts.items():
+            (folder / name).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            (folder / name).write_bytes(data)
+    except OSError as error:
+        complain(f"the plan cannot be copied to {place.folder}: {error.strerror}")
+        return UNREADABLE
+    return folder / PLAN
+
+
+def left_behind(place: Place, run_id: str) -> list[str]:
+    """Return what is to be said about processes of earlier runs that are still there."""
+    found = [one for one in leftovers(f"{place.name}:") if one.run != run_id]
+    if not found:
+        return []
+    lines = [f"an earlier run left {one.pid} behind: {one.command}" for one in found]
+    return [*lines, f"tfcompose down --leftovers --robot {place.name} stops {'it' if len(found) == 1 else 'them'}"]

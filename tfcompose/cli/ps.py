@@ -1,0 +1,99 @@
+"""``tfcompose ps``: the processes of running robots.
+
+Print each process with its state, number, time, restarts, use of the processor and of memory (proportional, with
+everything in its group), and how many of the edges that it owns are live.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.cli.running import add_robot, running
+from tfcompose.cli.terminal import UNREADABLE, complain
+from tfcompose.run.control import ask
+from tfcompose.run.place import PlaceError
+from tfcompose.run.usage import usage_of
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+
+HEAD = ("PROCESS", "STATE", "PID", "UPTIME", "RESTARTS", "CPU", "MEMORY", "EDGES")
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Add the command's arguments."""
+    add_robot(parser)
+    parser.add_argument("--format", choices=("text", "json"), default="text", help="default: text")
+
+
+def run(arguments: Namespace) -> int:
+    """Print the table; exit code 0, 1 where no robot runs."""
+    robots = _robots(arguments.robot)
+    if isinstance(robots, int):
+        return robots
+    if arguments.format == "json":
+        sys.stdout.write(json.dumps(robots, indent=1) + "\n")
+        return 0 if robots else 1
+    if not robots:
+        complain("no robot is running" if arguments.robot is None else f"{arguments.robot} is not running")
+        return 1
+    for robot in robots:
+        state = "stopping" if robot["stopping"] else "tree complete" if robot["complete"] else "tree not complete"
+        sys.stdout.write(f"{robot['name']}: {state}, launcher {robot['launcher']}, since {_time(robot['uptime'])}\n")
+        _table([_row(process) for process in robot["processes"]])
+    return 0
+
+
+def _robots(name: str | None) -> list[dict[str, Any]] | int:
+    found = []
+    try:
+        for place, _ in running():
+            if name is None or name in {place.name, place.name.rpartition("@")[0]}:
+                found.append({"name": place.name} | ask(place, do="ps"))
+    except PlaceError as error:
+        complain(str(error))
+        return UNREADABLE
+    except OSError as error:
+        complain(f"a robot does not answer: {error}")
+        return 1
+    used = usage_of([process["pid"] for robot in found for process in robot["processes"] if process["pid"]])
+    for robot in found:
+        for process in robot["processes"]:
+            cpu, memory = used.get(process["pid"], (None, None))
+            process |= {"cpu": cpu, "memory": memory}
+    return found
+
+
+def _row(process: dict[str, Any]) -> tuple[str, ...]:
+    cpu, memory = process["cpu"], process["memory"]
+    ready = "" if process["ready"] or process["state"] != "RUNNING" else ", not ready"
+    return (
+        process["name"],
+        process["state"].lower() + ready,
+        str(process["pid"] or "–"),
+        "–" if process["uptime"] is None else _time(process["uptime"]),
+        str(process["restarts"]),
+        "–" if cpu is None else f"{cpu:.0%}",
+        "–" if memory is None else f"{memory / 1e6:.0f} MB",
+        f"{process['live']}/{process['edges']}" if process["edges"] else "–",
+    )
+
+
+def _table(rows: list[tuple[str, ...]]) -> None:
+    widths = [max(map(len, column)) for column in zip(HEAD, *rows, strict=True)]
+    for row in (HEAD, *rows):
+        line = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+        sys.stdout.write(f"  {line.rstrip()}\n")
+
+
+def _time(seconds: float) -> str:
+    whole = int(seconds)
+    if whole < 60:  # noqa: PLR2004 (seconds of a minute)
+        return f"{whole} s"
+    minutes, rest = divmod(whole, 60)
+    if minutes < 60:  # noqa: PLR2004 (minutes of an hour)
+        return f"{minutes}:{rest:02d} min"
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d} h"

@@ -1,0 +1,108 @@
+"""What the commands about a running robot share: which one is meant, and how it is asked."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.cli.terminal import UNREADABLE, complain
+from tfcompose.run.control import ask, connect
+from tfcompose.run.place import PlaceError, places
+from tfcompose.run.told import notice_of
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser
+    from collections.abc import Callable, Iterator
+
+    from tfcompose.run.notice import Notice
+    from tfcompose.run.place import Holder, Place
+
+
+def add_robot(parser: ArgumentParser) -> None:
+    """Add --robot."""
+    parser.add_argument(
+        "--robot", metavar="NAME", help="which of several running robots: its name, or name@domain; default: the one"
+    )
+
+
+def running() -> list[tuple[Place, Holder]]:
+    """Return the robots that run, and who runs each.
+
+    Raises:
+        PlaceError: if there is no folder that only this user can open.
+    """
+    found = [(place, place.holder()) for place in places(os.environ)]
+    return [(place, holder) for place, holder in found if holder]
+
+
+def chosen(name: str | None, *, among: Callable[[], list[Place]] | None = None) -> Place | int:
+    """Return the place of the robot that is meant, or the exit code after saying why there is none."""
+    try:
+        known = among() if among else [place for place, _ in running()]
+    except PlaceError as error:
+        complain(str(error))
+        return UNREADABLE
+    what = "robot has run here" if among else "robot is running"
+    found = [place for place in known if name is None or name in {place.name, place.name.rpartition("@")[0]}]
+    names = ", ".join(place.name for place in known)
+    if not known:
+        complain(f"no {what}")
+    elif not found:
+        complain(f"no {what} by the name {name}: there is {names}")
+    elif len(found) > 1:
+        complain(f"several robots are there: {', '.join(place.name for place in found)}; choose one with --robot")
+        return UNREADABLE
+    else:
+        return found[0]
+    return 1
+
+
+def asked(place: Place, **request: Any) -> dict[str, Any] | int:
+    """Return the launcher's answer, or the exit code after saying why there is none."""
+    try:
+        answer = ask(place, **request)
+    except OSError as error:
+        complain(f"{place.name} does not answer: {error}")
+        return 1
+    if "error" in answer:
+        complain(str(answer["error"]))
+        return 1
+    return answer
+
+
+def events(place: Place, timeout_s: float | None = None) -> Iterator[tuple[Notice, float]]:
+    """Yield what the launcher has told and tells, with when, until it ends.
+
+    Raises:
+        OSError: if it cannot be heard; TimeoutError if the time is over.
+    """
+    end = None if timeout_s is None else time.monotonic() + timeout_s
+    with connect(place) as connection:
+        connection.sendall(b'{"do": "events"}\n')
+        rest = b""
+        while True:
+            left = None if end is None else end - time.monotonic()
+            if left is not None and left <= 0:
+                raise TimeoutError
+            connection.settimeout(left)
+            data = connection.recv(64 * 1024)
+            if not data:
+                return
+            *lines, rest = (rest + data).split(b"\n")
+            for line in lines:
+                yield notice_of(line.decode())
+
+
+def since(holder: Holder) -> str:
+    """Return since when, in local time: 14:03:27, with the date if that is not today."""
+    at, today = time.localtime(holder.since), time.localtime()
+    form = "%H:%M:%S" if at[:3] == today[:3] else "%Y-%m-%d %H:%M:%S"
+    return time.strftime(form, at)
+
+
+def told(answer: str) -> int:
+    """Print one line, and return 0."""
+    sys.stdout.write(f"{answer}\n")
+    return 0

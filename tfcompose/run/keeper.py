@@ -1,0 +1,65 @@
+"""What ends a run whose launcher was killed: a shell that outlives the launcher by a moment.
+
+It kills the groups that it was told last, and then whatever carries the run's id in its environment: processes that
+left their groups.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import subprocess
+from typing import TYPE_CHECKING
+
+from tfcompose.run.place import RUN_ID
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+_SCRIPT = """
+trap '' INT TERM HUP
+groups='' last=''
+while read -r line; do groups=$line; last=$line; done
+for g in $groups; do [ "$g" = end ] || kill -9 -$g; done
+[ -n "$1" ] && [ "$last" != end ] || exit 0
+for e in /proc/[0-9]*/environ; do
+    pid=${e#/proc/}; pid=${pid%/environ}
+    [ "$pid" = $$ ] || ! grep -qaF "$1" "$e" || kill -9 "$pid"
+done
+"""
+
+
+class Keeper:
+    """Outlives the launcher by a moment, and kills the groups that it was told last."""
+
+    def __init__(self, run_id: str = "") -> None:
+        self._shell = subprocess.Popen(
+            ["/bin/sh", "-c", _SCRIPT, "sh", f"{RUN_ID}={run_id}" if run_id else ""],
+            bufsize=0,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        self._kept = ""
+
+    @property
+    def pid(self) -> int:
+        """Its process number."""
+        return self._shell.pid
+
+    def keep(self, pids: Iterable[int]) -> None:
+        """Say which groups there are now."""
+        line = " ".join(map(str, pids)) + "\n"
+        self._kept = line.strip()
+        if self._shell.stdin:
+            with contextlib.suppress(BrokenPipeError):
+                self._shell.stdin.write(line.encode())
+
+    def close(self) -> None:
+        """Let it go; the groups that it was told last are killed."""
+        if self._shell.stdin:
+            if not self._kept:
+                with contextlib.suppress(BrokenPipeError):
+                    self._shell.stdin.write(b"end\n")
+            self._shell.stdin.close()
+        self._shell.wait()

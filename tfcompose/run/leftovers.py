@@ -1,0 +1,85 @@
+"""Processes of a run, found by the run's id in their environment: also those that left their group and session."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from tfcompose.run.place import RUN_ID
+
+
+@dataclass(frozen=True, slots=True)
+class Leftover:
+    """A process that a run started: its number, its run's id, its command, and when it began (clock ticks)."""
+
+    pid: int
+    run: str
+    command: str
+    began: int
+
+
+def leftovers(run: str) -> list[Leftover]:
+    """Return the processes whose run's id is, or begins with, ``run``: "rover@0:" finds all of rover's runs."""
+    found = []
+    for folder in Path("/proc").iterdir():
+        if not folder.name.isdigit() or int(folder.name) == os.getpid():
+            continue
+        with contextlib.suppress(OSError, ValueError, IndexError):
+            one = _look(folder, run)
+            if one:
+                found.append(one)
+    return sorted(found, key=lambda one: one.pid)
+
+
+def _look(folder: Path, run: str) -> Leftover | None:
+    marks = [word for word in (folder / "environ").read_bytes().split(b"\0") if word.startswith(RUN_ID.encode() + b"=")]
+    if not marks or not marks[0].decode(errors="replace").partition("=")[2].startswith(run):
+        return None
+    words = (folder / "cmdline").read_bytes().rstrip(b"\0").split(b"\0")
+    return Leftover(
+        int(folder.name),
+        marks[0].decode(errors="replace").partition("=")[2],
+        b" ".join(words).decode(errors="replace")[:200],
+        _began(folder),
+    )
+
+
+def _began(folder: Path) -> int:
+    return int((folder / "stat").read_text().rpartition(")")[2].split()[19])
+
+
+def end(found: list[Leftover], patience_s: float = 2.0) -> list[Leftover]:
+    """Tell them to end, kill those that do not, and return those that are still there."""
+    for number, wait_s in ((signal.SIGTERM, patience_s), (signal.SIGKILL, patience_s)):
+        for one in found:
+            _send(one, number)
+        until = time.monotonic() + wait_s
+        while (found := [one for one in found if _is_there(one)]) and time.monotonic() < until:
+            time.sleep(0.02)
+        if not found:
+            break
+    return found
+
+
+def _send(one: Leftover, number: int) -> None:
+    """Send the signal to that very process, and to no other that was given its number since."""
+    with contextlib.suppress(OSError):
+        descriptor = os.pidfd_open(one.pid)
+        try:
+            if _is_there(one):
+                signal.pidfd_send_signal(descriptor, number)
+        finally:
+            os.close(descriptor)
+
+
+def _is_there(one: Leftover) -> bool:
+    folder = Path("/proc") / str(one.pid)
+    try:
+        state = (folder / "stat").read_text().rpartition(")")[2].split()[0]
+        return _began(folder) == one.began and state != "Z"
+    except (OSError, IndexError):
+        return False

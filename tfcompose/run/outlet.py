@@ -1,0 +1,96 @@
+"""Output to somebody who may read slowly, or not at all for a while: a terminal that was stopped, a pipe to a pager.
+
+The robot does not wait for its reader. What cannot be written at once is kept, up to a limit; beyond it, lines of
+processes are left out and counted, and they are in the logs.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import select
+import stat
+
+#: So much is kept for a slow reader; what the launcher itself says may take as much again; bytes.
+KEPT = 256 * 1024
+#: What a pipe or terminal surely takes when it is ready; bytes.
+PIECE = 4096
+
+
+class Outlet:
+    """Writes to a file descriptor without waiting."""
+
+    def __init__(self, fd: int) -> None:
+        self.fd, self._own = _not_waiting(fd)
+        self._owed = bytearray()
+        self.left_out = 0
+
+    @property
+    def owes(self) -> bool:
+        """Whether something is still to be written."""
+        return bool(self._owed)
+
+    def write(self, text: str, *, log: bool = False) -> None:
+        """Write what can be written now; a log line is left out where too much is kept already.
+
+        Raises:
+            OSError: if nobody reads any more.
+        """
+        limit = KEPT if log else 2 * KEPT
+        if len(self._owed) > limit:
+            self.left_out += 1
+            return
+        if self.left_out and not self._owed:
+            self._owed += (
+                f"… {self.left_out} lines are left out here: they came too fast, and are in the logs\n".encode()
+            )
+            self.left_out = 0
+        self._owed += text.encode(errors="backslashreplace")
+        self.push()
+
+    def push(self) -> None:
+        """Write what can be written now.
+
+        Raises:
+            OSError: if nobody reads any more.
+        """
+        while self._owed:
+            if not self._own and not select.select([], [self.fd], [], 0)[1]:
+                return
+            try:
+                count = os.write(self.fd, bytes(self._owed[: (1 << 16) if self._own else PIECE]))
+            except BlockingIOError:
+                return
+            except OSError as error:
+                if error.errno not in {errno.ENOSPC, errno.EDQUOT}:
+                    raise
+                self.left_out += self._owed.count(b"\n")  # a full disk stops no robot
+                self._owed.clear()
+                return
+            del self._owed[:count]
+
+    def close(self, patience_s: float = 0.5) -> None:
+        """Write the rest, as far as the reader takes it in that time."""
+        try:
+            while self._owed and select.select([], [self.fd], [], patience_s)[1]:
+                self.push()
+        except OSError:
+            pass
+        finally:
+            if self._own and self.fd > 2:  # noqa: PLR2004 (the standard streams stay open)
+                os.close(self.fd)
+
+
+def _not_waiting(fd: int) -> tuple[int, bool]:
+    """Return a descriptor for the same thing that never waits, and whether it is one.
+
+    The flag belongs to what was opened, which others share; so pipes and terminals are opened once more. Regular files
+    never wait.
+    """
+    kind = os.fstat(fd).st_mode
+    if stat.S_ISREG(kind):
+        return fd, True
+    try:
+        return os.open(f"/proc/self/fd/{fd}", os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY), True
+    except OSError:
+        return fd, False

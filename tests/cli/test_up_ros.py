@@ -116,6 +116,9 @@ def up(domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Itera
     """Run ``tfcompose up`` on this text, or on these words, in a folder of the test's own."""
     assert domain
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "runtime").mkdir(mode=0o700)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "runtime"))
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
     running: list[Up] = []
 
     def run(text: str | None, *words: str, **environment: str) -> Up:
@@ -233,19 +236,23 @@ def test_an_edge_that_somebody_publishes_already_is_refused_with_the_nodes_name(
     assert re.findall(r"started (\w+)", robot.text) == ["guard"]
 
 
-def test_the_same_robot_is_refused_a_second_time(up: Callable[..., Up]) -> None:
+def test_the_same_edges_by_another_robots_name_are_refused(up: Callable[..., Up]) -> None:
     first = up(ROVER)
     first.says("tree complete")
-    second = up(ROVER, "--settle", "4")
+    second = up(ROVER.replace("robot: rover", "robot: other"), "--settle", "4")
     assert second.ends(40) == 1
     assert "before the start" in second.text
     assert "another /drive" in second.text or "another /tfcompose_static" in second.text
+    assert "help: end the other /" in second.text
     assert re.findall(r"started (\w+)", second.text) == ["guard"]
     assert first.popen.poll() is None
 
 
-def test_two_that_start_at_the_same_time_do_not_live_on_quietly(up: Callable[..., Up]) -> None:
-    both = [up(ROVER), up(None, "rover.yaml", "-o", "other")]
+def test_two_that_start_the_same_edges_at_the_same_time_do_not_live_on_quietly(
+    up: Callable[..., Up], tmp_path: Path
+) -> None:
+    (tmp_path / "other.yaml").write_text(ROVER.replace("robot: rover", "robot: other"))
+    both = [up(ROVER), up(None, "other.yaml")]
     assert until(lambda: all(one.popen.poll() is not None or "error[TF80" in one.text for one in both), 40)
     assert all("another /" in one.text for one in both), [one.text for one in both]
 
@@ -286,7 +293,8 @@ def test_without_ros_it_says_in_one_sentence_what_to_install_and_writes_nothing(
     (line, *rest) = robot.text.splitlines()
     assert line.startswith("error[TF901] rclpy cannot be imported: ")
     assert rest == []
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["output0.txt", "rover.yaml", "stubs"]
+    assert not any((tmp_path / "runtime").iterdir())
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["output0.txt", "rover.yaml", "runtime", "stubs"]
 
 
 def test_without_a_guard_edges_are_still_said_to_be_live_and_nobody_is_judged(

@@ -133,13 +133,13 @@ def is_ready(state: State) -> bool:
 
 def _say_ready(turn: Turn) -> None:
     state = turn.state
-    begun = state.begun or 0.0
+    begun = max(state.begun or 0.0, state.begun_anew)
     if state.all_ready or not is_ready(state):
         return
     turn.know(all_ready=True)
     rows = []
     for name, one in state.tracked.items():
-        if one.wanted:
+        if one.wanted and (one.began >= begun or state.begun_anew == 0.0):
             started = None if one.state == "EXPECTED" else one.began - begun
             rows.append(StartRow(name, started, (one.ready_since or one.since) - begun))
     turn.tell(AllReady(tuple(rows), turn.now - begun))

@@ -52,7 +52,8 @@ def lose(turn: Turn, one: Tracked) -> None:
     if name == state.guard:
         turn.know(live=frozenset(), complete=not state.plan.edges)
     elif one.process.owns:
-        turn.know(live=state.live - {child for _, child in one.process.owns}, complete=False)
+        live = state.live - {child for _, child in one.process.owns}
+        turn.know(live=live, complete=False, waiting_said=None if state.waiting_said is None else turn.now)
         if state.guard is not None:
             turn.actions.append(Order(Absent(name)))
 
@@ -126,7 +127,8 @@ def follow(turn: Turn, event: NewPlan) -> None:
         complete=False,
         all_started=False,
         all_ready=False,
-        waiting_said=None,
+        waiting_said=turn.now,
+        begun_anew=turn.now,
     )
     gone = {name: one for name, one in before.items() if name not in turn.state.tracked}
     for name, one in gone.items():

@@ -24,6 +24,7 @@ class Outlet:
         self.fd, self._own = _not_waiting(fd)
         self._owed = bytearray()
         self.left_out = 0
+        self._announced = 0
 
     @property
     def owes(self) -> bool:
@@ -44,7 +45,7 @@ class Outlet:
             self._owed += (
                 f"… {self.left_out} lines are left out here: they came too fast, and are in the logs\n".encode()
             )
-            self.left_out = 0
+            self._announced, self.left_out = self.left_out, 0
         self._owed += text.encode(errors="backslashreplace")
         self.push()
 
@@ -64,10 +65,13 @@ class Outlet:
             except OSError as error:
                 if error.errno not in {errno.ENOSPC, errno.EDQUOT}:
                     raise
-                self.left_out += self._owed.count(b"\n")  # a full disk stops no robot
+                # A full disk stops no robot.
+                self.left_out += self._owed.count(b"\n") + self._announced - (self._announced > 0)
+                self._announced = 0
                 self._owed.clear()
                 return
             del self._owed[:count]
+            self._announced = self._announced if self._owed else 0
 
     def close(self, patience_s: float = 0.5) -> None:
         """Write the rest, as far as the reader takes it in that time."""

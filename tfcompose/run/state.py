@@ -252,13 +252,17 @@ class Stop:
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """Everything that is known about a running plan. ``live`` holds the children of the edges that were seen."""
+    """Everything that is known about a running plan.
+
+    ``live`` holds the children of the edges that were seen; ``begun_anew`` is when another plan came, if one did.
+    """
 
     plan: Plan
     times: Times
     tracked: dict[str, Tracked]
     guard: str | None
     begun: float | None = None
+    begun_anew: float = 0.0
     clear: float | None = None
     live: frozenset[str] = frozenset()
     complete: bool = False

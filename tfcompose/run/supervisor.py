@@ -180,7 +180,7 @@ class _Supervisor:
                     bury_adopted({child.popen.pid for child in self._children.values()} | {self._keeper.pid})
             if end is not None and time.monotonic() >= end:
                 self._handle(TimeUp())
-            elif (self._due or math.inf) <= time.monotonic():
+            elif self._events or (self._due or math.inf) <= time.monotonic():
                 self._handle(Tick())
             if self._session.refresh and self._report:
                 self._refresh(self._session.refresh)

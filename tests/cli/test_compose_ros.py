@@ -1,0 +1,201 @@
+"""Robots in the background: started, listed, steered, changed and ended by other commands."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import psutil
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+pytestmark = pytest.mark.ros
+
+ROVER = """
+tfcompose: 1
+robot: rover
+ros: {discovery: localhost}
+frames:
+  odom: {}
+  base_link: {parent: odom, owner: drive, rate: 20 Hz}
+  lidar: {parent: base_link, xyz: [0, 0, 0.3]}
+processes:
+  drive: {simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}
+"""
+
+
+def until(condition: Callable[[], object], seconds: float = 20.0) -> bool:
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+@pytest.fixture
+def tfc(domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Any]]:
+    """Run a command to its end, in a folder and with a runtime folder of the test's own."""
+    assert domain
+    (tmp_path / "runtime").mkdir(mode=0o700)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "runtime"))
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
+    (tmp_path / "robot.yaml").write_text(ROVER, encoding="utf-8")
+
+    def run(*words: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "tfcompose", *words]
+        return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+    yield run
+    launchers = [robot["launcher"] for robot in json.loads(run("ps", "--format", "json").stdout or "[]")]
+    below = [child for pid in launchers for child in psutil.Process(pid).children(recursive=True)]
+    for pid in launchers:
+        os.kill(pid, signal.SIGKILL)
+    assert until(lambda: not any(map(psutil.pid_exists, launchers)) and not any(map(_alive, below)), 5)
+
+
+def _alive(process: psutil.Process) -> bool:
+    return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
+
+
+def ps(tfc: Callable[..., Any]) -> dict[str, dict[str, Any]]:
+    (robot,) = json.loads(tfc("ps", "--format", "json").stdout)
+    return {process["name"]: process for process in robot["processes"]}
+
+
+def test_a_robot_in_the_background_is_ready_when_the_command_returns_is_listed_and_goes_down(
+    tfc: Callable[..., Any],
+) -> None:
+    up = tfc("up", "--wait")
+    assert up.returncode == 0, up.stdout + up.stderr
+    assert "tree complete: 2 edges" in up.stdout
+    assert "all ready after" in up.stdout
+    processes = ps(tfc)
+    for process in processes.values():
+        assert (process["state"], process["ready"], process["restarts"]) == ("RUNNING", True, 0)
+        assert psutil.pid_exists(process["pid"])
+        assert process["memory"] > 1e6
+    assert [(one["live"], one["edges"]) for one in processes.values()] == [(1, 1), (1, 1), (0, 0)]
+    pids = [process["pid"] for process in processes.values()]
+    down = tfc("down")
+    assert (down.returncode, down.stdout.split("@")[0]) == (0, "rover")
+    assert until(lambda: not any(map(psutil.pid_exists, pids)), 2)
+    assert tfc("ps").returncode == 1
+    assert "ended" in tfc("logs", "tfcompose", "-n", "1").stdout
+
+
+def test_what_is_missing_when_the_time_is_over_is_said_with_1_and_the_robot_goes_on(
+    tfc: Callable[..., Any], tmp_path: Path
+) -> None:
+    external = ROVER.replace("{simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}", "{external: true, node: diff}")
+    (tmp_path / "robot.yaml").write_text(external)
+    up = tfc("up", "--wait", "--timeout", "6")
+    assert up.returncode == 1
+    assert "not ready: drive (expected, 0 of 1 edges live)" in up.stderr
+    assert "not live: odom → base_link" in up.stderr
+    assert ps(tfc)["static"]["state"] == "RUNNING"
+
+
+def test_one_process_is_restarted_stopped_and_started_and_the_guard_blames_nobody(tfc: Callable[..., Any]) -> None:
+    assert tfc("up", "--wait").returncode == 0
+    before = ps(tfc)
+    assert tfc("restart", "drive").returncode == 0
+    assert until(lambda: ps(tfc)["drive"]["restarts"] == 1)
+    assert tfc("wait", "--ready", "--timeout", "20").returncode == 0
+    assert tfc("stop", "drive", "static").returncode == 0
+    assert until(lambda: {ps(tfc)[name]["state"] for name in ("drive", "static")} == {"STOPPED"})
+    again = tfc("stop", "drive")
+    assert (again.returncode, again.stderr) == (1, "tfcompose: drive does not run\n")
+    time.sleep(1.5)  # so long a silence would be told
+    assert tfc("start", "drive", "static").returncode == 0
+    assert tfc("wait", "--ready", "--timeout", "20").returncode == 0
+    after = ps(tfc)
+    assert after["guard"]["pid"] == before["guard"]["pid"]
+    assert after["static"]["pid"] != before["static"]["pid"]
+    assert "TF8" not in tfc("logs").stdout
+    assert "did you mean drive?" in tfc("restart", "driv").stderr
+
+
+def test_up_on_a_running_robot_restarts_what_changed_and_says_what_listeners_keep(
+    tfc: Callable[..., Any], tmp_path: Path
+) -> None:
+    assert tfc("up", "--wait").returncode == 0
+    before = ps(tfc)
+    same = tfc("up")
+    assert same.returncode == 1
+    assert "rover@" in same.stderr
+    assert "runs already: pid " in same.stderr
+    assert "tfcompose down ends it" in same.stderr
+    assert tfc("up", "-d").returncode == 0
+    (tmp_path / "robot.yaml").write_text(ROVER.replace("lidar:", "laser:"))
+    changed = tfc("up", "--wait")
+    assert changed.returncode == 0, changed.stderr
+    assert "restarted: static, guard" in changed.stdout
+    assert "listeners that run keep base_link → lidar" in changed.stdout
+    after = ps(tfc)
+    assert after["drive"]["pid"] == before["drive"]["pid"]
+    assert after["static"]["pid"] != before["static"]["pid"]
+    assert "TF8" not in tfc("logs").stdout
+
+
+@pytest.mark.usefixtures("tfc")
+def test_of_two_that_start_at_the_same_moment_one_wins_and_the_other_says_who() -> None:
+    command = [sys.executable, "-m", "tfcompose", "up", "--for", "4"]
+    start = partial(subprocess.Popen, command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    both = [start(), start()]
+    said = [one.communicate(timeout=60) for one in both]
+    assert sorted(one.returncode for one in both) == [0, 1]
+    loser = said[0 if both[0].returncode else 1]
+    winner = both[1 if both[0].returncode else 0]
+    assert f"runs already: pid {winner.pid}, since " in loser[1]
+    assert "started" not in loser[0]
+
+
+def test_a_launcher_that_was_killed_leaves_no_process_and_nothing_that_is_in_the_way(tfc: Callable[..., Any]) -> None:
+    assert tfc("up", "--wait").returncode == 0
+    (robot,) = json.loads(tfc("ps", "--format", "json").stdout)
+    below = psutil.Process(robot["launcher"]).children(recursive=True)
+    os.kill(robot["launcher"], signal.SIGKILL)
+    assert until(lambda: not any(map(_alive, below)), 3)
+    assert tfc("ps").returncode == 1
+    assert "was killed" in tfc("logs").stdout or "tree complete" in tfc("logs").stdout
+    assert tfc("up", "--wait", "--timeout", "30").returncode == 0
+
+
+def test_events_are_told_from_the_start_and_wait_returns_the_exit_code(tfc: Callable[..., Any]) -> None:
+    assert tfc("up", "--wait").returncode == 0
+    waiting = subprocess.Popen([sys.executable, "-m", "tfcompose", "wait"])
+    listening = subprocess.Popen(
+        [sys.executable, "-m", "tfcompose", "events", "--format", "json"], stdout=subprocess.PIPE, text=True
+    )
+    os.kill(ps(tfc)["static"]["pid"], signal.SIGKILL)
+    told = [json.loads(line) for line in listening.communicate(timeout=20)[0].splitlines()]
+    assert waiting.wait(20) == 1
+    kinds = [event["event"] for event in told]
+    assert kinds[0] == "ProcessState"
+    assert kinds[-1] == "Ended"
+    (found,) = [event["found"] for event in told if event["event"] == "FindingShown"]
+    assert found["message"] == "static was ended by SIGKILL"
+
+
+def test_a_dry_run_is_the_same_everywhere_starts_nothing_and_writes_nothing(
+    tfc: Callable[..., Any], tmp_path: Path
+) -> None:
+    first = tfc("up", "--dry-run")
+    assert first.returncode == 0
+    assert not (tmp_path / "build").exists()
+    assert str(tmp_path) not in first.stdout
+    assert "command  ${python} -m tfcompose.run.static ${plan} static" in first.stdout
+    assert "edge     odom → base_link (dynamic, 20 Hz)" in first.stdout
+    tfc("build")
+    assert tfc("up", "build/rover/plan.json", "--dry-run").stdout == first.stdout

@@ -1,0 +1,103 @@
+"""Where a run is found: folders that nobody else can open, and a lock that ends with its holder."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tfcompose.plan import Plan, RosSettings
+from tfcompose.run.place import Lock, PlaceError, place_of, places
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+ROVER = Plan("rover", "", None, RosSettings(domain_id=7), (), ())
+HOLD = """
+import os, sys
+from pathlib import Path
+from tfcompose.run.place import Lock, Place
+lock = Lock(Place("rover@7", Path(sys.argv[1]), Path(sys.argv[1])))
+print(lock.run, flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def env(tmp_path: Path) -> dict[str, str]:
+    folder = tmp_path / "runtime"
+    folder.mkdir(mode=0o700)
+    return {"XDG_RUNTIME_DIR": str(folder), "ROS_LOG_DIR": str(tmp_path / "log"), "ROS_DOMAIN_ID": "3"}
+
+
+def test_a_robot_is_its_name_in_its_domain_which_is_the_plans_or_else_the_environments(env: dict[str, str]) -> None:
+    place = place_of(ROVER, env)
+    assert (place.name, place.folder.parent.stat().st_mode & 0o777) == ("rover@7", 0o700)
+    assert place.logs == place_of(ROVER, env).logs
+    assert str(place.logs) == f"{env['ROS_LOG_DIR']}/tfcompose/rover@7"
+    assert place_of(Plan("rover", "", None, RosSettings(), (), ()), env).name == "rover@3"
+    assert place_of(Plan("rover", "", None, RosSettings(), (), ()), env | {"ROS_DOMAIN_ID": ""}).name == "rover@0"
+
+
+@pytest.mark.parametrize("given", ["", "relative", "/nowhere", "shared"])
+def test_without_a_safe_runtime_folder_one_of_the_users_own_is_made(
+    given: str, env: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "shared").mkdir(mode=0o777)
+    (tmp_path / "shared").chmod(0o777)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    place = place_of(ROVER, env | {"XDG_RUNTIME_DIR": str(tmp_path / given) if given == "shared" else given})
+    assert place.folder.parent == tmp_path / f"tfcompose-{os.getuid()}"
+    assert place.folder.parent.stat().st_mode & 0o777 == 0o700
+
+
+@pytest.mark.parametrize("how", ["open to all", "a link"])
+def test_a_folder_that_somebody_else_may_have_prepared_is_refused(
+    how: str, env: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    folder = tmp_path / f"tfcompose-{os.getuid()}"
+    if how == "a link":
+        (tmp_path / "trap").mkdir(mode=0o700)
+        folder.symlink_to(tmp_path / "trap")
+    else:
+        folder.mkdir()
+        folder.chmod(0o755)
+    with pytest.raises(PlaceError, match="is not a folder that only this user can open"):
+        place_of(ROVER, env | {"XDG_RUNTIME_DIR": ""})
+
+
+def test_of_two_only_one_gets_the_lock_the_other_learns_who_has_it_and_a_killed_holder_leaves_nothing(
+    env: dict[str, str],
+) -> None:
+    place = place_of(ROVER, env)
+    command = [sys.executable, "-c", HOLD, str(place.folder)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout
+        run = other.stdout.readline().strip()
+        with pytest.raises(BlockingIOError):
+            Lock(place)
+        holder = place.holder()
+        assert holder
+        assert (holder.pid, holder.run) == (other.pid, run)
+        assert [one.name for one in places(env)] == ["rover@7"]
+        other.kill()
+    assert place.holder() is None
+    lock = Lock(place)
+    assert lock.run != run
+    lock.close()
+
+
+def test_a_child_that_is_started_does_not_hold_the_lock_on(env: dict[str, str]) -> None:
+    place = place_of(ROVER, env)
+    lock = Lock(place)
+    with subprocess.Popen(["/bin/sleep", "60"], close_fds=False) as child:
+        lock.close()
+        try:
+            assert place.holder() is None
+        finally:
+            child.kill()

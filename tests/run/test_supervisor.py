@@ -19,7 +19,7 @@ from tests.waiting import until
 from tfcompose.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.planfile import write_plan
 from tfcompose.run.events import Clear, Complete, Live, OwnerReady, to_line
-from tfcompose.run.notice import Ended, FindingShown, LogLine, Notice, ProcessState, TreeComplete
+from tfcompose.run.notice import Ended, FindingShown, LogLine, Notice, ProcessState
 from tfcompose.run.state import Times
 from tfcompose.run.supervisor import supervise
 
@@ -297,7 +297,6 @@ def test_the_guards_events_steer_the_start_and_a_line_that_is_none_is_shown(tmp_
     started = [notice.process for notice in told if isinstance(notice, ProcessState) and notice.state == "STARTING"]
     assert started == ["guard", "a", "b"]
     assert logged(told, "guard")[:1] == ["not an event: rubbish"]
-    assert len([notice for notice in told if isinstance(notice, TreeComplete)]) == 1
 
 
 def test_a_guard_that_dies_before_it_is_clear_ends_everything_with_1(tmp_path: Path) -> None:

@@ -30,18 +30,18 @@ def folder_of(process: PlanProcess, build_dir: Path) -> Path:
     return build_dir / process.cwd if process.cwd is not None else Path.cwd()
 
 
-def filled_in(process: PlanProcess, plan_file: Path, build_dir: Path) -> tuple[str, ...]:
+def filled_in(process: PlanProcess, plan_file: Path, build_dir: Path | None = None) -> tuple[str, ...]:
     """Return the process's ``argv`` with the placeholders replaced; both paths are absolute."""
     return tuple(_filled(word, process, plan_file, build_dir) for word in process.argv)
 
 
-def own_env(process: PlanProcess, plan_file: Path, build_dir: Path) -> dict[str, str]:
+def own_env(process: PlanProcess, plan_file: Path, build_dir: Path | None = None) -> dict[str, str]:
     """Return the variables that the plan gives the process, with the placeholders replaced."""
     return {name: _filled(value, process, plan_file, build_dir) for name, value in process.env.items()}
 
 
-def _filled(text: str, process: PlanProcess, plan_file: Path, build_dir: Path) -> str:
-    values = {"python": sys.executable, "plan": str(plan_file), "build_dir": str(build_dir)}
+def _filled(text: str, process: PlanProcess, plan_file: Path, build_dir: Path | None = None) -> str:
+    values = {"python": sys.executable, "plan": str(plan_file), "build_dir": str(build_dir or plan_file.parent)}
     if process.params_file is not None:
         values["params_file"] = str(plan_file.parent / process.params_file)
     return _PLACEHOLDER.sub(lambda found: values.get(found[1], found[0]), text)

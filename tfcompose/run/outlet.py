@@ -63,7 +63,7 @@ class Outlet:
             except BlockingIOError:
                 return
             except OSError as error:
-                if error.errno not in {errno.ENOSPC, errno.EDQUOT}:
+                if error.errno not in {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}:
                     raise
                 # A full disk stops no robot.
                 self.left_out += self._owed.count(b"\n") + self._announced - (self._announced > 0)

@@ -215,7 +215,7 @@ class _Supervisor:
         if self._owing is not None:
             self._selector.unregister(self._owing)
         self._session.outlet = self._report = self._owing = None
-        self._handle(OutputLost())
+        self._events.append(OutputLost())
 
     def _answer(self, request: dict[str, Any]) -> dict[str, Any]:
         said, event, planned = self._ask(request, self._state, self._session.plan_file)
@@ -272,8 +272,7 @@ class _Supervisor:
         try:
             self._report(notice)
         except OSError:
-            self._report = None
-            self._events.append(OutputLost())
+            self._lose_output()
 
     def _order(self, line: str) -> None:
         """Tell the guard; one that is not there, or stuck, is told nothing."""

@@ -1,0 +1,262 @@
+"""What goes wrong on real robots, without ROS: floods, readers that stop, full disks, daemons, many processes."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING, Any
+
+import psutil
+import pytest
+
+from tfcompose.plan import Plan, PlanProcess, RosSettings
+from tfcompose.planfile import write_plan
+from tfcompose.run.control import ask, connect
+from tfcompose.run.leftovers import end, leftovers
+from tfcompose.run.place import Place
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+#: A launcher with all that ``up`` gives it, for a plan without ROS.
+LAUNCHER = """
+import resource, sys
+from pathlib import Path
+from tfcompose.cli.console import Console
+from tfcompose.planfile import read_plan
+from tfcompose.run.control import listen
+from tfcompose.run.logs import Logs
+from tfcompose.run.outlet import Outlet
+from tfcompose.run.place import Lock, Place
+from tfcompose.run.supervisor import Session, supervise
+file = Path(sys.argv[1])
+if len(sys.argv) > 2:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), int(sys.argv[2])))
+place = Place("rover@0", file.parent / "place", file.parent / "log")
+lock = Lock(place)
+plan = read_plan(file.read_text(), str(file))
+output, logs = Outlet(1), Logs(place.logs)
+session = Session(file, lock.run, None, listen(place), output)
+code = supervise(plan, file, report=Console(plan, output, colour=False, keep=logs.write), session=session)
+output.close()
+sys.exit(code)
+"""
+PYTHON = ("${python}", "-I", "-S", "-c")
+SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); print('up', flush=True); time.sleep(60)"
+FLOOD = """
+import os, time
+data, end, count = b"a line of sixty-three characters, which says nothing worth a word\\n" * 1000, time.time() + 3, 0
+while time.time() < end:
+    count += os.write(1, data)
+open("flooded", "w").write(str(count / 3))
+time.sleep(60)
+"""
+#: A daemon: its child leaves the group and the session, heeds no signal, and goes on when it has ended.
+DAEMON = """
+import os, signal, time
+if os.fork() == 0:
+    os.setsid()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    open("daemon", "w").write(str(os.getpid()))
+    os.close(1), os.close(2)
+    time.sleep(60)
+"""
+
+
+def until(condition: Callable[[], object], seconds: float = 15.0) -> None:
+    end_at = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end_at, "it did not come to pass in time"
+        time.sleep(0.01)
+
+
+def alive(pid: int) -> bool:
+    try:
+        return bool(psutil.Process(pid).status() != psutil.STATUS_ZOMBIE)
+    except psutil.NoSuchProcess:
+        return False
+
+
+class Run:
+    """A launcher that runs in a folder, and who can be asked there."""
+
+    def __init__(self, folder: Path, processes: tuple[PlanProcess, ...], stdout: int, *words: str) -> None:
+        file = folder / "plan.json"
+        file.write_text(write_plan(Plan("rover", "", None, RosSettings(), (), processes)))
+        self.place = Place("rover@0", folder / "place", folder / "log")
+        command = [sys.executable, "-c", LAUNCHER, str(file), *words]
+        self.popen = subprocess.Popen(command, stdout=stdout, cwd=folder)
+
+    def ps(self) -> dict[str, dict[str, Any]]:
+        return {process["name"]: process for process in ask(self.place, do="ps")["processes"]}
+
+    def is_up(self) -> bool:
+        try:
+            return all(process["state"] == "RUNNING" for process in self.ps().values())
+        except OSError:
+            return False
+
+    def down(self) -> int:
+        assert ask(self.place, do="down") == {"ok": True}
+        return self.popen.wait(20)
+
+
+@pytest.fixture
+def launch(tmp_path: Path) -> Iterator[Callable[..., Run]]:
+    runs: list[Run] = []
+
+    def start(*processes: PlanProcess, stdout: int = subprocess.DEVNULL, words: tuple[str, ...] = ()) -> Run:
+        runs.append(Run(tmp_path, processes, stdout, *words))
+        return runs[-1]
+
+    yield start
+    for run in runs:
+        if run.popen.poll() is None:
+            run.popen.kill()
+        run.popen.wait()
+    until(lambda: not end(leftovers("rover@0:")))
+
+
+def program(name: str, code: str, **more: Any) -> PlanProcess:
+    return PlanProcess(name, "run", argv=(*PYTHON, code), cwd=".", **more)
+
+
+def test_a_flood_of_100_mb_a_second_blocks_neither_its_writer_nor_anybody_else_and_takes_little_memory_and_disk(
+    launch: Callable[..., Run], tmp_path: Path
+) -> None:
+    run = launch(program("flood", FLOOD), program("calm", SLEEPER))
+    until(run.is_up)
+    slowest = 0.0
+    while not (tmp_path / "flooded").exists():
+        began = time.monotonic()
+        run.ps()
+        slowest = max(slowest, time.monotonic() - began)
+        time.sleep(0.05)
+    until((tmp_path / "flooded").read_text)
+    assert float((tmp_path / "flooded").read_text()) > 100e6
+    assert psutil.Process(run.popen.pid).memory_info().rss < 80e6
+    assert slowest < 0.5
+    assert sum(file.stat().st_size for file in (tmp_path / "log").iterdir()) < 30e6
+    assert "bytes of output were thrown away here" in (tmp_path / "log" / "flood.log").read_text()
+    assert run.down() == 0
+
+
+def test_a_reader_that_stops_reading_stops_nobody(launch: Callable[..., Run]) -> None:
+    reader, writer = os.pipe()
+    run = launch(program("flood", FLOOD), program("calm", SLEEPER), stdout=writer)
+    os.close(writer)
+    try:
+        until(run.is_up)
+        until(lambda: run.ps()["flood"]["state"] == "RUNNING")
+        assert run.down() == 0
+    finally:
+        os.close(reader)
+
+
+def test_a_disk_that_takes_no_more_stops_nobody(launch: Callable[..., Run], tmp_path: Path) -> None:
+    """A limit on the size of files stands in for the full disk."""
+    chatty = "import time\nwhile True: print('x' * 100, flush=True); time.sleep(0.0005)"
+    with (tmp_path / "output").open("wb") as output:
+        run = launch(program("chatty", chatty), stdout=output.fileno(), words=("20000",))
+        until((tmp_path / "log" / "chatty.log").exists)
+        until(lambda: (tmp_path / "log" / "chatty.log").stat().st_size >= 19_900)
+        time.sleep(0.3)
+        assert run.is_up()
+        assert run.down() == 0
+    assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] == resource.RLIM_INFINITY
+
+
+@pytest.mark.parametrize("how", ["is stopped", "is killed"])
+def test_a_daemon_that_left_its_group_ends_with_the_run(launch: Callable[..., Run], tmp_path: Path, how: str) -> None:
+    run = launch(program("daemon", DAEMON), program("calm", SLEEPER))
+    until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
+    pid = int((tmp_path / "daemon").read_text())
+    until(lambda: run.ps()["daemon"]["state"] == "EXITED")
+    assert alive(pid)
+    if how == "is killed":
+        run.popen.kill()
+    else:
+        assert run.down() == 0
+    until(lambda: not alive(pid), 4)
+
+
+def test_leftovers_are_recognised_by_the_runs_id_and_ended_on_request_only(
+    launch: Callable[..., Run], tmp_path: Path
+) -> None:
+    run = launch(program("daemon", DAEMON), program("calm", SLEEPER))
+    until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
+    pid = int((tmp_path / "daemon").read_text())
+    keeper = next(child for child in psutil.Process(run.popen.pid).children() if child.name() == "sh")
+    os.kill(keeper.pid, signal.SIGKILL)
+    run.popen.kill()
+    run.popen.wait()
+    until(lambda: [one.pid for one in leftovers("rover@0:")] == [pid])
+    assert leftovers("rover@1:") == []
+    assert end(leftovers("rover@0:"), 0.3) == []
+    assert not alive(pid)
+
+
+def test_200_processes_are_started_listed_and_stopped_and_all_are_gone(launch: Callable[..., Run]) -> None:
+    run = launch(*(PlanProcess(f"p{number}", "run", argv=("sleep", "60")) for number in range(200)))
+    began = time.monotonic()
+    until(run.is_up)
+    assert time.monotonic() - began < 10
+    pids = [process["pid"] for process in run.ps().values()]
+    assert len(set(pids)) == 200
+    began = time.monotonic()
+    assert run.down() == 0
+    assert time.monotonic() - began < 10
+    assert not any(map(alive, pids))
+
+
+def test_40_restarts_leave_no_process_and_no_descriptor(launch: Callable[..., Run]) -> None:
+    """A part of the 500 that were tried by hand."""
+    run = launch(PlanProcess("a", "run", argv=("sleep", "60")), PlanProcess("b", "run", argv=("sleep", "60")))
+    until(run.is_up)
+    launcher = psutil.Process(run.popen.pid)
+
+    def restart(count: int) -> None:
+        for _ in range(count):
+            before = run.ps()["a"]["restarts"]
+            assert ask(run.place, do="restart", name="a") == {"ok": True}
+            until(lambda before=before: run.ps()["a"]["restarts"] == before + 1 and run.is_up())  # type: ignore[misc]
+
+    restart(3)
+    fds, children = launcher.num_fds(), len(launcher.children(recursive=True))
+    restart(40)
+    until(lambda: launcher.num_fds() <= fds)
+    assert len(launcher.children(recursive=True)) == children
+    assert run.down() == 0
+
+
+def test_a_socket_that_was_left_there_by_a_killed_launcher_is_not_in_the_way(launch: Callable[..., Run]) -> None:
+    first = launch(program("a", SLEEPER))
+    until(first.is_up)
+    first.popen.kill()
+    first.popen.wait()
+    assert first.place.socket.exists()
+    assert first.place.holder() is None
+    second = launch(program("a", SLEEPER))
+    until(second.is_up)
+    assert second.place.socket.stat().st_mode & 0o777 == 0o600
+    assert second.down() == 0
+
+
+@pytest.mark.parametrize("line", [b"rubbish", b"[1]", b'{"do": "dance"}', b"x" * 200_000])
+def test_rubbish_on_the_socket_is_answered_and_harms_nobody(launch: Callable[..., Run], line: bytes) -> None:
+    run = launch(program("a", SLEEPER))
+    until(run.is_up)
+    with connect(run.place) as connection:
+        try:
+            connection.sendall(line + b"\n")
+            assert b"error" in connection.recv(1000) or len(line) > 100_000
+        except ConnectionError:
+            assert len(line) > 100_000
+    assert run.is_up()
+    assert run.down() == 0

@@ -1,0 +1,102 @@
+"""Gates at real nodes: a topic, a service, and a lifecycle node that is configured and activated."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tfcompose.plan import Plan, PlanProcess, Ready, RosSettings
+from tfcompose.planfile import write_plan
+from tfcompose.run.notice import AllReady, FindingShown, Notice, ProcessReady
+from tfcompose.run.supervisor import supervise
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+pytestmark = pytest.mark.ros
+
+NODE = """
+import sys, time
+import rclpy
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+class Slam(LifecycleNode):
+    def on_configure(self, state):
+        print("configured", flush=True)
+        fails = "fail" in sys.argv
+        return TransitionCallbackReturn.FAILURE if fails else TransitionCallbackReturn.SUCCESS
+    def on_activate(self, state):
+        print("activated", flush=True)
+        return super().on_activate(state)
+
+rclpy.init(args=[])
+node = Slam("slam", namespace="/robot") if "lifecycle" in sys.argv else rclpy.create_node("lidar", namespace="/robot")
+if "lifecycle" not in sys.argv:
+    time.sleep(0.5)
+    publisher = node.create_publisher(String, "scan", 1)
+    service = node.create_service(Trigger, "reset", lambda request, response: response)
+try:
+    rclpy.spin(node)
+except BaseException:
+    pass
+"""
+GUARD = PlanProcess("guard", "guard", ("${python}", "-m", "tfcompose.run.guard", "${plan}", "guard"), nodes=("/guard",))
+
+
+def node(name: str, *words: str, ready: Ready | None = None, lifecycle: dict[str, str] | None = None) -> PlanProcess:
+    argv = (sys.executable, "-c", NODE, *words)
+    return PlanProcess(name, "run", argv, ready=ready, lifecycle=lifecycle or {}, nodes=(f"/robot/{name}",))
+
+
+def run(tmp_path: Path, seconds: float, *processes: PlanProcess) -> list[Notice]:
+    plan = Plan("rover", "", None, RosSettings(), (), (*processes, GUARD))
+    file = tmp_path / "plan.json"
+    file.write_text(write_plan(plan))
+    told: list[Notice] = []
+    end = time.monotonic() + seconds
+
+    def report(notice: Notice) -> None:
+        told.append(notice)
+        if isinstance(notice, AllReady) or time.monotonic() > end:
+            raise BrokenPipeError  # enough was seen
+
+    supervise(plan, file, report=report, duration_s=seconds)
+    return told
+
+
+@pytest.mark.usefixtures("domain")
+def test_a_topic_and_a_service_open_gates_and_say_what_they_are(tmp_path: Path) -> None:
+    lidar, reset = Ready("topic", "/robot/scan"), Ready("service", "/robot/reset")
+    told = run(tmp_path, 15, node("lidar", ready=lidar), node("reset", ready=reset))
+    seen = {notice.process: notice.seen for notice in told if isinstance(notice, ProcessReady)}
+    assert seen["lidar"].startswith("/robot/scan is published by /robot/lidar")
+    assert seen["reset"] == "the service /robot/reset is there"
+    assert isinstance(told[-1], AllReady)
+
+
+@pytest.mark.usefixtures("domain")
+def test_a_lifecycle_node_is_configured_and_activated_and_then_ready(tmp_path: Path) -> None:
+    told = run(tmp_path, 15, node("slam", "lifecycle", lifecycle={"/robot/slam": "active"}))
+    (ready,) = [notice for notice in told if isinstance(notice, ProcessReady)]
+    assert ready.seen == "/robot/slam is active"
+    said = [getattr(notice, "text", "") for notice in told if getattr(notice, "process", "") == "slam"]
+    assert [text for text in said if text] == ["configured", "activated"]
+
+
+@pytest.mark.usefixtures("domain")
+def test_gates_that_stay_shut_say_what_was_seen_instead(tmp_path: Path) -> None:
+    scan = Ready("topic", "/robot/scam", timeout_s=3.0)
+    active = Ready("lifecycle", "active", timeout_s=4.0)
+    slam = node("slam", "lifecycle", "fail", lifecycle={"/robot/slam": "active"}, ready=active)
+    told = run(tmp_path, 6, node("lidar", ready=scan), slam)
+    found = {notice.found.message: notice.found for notice in told if isinstance(notice, FindingShown)}
+    topic = found["lidar is not ready after 3 s: nobody publishes /robot/scam"]
+    assert "/robot/scan" in topic.notes[0].message
+    state = found["slam is not ready after 4 s: its nodes are not in their lifecycle states"]
+    assert state.notes[0].message == "seen instead: /robot/slam is unconfigured, and does not configure"
+    assert state.notes[-1].message == "slam: configured"

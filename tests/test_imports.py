@@ -50,6 +50,8 @@ ONLY_IN: dict[str, set[str]] = {
     "geometry_msgs": {"ros"},
     "sensor_msgs": {"ros"},
     "lifecycle_msgs": {"ros"},
+    "launch": {"run"},
+    "launch_ros": {"run"},
     "std_msgs": {"ros"},
     "builtin_interfaces": {"ros"},
     "rosgraph_msgs": {"ros"},

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from tfcompose.plan import Plan
     from tfcompose.run.place import Lock, Place
-    from tfcompose.run.supervisor import Session
+    from tfcompose.run.session import Session
 
 
 def detach(plan: Plan, place: Place, lock: Lock, session: Session, arguments: Namespace) -> int:

@@ -6,7 +6,7 @@ import os
 import time
 from typing import TYPE_CHECKING
 
-from tfcompose.run.notice import AllReady, FindingShown, OwnerLive, ProcessState, Stopping, TreeComplete
+from tfcompose.run.notice import AllReady, Ended, FindingShown, OwnerLive, ProcessState, Stopping, TreeComplete
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,7 +30,7 @@ class Status:
         self._running: set[str] = set()
         self._live: dict[str, int] = {}
         self._findings = {"error": 0, "warning": 0}
-        self._stopping = self._ready = False
+        self._stopping = self._ready = self._ended = False
         self._shown = ""
         self._at = 0.0
 
@@ -49,6 +49,8 @@ class Status:
             self._ready = True
         elif isinstance(notice, Stopping):
             self._stopping = True
+        elif isinstance(notice, Ended):
+            self._ended = True
 
     def cleared(self) -> str:
         """Return what takes the line away, so that others can be written in its place."""
@@ -57,7 +59,7 @@ class Status:
 
     def drawn(self) -> str:
         """Return what draws the line anew; nothing where that would change nothing, or was done a moment ago."""
-        text = self._text()
+        text = "" if self._ended else self._text()
         now = self._clock()
         if text == self._shown or (self._shown and now - self._at < EVERY_S):
             return ""
@@ -81,6 +83,6 @@ class Status:
 def columns_of(fd: int) -> int:
     """Return the width of the terminal behind the descriptor."""
     try:
-        return os.get_terminal_size(fd).columns
+        return os.get_terminal_size(fd).columns or 80
     except OSError:
         return 80

@@ -117,6 +117,8 @@ def _owner_ready(turn: Turn, process: str) -> None:
     if edges:
         names = tuple(edge.name for edge in edges)
         turn.tell(OwnerLive(process, edges[0].node, names, turn.now - (turn.state.begun or 0.0)))
+        if not turn.state.missing:
+            _complete(turn, len(turn.state.plan.edges))
 
 
 def _begin(turn: Turn) -> None:
@@ -176,8 +178,6 @@ def _guard_said(turn: Turn, event: Event) -> None:
             turn.know(clear=turn.now if turn.state.clear is None else turn.state.clear)
         case Live(child=child):
             turn.know(live=turn.state.live | {child})
-            if not turn.state.missing:
-                _complete(turn, len(turn.state.plan.edges))
         case Complete(edges):
             _complete(turn, edges)
         case Found(found):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 from tfcompose.diagnostic import Diagnostic, finding
 from tfcompose.ros.environment import RosError
 from tfcompose.run.executable import NotFound, executable_of, filled_in, folder_of, not_found, own_env
+from tfcompose.run.launch_file import is_launch, launch_command
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -87,6 +88,9 @@ def _command_of(
     if not argv:
         return finding("TF902", f"the plan does not say how {process.name} is started", None)
     folder = folder_of(process, files[1])
+    if is_launch(argv[0]):
+        launched = launch_command(process, ros, argv, env)
+        return Command(launched[0], env | launched[1], folder) if isinstance(launched, tuple) else launched
     program = executable_of(process, argv[0], folder, env)
     return program if isinstance(program, NotFound) else Command((program, *argv[1:]), env, folder, own)
 

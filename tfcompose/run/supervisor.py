@@ -7,7 +7,6 @@ launcher alone. A process whose output comes faster than it can be told waits in
 from __future__ import annotations
 
 import contextlib
-import io
 import math
 import os
 import re
@@ -16,7 +15,7 @@ import signal
 import subprocess
 import time
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -24,16 +23,16 @@ from tfcompose.diagnostic import Note
 from tfcompose.ros.environment import child_environment
 from tfcompose.run.answers import answer
 from tfcompose.run.child import LAST_LINE_LENGTH, Child, Pipe, bury_adopted, has_ended, kill_group, spawn, subreaper
-from tfcompose.run.control import Control
-from tfcompose.run.events import EVENTS_FD, from_line
+from tfcompose.run.events import from_line
+from tfcompose.run.guard_pipes import GuardPipes
 from tfcompose.run.keeper import Keeper
 from tfcompose.run.leftovers import end as end_leftovers
 from tfcompose.run.leftovers import leftovers
 from tfcompose.run.machine import step
 from tfcompose.run.notice import Ended, FindingShown, LogLine
-from tfcompose.run.orders import JOINS, ORDERS_FD, order_line
 from tfcompose.run.place import RUN_ID
 from tfcompose.run.preflight import commands_of
+from tfcompose.run.session import Session
 from tfcompose.run.signals import Signals
 from tfcompose.run.state import (
     Begin,
@@ -53,17 +52,15 @@ from tfcompose.run.state import (
     TimeUp,
     initial,
 )
+from tfcompose.run.teller import Teller
 from tfcompose.run.timing import wake_time
-from tfcompose.run.told import told_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
-    from socket import socket
 
     from tfcompose.plan import Plan
     from tfcompose.run.notice import Notice, Stream
-    from tfcompose.run.outlet import Outlet
     from tfcompose.run.preflight import Command, Environment
     from tfcompose.run.state import Action, Event, State, Times
 
@@ -112,22 +109,6 @@ def supervise(  # noqa: PLR0913 (all but two are named, and most have what a use
         return supervisor.run(duration_s)
 
 
-@dataclass(slots=True)
-class Session:
-    """What a run has on this machine: the plan's file, its id, the control socket, and an output that does not wait.
-
-    ``base`` is the folder that the plan was built in, where ``plan_file`` is a copy. With an id, what the run's
-    processes leave behind is ended with it, also what left their groups. ``refresh`` is called now and then.
-    """
-
-    plan_file: Path
-    run_id: str = ""
-    base: Path | None = None
-    listener: socket | None = None
-    outlet: Outlet | None = None
-    refresh: Callable[[], None] | None = None
-
-
 class _Supervisor:
     def __init__(  # noqa: PLR0913, PLR0917 (made in one place)
         self,
@@ -140,23 +121,21 @@ class _Supervisor:
     ) -> None:
         self._state = state
         self._commands = commands
-        self._report: Callable[[Notice], None] | None = report
         self._children: dict[str, Child] = {}
         self._events: deque[Event] = deque()
         self._exit_code: int | None = None
         self._due: float | None = None
         self._look_at = 0.0
-        self._owing: int | None = None
         self._selector = stack.enter_context(selectors.DefaultSelector())
         self._signals = stack.enter_context(Signals())
         self._selector.register(self._signals.fd, selectors.EVENT_READ, self._signals.woken)
         self._session = session
         self._ask = ask
-        self._orders: int | None = None
-        self._control: Control | None = None
-        if session.listener:
-            self._control = Control(session.listener, self._selector, self._answer)
-            stack.callback(self._control.close)
+        self._guard_pipes: GuardPipes | None = None
+        self._teller = Teller(self._selector, session, report, lambda: self._events.append(OutputLost()))
+        self._teller.listen(session, self._answer)
+        self._tell = self._teller.tell
+        stack.callback(self._teller.close)
         if session.run_id:
             stack.enter_context(subreaper())
         self._keeper = Keeper(session.run_id)
@@ -167,7 +146,7 @@ class _Supervisor:
         self._handle(Begin())
         while self._exit_code is None:
             end = self._end(duration_s)
-            self._watch_outlet()
+            self._teller.keep_up()
             for key, _ in self._selector.select(self._sleep_s(end)):
                 key.data()
             for number in self._signals.taken():
@@ -182,40 +161,7 @@ class _Supervisor:
                 self._handle(TimeUp())
             elif self._events or (self._due or math.inf) <= time.monotonic():
                 self._handle(Tick())
-            if self._session.refresh and self._report:
-                self._refresh(self._session.refresh)
         return self._exit_code
-
-    def _watch_outlet(self) -> None:
-        """Have the output written on when its reader is ready again, if something is owed."""
-        outlet = self._session.outlet
-        if outlet is None or outlet.owes == (self._owing is not None):
-            return
-        if outlet.owes:
-            self._owing = outlet.fd
-            self._selector.register(outlet.fd, selectors.EVENT_WRITE, self._push)
-        elif self._owing is not None:
-            self._selector.unregister(self._owing)
-            self._owing = None
-
-    def _refresh(self, refresh: Callable[[], None]) -> None:
-        try:
-            refresh()
-        except OSError:
-            self._lose_output()
-
-    def _push(self) -> None:
-        try:
-            if self._session.outlet:
-                self._session.outlet.push()
-        except OSError:
-            self._lose_output()
-
-    def _lose_output(self) -> None:
-        if self._owing is not None:
-            self._selector.unregister(self._owing)
-        self._session.outlet = self._report = self._owing = None
-        self._events.append(OutputLost())
 
     def _answer(self, request: dict[str, Any]) -> dict[str, Any]:
         said, event, planned = self._ask(request, self._state, self._session.plan_file)
@@ -252,8 +198,8 @@ class _Supervisor:
                 kill_group(self._children[name].popen.pid, number)
             case Tell(notice):
                 self._tell(notice)
-            case Order(order):
-                self._order(order_line(order))
+            case Order(order) if self._guard_pipes:
+                self._guard_pipes.order(order)
             case TellLate(name, found) if name in self._children:
                 notes = [Note(f"{name}: {line}") for line in self._children[name].last_lines]
                 self._tell(FindingShown(replace(found, notes=(*found.notes, *notes))))
@@ -263,22 +209,6 @@ class _Supervisor:
                 self._exit_code = exit_code
             case _:
                 pass
-
-    def _tell(self, notice: Notice) -> None:
-        if self._control and not isinstance(notice, LogLine):
-            self._control.tell(told_line(notice, time.time()), keep=True)
-        if self._report is None:
-            return
-        try:
-            self._report(notice)
-        except OSError:
-            self._lose_output()
-
-    def _order(self, line: str) -> None:
-        """Tell the guard; one that is not there, or stuck, is told nothing."""
-        with contextlib.suppress(OSError):
-            if self._orders is not None:
-                os.write(self._orders, line.encode())
 
     # A process's life.
 
@@ -292,29 +222,23 @@ class _Supervisor:
             self._events.append(StartFailed(name, _reason(error)))
 
     def _spawn_guard(self, name: str) -> None:
-        read_fd, write_fd = os.pipe()
-        orders_fd, self._orders = os.pipe()
-        os.set_blocking(self._orders, False)
-        events = io.FileIO(read_fd)
+        pipes = GuardPipes(joins=self._state.clear is not None)
         command = self._commands[name]
-        env = {EVENTS_FD: str(write_fd), ORDERS_FD: str(orders_fd)}
-        if self._state.clear is not None:
-            env[JOINS] = "1"
         try:
-            child = self._spawn(name, replace(command, env=command.env | env), (write_fd, orders_fd))
+            child = self._spawn(name, replace(command, env=command.env | pipes.env), pipes.theirs)
         except BaseException:
-            events.close()
-            self._close_orders()
+            pipes.events.close()
+            pipes.close()
             raise
         finally:
-            os.close(write_fd)
-            os.close(orders_fd)
-        self._watch(child, Pipe(events, self._guard_said, EVENT_LIMIT))
+            pipes.handed_over()
+        self._guard_pipes = pipes
+        self._watch(child, Pipe(pipes.events, self._guard_said, EVENT_LIMIT))
 
-    def _close_orders(self) -> None:
-        if self._orders is not None:
-            os.close(self._orders)
-            self._orders = None
+    def _close_guard_pipes(self) -> None:
+        if self._guard_pipes:
+            self._guard_pipes.close()
+            self._guard_pipes = None
 
     def _spawn(self, name: str, command: Command, pass_fds: tuple[int, ...] = ()) -> Child:
         run_id = self._session.run_id
@@ -372,7 +296,7 @@ class _Supervisor:
         returncode = child.popen.wait()
         del self._children[child.name]
         if child.name == self._state.guard:
-            self._close_orders()
+            self._close_guard_pipes()
         self._keep()
         self._handle(Exited(child.name, returncode, child.last_lines))
 
@@ -387,7 +311,7 @@ class _Supervisor:
             for pipe in child.pipes:
                 pipe.file.close()
         self._children.clear()
-        self._close_orders()
+        self._close_guard_pipes()
         self._keep()
         if self._session.run_id:
             end_leftovers(leftovers(self._session.run_id), 1.0)

@@ -203,7 +203,7 @@ def test_a_failed_process_is_named_with_its_last_lines_and_the_exit_code_is_1(tm
     assert (code, found.message) == (1, "lidar ended with exit code 1")
     assert "lidar: no lidar at /dev/ttyUSB0" in [note.message for note in found.notes]
     assert len(found.notes) == 8
-    assert told[-1] == Ended(1)
+    assert told[-1] == Ended(1, (found.message, *(note.message for note in found.notes)))
 
 
 def test_a_process_that_fails_is_started_again(tmp_path: Path) -> None:

@@ -179,8 +179,13 @@ class Console:
 
     @_write.register
     def _(self, notice: Ended) -> None:
-        text = "ended" if notice.exit_code == 0 else f"ended with exit code {notice.exit_code}"
-        self._say(text if notice.exit_code == 0 else self._paint(text, RED))
+        if notice.exit_code == 0:
+            self._say("ended")
+            return
+        first, *rest = notice.because or ("",)
+        for line in rest:
+            self._say(f"   {line}")
+        self._say(self._paint(f"ended with exit code {notice.exit_code}{f': {first}' if first else ''}", RED))
 
     def _say(self, text: str) -> None:
         self._line(OURS, text, BOLD)

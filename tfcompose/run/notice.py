@@ -136,9 +136,10 @@ class Stopping:
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """Nothing runs any more: the last notice."""
+    """Nothing runs any more: the last notice. ``because`` is the failure that came first, and what was said last."""
 
     exit_code: int
+    because: tuple[str, ...] = ()
 
 
 Notice = (

@@ -272,6 +272,7 @@ class State:
     all_started: bool = False
     all_ready: bool = False
     stop: Stop | None = None
+    because: tuple[str, ...] = ()
     finished: bool = False
 
     @property

@@ -61,6 +61,7 @@ class Turn:
         """Show the finding and stop everything; once that is under way, further failures follow from it."""
         if self.state.stop is None:
             self.show(found)
+            self.know(because=(found.message, *(note.message for note in found.notes)))
             self.stop(Stop("failure", 1), in_short(found))
 
     def stop(self, stop: Stop, reason: str) -> None:
@@ -76,5 +77,5 @@ class Turn:
     def finish(self, exit_code: int) -> None:
         """End: nothing runs any more."""
         self.know(finished=True)
-        self.tell(Ended(exit_code))
+        self.tell(Ended(exit_code, self.state.because))
         self.actions.append(Finish(exit_code))

@@ -46,13 +46,14 @@ def detach(plan: Plan, place: Place, lock: Lock, session: Session, arguments: Na
 def _launcher(plan: Plan, place: Place, session: Session, duration_s: float | None) -> int:
     """Run as a process without a terminal; what Python itself says goes beside the logs."""
     os.setsid()
-    place.logs.mkdir(parents=True, exist_ok=True)
-    nowhere = os.open(os.devnull, os.O_RDWR)
-    said = os.open(place.logs / "launcher.err", os.O_CREAT | os.O_WRONLY | os.O_TRUNC, 0o640)
+    nowhere = said = os.open(os.devnull, os.O_RDWR)
+    with contextlib.suppress(OSError):  # a full disk stops no robot
+        place.logs.mkdir(parents=True, exist_ok=True)
+        said = os.open(place.logs / "launcher.err", os.O_CREAT | os.O_WRONLY | os.O_TRUNC, 0o640)
     for fd, to in ((0, nowhere), (1, said), (2, said)):
         os.dup2(to, fd)
-    os.close(nowhere)
-    os.close(said)
+    for fd in {nowhere, said}:
+        os.close(fd)
     logs = Logs(place.logs)
     console = Console(plan, _Nowhere(), colour=False, keep=logs.write)
     try:

@@ -212,8 +212,9 @@ class MountedSensor:
     """A sensor as the rules see it: the frames that it brings, and its driver.
 
     ``driver`` is the name of the driver's process, empty without one; ``switch`` holds the parameters that keep the
-    driver from publishing frames (None: there are none), ``publishes`` says that it may. ``serial_option`` is the
-    preset's option for a serial number, empty where it has none.
+    driver from publishing frames (None: there are none), ``publishes`` says that it may. ``claims`` are the edges
+    outside the sensor that it publishes by default and does not own, each with the parameters that keep it from that.
+    ``serial_option`` is the preset's option for a serial number, empty where it has none.
     """
 
     name: str
@@ -226,6 +227,7 @@ class MountedSensor:
     driver: str = ""
     switch: dict[str, Any] | None = None
     publishes: bool = False
+    claims: dict[str, dict[str, Any]] = field(default_factory=dict)
     serial_option: str = ""
     serial: str | None = None
     tf_at: Span | None = None

@@ -135,12 +135,26 @@ class StopRule:
 
 
 @dataclass(frozen=True, slots=True)
+class Driven:
+    """A sensor that a process drives. ``publishes`` says that the frames inside the sensor are the driver's.
+
+    ``switch`` holds the parameters, or arguments, that keep the driver from publishing what is not its own.
+    """
+
+    sensor: str
+    preset: str
+    publishes: bool
+    switch: dict[str, str | int | float | bool] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
 class PlanProcess:
     """What is started, or, with kind ``external``, expected to run.
 
     ``nodes`` are full names; ``lifecycle`` says of some of them into which state they are brought after the start.
     ``required`` says that the plan ends when the process does. ``max_restarts`` None is the launcher's default, as is
     ``ready`` None: the edges that the process owns, or that it was started.
+    ``drives`` are the sensors that it is the driver of, by their presets.
     ``description`` is the file beside the plan that a publisher sends as ``robot_description``; None: the plan's.
     """
 
@@ -164,6 +178,7 @@ class PlanProcess:
     owns: tuple[tuple[str, str], ...] = ()
     simulate: Simulation | None = None
     description: str | None = None
+    drives: tuple[Driven, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from tfcompose.plan import (
     READY_KINDS,
     STOP_SIGNALS,
     VERSION,
+    Driven,
     GuardPolicy,
     Joint,
     Plan,
@@ -83,7 +84,7 @@ def _block(key: str, rows: list[dict[str, Any]]) -> str:
 
 
 def _fields(
-    value: Joint | GuardPolicy | PlanProcess | Ready | RosSettings | Simulation | StopRule | Sweep,
+    value: Joint | Driven | GuardPolicy | PlanProcess | Ready | RosSettings | Simulation | StopRule | Sweep,
 ) -> dict[str, Any]:
     return {name: getattr(value, name) for name in value.__slots__}
 
@@ -114,6 +115,9 @@ def _process_to_json(process: PlanProcess) -> dict[str, Any]:
     simulation = row.pop("simulate")
     if process.description is None:
         del row["description"]
+    row["drives"] = [_fields(driven) for driven in process.drives]
+    if not process.drives:
+        del row["drives"]
     if simulation:
         row["simulate"] = _fields(simulation)
         pose = row["simulate"].pop("pose")
@@ -226,6 +230,19 @@ def _process_from_json(data: dict[str, Any], where: str) -> PlanProcess:
         owns=tuple((str(parent), str(child)) for parent, child in get(data, "owns", list, where)),
         simulate=_simulation_from_json(simulation, where) if simulation else None,
         description=get(data, "description", str, where) if "description" in data else None,
+        drives=rows(data, "drives", _driven_from_json) if "drives" in data else (),
+    )
+
+
+def _driven_from_json(data: dict[str, Any], where: str) -> Driven:
+    switch = get(data, "switch", dict, where)
+    if not all(isinstance(value, (str, int, float)) for value in switch.values()):
+        raise TypeError(f"{where}: switch holds something that is no parameter")
+    return Driven(
+        sensor=get(data, "sensor", str, where),
+        preset=get(data, "preset", str, where),
+        publishes=get(data, "publishes", bool, where),
+        switch=switch,
     )
 
 

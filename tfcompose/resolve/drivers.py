@@ -17,7 +17,7 @@ from tfcompose.validate.preset import Chosen
 if TYPE_CHECKING:
     from tfcompose.load import Path, Source
     from tfcompose.resolve.presets import Sensor
-    from tfcompose.validate.preset import PresetDriver
+    from tfcompose.validate.preset import Claim, PresetDriver
     from tfcompose.validate.spec import RobotSpec
 
 #: In an argument, the file that holds the parameters of a process.
@@ -68,15 +68,21 @@ def driver_node(sensor: Sensor, spec: RobotSpec) -> str:
 
 def driver_parameters(sensor: Sensor, prefix: str = "") -> dict[str, Any]:
     """Return the parameters, or the arguments of a launch file, that make the driver do what the spec says."""
-    driver, said = sensor.preset.driver, sensor.spec
+    driver = sensor.preset.driver
     if driver is None:
         return {}
     fill = _Filler(sensor, prefix)
     named = _frame_names(sensor, driver)
     switch = (driver.on if sensor.tf == DRIVER else driver.off or {}) if sensor.driven() else {}
-    own = {sensor.name, said.driver.process if said.driver else None}
-    claims = {} if said.owner in own else {key: v for claim in driver.claims for key, v in claim.off.items()}
+    claims = {key: value for claim in claims_of(sensor) for key, value in claim.off.items()}
     return fill.table(driver.args if driver.launch else driver.params) | named | fill.table(claims | switch)
+
+
+def claims_of(sensor: Sensor) -> tuple[Claim, ...]:
+    """Return the edges outside the sensor that its driver publishes by default, unless it owns the mount's."""
+    driver, said = sensor.preset.driver, sensor.spec
+    own = {sensor.name, said.driver.process if said.driver else None}
+    return () if driver is None or (said.owner and said.owner in own) else driver.claims
 
 
 def _node_parameters(sensor: Sensor, computed: dict[str, Any], *, launched: bool) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from tfcompose.diagnostic import did_you_mean, finding
 from tfcompose.model import STATIC, Edge, Link, MountedSensor
 from tfcompose.pose import Pose
 from tfcompose.resolve.bodies import inertial_of
-from tfcompose.resolve.drivers import driver_process
+from tfcompose.resolve.drivers import claims_of, driver_process
 from tfcompose.resolve.poses import Draft, rotation_of
 from tfcompose.resolve.presets import DRIVER, TFCOMPOSE
 
@@ -131,6 +131,7 @@ class _Mounting:
             "" if named == "none" else named or own,
             preset.driver.off if preset.driver else None,
             sensor.tf == DRIVER,
+            {f"{claim.parent} → {self.renamed(sensor.named(claim.child))}": claim.off for claim in claims_of(sensor)},
             serial,
             sensor.options.get(serial) if serial else None,
             self.place("tf"),

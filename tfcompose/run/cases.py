@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tfcompose.run.driven import drives_of, sensor_of
 from tfcompose.run.events import Found, GuardEvent, Recovered, Taken
 from tfcompose.run.offences import NAMELESS, Offence, taken, violation
 from tfcompose.run.senders import FEWEST_GAPS
@@ -64,6 +65,7 @@ class Cases:
         self._plan = plan
         self._senders = senders
         self._start = start
+        self._drives = drives_of(plan)
         self._reported: dict[tuple[str, str], float] = {}
         self._processes = {
             node: process.name for process in plan.processes if process.kind != "external" for node in process.nodes
@@ -105,7 +107,8 @@ class Cases:
         where = self._senders.where(cases[0].gid)
         if any(self._was_first(case, now) for case in cases):
             return Taken(taken(offences, where))
-        return Found(violation(offences, self._plan.guard, where), self._process(offences[0]))
+        driven = sensor_of(offences[0], self._drives)
+        return Found(violation(offences, self._plan.guard, where, driven), self._process(offences[0]))
 
     def _process(self, offence: Offence) -> str:
         """Return the plan's process that did it, where that is sure and it can be stopped for it."""

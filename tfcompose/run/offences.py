@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, Severity, finding
+from tfcompose.run.driven import advice_of, message_of
 from tfcompose.run.stamps import BACK, REPEATED, WRONG_CLOCK
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tfcompose.plan import GuardPolicy, Plan, PlanEdge
+    from tfcompose.plan import Driven, GuardPolicy, Plan, PlanEdge
 
 LISTED_AT_MOST = 12
 NAMELESS = "a publisher without a node name"
@@ -76,13 +77,17 @@ class Offence:
         return f"{self.name} is no longer published by {self.who}"
 
 
-def violation(offences: Sequence[Offence], guard: GuardPolicy, where: str = "") -> Diagnostic:
-    """Return the finding for offences of one kind by one node, that runs ``where``."""
+def violation(
+    offences: Sequence[Offence], guard: GuardPolicy, where: str = "", driven: Driven | None = None
+) -> Diagnostic:
+    """Return the finding for offences of one kind by one node, that runs ``where`` and may drive a sensor."""
     first = offences[0]
     mild = first.code in _WARNINGS or (first.code == "TF803" and guard.unknown_edges == "warn")
     severity: Severity = "warning" if mild else "error"
     notes = [*_others(offences), *_declared(first), *_runs(first, where)]
-    return finding(first.code, _message(offences), None, help=_help(first), notes=notes, severity=severity)
+    message = message_of(first, _more(offences), driven) or _message(offences)
+    advice = advice_of(first, driven) or _help(first)
+    return finding(first.code, message, None, help=advice, notes=notes, severity=severity)
 
 
 def taken(offences: Sequence[Offence], where: str = "") -> Diagnostic:

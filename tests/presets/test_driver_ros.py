@@ -1,0 +1,185 @@
+"""A driver that publishes as realsense2_camera does, started by ``tfcompose up`` as its preset says, and guarded."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import psutil
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+pytestmark = pytest.mark.ros
+
+#: What it does by its parameters is from realsense2_camera's tfs.cpp: each enabled stream below the link, its optical
+#: frame below that; streams of index 1 once more, as aligned depth; imu below gyro with unite_imu_method. Like tf2's
+#: static broadcaster it keeps one transform a child, the one that it was given last. Its values are a unit's own.
+STAND_IN = """
+import os, signal, sys, time
+import rclpy
+from rclpy.node import Node
+from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.tf import TFPublisher
+rclpy.init(args=sys.argv)
+node = Node("camera", automatically_declare_parameters_from_overrides=True)
+told = {name: node.get_parameter(name).value for name in node._parameters}
+streams = {"depth": True, "color": True, "infra1": False, "infra2": False, "gyro": False, "accel": False}
+streams = {name: told.get("enable_" + name, default) for name, default in streams.items()}
+streams |= {name: True for name in os.environ.get("STAND_IN_ALSO", "").split()}
+prefix = told.get("tf_prefix", "") + told.get("camera_name", "camera") + "_"
+base = prefix + told.get("base_frame_id", "link")
+kept = {}
+def send(parent, child, xyz=(0.0, 0.0, 0.0), optical=False):
+    turn = (-0.5, 0.5, -0.5, 0.5) if optical else (0.0, 0.0, 0.0, 1.0)
+    kept[child] = Transform(time.time_ns(), parent, child, xyz, turn)
+for index, name in enumerate(stream for stream, enabled in streams.items() if enabled):
+    frame, optical = f"{prefix}{name}_frame", f"{prefix}{name}_optical_frame"
+    send(base, frame, (0.0, 0.0149 * index, 0.0003))
+    send(frame, optical, optical=True)
+    if name == "infra1":
+        aligned = f"{prefix}aligned_depth_to_{name}_frame"
+        send(base, aligned, (0.0, 0.0149 * index, 0.0003))
+        send(aligned, optical, optical=True)
+if streams["gyro"] and told.get("unite_imu_method", 0) > 0:
+    send(f"{prefix}gyro_frame", f"{prefix}imu_frame")
+    send(f"{prefix}imu_frame", f"{prefix}imu_optical_frame", optical=True)
+if told.get("publish_tf", True) or os.environ.get("STAND_IN_IGNORES"):
+    publisher = TFPublisher(node, static=True)
+    publisher.publish(encode(list(kept.values())))
+print("stand-in:", node.get_fully_qualified_name(), told.get("serial_no"), len(kept), flush=True)
+signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGTERM, lambda *_: sys.exit())
+try:
+    while True:
+        time.sleep(0.05)
+except KeyboardInterrupt:
+    pass
+node.destroy_node()
+rclpy.try_shutdown()
+"""
+ROVER = """
+tfcompose: 1
+robot: rover
+ros: {discovery: localhost}
+links: {base_link: {}}
+sensors:
+  front: {preset: realsense/d435i, parent: base_link, options: {%s}, %s}
+"""
+EVERYTHING = 'streams: [depth, color, infra1, infra2], imu: true, serial: "0042"'
+CLEAR_S = 3.0
+
+
+@dataclass
+class Up:
+    """A launcher that runs, and what it has printed so far."""
+
+    popen: subprocess.Popen[bytes]
+    output: Path
+
+    @property
+    def text(self) -> str:
+        return self.output.read_text(encoding="utf-8")
+
+    def says(self, *words: str, within: float = 30.0) -> None:
+        end = time.monotonic() + within
+        while not all(word in self.text for word in words) and self.popen.poll() is None and time.monotonic() < end:
+            time.sleep(0.01)
+        for word in words:
+            assert word in self.text, self.text
+
+
+@pytest.fixture
+def up(domain: object, tmp_path: Path) -> Iterator[Callable[..., Up]]:
+    """Build and run this robot with the stand-in as its installed driver."""
+    assert domain
+    program = tmp_path / "ros" / "lib" / "realsense2_camera" / "realsense2_camera_node"
+    program.parent.mkdir(parents=True)
+    program.write_text(f"#!{sys.executable}\n{STAND_IN}", encoding="utf-8")
+    program.chmod(0o755)
+    running: list[Up] = []
+
+    def run(text: str, **environment: str) -> Up:
+        (tmp_path / "rover.yaml").write_text(text, encoding="utf-8")
+        output = tmp_path / "output.txt"
+        prefixes = os.pathsep.join(filter(None, [str(tmp_path / "ros"), os.environ.get("AMENT_PREFIX_PATH")]))
+        with output.open("wb") as out:
+            popen = subprocess.Popen(
+                [sys.executable, "-m", "tfcompose", "up", "rover.yaml"],
+                stdout=out,
+                stderr=out,
+                cwd=tmp_path,
+                env=os.environ | {"AMENT_PREFIX_PATH": prefixes} | environment,
+            )
+        running.append(Up(popen, output))
+        return running[-1]
+
+    yield run
+    for one in running:
+        below = psutil.Process(one.popen.pid).children(recursive=True) if one.popen.poll() is None else []
+        if one.popen.poll() is None:
+            one.popen.send_signal(2)
+            try:
+                one.popen.wait(15)
+            except subprocess.TimeoutExpired:
+                one.popen.kill()
+                one.popen.wait()
+        assert not psutil.wait_procs(below, 10)[1]
+
+
+def codes(text: str) -> list[str]:
+    return [line for line in text.splitlines() if "[TF" in line]
+
+
+@pytest.mark.parametrize(
+    "options", [EVERYTHING, "streams: [depth]", "streams: [infra1, infra2]", "imu: true, unite_imu: false"]
+)
+def test_a_driver_that_publishes_what_its_preset_says_is_let_alone(up: Callable[..., Up], options: str) -> None:
+    robot = up(ROVER % (options, "tf: driver"))
+    robot.says("stand-in: /front/front")
+    robot.says("edges live")
+    time.sleep(CLEAR_S)
+    assert codes(robot.text) == []
+    if "serial" in options:
+        assert "stand-in: /front/front 0042" in robot.text
+
+
+def test_a_driver_that_ignores_its_switch_is_named_with_it(up: Callable[..., Up]) -> None:
+    robot = up(ROVER % (EVERYTHING, "tf: tfcompose"), STAND_IN_IGNORES="1")
+    robot.says("TF801", "/front/front", "publish_tf: false", "realsense/d435i")
+    assert "drives front (realsense/d435i) and ignores its switch: start it with publish_tf: false" in robot.text
+
+
+def test_a_driver_that_keeps_to_its_switch_is_let_alone(up: Callable[..., Up]) -> None:
+    robot = up(ROVER % (EVERYTHING, "tf: tfcompose"))
+    robot.says("stand-in: /front/front")
+    time.sleep(CLEAR_S)
+    assert codes(robot.text) == []
+
+
+def test_a_driver_with_another_stream_than_its_preset_has_is_named_with_what_was_expected(
+    up: Callable[..., Up],
+) -> None:
+    robot = up(ROVER % ("streams: [depth]", "tf: driver"), STAND_IN_ALSO="infra1")
+    robot.says("TF803", "preset realsense/d435i expects no frame front_infra1_frame, the driver /front/front sent")
+    assert "let sensors.front say what its driver does: options with that frame" in robot.text
+
+
+def test_two_cameras_of_one_kind_get_names_and_serial_numbers_by_two_lines(
+    up: Callable[..., Up], tmp_path: Path
+) -> None:
+    line = '  %s: {preset: realsense/d435i, parent: base_link, xyz: [%s, 0, 0], options: {serial: "%s"}}\n'
+    head = "tfcompose: 1\nrobot: rover\nros: {discovery: localhost}\nlinks: {base_link: {}}\nsensors:\n"
+    robot = up(head + line % ("left", 0.1, "0001") + line % ("right", 0.2, "0002"))
+    robot.says("stand-in: /left/left 0001", "stand-in: /right/right 0002")
+    time.sleep(CLEAR_S)
+    assert codes(robot.text) == []
+    plan = json.loads(next(tmp_path.rglob("plan.json")).read_text("utf-8"))
+    assert {edge["child"].partition("_")[0] for edge in plan["edges"]} == {"left", "right"}

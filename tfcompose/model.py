@@ -300,7 +300,7 @@ class Edge:
     ``switched`` holds the further parents between which the owner may change it, as a tool changer does; ``parent`` is
     the nominal one.
     ``joint`` moves by joint states. ``free`` is a planar or floating joint, of which joint states say nothing.
-    ``other_axes``: the vendor calls the frame optical, and its z does not look forward.
+    ``other_axes``: the vendor's name for the frame does not say whether it is optical, or says it wrongly.
     """
 
     parent: str

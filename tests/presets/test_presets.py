@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from functools import cache
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 KNOWN = library()
 NAMES = KNOWN.names
 HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
+#: A frame in what is to be written for values that nobody knows.
+ASKED = re.compile(r"(\w+): \{(?:xyz|rpy)")
 OPTICAL_XYZW = (-0.5, 0.5, -0.5, 0.5)
 
 
@@ -52,7 +55,7 @@ def robots(name: str) -> list[tuple[str, dict[str, Any], Robot]]:
         options = whole(name) | variant
         for tf in ("", "driver", "tfcompose"):
             plain = compile_robot(spec(name, options, tf, {}), "r.yaml", KNOWN)
-            asked = [one.message.split(" where ")[1].split()[0] for one in plain.found if one.code == "TF605"]
+            asked = [frame for one in plain.found if one.code == "TF605" for frame in ASKED.findall(one.help)]
             frames = {frame: {"xyz": [0.1, 0.2, 0.3], "rpy": [0, 0, 0]} for frame in asked}
             done = compile_robot(spec(name, options, tf, frames), "r.yaml", KNOWN)
             assert done.robot

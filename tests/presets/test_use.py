@@ -65,8 +65,12 @@ def told(robot: Robot) -> dict[str, Any]:
 
 def unknown(preset: str, **keys: Any) -> dict[str, Any]:
     found = compiled(preset, **keys).found
-    asked = [one.message.split(" where ")[1].split()[0] for one in found if one.code == "TF605"]
-    return {frame: {"xyz": [1, 2, 3], "rpy": [0, 0, 0]} for frame in asked}
+    asked: dict[str, Any] = {}
+    for one in found:
+        if one.code == "TF605":
+            asked |= yaml.safe_load(one.help.partition(" write: ")[2])["sensors"]["s"]["frames"]
+    values = {"xyz": [1, 2, 3], "rpy": [0, 0, 0]}
+    return {frame: {key: values[key] for key in keys} for frame, keys in asked.items()}
 
 
 DRIVEN = [name for name in NAMES if any(frame.driver for frame in KNOWN.get(name).frames.values())]
@@ -211,6 +215,10 @@ def test_what_nobody_knows_is_asked_for_with_the_yaml_to_write_and_is_never_a_ze
     assert [one.code for one in found] == ["TF605"]
     assert found[0].message == "realsense/d457 does not know where s_color_frame is in s_link"
     assert "sensors: {s: {frames: {s_color_frame: {xyz: [x, y, z], rpy: [roll, pitch, yaw]}}}}" in found[0].help
+    several = compiled("realsense/d457", options={"streams": ["infra2", "color"]}).found
+    assert [one.message for one in several] == [
+        "realsense/d457 does not know where s_color_frame and s_infra2_frame are"
+    ]
     robot = robot_of("realsense/d457", frames={"s_color_frame": {"xyz": [0, -0.059, 0], "rpy": [0, 0, 0]}})
     assert edge_of(robot, "s_color_frame").pose.xyz == (0, -0.059, 0)
     assert not edge_of(robot, "s_color_frame").nominal

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import did_you_mean, finding
@@ -33,6 +33,7 @@ class _Mounting:
 
     drafts: Drafts
     sensor: Sensor
+    unknown: dict[str, str] = field(default_factory=dict)
 
     def add(self) -> None:
         drafts, sensor = self.drafts, self.sensor
@@ -42,6 +43,7 @@ class _Mounting:
         publisher = self.publisher()
         for name, frame in sensor.frames().items():
             self.add_frame(name, frame, publisher)
+        self.ask()
         self.check_overrides(mount)
         self.add_body()
         drafts.sensors.append(self.mounted(mount))
@@ -59,7 +61,7 @@ class _Mounting:
         """Take one frame inside the sensor: the unit's own value before the preset's."""
         own, final = self.sensor.spec.frames.get(name), self.renamed(name)
         parent = self.sensor.parent_of(name, frame)
-        pose, measured = self.pose_of(name, frame, parent, own)
+        pose, measured = self.pose_of(name, frame, own)
         owner = publisher if frame.driver else STATIC
         kind = "dynamic" if frame.driver == "dynamic" and owner != STATIC else "static"
         self.drafts.frames.setdefault(final, self.place())
@@ -70,24 +72,31 @@ class _Mounting:
         )  # fmt: skip
         self.drafts.edges.append(Draft(edge))
 
-    def pose_of(self, name: str, frame: PresetFrame, parent: str, own: FrameOverride | None) -> tuple[Pose, bool]:
-        """Return the frame's pose in its parent, and whether it is the unit's own. What nobody knows is a finding."""
+    def pose_of(self, name: str, frame: PresetFrame, own: FrameOverride | None) -> tuple[Pose, bool]:
+        """Return the frame's pose in its parent, and whether it is the unit's own; note what nobody knows."""
         at, written = frame.xyz, rotation_of(frame, name)
         if frame.by_driver and self.sensor.tf == DRIVER:
             at, written = frame.by_driver.xyz or at, rotation_of(frame.by_driver, name) or written
         turned = rotation_of(own, name) if own else None
-        unknown = []
-        if at is None and not (own and own.xyz):
-            unknown.append("xyz: [x, y, z]")
+        unknown = ["xyz: [x, y, z]"] if at is None and not (own and own.xyz) else []
         if at is None and written is None and turned is None:
             unknown.append("rpy: [roll, pitch, yaw]")
         if unknown:
-            preset, sensor = self.sensor.spec.preset, self.sensor.name
-            message = f"{preset} does not know where {name} is in {parent}"
-            advice = f"measure it, and write: sensors: {{{sensor}: {{frames: {{{name}: {{{', '.join(unknown)}}}}}}}}}"
-            self.drafts.found.append(finding("TF605", message, self.place("preset"), help=advice))
+            self.unknown[name] = f"{name}: {{{', '.join(unknown)}}}"
         xyz = (own.xyz if own else None) or at or (0.0, 0.0, 0.0)
         return Pose(xyz, turned or written or Pose().quat_xyzw), bool(own and (own.xyz or turned))
+
+    def ask(self) -> None:
+        """Note where nobody knows where frames are, with what to write."""
+        if self.unknown:
+            sensor, first = self.sensor, next(iter(self.unknown))
+            *others, last = self.unknown
+            names = f"{', '.join(others)} and {last} are" if others else f"{last} is"
+            parent = "" if others else f" in {sensor.parent_of(first, sensor.frames()[first])}"
+            message = f"{sensor.spec.preset} does not know where {names}{parent}"
+            frames = ", ".join(self.unknown.values())
+            advice = f"measure, and write: sensors: {{{sensor.name}: {{frames: {{{frames}}}}}}}"
+            self.drafts.found.append(finding("TF605", message, self.place("preset"), help=advice))
 
     def publisher(self) -> str:
         """Return who publishes the frames inside the sensor that a driver can publish; note what cannot be."""

@@ -69,7 +69,9 @@ class PresetFrame(Turned):
     when: Condition = key(
         CONDITION, {}, "option → the value that it has, or, for a set, holds; tf → driver or tfcompose; all must hold"
     )
-    other_axes: bool = key(BOOLEAN, default=False, about="it is called optical, and z does not look forward")
+    other_axes: bool = key(
+        BOOLEAN, default=False, about="its name does not say whether it is optical, or says it wrongly"
+    )
     about: str = key(TEXT, "")
 
 

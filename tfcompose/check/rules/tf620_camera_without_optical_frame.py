@@ -33,7 +33,8 @@ def camera_without_optical_frame(robot: Robot) -> Iterator[Diagnostic]:
             if frame not in seen:
                 seen.add(frame)
                 waiting += [edge.child for edge in children.get(frame, ())]
-        if not any(is_optical(frame) for frame in seen):
+        by_other_names = any(edge.other_axes for edge in robot.edges if edge.child in seen)
+        if not by_other_names and not any(is_optical(frame) for frame in seen):
             message = f"the camera {sensor.name} has no optical frame"
             advice = f"a frame {sensor.name}_optical_frame with rpy: [-90 deg, 0, -90 deg]"
             yield finding("TF620", message, sensor.at, help=advice)

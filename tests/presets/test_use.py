@@ -201,6 +201,18 @@ def test_who_publishes_is_by_default_as_the_vendor_has_it() -> None:
     }  # fmt: skip
 
 
+def test_a_driver_that_does_nothing_until_it_is_active_is_made_active() -> None:
+    for preset, options, state in (
+        ("ouster/os1", {}, "active"),
+        ("hokuyo/utm-30lx", {}, "active"),
+        ("hokuyo/utm-30lx", {"driver": "urg_node"}, None),
+        ("realsense/d435", {}, None),
+    ):
+        assert driver_of(robot_of(preset, options=options)).nodes[0].lifecycle == state
+    own = {"run": {"package": "mine", "executable": "lidar"}}
+    assert driver_of(robot_of("ouster/os1", driver=own)).nodes[0].lifecycle is None
+
+
 def test_a_unit_whose_cameras_hang_otherwise_says_on_what() -> None:
     frames = {"s_left_camera_frame": {"parent": "s_right_camera_frame", "xyz": [0, 0.075, 0]}}
     robot = robot_of("oak/oak-d", tf="driver", frames=frames)

@@ -126,7 +126,7 @@ def _shape(shape: Shape) -> dict[str, Any]:
 
 
 def _driver(driver: PresetDriver, preset: PresetSpec) -> dict[str, Any]:
-    keys = ("package", "executable", "launch", "versions", "params", "args", "naming", "on", "about")
+    keys = ("package", "executable", "launch", "lifecycle", "versions", "params", "args", "naming", "on", "about")
     published = any(frame.driver for frame in preset.frames.values())
     said = _shown(driver, preset, keys)
     said["node"] = "/" + "/".join(_named(part, preset) for part in (driver.namespace, driver.node) if part)
@@ -202,7 +202,10 @@ def _body_text(body: dict[str, Any]) -> str:
 
 def _driver_text(preset: dict[str, Any]) -> str:
     driver = preset["driver"]
-    rows = [("starts", f"{driver['package']} {driver.get('executable') or driver.get('launch')} as {driver['node']}")]
+    state = ", and makes it active" if "lifecycle" in driver else ""
+    rows = [
+        ("starts", f"{driver['package']} {driver.get('executable') or driver.get('launch')} as {driver['node']}{state}")
+    ]
     rows += [(word, driver[key]) for word, key in (("versions", "versions"), ("note", "about")) if key in driver]
     rows += [("names", _pairs(driver["naming"]))] if "naming" in driver else []
     inside = [frame["name"] for frame in preset["frames"] if frame["driver"]]

@@ -46,7 +46,8 @@ def driver_process(sensor: Sensor, spec: RobotSpec, source: Source) -> tuple[Pro
     computed = driver_parameters(sensor, settings_of(spec.ros).frame_prefix)
     params = (said.params if said else {}) | _node_parameters(sensor, computed, launched=launched)
     place = source.at_key(at[:2])
-    node = Node(driver_node(sensor, spec), place, at, params, said.lifecycle if said else None)
+    state = driver.lifecycle if driver and run is None else None
+    node = Node(driver_node(sensor, spec), place, at, params, (said.lifecycle if said else None) or state)
     process = Process(sensor.name, "external" if external else "run", place, (node,))
     process = replace(process, **how(said, spec.ros.namespace) if said else {})
     if run:

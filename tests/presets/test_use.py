@@ -299,12 +299,17 @@ def test_a_folder_beside_the_robot_adds_presets(tmp_path: Path) -> None:
 def test_a_preset_that_stands_before_a_built_in_one_is_said_and_may_change_it(tmp_path: Path) -> None:
     text = 'preset: 1\nextends: realsense/d435i\nframes:\n  "{name}_color_frame": {xyz: [0, 0.0149, 0]}\n'
     write(tmp_path / "mine", "realsense/d435i", text)
-    done = compiled("realsense/d435i", "preset_path: mine\n", str(tmp_path / "r.yaml"))
+    done = compiled("realsense/d435i", "preset_path: mine/\n", str(tmp_path / "r.yaml"))
     assert done.robot
     assert edge_of(done.robot, "s_color_frame").pose.xyz == (0, 0.0149, 0)
     assert [(one.code, one.severity) for one in done.found] == [("TF607", "warning")]
     assert "stands before tfcompose's own preset" in done.found[0].message
     assert compiled("realsense/d435", "preset_path: mine\n", str(tmp_path / "r.yaml")).found == ()
+
+
+def test_a_folder_that_is_not_there_is_said(tmp_path: Path) -> None:
+    found = compiled("generic/imu", "preset_path: [mine, .]\n", str(tmp_path / "r.yaml")).found
+    assert [(one.code, one.message) for one in found] == [("TF001", f"preset_path: no folder {tmp_path}/mine")]
 
 
 @pytest.mark.parametrize(
@@ -317,6 +322,12 @@ def test_a_preset_that_stands_before_a_built_in_one_is_said_and_may_change_it(tm
         ("model: mast camera", "model: mast camera\nextends: me/mist", "me/mast extends me/mist, which is not there"),
         ("model: mast camera", "model: mast camera\nextends: me/mast", "me/mast extends me/mast, which is not there"),
         ("about: a", "abut: a", "unknown key abut"),
+        ("frames:\n", "options: {o: {type: choice, variants: {a: 5}, default: a}}\nframes:\n", "5 is no mapping"),
+        ("frames:\n", "options: {o: {type: choice, variants: {a: {}}, default: [a]}}\nframes:\n", "cannot be ['a']"),
+        ("frames:\n", "options: {o: {type: set, values: [a], default: b}}\nframes:\n", "cannot be 'b'"),
+        ("frames:\n", 'body: {frame: "{name}_foot", shape: {xyz: [0, 0, 1]}}\nframes:\n', "a shape without a form"),
+        ("rpy: [-90 deg", "look: up, rpy: [-90 deg", "rpy and look exclude each other"),
+        ("frames:\n", "driver: {package: p, node: n}\nframes:\n", "one of executable and launch says what is started"),
         ("frames:\n", 'body: {frame: "{name}_case", shape: {box: [1, 1, 1]}}\nframes:\n', "no frame {name}_case"),
     ],
 )  # fmt: skip

@@ -23,6 +23,10 @@ class Folders:
         """Return whether the file is there."""
         return os.path.isfile(path)
 
+    def is_folder(self, path: str) -> bool:
+        """Return whether the folder is there."""
+        return os.path.isdir(path)
+
     def read(self, path: str) -> str:
         """Return its text; raises RejectedError."""
         return read_text(path)

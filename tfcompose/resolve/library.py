@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from tfcompose.load import Source
     from tfcompose.validate.preset import PresetSpec
 
-#: vendor/model; a model that begins with _ is there to be extended only.
-_NAME = re.compile(r"[a-z0-9][a-z0-9_.-]*/_?[a-z0-9][a-z0-9_.-]*")
+#: vendor/model; a model that begins with _ is there to be extended only, and nodes/ holds no sensors.
+_NAME = re.compile(r"(?!nodes/)[A-Za-z0-9][A-Za-z0-9_.-]*/_?[A-Za-z0-9][A-Za-z0-9_.-]*")
 _DEEPEST = 8
 
 
@@ -31,6 +31,9 @@ class Shelves(Protocol):
 
     def has(self, path: str) -> bool:
         """Return whether the file is there."""
+
+    def is_folder(self, path: str) -> bool:
+        """Return whether the folder is there."""
 
     def read(self, path: str) -> str:
         """Return its text; raises RejectedError."""
@@ -55,7 +58,7 @@ class Library:
 
     def over(self, folders: Iterable[str]) -> Library:
         """Return a library with these folders before its own."""
-        return Library((*folders, *self.folders), self.shelves, self.own)
+        return Library((*map(posixpath.normpath, folders), *self.folders), self.shelves, self.own)
 
     @property
     def names(self) -> list[str]:

@@ -74,7 +74,7 @@ def resolve(
     drafts.add_frames()
     drafts.add_links()
     drafts.add_joints()
-    presets = _with_path(library, spec, source)
+    presets = _with_path(library, spec, source, found)
     for name, said in spec.sensors.items():
         sensor, refused = sensor_of(name, said, presets, source)
         found += refused
@@ -155,13 +155,17 @@ def _with_blocks(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, 
     return replace(robot, hardware=(*hardware, *robot.hardware), blocks=(*blocks, *robot.blocks)), found
 
 
-def _with_path(library: Library, spec: RobotSpec, source: Source) -> Library:
+def _with_path(library: Library, spec: RobotSpec, source: Source, found: list[Diagnostic]) -> Library:
     """Return the library with the user's folders before its own; a folder is relative to the file that names it."""
     if not spec.preset_path:
         return library
     places = [source.at(("preset_path", index)).file for index in range(len(spec.preset_path))]
     homes = ["" if file.startswith("--") else posixpath.dirname(file) for file in places]
-    return library.over(posixpath.join(home, folder) for home, folder in zip(homes, spec.preset_path, strict=True))
+    folders = [posixpath.join(home, folder) for home, folder in zip(homes, spec.preset_path, strict=True)]
+    for index, folder in enumerate(folders):
+        if not library.shelves.is_folder(folder):
+            found.append(finding("TF001", f"preset_path: no folder {folder}", source.at(("preset_path", index))))
+    return library.over(folders)
 
 
 def _has_calibrations(spec: RobotSpec) -> bool:

@@ -97,7 +97,8 @@ def _shape(value: Any, path: Path, problems: Problems) -> Any:
 
 
 FORMS = frozenset({"box", "cylinder", "sphere", "capsule", "mesh"})
-SHAPES = listing(Type(_shape, Shape), single=True)
+SHAPE = Type(_shape, Shape)
+SHAPES = listing(SHAPE, single=True)
 
 
 class LinkSpec(MountKeys):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.validate.bodies import Shape
+from tfcompose.validate.bodies import SHAPE, Shape
 from tfcompose.validate.fields import ANYTHING, BOOLEAN, MASS_, RATE_, TEXT, XYZ, choice, text
 from tfcompose.validate.posed import Turned
 from tfcompose.validate.schema import Model, Problems, Type, key, listing, mapping, record
@@ -39,7 +39,7 @@ class Option(Model):
 
     type: str = key(choice("set", "bool", "text", "choice"))
     values: tuple[str, ...] = key(listing(TEXT), (), "what a set may hold")
-    variants: dict[str, Any] = key(mapping(ANYTHING), {}, "of a choice: value → what it lays over the preset")
+    variants: dict[str, Any] = key(mapping(mapping(ANYTHING)), {}, "of a choice: value → what it lays over the preset")
     default: Any = key(ANYTHING, None)
     about: str = key(TEXT, "")
 
@@ -79,7 +79,7 @@ class Body(Model):
     """The sensor's body, on one of its frames."""
 
     frame: str = key(TEXT)
-    shape: Shape = key(record(Shape))
+    shape: Shape = key(SHAPE)
     mass: float | None = key(MASS_, None, "where the vendor's is credible; the inertia is computed")
 
 

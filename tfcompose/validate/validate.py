@@ -59,6 +59,7 @@ def validate_preset(source: Source) -> PresetSpec:
     """
     problems = Problems()
     preset = _read(PresetSpec, source.data, problems)
+    _exclusive(source.data, _FORKS, (), problems)
     if preset is not BROKEN and not problems.all:
         check_names(preset, problems)
     found = (*source.found, *(_finding(problem, source) for problem in _once(problems.all)))

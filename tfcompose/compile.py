@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.check import apply, check, levelled, unknown_rules, with_edits
-from tfcompose.diagnostic import Allow, Diagnostic, RejectedError, Span
+from tfcompose.diagnostic import Allow, Diagnostic, Note, RejectedError, Span
 from tfcompose.load import Source, composed, load, with_includes
 from tfcompose.resolve import Disk, Library, resolve
 from tfcompose.validate import validate
@@ -79,16 +79,33 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     except RejectedError as error:
         return Compiled(None, error.diagnostics)
     resolved = resolve(validated, library, read, disk)
-    later = [*resolved.found, *check(resolved.robot)]
+    later = [*resolved.found, *_about_parts(check(resolved.robot), resolved.whole.foreign)]
     source = validated.source
     plain = not (profiles or overlays)
     found = [*validated.found, *(one for one in later if _stands(one, validated) and (plain or one.code not in _IDLE))]
     rules = validated.spec.rules
     found += unknown_rules({word: source.at_key(("rules", word)) for word in rules})
     found = with_edits(found, source)
-    kept, used = apply(levelled(dict.fromkeys(found), rules), (*source.allows, *resolved.allows))
+    kept, used = apply(levelled(dict.fromkeys(found), rules), (*source.allows, *resolved.whole.allows))
     ordered = sorted(kept, key=lambda one: one.sort_key)
     return Compiled(resolved.robot, tuple(ordered), source.allows, frozenset(used))
+
+
+def _about_parts(found: list[Diagnostic], files: dict[str, Note]) -> list[Diagnostic]:
+    """Return the findings; those about files of parts that somebody else wrote with a note that says which part it is.
+
+    Warnings about such files are left out: who holds the part cannot mend them, and ``lint`` of the file says them.
+    """
+    if not files:
+        return found
+    said = []
+    for one in found:
+        note = files.get(one.span.file) if one.span else None
+        if note is None:
+            said.append(one)
+        elif one.severity == "error":
+            said.append(replace(one, notes=(*one.notes, note)))
+    return said
 
 
 def _stands(found: Diagnostic, validated: Validated) -> bool:

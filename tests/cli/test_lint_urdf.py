@@ -13,12 +13,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tfcompose.cli import urdf
 from tfcompose.cli.compiling import library
 from tfcompose.cli.disk import disk
 from tfcompose.cli.urdf import CODES, lint_urdf
 from tfcompose.compile import compile_robot
-from tfcompose.diagnostic import Diagnostic, RejectedError
+from tfcompose.diagnostic import Diagnostic, RejectedError, Span
 from tfcompose.emit import emit
 from tfcompose.load.urdf import load_xml
 from tfcompose.resolve.packages import Packages
@@ -37,7 +36,7 @@ def marks(text: str) -> list[tuple[int, str]]:
 
 def lint_text(text: str) -> tuple[Diagnostic, ...]:
     try:
-        return robot_of_urdf(load_xml(text, "r.urdf"), "r.urdf", lambda _: None)[1]
+        return robot_of_urdf(load_xml(text, "r.urdf"), "r.urdf", Packages().asset)[1]
     except RejectedError as error:
         return error.diagnostics
 
@@ -138,22 +137,22 @@ def test_a_package_is_looked_for_where_ros_looks(tmp_path: Path, monkeypatch: py
     mesh.touch()
     monkeypatch.setenv("AMENT_PREFIX_PATH", f"/nowhere:{tmp_path}")
 
-    def missing(name: str) -> tuple[str, str, str] | None:
-        return urdf.missing_mesh(name, str(tmp_path / "a.urdf"), Packages(disk()))
+    def missing(name: str) -> Diagnostic | None:
+        return Packages(disk()).asset(name, Span(str(tmp_path / "a.urdf")))[1]
 
     assert missing("package://mine/meshes/a.stl") is None
     assert missing(f"file://{mesh}") is None
     assert missing("share/mine/meshes/a.stl") is None
     gone = missing("package://mine/b.stl")
     assert gone
-    assert (gone[0], str(tmp_path / "share/mine/b.stl") in gone[2]) == ("TF723", True)
+    assert (gone.code, str(tmp_path / "share/mine/b.stl") in gone.help) == ("TF723", True)
     other = missing("package://other/b.stl")
     assert other
-    assert (other[0], "/nowhere/share/other" in other[2]) == ("TF724", True)
+    assert (other.code, "/nowhere/share/other" in other.help) == ("TF724", True)
     monkeypatch.delenv("AMENT_PREFIX_PATH")
     unset = missing("package://mine/meshes/a.stl")
     assert unset
-    assert "AMENT_PREFIX_PATH is empty" in unset[2]
+    assert "AMENT_PREFIX_PATH is empty" in unset.help
 
 
 XACRO = """<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">

@@ -13,13 +13,21 @@ from tfcompose.resolve.moments import Moments
 from tfcompose.resolve.packages import Disk, UnmeasurableError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from tfcompose.pose import Vector
+    from tfcompose.resolve.packages import Packages
 
 
 def disk() -> Disk:
     """Return this machine's files, with the packages of the workspaces that are sourced."""
     prefixes = tuple(prefix for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix)
-    return Disk(read_text, os.path.isfile, os.path.isdir, prefixes, moments)
+    return Disk(read_text, os.path.isfile, os.path.isdir, prefixes, moments, _expanded, os.path.abspath)
+
+
+def _expanded(file: str, packages: Packages, arguments: Mapping[str, Any], text: str | None) -> str:
+    result: str = import_module("tfcompose.cli.xacro").expanded(file, packages, arguments, text)
+    return result
 
 
 @cache

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib import import_module
-from typing import TYPE_CHECKING
 
 from tfcompose.check import apply, check, idle
 from tfcompose.cli.disk import disk
 from tfcompose.cli.terminal import read_text
-from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
+from tfcompose.cli.xacro import expanded
+from tfcompose.diagnostic import Diagnostic, RejectedError
 from tfcompose.load.comments import allows_in_xml
 from tfcompose.load.urdf import load_xml
 from tfcompose.resolve.packages import Packages
 from tfcompose.resolve.urdf import robot_of_urdf
-
-if TYPE_CHECKING:
-    from typing import Any
 
 #: The rules that make sense without owners, sensors and processes.
 CODES = frozenset(
@@ -41,9 +37,10 @@ _HELP = {
 def lint_urdf(file: str) -> list[Diagnostic]:
     """Return what is wrong with the file, by place. A xacro file is expanded, and places are those of the result."""
     try:
-        name, text = (f"{file} (expanded)", expanded(file)) if file.endswith(".xacro") else (file, read_text(file))
         packages = Packages(disk())
-        robot, found = robot_of_urdf(load_xml(text, name), name, lambda mesh: missing_mesh(mesh, file, packages))
+        is_xacro = file.endswith(".xacro")
+        name, text = (f"{file} (expanded)", expanded(file, packages)) if is_xacro else (file, read_text(file))
+        robot, found = robot_of_urdf(load_xml(text, name), name, packages.asset)
     except RejectedError as error:
         return list(error.diagnostics)
     allows = allows_in_xml(text, name)
@@ -55,47 +52,3 @@ def _said(found: Diagnostic) -> Diagnostic:
     """Return the finding with its advice in URDF's words."""
     keeps = found.help.startswith("did you mean")
     return found if keeps else replace(found, help=_HELP.get(found.code, found.help))
-
-
-def expanded(file: str) -> str:
-    """Return the URDF that xacro makes of the file.
-
-    Raises:
-        RejectedError: if xacro is not installed, or refuses the file.
-    """
-    read_text(file)  # what cannot be read is said as everywhere
-    try:
-        xacro: Any = import_module("xacro")
-    except ImportError:
-        advice = "pip install xacro, or lint the expanded file"
-        message = "xacro is not installed"
-        raise RejectedError([finding("TF904", message, Span(file), help=advice)]) from None
-    try:
-        document = xacro.process_file(file)
-        _raise_comments(document)
-        text: str = document.toprettyxml(indent="  ")
-    except Exception as error:  # noqa: BLE001 (xacro evaluates Python: anything can come out of it)
-        said = " ".join(str(error).split()) or type(error).__name__
-        raise RejectedError([finding("TF018", f"xacro: {said}", Span(file))]) from None
-    return text
-
-
-def _raise_comments(node: Any) -> None:
-    """Put comments that let findings stand above the tag on whose line they stood: printing gives each its own line."""
-    for child in list(node.childNodes):
-        _raise_comments(child)
-        before = child.previousSibling
-        if child.nodeType != child.COMMENT_NODE or "tfcompose:" not in child.data or before is None:
-            continue
-        if before.nodeType == child.TEXT_NODE and ("\n" in before.data or before.data.strip()):
-            continue
-        while before is not None and before.nodeType != child.ELEMENT_NODE:
-            before = before.previousSibling
-        over = before or node
-        over.parentNode.insertBefore(child, over)
-
-
-def missing_mesh(name: str, file: str, packages: Packages) -> tuple[str, str, str] | None:
-    """Return code, message and advice about a mesh file that is not there, or None."""
-    wrong = packages.asset(name, Span(file))[1]
-    return (wrong.code, wrong.message, wrong.help) if wrong else None

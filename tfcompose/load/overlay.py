@@ -30,6 +30,8 @@ SHAPES = frozenset({"box", "cylinder", "sphere", "capsule", "mesh"})
 MASSES = frozenset({"mass", "density"})
 SIMULATIONS = frozenset({"circle", "fixed", "joints"})
 
+PARTS = frozenset({"spec", "urdf", "xacro"})
+
 _POSES: tuple[tuple[str, ...], ...] = (
     ("frames", "*"),
     ("links", "*"),
@@ -55,6 +57,7 @@ CHOICES: tuple[tuple[tuple[str, ...], frozenset[str]], ...] = (
     (("links", "*", "visual"), SHAPES),
     (("links", "*", "collision"), SHAPES),
     (("links", "*", "inertial"), MASSES),
+    (("parts", "*"), PARTS),
 )
 
 

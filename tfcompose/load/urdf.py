@@ -22,13 +22,14 @@ _BREAK = re.compile("\r\n|\r|\n")
 
 @dataclass(slots=True, eq=False)
 class Element:
-    """A tag with its attributes; ``places`` are those of the attributes' values."""
+    """A tag with its attributes; ``places`` are those of the attributes' values, ``raw`` is the element as written."""
 
     tag: str
     at: Span
     attributes: dict[str, str] = field(default_factory=dict)
     places: dict[str, Span] = field(default_factory=dict)
     children: list[Element] = field(default_factory=list)
+    raw: str = ""
 
     def all(self, tag: str) -> list[Element]:
         """Return the children of a tag."""
@@ -60,11 +61,12 @@ class _Reader:
         self.data = text.encode()
         self.starts = [0, *(found.end() for found in _BREAK.finditer(text))]
         self.stack: list[Element] = []
+        self.begins: list[tuple[int, int]] = []  # of each open tag: where it begins, and where its attributes end
         self.root: Element | None = None
         self.elements = 0
         self.parser = expat.ParserCreate("utf-8")
         self.parser.StartElementHandler = self._open
-        self.parser.EndElementHandler = lambda _: self.stack.pop()
+        self.parser.EndElementHandler = self._close
         self.parser.StartDoctypeDeclHandler = self._refuse_type
 
     def read(self) -> Element:
@@ -103,6 +105,15 @@ class _Reader:
         else:
             self.root = element
         self.stack.append(element)
+        self.begins.append((begin, position))
+
+    def _close(self, _: str) -> None:
+        element = self.stack.pop()
+        begin, after_attributes = self.begins.pop()
+        if len(self.stack) != 1:  # of what stands in the root only
+            return
+        at = self._position(self.parser.CurrentByteIndex)
+        element.raw = self.text[begin : self.text.find(">", max(at, after_attributes)) + 1]
 
     def _position(self, byte: int) -> int:
         """Return the character that begins at a byte."""

@@ -13,6 +13,8 @@ from tfcompose.resolve.packages import Packages, UnmeasurableError
 from tfcompose.resolve.poses import pose_of, rotation_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from tfcompose.diagnostic import Span
     from tfcompose.load import Path, Source
     from tfcompose.validate import bodies as said
@@ -83,7 +85,7 @@ class Bodies:
         name, rgba = given.name, given.rgba
         if name is None:
             rgba = rgba if rgba or texture else (0.5, 0.5, 0.5, 1.0)
-            name = "_".join(["rgba", *(f"{part:g}".replace(".", "p").replace("-", "m") for part in rgba or ())])
+            name = name_of_colour(rgba or ())
             name = name if texture is None else f"{name}_{_word(texture.uri)}"
         return Material(name, rgba, texture, self.source.at(at))
 
@@ -127,6 +129,11 @@ class Bodies:
 
     def _is_missing(self, path: str) -> bool:
         return self.packages.disk is not None and not self.packages.disk.is_file(path)
+
+
+def name_of_colour(rgba: Sequence[float]) -> str:
+    """Return a name for a colour that has none."""
+    return "_".join(["rgba", *(f"{part:g}".replace(".", "p").replace("-", "m") for part in rgba)])
 
 
 def with_colours(links: dict[str, Link]) -> dict[str, Link]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
 from tfcompose.plan import told_at_start
-from tfcompose.resolve.packages import beside
+from tfcompose.resolve.beside import beside
 
 if TYPE_CHECKING:
     from tfcompose.load import Path, Source

@@ -32,12 +32,16 @@ def settings_of(ros: RosSpec) -> RosSettings:
     return RosSettings(namespace, ros.domain_id, ros.discovery, ros.clock, prefix, tuple(ros.shared_frames))
 
 
+def topics_below(namespace: str, isolate: str) -> dict[str, str]:
+    """Return where the TF topics are moved: below the namespace, if they are isolated and it is one."""
+    moves = isolate in {"topics", "both"} and namespace
+    return {topic: f"/{namespace}{topic}" for topic in TF_TOPICS} if moves else {}
+
+
 def isolate(robot: Robot, ros: RosSpec, source: Source, disk: Disk | None = None) -> tuple[Robot, list[Diagnostic]]:
     """Return the robot with its processes' topics moved, and frames and files in them named; and what is wrong."""
     found = _wrong(robot, ros, source)
-    remap = {}
-    if ros.isolate in {"topics", "both"} and robot.ros.namespace:
-        remap = {topic: f"/{robot.ros.namespace}{topic}" for topic in TF_TOPICS}
+    remap = topics_below(robot.ros.namespace, ros.isolate)
     processes = []
     filler = Filler(robot, source, disk)
     for process in robot.processes:

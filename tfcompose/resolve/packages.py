@@ -9,10 +9,11 @@ import posixpath
 import re
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Span, did_you_mean, finding
 from tfcompose.model import Asset
+from tfcompose.resolve.beside import beside
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -29,6 +30,7 @@ _HIGHEST = 12  # so many folders above a file its package.xml is looked for
 class Disk:
     """What a compiler may ask about files. ``prefixes`` are those of AMENT_PREFIX_PATH, in order.
 
+    ``expand`` gives the URDF that xacro makes of a file, with arguments, or of a text that stands for it.
     ``moments`` gives those of a mesh file at a scale, and raises ``UnmeasurableError`` with the finding's parts.
     """
 
@@ -37,6 +39,8 @@ class Disk:
     is_folder: Callable[[str], bool]
     prefixes: tuple[str, ...] = ()
     moments: Callable[[str, Vector], Moments] | None = None
+    expand: Callable[[str, Packages, Mapping[str, Any], str | None], str] | None = None
+    absolute: Callable[[str], str] = str
 
 
 class UnmeasurableError(Exception):
@@ -45,12 +49,6 @@ class UnmeasurableError(Exception):
     def __init__(self, code: str, message: str, advice: str) -> None:
         self.code, self.advice = code, advice
         super().__init__(message)
-
-
-def beside(named: str, at: Span) -> str:
-    """Return the path of a file that is named at a place; on the command line it is relative to the folder."""
-    folder = "" if at.file.startswith("--") else posixpath.dirname(at.file)
-    return posixpath.normpath(posixpath.join(folder, named))
 
 
 def _unquoted(text: str) -> str:

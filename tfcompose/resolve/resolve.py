@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import posixpath
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Allow, Diagnostic, did_you_mean, finding
+from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
 from tfcompose.model import Edge, Process, Robot
 from tfcompose.plan import GuardPolicy
 from tfcompose.resolve.bodies import Bodies, with_colours
@@ -20,6 +20,7 @@ from tfcompose.resolve.presets import sensor_of
 from tfcompose.resolve.processes import idle_rates, name_clashes, unknown_names, user_process
 from tfcompose.resolve.sensors import add_sensor
 from tfcompose.resolve.simulated import with_positions
+from tfcompose.resolve.whole import Whole
 from tfcompose.resolve.written import as_written
 
 if TYPE_CHECKING:
@@ -28,7 +29,8 @@ if TYPE_CHECKING:
     from tfcompose.load import Source
     from tfcompose.resolve.library import Library
     from tfcompose.resolve.packages import Disk
-    from tfcompose.resolve.parts import Joined, Parts
+    from tfcompose.resolve.part import Joined
+    from tfcompose.resolve.parts import Parts
     from tfcompose.validate import Validated
     from tfcompose.validate.spec import RobotSpec
 
@@ -39,7 +41,7 @@ class Resolved:
 
     robot: Robot
     found: tuple[Diagnostic, ...]
-    allows: tuple[Allow, ...] = ()
+    whole: Whole = field(default_factory=Whole)
 
 
 def resolve(
@@ -52,24 +54,24 @@ def resolve(
     """Return the robot with presets expanded, parts joined, poses solved and owners given.
 
     ``read`` gives the text of a calibration or a part; without ``disk`` no mesh and no package is looked for.
-    ``holder`` is what resolves the robot as a part. ``allows`` are the comments in the files of parts.
+    ``holder`` is what resolves the robot as a part.
     """
     spec, source = validated.spec, validated.source
     found: list[Diagnostic] = []
     broken = set(validated.broken)
     processes = _processes(spec, source, found)
-    joined: list[Joined] = []
-    allows: list[Allow] = []
-    if spec.parts:  # few robots have any, and what joins them is loaded only then
-        made = holder or import_module("tfcompose.resolve.parts").Parts(library, read, disk, resolve, (source.file,))
-        joined = made.join(spec, source, settings_of(spec.ros).frame_prefix)
-        found += made.found
-        allows = made.allows
-        broken |= {entry for part in joined for entry in part.robot.broken}
-        broken |= set(made.missing)
-    everybody = [*processes, *(process for part in joined for process in part.robot.processes)]
     named = {name: (folder, source.at(("packages", name))) for name, folder in spec.packages.items()}
-    bodies = Bodies(source, Packages(disk, named))
+    packages = Packages(disk, named)
+    joined: list[Joined] = []
+    whole = Whole()
+    if spec.parts:  # few robots have any, and what joins them is loaded only then
+        files = (source.file,)
+        parts = holder or import_module("tfcompose.resolve.parts").Parts(library, read, disk, resolve, files, whole)
+        joined = parts.join(spec, source, settings_of(spec.ros).frame_prefix, packages)
+        found += parts.found
+        broken |= {*parts.missing, *(entry for part in joined for entry in part.robot.broken)}
+    everybody = [*processes, *(process for part in joined for process in part.robot.processes)]
+    bodies = Bodies(source, packages)
     drafts = Drafts(spec, source, frozenset(p.name for p in everybody if p.kind == "simulate"), bodies)
     drafts.add_frames()
     drafts.add_links()
@@ -125,7 +127,7 @@ def resolve(
         hardware=tuple(one for part in joined if not part.said.namespace for one in part.robot.hardware),
         blocks=tuple(one for part in joined if not part.said.namespace for one in part.robot.blocks),
     )
-    return Resolved(_completed(robot, spec, source, disk, found), tuple(found), tuple(allows))
+    return Resolved(_completed(robot, spec, source, disk, found), tuple(found), whole)
 
 
 def _completed(robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None, found: list[Diagnostic]) -> Robot:

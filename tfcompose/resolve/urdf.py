@@ -2,72 +2,23 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Severity, Span, did_you_mean, finding
-from tfcompose.model import JOINTS, STATIC, Edge, Joint, Limit, Robot
-from tfcompose.pose import Pose, norm, normalised, quat_from_rpy
+from tfcompose.diagnostic import Diagnostic, Note, RejectedError, finding
+from tfcompose.model import Block, Robot
 from tfcompose.resolve.urdf_bodies import Bodies
+from tfcompose.resolve.urdf_joints import edge_of
+from tfcompose.resolve.urdf_values import Values
 from tfcompose.resolve.urdf_words import unknown_words
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from tfcompose.load.urdf import Element
-    from tfcompose.pose import Vector
     from tfcompose.resolve.urdf_bodies import Finder
 
-MOVING = ("revolute", "continuous", "prismatic")
-TYPES = (*MOVING, "fixed", "floating", "planar")
-
-
-@dataclass(slots=True)
-class Values:
-    """Reads attributes; ``found`` is what was wrong with them."""
-
-    found: list[Diagnostic] = field(default_factory=list)
-
-    def refuse(self, message: str, at: Span, advice: str = "", severity: Severity = "error") -> None:
-        """Note that a value is wrong."""
-        self.found.append(finding("TF721", message, at, help=advice, severity=severity))
-
-    def text(self, element: Element, name: str, sample: str) -> str:
-        """Return an attribute that must be there, or an empty text."""
-        value = element.attributes.get(name, "")
-        if not value:
-            self.refuse(f"<{element.tag}> has no {name}", element.at, f"for example {sample}")
-        return value
-
-    def numbers(self, element: Element | None, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
-        """Return an attribute's numbers, as many as ``default`` has; that is taken where there are none."""
-        if element is None or name not in element.attributes:
-            return default
-        words = element.attributes[name].split()
-        try:
-            values = tuple(map(float, words))
-        except ValueError:
-            values = ()
-        if len(values) != len(default) or not all(map(math.isfinite, values)):
-            count = "a number" if len(default) == 1 else f"{len(default)} numbers"
-            self.refuse(f"{name}={element.attributes[name]!r} is not {count}", element.place(name))
-            return default
-        return values
-
-    def number(self, element: Element | None, name: str, default: Any = None) -> Any:
-        """Return an attribute's number; ``default`` is taken where there is none."""
-        if element is None or name not in element.attributes:
-            return default
-        return self.numbers(element, name, (0.0,))[0]
-
-    def pose(self, parent: Element) -> Pose:
-        """Return what the element's origin says."""
-        origin = parent.first("origin")
-        x, y, z = self.numbers(origin, "xyz", (0.0, 0.0, 0.0))
-        roll, pitch, yaw = self.numbers(origin, "rpy", (0.0, 0.0, 0.0))
-        if max(map(abs, (roll, pitch, yaw))) > 1e9:  # noqa: PLR2004 (no angle has so many turns, and none is left of it)
-            self.refuse("this rpy is no angle", origin.place("rpy") if origin else parent.at)
-            return Pose((x, y, z))
-        return Pose((x, y, z), normalised(quat_from_rpy(roll, pitch, yaw)))
+#: What links and joints are made of; everything else beside them is kept as it is written.
+_READ = frozenset({"link", "joint", "material"})
 
 
 def robot_of_urdf(root: Element, file: str, finder: Finder) -> tuple[Robot, tuple[Diagnostic, ...]]:
@@ -80,7 +31,7 @@ def robot_of_urdf(root: Element, file: str, finder: Finder) -> tuple[Robot, tupl
         message = f"the document is <{root.tag}>, not <robot>"
         raise RejectedError([finding("TF018", message, root.at, help="a URDF begins with <robot name=…>")])
     values = Values()
-    bodies = Bodies(values, finder)
+    bodies = Bodies(values, finder, root)
     name = values.text(root, "name", '<robot name="rover">')
     links: dict[str, Element] = {}
     for element in root.all("link"):
@@ -88,7 +39,7 @@ def robot_of_urdf(root: Element, file: str, finder: Finder) -> tuple[Robot, tupl
     joints: dict[str, Element] = {}
     for element in root.all("joint"):
         _add(joints, element, values)
-    edges = [edge for element in root.all("joint") if (edge := _edge(element, values))]
+    edges = [edge for element in root.all("joint") if (edge := edge_of(element, values))]
     frames = {link: element.place("name") for link, element in links.items()}
     robot = Robot(
         name=name,
@@ -98,8 +49,18 @@ def robot_of_urdf(root: Element, file: str, finder: Finder) -> tuple[Robot, tupl
         links={link: bodies.link(link, element) for link, element in links.items()},
         processes=(),
         base=None,
+        blocks=tuple(_blocks(root)),
     )
     return robot, (*values.found, *bodies.found, *unknown_words(root))
+
+
+def _blocks(root: Element) -> Iterator[Block]:
+    """Yield what stands beside links and joints, each element by its tag and number."""
+    counts: dict[str, int] = {}
+    for element in root.children:
+        if element.tag not in _READ:
+            counts[element.tag] = counts.get(element.tag, 0) + 1
+            yield Block(f"{element.tag}_{counts[element.tag]}", element.at, element.raw)
 
 
 def _add(known: dict[str, Element], element: Element, values: Values) -> None:
@@ -112,53 +73,3 @@ def _add(known: dict[str, Element], element: Element, values: Values) -> None:
         values.found.append(finding("TF722", message, element.place("name"), notes=[note], help=advice))
     elif name:
         known[name] = element
-
-
-def _edge(element: Element, values: Values) -> Edge | None:
-    name, kind = element.attributes.get("name", ""), values.text(element, "type", 'type="fixed"')
-    if kind and kind not in TYPES:
-        advice = did_you_mean(kind, TYPES, f"one of: {', '.join(TYPES)}")
-        values.refuse(f"there is no joint type {kind}", element.place("type"), advice)
-    ends = {}
-    for tag in ("parent", "child"):
-        end = element.first(tag)
-        if end is None:
-            values.refuse(f"the joint {name} has no {tag}", element.at, f'<{tag} link="…"/>')
-        elif values.text(end, "link", f'<{tag} link="…"/>'):
-            ends[tag] = end
-    moving = _moving(name, kind, element, values) if kind in MOVING else None
-    if len(ends) < 2:  # noqa: PLR2004 (parent and child)
-        return None
-    return Edge(
-        parent=ends["parent"].attributes["link"],
-        child=ends["child"].attributes["link"],
-        kind="joint" if moving else "dynamic" if kind in {"floating", "planar"} else "static",
-        pose=values.pose(element),
-        owner=JOINTS if moving else STATIC,
-        at=ends["parent"].place("link"),
-        joint=moving,
-        joint_name=name,
-        child_at=ends["child"].place("link"),
-    )
-
-
-def _moving(name: str, kind: Any, element: Element, values: Values) -> Joint:
-    written = element.first("axis")
-    x, y, z = values.numbers(written, "xyz", (1.0, 0.0, 0.0))
-    length = norm((x, y, z))
-    if not 0 < length < math.inf:
-        values.refuse(f"the axis of {name} has no direction", (written or element).place("xyz"), '<axis xyz="0 0 1"/>')
-        x, y, z, length = 1.0, 0.0, 0.0, 1.0
-    axis: Vector = (x / length, y / length, z / length)
-    said = element.first("limit")
-    limit = None
-    if said is not None:
-        limit = Limit(*(values.number(said, key) for key in ("lower", "upper", "effort", "velocity")))
-        for key in ("effort", "velocity"):
-            if key not in said.attributes:
-                values.refuse(f"the limit of {name} has no {key}", said.at, f'URDF requires it: {key}="1"')
-    mimic = element.first("mimic")
-    master = values.text(mimic, "joint", '<mimic joint="…"/>') if mimic is not None else None
-    multiplier, offset = values.number(mimic, "multiplier", 1.0), values.number(mimic, "offset", 0.0)
-    at = element.place("name")
-    return Joint(name, kind, at, axis, limit, master or None, multiplier, offset, length)

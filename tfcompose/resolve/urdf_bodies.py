@@ -3,36 +3,39 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from tfcompose.diagnostic import Diagnostic, finding
-from tfcompose.model import Inertial, Link, Shape
-from tfcompose.resolve.bodies import traces
+from tfcompose.model import Asset, Inertial, Link, Material, Shape
+from tfcompose.resolve.bodies import name_of_colour, traces
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from tfcompose.diagnostic import Diagnostic, Span
     from tfcompose.load.urdf import Element
-    from tfcompose.resolve.urdf import Values
+    from tfcompose.resolve.urdf_values import Values
 
-    #: Takes a mesh's file name; returns a code with what is wrong and where it looked, or None.
-    Finder = Callable[[str], tuple[str, str, str] | None]
+    #: Takes the address of a file and its place; returns the file, and what is wrong with the address, if anything is.
+    Finder = Callable[[str, Span], tuple[Asset, Diagnostic | None]]
 
 _FORMS: dict[str, tuple[tuple[str, int], ...]] = {
     "box": (("size", 3),),
     "cylinder": (("radius", 1), ("length", 1)),
     "sphere": (("radius", 1),),
+    "capsule": (("radius", 1), ("length", 1)),
 }
 _TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 @dataclass(slots=True)
 class Bodies:
-    """Reads links; ``found`` holds what is wrong with their meshes."""
+    """Reads the links of a document; ``found`` holds what is wrong with their files."""
 
     values: Values
     finder: Finder
+    root: Element
     found: list[Diagnostic] = field(default_factory=list)
+    _materials: dict[str, Material | None] = field(default_factory=dict)
 
     def link(self, name: str, element: Element) -> Link:
         """Return the body."""
@@ -51,7 +54,7 @@ class Bodies:
         shapes = []
         for form in geometry.children:
             if form.tag == "mesh":
-                self._mesh(form)
+                shapes += self._mesh(element, form)
             elif form.tag in _FORMS:
                 shapes += self._primitive(element, form)
         return shapes
@@ -67,18 +70,48 @@ class Bodies:
             at = form.place(_FORMS[form.tag][0][0])
             self.values.refuse(f"a {form.tag} of size {' '.join(f'{value:g}' for value in size)}", at)
             return []
-        kind: Literal["box", "cylinder", "sphere"] = "sphere"
-        kind = "box" if form.tag == "box" else "cylinder" if form.tag == "cylinder" else kind
-        return [Shape(kind, tuple(size), self.values.pose(element))]
+        kind: Any = form.tag
+        return [Shape(kind, tuple(size), self.values.pose(element), self._material(element))]
 
-    def _mesh(self, form: Element) -> None:
+    def _mesh(self, element: Element, form: Element) -> list[Shape]:
         name = self.values.text(form, "filename", '<mesh filename="package://…"/>')
-        wrong = self.finder(name) if name else None
+        if not name:
+            return []
+        x, y, z = self.values.numbers(form, "scale", (1.0, 1.0, 1.0))
+        asset = self._asset(name, form.place("filename"))
+        return [Shape("mesh", (x, y, z), self.values.pose(element), self._material(element), asset)]
+
+    def _asset(self, name: str, at: Span) -> Asset:
+        asset, wrong = self.finder(name, at)
         if wrong:
-            code, message, advice = wrong
-            severity: Literal["error", "warning"] = "error" if code == "TF723" else "warning"
-            place = form.place("filename")
-            self.found.append(finding(code, message, place, help=advice, severity=severity))
+            self.found.append(wrong)
+        return asset
+
+    def _material(self, element: Element) -> Material | None:
+        """Return the colour or texture of a visual; one that is only named is described elsewhere in the document."""
+        said = element.first("material")
+        if said is None:
+            return None
+        name = said.attributes.get("name", "")
+        return self._described(name, said) or (self._named(name) if name else None)
+
+    def _named(self, name: str) -> Material | None:
+        if name not in self._materials:
+            visuals = [one for link in self.root.all("link") for one in link.all("visual")]
+            everywhere = [said for around in (self.root, *visuals) for said in around.all("material")]
+            described = (self._described(name, said) for said in everywhere if said.attributes.get("name") == name)
+            self._materials[name] = next((one for one in described if one), None)
+        return self._materials[name]
+
+    def _described(self, name: str, said: Element) -> Material | None:
+        colour, texture = said.first("color"), said.first("texture")
+        if colour is None and texture is None:
+            return None
+        red, green, blue, opacity = self.values.numbers(colour, "rgba", (0.5, 0.5, 0.5, 1.0))
+        file = texture.attributes.get("filename") if texture is not None else None
+        image = self._asset(file, texture.place("filename")) if texture is not None and file else None
+        rgba = (red, green, blue, opacity) if colour is not None else None
+        return Material(name or name_of_colour(rgba or ()), rgba, image, said.at)
 
     def _inertial(
         self, name: str, element: Element, visuals: tuple[Shape, ...], collisions: tuple[Shape, ...]

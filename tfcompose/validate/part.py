@@ -2,25 +2,67 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.validate.edges import MountKeys
 from tfcompose.validate.fields import ANYTHING, NAMESPACE, TEXT
-from tfcompose.validate.schema import key, listing, mapping
+from tfcompose.validate.schema import Problems, Type, key, listing, mapping, record
+
+if TYPE_CHECKING:
+    from tfcompose.load import Path
+
+_WHERE = "relative to the file that names it, package://NAME/PATH or $(find NAME)/PATH"
 
 
 class PartSpec(MountKeys):
-    """Another robot file as a part. Everywhere else in this file its names have the prefix."""
+    """Another robot as a part: one of spec, urdf and xacro. Everywhere else in this file its names have the prefix."""
 
-    spec: str = key(TEXT, about="a robot file; relative to the file that names it", examples=("rover.yaml",))
+    spec: str | None = key(TEXT, None, "a robot file; relative to the file that names it", ("rover.yaml",))
+    urdf: str | None = key(TEXT, None, f"a URDF file; {_WHERE}", ("package://ur_description/urdf/ur5e.urdf",))
+    xacro: str | None = key(TEXT, None, f"a xacro file; {_WHERE}", ("$(find ur_description)/urdf/ur.urdf.xacro",))
+    args: dict[str, Any] = key(
+        mapping(ANYTHING), {}, "arguments of the xacro file", ({"name": "ur", "ur_type": "ur5e"},)
+    )
+    macro: str | None = key(TEXT, None, "a macro that the xacro file defines, and that is called", ("hokuyo_ust10",))
+    params: dict[str, Any] = key(
+        mapping(ANYTHING),
+        {},
+        "the macro's parameters; {xyz, rpy}, or text that begins with <, for one that takes a block",
+        ({"name": "front", "parent_link": "base_link", "origin": {"xyz": [0.3, 0, 0.1]}},),
+    )
+    include: tuple[str, ...] = key(listing(TEXT, single=True), (), "further xacro files that the macro needs")
     prefix: str | None = key(
         TEXT, None, "written in front of the part's frames and joints as it is; with its slash", ("robot1/",)
     )
     namespace: str | None = key(
         NAMESPACE, None, "makes the part a robot of its own, with its own static and joints; below ros.namespace"
     )
-    profiles: tuple[str, ...] = key(listing(TEXT, single=True), (), "profiles of that file", (["demo"],))
-    vars: dict[str, Any] = key(mapping(ANYTHING), {}, "values for variables of that file")
-    root: str | None = key(TEXT, None, "only what is below this frame of the part; without the prefix")
+    profiles: tuple[str, ...] = key(listing(TEXT, single=True), (), "profiles of the robot file", (["demo"],))
+    vars: dict[str, Any] = key(mapping(ANYTHING), {}, "values for variables of the robot file")
+    root: str | None = key(TEXT, None, "only what is below this frame of the part; without the prefix", ("base_link",))
     place: str | None = key(TEXT, None, "the pose is this frame's; the mount edge is solved for")
     owner: str | None = key(TEXT, None, "the process that publishes every edge of the part")
+
+
+#: What can be the part, and which keys go with it alone.
+KINDS = {"spec": ("vars", "profiles"), "urdf": (), "xacro": ("args", "macro", "params", "include")}
+_MACRO = ("params", "include")
+
+
+def _part(value: Any, path: Path, problems: Problems) -> Any:
+    """Read a part, and refuse one that is nothing, or has keys of another kind of part."""
+    if isinstance(value, dict):
+        kind = next((kind for kind in KINDS if kind in value), None)
+        if kind is None and set(value) <= set(PartSpec.KEYS):
+            problems.refuse("TF102", path, "a part without a robot", "give spec, urdf or xacro", on_key=True)
+        for other, keys in KINDS.items():
+            for name in keys:
+                if name in value and kind not in {None, other}:
+                    problems.refuse("TF107", (*path, name), f"{name} goes with {other}, not with {kind}", on_key=True)
+        for name in _MACRO:
+            if name in value and "macro" not in value:
+                problems.refuse("TF102", (*path, name), f"{name} without a macro", "macro: NAME", on_key=True)
+    return record(PartSpec).read(value, path, problems)
+
+
+PART = Type(_part, PartSpec)

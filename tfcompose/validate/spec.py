@@ -20,7 +20,7 @@ from tfcompose.validate.fields import (
 )
 from tfcompose.validate.hardware import HARDWARE, XML, HardwareSpec
 from tfcompose.validate.joints import JointSpec
-from tfcompose.validate.part import PartSpec
+from tfcompose.validate.part import PART, PartSpec
 from tfcompose.validate.posed import Turned
 from tfcompose.validate.process import DriverSpec, ProcessSpec, process
 from tfcompose.validate.schema import Model, key, listing, mapping, record
@@ -131,7 +131,7 @@ class RobotSpec(Model):
     )
     frames: dict[str, FrameSpec] = key(mapping(record(FrameSpec)), {}, "bare frames: the skeleton")
     sensors: dict[str, SensorSpec] = key(mapping(record(SensorSpec)), {})
-    parts: dict[str, PartSpec] = key(mapping(record(PartSpec)), {}, "other robots as subtrees, or beside each other")
+    parts: dict[str, PartSpec] = key(mapping(PART), {}, "other robots as subtrees, or beside each other")
     processes: dict[str, ProcessSpec] = key(mapping(process(ProcessSpec)), {}, "what is started, or expected to run")
     profiles: dict[str, Any] = key(mapping(ANYTHING), {}, "named overlays, chosen with --profile")
     guard: GuardSpec = key(record(GuardSpec), GuardSpec())

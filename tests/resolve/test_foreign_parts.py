@@ -1,0 +1,259 @@
+"""A URDF, a xacro file or a macro as a part: whole, under a prefix, where the holder puts it."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import yourdfpy
+from scipy.spatial.transform import Rotation
+
+from tfcompose.cli.compiling import library
+from tfcompose.cli.disk import disk
+from tfcompose.cli.terminal import read_text
+from tfcompose.compile import Compiled, compile_robot
+from tfcompose.emit import emit
+from tfcompose.planfile import read_plan
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+ARM = """<?xml version="1.0"?>
+<robot name="arm">
+  <material name="grey"><color rgba="0.5 0.25 0.125 1"/></material>
+  <link name="world"/>
+  <link name="base">
+    <visual><origin xyz="0 0 0.1"/><geometry><mesh filename="package://arm/base.stl" scale="2 2 2"/></geometry>
+      <material name="grey"/></visual>
+    <collision><geometry><cylinder radius="0.1" length="0.2"/></geometry></collision>
+    <inertial><origin xyz="0 0 0.05"/><mass value="2"/>
+      <inertia ixx="0.02" iyy="0.02" izz="0.01" ixy="0.001" ixz="0" iyz="0"/></inertial>
+  </link>
+  <link name="upper"/> <link name="finger"/> <link name="tip"/>
+  <joint name="fix" type="fixed"><parent link="world"/><child link="base"/><origin xyz="0 0 1"/></joint>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/>
+    <origin xyz="0 0 0.3" rpy="0.1 0.2 0.3"/><axis xyz="0 0 2"/>
+    <limit lower="-3" upper="3" effort="10" velocity="1"/><dynamics damping="0.5" friction="0.25"/>
+    <safety_controller soft_lower_limit="-2" soft_upper_limit="2" k_position="4" k_velocity="8"/></joint>
+  <joint name="follow" type="prismatic"><parent link="upper"/><child link="finger"/><axis xyz="0 1 0"/>
+    <mimic joint="shoulder" multiplier="-0.5" offset="0.125"/>
+    <limit lower="-3" upper="3" effort="10" velocity="1"/></joint>
+  <joint name="end" type="fixed"><parent link="finger"/><child link="tip"/><origin xyz="0.5 0 0"/></joint>
+  <transmission name="drive"><type>transmission_interface/SimpleTransmission</type>
+    <joint name="shoulder"><hardwareInterface>x</hardwareInterface></joint><actuator name="motor"/></transmission>
+  <gazebo reference="upper"><mu1>0.5</mu1></gazebo>
+  <gazebo><plugin filename="a.so" name="p"/></gazebo>
+</robot>
+"""
+
+XACRO = """<robot name="slide" xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <xacro:arg name="reach" default="0.5"/>
+  <xacro:include filename="$(find arm)/sizes.xacro"/>
+  <link name="base"/> <link name="tool"/>
+  <joint name="reach" type="fixed"><parent link="base"/><child link="tool"/>
+    <origin xyz="$(arg reach) 0 ${height}"/></joint>
+</robot>
+"""
+
+MACRO = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <xacro:macro name="mast" params="name parent_link tall:=false *origin">
+    <link name="${name}_mast"/>
+    <joint name="${name}_mast_joint" type="fixed"><parent link="${parent_link}"/><child link="${name}_mast"/>
+      <xacro:insert_block name="origin"/></joint>
+    <xacro:if value="${tall}"><link name="${name}_top"/>
+      <joint name="${name}_top_joint" type="fixed"><parent link="${name}_mast"/><child link="${name}_top"/>
+      <origin xyz="0 0 ${height}"/></joint></xacro:if>
+  </xacro:macro>
+</robot>
+"""
+
+HEAD = """
+tfcompose: 1
+robot: cell
+packages: {arm: third/arm}
+links: {table: {visual: {box: [1, 1, 0.1]}}}
+parts:
+"""
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Any:
+    """Compile these parts on a table, beside the package arm."""
+    package = tmp_path / "third" / "arm"
+    package.mkdir(parents=True)
+    texts = {"arm.urdf": ARM, "slide.xacro": XACRO, "mast.xacro": MACRO, "base.stl": ""}
+    sizes = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="height" value="0.25"/></robot>'
+    for name, text in (texts | {"sizes.xacro": sizes}).items():
+        (package / name).write_text(text, encoding="utf-8")
+    file = tmp_path / "cell.yaml"
+
+    def compiled(*parts: str) -> Compiled:
+        text = HEAD + "".join(f"  {part}\n" for part in parts)
+        return compile_robot(text, str(file), library(), read=read_text, disk=disk())
+
+    return compiled
+
+
+def sound(compiled: Compiled) -> Any:
+    assert not compiled.found, [(str(one.span), one.message) for one in compiled.found]
+    return compiled.robot
+
+
+def files(compiled: Compiled) -> dict[str, str]:
+    return {file.path: file.text for file in emit(sound(compiled))}
+
+
+LEFT = "left: {urdf: third/arm/arm.urdf, prefix: left_, root: base, parent: table, xyz: [0, 0.5, 0], rpy: [0, 0, 1]}"
+RIGHT = 'right: {urdf: "$(find arm)/arm.urdf", prefix: right_, root: base, parent: table, xyz: [0, -0.5, 0]}'
+
+
+def test_an_urdf_is_taken_twice_with_everything_in_it_renamed(cell: Any) -> None:
+    text = files(cell(LEFT, RIGHT))["robot.full.urdf"]
+    root = ET.fromstring(text)  # noqa: S314 (our own text)
+    for kind in ("link", "joint", "transmission"):
+        names = [one.get("name") for one in root.findall(kind)]
+        assert len(names) == len(set(names))
+    assert [one.get("joint") for one in root.iter("mimic")] == ["left_shoulder", "right_shoulder"]
+    assert [one.get("reference") for one in root.findall("gazebo")] == ["left_upper", None, "right_upper", None]
+    assert [one.find("joint").get("name") for one in root.findall("transmission")] == [  # type: ignore[union-attr]
+        "left_shoulder",
+        "right_shoulder",
+    ]
+    assert {one.get("name") for one in root.iter("actuator")} == {"left_motor", "right_motor"}
+    assert {one.get("name") for one in root.iter("material")} == {"left_grey", "right_grey"}
+
+
+def test_each_number_of_the_urdf_is_still_there(cell: Any) -> None:
+    root = ET.fromstring(files(cell(LEFT))["robot.full.urdf"])  # noqa: S314 (our own text)
+    joint = next(one for one in root.findall("joint") if one.get("name") == "left_shoulder")
+    said = {child.tag: child.attrib for child in joint}
+    assert said["limit"] == {"lower": "-3", "upper": "3", "effort": "10", "velocity": "1"}
+    assert said["dynamics"] == {"damping": "0.5", "friction": "0.25"}
+    assert said["axis"] == {"xyz": "0 0 1"}
+    assert [float(value) for value in said["safety_controller"].values()] == [-2, 2, 4, 8]
+    base = next(one for one in root.findall("link") if one.get("name") == "left_base")
+    mesh, colour = next(base.iter("mesh")), next(base.iter("color"))
+    assert (mesh.get("filename"), mesh.get("scale")) == ("package://arm/base.stl", "2 2 2")
+    assert colour.get("rgba") == "0.5 0.25 0.125 1"
+    assert next(base.iter("mass")).get("value") == "2"
+    assert next(base.iter("inertia")).get("ixy") == "0.001"
+    assert next(base.iter("cylinder")).attrib == {"radius": "0.1", "length": "0.2"}
+
+
+def test_every_frame_is_where_an_independent_reader_of_the_urdf_has_it(cell: Any, tmp_path: Path) -> None:
+    whole = tmp_path / "whole.urdf"
+    whole.write_text(files(cell(LEFT))["robot.full.urdf"], encoding="utf-8")
+    load = {"load_meshes": False, "build_scene_graph": True}
+    mine, theirs = (
+        yourdfpy.URDF.load(str(whole), **load),
+        yourdfpy.URDF.load(str(tmp_path / "third/arm/arm.urdf"), **load),
+    )
+    for q in (0.0, 0.7):
+        mine.update_cfg({"left_shoulder": q})
+        theirs.update_cfg({"shoulder": q})
+        got = mine.get_transform("left_tip", "left_base")
+        assert got == pytest.approx(theirs.get_transform("tip", "base"), abs=1e-9)
+
+
+def test_moving_joints_go_to_joints_and_fixed_ones_to_static_under_their_new_names(cell: Any) -> None:
+    plan = read_plan(files(cell(LEFT))["plan.json"], "plan.json")
+    owners = {edge.child: (edge.owner, edge.joint.name if edge.joint else "") for edge in plan.edges}
+    assert owners == {
+        "left_base": ("static", ""),
+        "left_upper": ("joints", "left_shoulder"),
+        "left_finger": ("joints", "left_follow"),
+        "left_tip": ("static", ""),
+    }
+
+
+def test_a_frame_of_the_urdf_is_placed(cell: Any) -> None:
+    edge = sound(cell(LEFT.replace("root: base", "place: left_base").replace("left_,", "left_,"))).parent_edge(
+        "left_world"
+    )
+    turn = Rotation.from_euler("xyz", [0, 0, 1])
+    assert edge.pose.xyz == pytest.approx(turn.apply([0, 0, -1]) + np.array([0, 0.5, 0]), abs=1e-12)
+
+
+def test_an_urdf_can_be_a_robot_of_its_own(cell: Any) -> None:
+    out = files(cell("left: {urdf: third/arm/arm.urdf, prefix: left_, parent: table, namespace: left}"))
+    plan = read_plan(out["plan.json"], "plan.json")
+    assert plan.process("left/joints").nodes == ("/left/tfcompose_joints",)
+    assert {edge.joint.name for edge in plan.edges if edge.joint} == {"shoulder", "follow"}
+    assert '<link name="upper"/>' in out["left/robot.full.urdf"]
+
+
+def test_a_xacro_file_is_expanded_with_arguments_and_the_robots_own_packages(cell: Any) -> None:
+    robot = sound(cell("slide: {xacro: package://arm/slide.xacro, args: {reach: 0.75}, parent: table, prefix: s_}"))
+    assert robot.parent_edge("s_tool").pose.xyz == (0.75, 0, 0.25)
+
+
+def test_a_macro_hangs_itself_on_the_holders_frame(cell: Any) -> None:
+    robot = sound(
+        cell(
+            "mast: {xacro: third/arm/mast.xacro, include: third/arm/sizes.xacro, macro: mast, prefix: m_, "
+            "params: {name: front, parent_link: table, tall: true, origin: {xyz: [1, 2, 3], rpy: [0, 0, 0.5]}}}",
+            "other: {xacro: third/arm/mast.xacro, macro: mast, "
+            "params: {name: rear, parent_link: m_front_top, origin: '<origin xyz=\"4 5 6\"/>'}}",
+        )
+    )
+    mast = robot.parent_edge("m_front_mast")
+    assert (mast.parent, mast.pose.xyz) == ("table", (1, 2, 3))
+    assert robot.parent_edge("m_front_top").pose.xyz == (0, 0, 0.25)
+    assert robot.parent_edge("rear_mast").parent == "m_front_top"
+    assert robot.parent_edge("rear_mast").pose.xyz == (4, 5, 6)
+
+
+def test_warnings_about_somebody_elses_file_are_left_to_its_own_lint(cell: Any, tmp_path: Path) -> None:
+    file = tmp_path / "third/arm/arm.urdf"
+    file.write_text(ARM.replace('ixx="0.02" iyy="0.02"', 'ixx="9" iyy="9"'), encoding="utf-8")
+    assert cell(LEFT).found == ()
+    file.write_text(ARM.replace('parent link="finger"', 'parent link="fingr"'), encoding="utf-8")
+    (found,) = cell(LEFT.replace("root: base, ", "")).errors
+    assert (found.code, found.span.file) == ("TF203", str(file))
+    assert found.notes[-1].message == "as the part left"
+
+
+@pytest.mark.parametrize(
+    ("part", "code", "message", "advice", "place"),
+    [
+        (
+            "a: {urdf: package://amr/arm.urdf, parent: table}",
+            "TF724",
+            "no package amr",
+            "did you mean arm?",
+            "cell.yaml",
+        ),
+        ("a: {urdf: none.urdf, parent: table}", "TF001", "cannot be read", "", "none.urdf"),
+        ("a: {urdf: cell.yaml, parent: table}", "TF001", "cannot be read", "", "cell.yaml"),
+        (
+            "a: {xacro: third/arm/slide.xacro, args: {rech: 1}, parent: table}",
+            "TF106",
+            "rech",
+            "mean reach?",
+            "cell.yaml",
+        ),
+        ("a: {xacro: third/arm/mast.xacro, macro: mst, parent: table}", "TF018", "xacro:mst", "", "cell.yaml"),
+        ("a: {xacro: third/arm/mast.xacro, macro: mast, params: {b: 1}}", "TF018", "parameter", "", "cell.yaml"),
+        ("a: {urdf: third/arm/arm.urdf, root: bse, parent: table}", "TF203", "bse", "did you mean base?", "cell.yaml"),
+        ("a: {urdf: third/arm/arm.urdf, vars: {b: 1}, parent: table}", "TF107", "vars goes with spec", "", "cell.yaml"),
+        ("a: {urdf: third/arm/arm.urdf, xacro: b, parent: table}", "TF107", "exclude", "", "cell.yaml"),
+        (
+            "a: {xacro: third/arm/slide.xacro, params: {b: 1}, parent: table}",
+            "TF102",
+            "without a macro",
+            "",
+            "cell.yaml",
+        ),
+        ("a: {parent: table}", "TF102", "a part without a robot", "spec, urdf or xacro", "cell.yaml"),
+    ],
+)
+def test_what_cannot_be_a_part_is_said_with_its_place(  # noqa: PLR0913, PLR0917 (what is said, in its parts)
+    cell: Any, part: str, code: str, message: str, advice: str, place: str
+) -> None:
+    errors = cell(part).errors
+    assert [one.code for one in errors] == [code], [one.message for one in errors]
+    assert message in errors[0].message
+    assert advice in errors[0].help
+    assert errors[0].span.file.endswith(place)

@@ -1,0 +1,150 @@
+"""Robots that somebody else describes: a URDF or a xacro file as a part, or what one macro of such a file makes."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import quoteattr
+
+from tfcompose.diagnostic import Diagnostic, RejectedError, finding
+from tfcompose.load.urdf import load_xml
+from tfcompose.model import BUILT_IN, Node, Process, Robot
+from tfcompose.resolve.beside import beside
+from tfcompose.resolve.isolation import topics_below
+from tfcompose.resolve.nodes import full_name
+from tfcompose.resolve.stock import with_stock
+from tfcompose.resolve.urdf import robot_of_urdf
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tfcompose.diagnostic import Span
+    from tfcompose.plan import RosSettings
+    from tfcompose.resolve.packages import Packages
+    from tfcompose.resolve.part import PartEntry
+
+_PACKAGE = re.compile(r"(?:package://|\$\(find(?:-pkg-share)?\s+)([A-Za-z][A-Za-z0-9_]*)\)?/(.+)")
+
+
+@dataclass(frozen=True, slots=True)
+class Foreign:
+    """A robot that somebody else describes. ``file`` is as places name it; ``found`` is what was wrong with it.
+
+    ``implied`` are the frames that its joints hang on and that it does not have: the holder's, where a macro makes it.
+    """
+
+    robot: Robot
+    file: str
+    found: tuple[Diagnostic, ...]
+    implied: frozenset[str] = frozenset()
+
+
+def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> Foreign:
+    """Return the robot of a part that is a URDF or xacro file.
+
+    Raises:
+        RejectedError: if the file is not there, is none, or xacro refuses it.
+    """
+    said = part.said
+    key = "urdf" if said.urdf is not None else "xacro"
+    at = part.source.at((*part.at, key))
+    file = _address(said.urdf or said.xacro or "", at, packages)
+    if said.urdf is not None:
+        name, text = file, read(file)
+    else:
+        name, text = f"{file} (expanded)", _expanded(part, file, at, packages)
+    robot, found = robot_of_urdf(load_xml(text, name), name, packages.asset)
+    parents = {edge.parent for edge in robot.edges}
+    implied = frozenset(parents - robot.frames.keys()) if said.macro is not None else frozenset[str]()
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    own = _with_base(replace(robot, ros=part.settings, processes=_own(part), written={"urdf": digest}))
+    if part.alone and part.spec.ros.state_publisher == "stock":
+        own, refused = with_stock(own)
+        found = (*found, *refused)
+    return Foreign(own, name, found, implied)
+
+
+def _with_base(robot: Robot) -> Robot:
+    roots = robot.roots()
+    return replace(robot, base=roots[0] if len(roots) == 1 else None)
+
+
+def _address(named: str, at: Span, packages: Packages) -> str:
+    """Return the path of a file beside the robot file, or in a package."""
+    found = _PACKAGE.fullmatch(named)
+    if found is None:
+        return beside(named, at)
+    folder = packages.folder(found[1])
+    if folder is None:
+        raise RejectedError([replace(packages.not_found(found[1], at), severity="error")])
+    return f"{folder}/{found[2]}"
+
+
+def _expanded(part: PartEntry, file: str, at: Span, packages: Packages) -> str:
+    disk, said = packages.disk, part.said
+    if disk is None or disk.expand is None:
+        raise RejectedError([finding("TF904", f"{file}: xacro files cannot be expanded here", at)])
+    try:
+        return disk.expand(file, packages, said.args, _document(part, file, packages, disk.absolute))
+    except RejectedError as error:
+        place = part.source.at((*part.at, "xacro" if said.macro is None else "macro"))
+        raise RejectedError([_at(place, one) for one in error.diagnostics]) from None
+
+
+def _at(place: Span, found: Diagnostic) -> Diagnostic:
+    """Return the finding about a file that has no better place in it, at the place that names the file."""
+    if found.span is None or found.code == "TF001":
+        return found
+    return replace(found, span=place, message=f"{found.span.file}: {found.message}")
+
+
+def _document(part: PartEntry, file: str, packages: Packages, absolute: Callable[[str], str]) -> str | None:
+    """Return the document that calls the part's macro; None where the file itself is the robot."""
+    said = part.said
+    if said.macro is None:
+        return None
+    places = (part.source.at((*part.at, "include", index)) for index in range(len(said.include)))
+    files = [*(_address(one, place, packages) for one, place in zip(said.include, places, strict=True)), file]
+    return _call(said.macro, said.params, files, absolute)
+
+
+def _call(macro: str, params: dict[str, Any], files: list[str], absolute: Callable[[str], str]) -> str:
+    """Return a xacro document that calls the macro."""
+    blocks = [block for value in params.values() if (block := _block(value)) is not None]
+    plain = {name: value for name, value in params.items() if _block(value) is None}
+    attributes = "".join(f" {name}={quoteattr(_word(value))}" for name, value in plain.items())
+    includes = "".join(f"<xacro:include filename={quoteattr(absolute(file))}/>" for file in files)
+    call = f"<xacro:{macro}{attributes}>{''.join(blocks)}</xacro:{macro}>"
+    return f'<robot name="part" xmlns:xacro="http://www.ros.org/wiki/xacro">{includes}{call}</robot>'
+
+
+def _block(value: Any) -> str | None:
+    """Return the element that a parameter is, or None for one that is a word."""
+    if isinstance(value, str) and value.lstrip().startswith("<"):
+        return value
+    if isinstance(value, dict):
+        xyz, rpy = (" ".join(map(_word, value.get(key, (0, 0, 0)))) for key in ("xyz", "rpy"))
+        return f'<origin xyz="{xyz}" rpy="{rpy}"/>'
+    return None
+
+
+def _word(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _own(part: PartEntry) -> tuple[Process, ...]:
+    """Return the publishers of a part that is a robot of its own."""
+    settings: RosSettings = part.settings
+    remap = topics_below(settings.namespace, part.isolate)
+    return tuple(
+        Process(
+            name,
+            name,  # type: ignore[arg-type]  # the built-in processes are called by their kinds
+            part.place,
+            (Node(full_name(settings.namespace, f"tfcompose_{name}"), part.place),),
+            remap=remap,
+        )
+        for name in BUILT_IN
+    )

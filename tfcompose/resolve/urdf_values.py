@@ -1,0 +1,62 @@
+"""The values of a URDF's attributes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.diagnostic import Diagnostic, Severity, Span, finding
+from tfcompose.pose import Pose, normalised, quat_from_rpy
+
+if TYPE_CHECKING:
+    from tfcompose.load.urdf import Element
+
+
+@dataclass(slots=True)
+class Values:
+    """Reads attributes; ``found`` is what was wrong with them."""
+
+    found: list[Diagnostic] = field(default_factory=list)
+
+    def refuse(self, message: str, at: Span, advice: str = "", severity: Severity = "error") -> None:
+        """Note that a value is wrong."""
+        self.found.append(finding("TF721", message, at, help=advice, severity=severity))
+
+    def text(self, element: Element, name: str, sample: str) -> str:
+        """Return an attribute that must be there, or an empty text."""
+        value = element.attributes.get(name, "")
+        if not value:
+            self.refuse(f"<{element.tag}> has no {name}", element.at, f"for example {sample}")
+        return value
+
+    def numbers(self, element: Element | None, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
+        """Return an attribute's numbers, as many as ``default`` has; that is taken where there are none."""
+        if element is None or name not in element.attributes:
+            return default
+        words = element.attributes[name].split()
+        try:
+            values = tuple(map(float, words))
+        except ValueError:
+            values = ()
+        if len(values) != len(default) or not all(map(math.isfinite, values)):
+            count = "a number" if len(default) == 1 else f"{len(default)} numbers"
+            self.refuse(f"{name}={element.attributes[name]!r} is not {count}", element.place(name))
+            return default
+        return values
+
+    def number(self, element: Element | None, name: str, default: Any = None) -> Any:
+        """Return an attribute's number; ``default`` is taken where there is none."""
+        if element is None or name not in element.attributes:
+            return default
+        return self.numbers(element, name, (0.0,))[0]
+
+    def pose(self, parent: Element) -> Pose:
+        """Return what the element's origin says."""
+        origin = parent.first("origin")
+        x, y, z = self.numbers(origin, "xyz", (0.0, 0.0, 0.0))
+        roll, pitch, yaw = self.numbers(origin, "rpy", (0.0, 0.0, 0.0))
+        if max(map(abs, (roll, pitch, yaw))) > 1e9:  # noqa: PLR2004 (no angle has so many turns, and none is left of it)
+            self.refuse("this rpy is no angle", origin.place("rpy") if origin else parent.at)
+            return Pose((x, y, z))
+        return Pose((x, y, z), normalised(quat_from_rpy(roll, pitch, yaw)))

@@ -1,0 +1,22 @@
+"""What all parts of a robot have in common."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tfcompose.diagnostic import Allow, Note
+
+
+@dataclass(slots=True)
+class Whole:
+    """What is known of all parts of a robot, and of theirs, together.
+
+    ``allows`` are the comments that let findings in their files stand, ``foreign`` the files that somebody else wrote,
+    with a note that says as which part.
+    """
+
+    count: int = 0
+    allows: list[Allow] = field(default_factory=list)
+    foreign: dict[str, Note] = field(default_factory=dict)

@@ -68,8 +68,15 @@ class Domain:
 
 
 @pytest.fixture
-def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[Domain]:
-    """A domain of the test's own, on the loopback interface, in this process's environment too."""
+def domain(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Domain]:
+    """A domain of the test's own, on the loopback interface, in this process's environment too.
+
+    Runs and logs are kept in folders of the test's own.
+    """
+    for name in ("XDG_RUNTIME_DIR", "ROS_LOG_DIR"):
+        folder = tmp_path_factory.mktemp(name)
+        folder.chmod(0o700)
+        monkeypatch.setenv(name, str(folder))
     with _reserved() as (number, _):
         monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
         monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")

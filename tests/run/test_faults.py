@@ -36,9 +36,9 @@ from tfcompose.run.place import Lock, Place
 from tfcompose.run.session import Session
 from tfcompose.run.supervisor import supervise
 file = Path(sys.argv[1])
-if len(sys.argv) > 2:
-    resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), int(sys.argv[2])))
-place = Place("rover@0", file.parent / "place", file.parent / "log")
+if len(sys.argv) > 3:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]), int(sys.argv[3])))
+place = Place(sys.argv[2], file.parent / "place", file.parent / "log")
 lock = Lock(place)
 plan = read_plan(file.read_text(), str(file))
 output, logs = Outlet(1), Logs(place.logs)
@@ -47,6 +47,8 @@ code = supervise(plan, file, report=Console(plan, output, colour=False, keep=log
 output.close()
 sys.exit(code)
 """
+#: The robot of this run of the tests alone: what it leaves behind is ended, and what others run is not.
+NAME = f"rover{os.getpid()}@0"
 PYTHON = ("${python}", "-I", "-S", "-c")
 SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); print('up', flush=True); time.sleep(60)"
 FLOOD = """
@@ -90,8 +92,8 @@ class Run:
     def __init__(self, folder: Path, processes: tuple[PlanProcess, ...], stdout: int, *words: str) -> None:
         file = folder / "plan.json"
         file.write_text(write_plan(Plan("rover", "", None, RosSettings(), (), processes)))
-        self.place = Place("rover@0", folder / "place", folder / "log")
-        command = [sys.executable, "-c", LAUNCHER, str(file), *words]
+        self.place = Place(NAME, folder / "place", folder / "log")
+        command = [sys.executable, "-c", LAUNCHER, str(file), NAME, *words]
         self.popen = subprocess.Popen(command, stdout=stdout, cwd=folder)
 
     def ps(self) -> dict[str, dict[str, Any]]:
@@ -121,7 +123,7 @@ def launch(tmp_path: Path) -> Iterator[Callable[..., Run]]:
         if run.popen.poll() is None:
             run.popen.kill()
         run.popen.wait()
-    until(lambda: not end(leftovers("rover@0:")))
+    until(lambda: not end(leftovers(f"{NAME}:")))
 
 
 def program(name: str, code: str, **more: Any) -> PlanProcess:
@@ -200,9 +202,9 @@ def test_leftovers_are_recognised_by_the_runs_id_and_ended_on_request_only(
     os.kill(keeper.pid, signal.SIGKILL)
     run.popen.kill()
     run.popen.wait()
-    until(lambda: [one.pid for one in leftovers("rover@0:")] == [pid])
-    assert leftovers("rover@1:") == []
-    assert end(leftovers("rover@0:"), 0.3) == []
+    until(lambda: [one.pid for one in leftovers(f"{NAME}:")] == [pid])
+    assert leftovers(f"{NAME}1:") == []
+    assert end(leftovers(f"{NAME}:"), 0.3) == []
     assert not alive(pid)
 
 

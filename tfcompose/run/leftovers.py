@@ -11,6 +11,9 @@ from pathlib import Path
 
 from tfcompose.run.place import RUN_ID
 
+#: The kernel ends a killed process within this time, in seconds, also where much is going on.
+KILLED_WITHIN_S = 5.0
+
 
 @dataclass(frozen=True, slots=True)
 class Leftover:
@@ -54,7 +57,7 @@ def _began(folder: Path) -> int:
 
 def end(found: list[Leftover], patience_s: float = 2.0) -> list[Leftover]:
     """Tell them to end, kill those that do not, and return those that are still there."""
-    for number, wait_s in ((signal.SIGTERM, patience_s), (signal.SIGKILL, patience_s)):
+    for number, wait_s in ((signal.SIGTERM, patience_s), (signal.SIGKILL, KILLED_WITHIN_S)):
         for one in found:
             _send(one, number)
         until = time.monotonic() + wait_s

@@ -139,6 +139,7 @@ def up(domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Itera
             one.popen.kill()
             one.popen.wait()
             assert all(until(partial(gone, process)) for process in below)
+        assert "KeyboardInterrupt" not in one.text, "a process of its own was interrupted before it could handle it"
 
 
 @pytest.fixture
@@ -234,6 +235,16 @@ def test_an_edge_that_somebody_publishes_already_is_refused_with_the_nodes_name(
     assert robot.ends(40) == 1
     assert "error[TF807] odom → base_link: published by /strange/rogue before the start" in robot.text
     assert re.findall(r"started (\w+)", robot.text) == ["guard"]
+
+
+def test_an_edge_that_turns_out_to_be_published_while_processes_start_is_refused_as_quietly(
+    up: Callable[..., Up], rogue: Callable[[], object]
+) -> None:
+    rogue()
+    robot = up(ROVER, "--settle", "0.1")
+    assert robot.ends(40) == 1
+    assert "error[TF807] odom → base_link: published by /strange/rogue before the start" in robot.text
+    assert "Traceback" not in robot.text
 
 
 def test_the_same_edges_by_another_robots_name_are_refused(up: Callable[..., Up]) -> None:

@@ -37,6 +37,8 @@ def start(argv: Sequence[str], kind: str) -> int:
         if missing:
             return _fail(missing, 1)
         os.environ.update(child_environment(os.environ, own.plan.ros, own=True))
+        if stop.requested:
+            return 0
         try:
             role = import_module(ROLES).ROLES[kind]
             if not stop.requested:

@@ -62,6 +62,10 @@ CODES = {
     "TF314": "publish_frequency_too_low",
     "TF315": "joint_outside_description",
     "TF316": "shared_frame_in_description",
+    "TF330": "node_publishes_too",
+    "TF331": "claim_not_declared",
+    "TF332": "owner_not_known_to_publish",
+    "TF333": "parameter_disagrees",
     # poses and conventions
     "TF401": "optical_frame_not_rotated",
     "TF402": "quaternion_not_unit",

@@ -300,7 +300,8 @@ class Edge:
     ``switched`` holds the further parents between which the owner may change it, as a tool changer does; ``parent`` is
     the nominal one.
     ``joint`` moves by joint states. ``free`` is a planar or floating joint, of which joint states say nothing.
-    ``other_axes``: the vendor's name for the frame does not say whether it is optical, or says it wrongly.
+    ``other_axes``: the vendor's name for the frame does not say whether it is optical, or says it wrongly. ``node`` is
+    the full name of the node that publishes the edge, where the owner has several.
     """
 
     parent: str
@@ -322,6 +323,7 @@ class Edge:
     switched: tuple[str, ...] = ()
     free: Joint | None = None
     other_axes: bool = False
+    node: str = ""
 
     @property
     def name(self) -> str:
@@ -400,6 +402,16 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True)
+class Claim:
+    """An edge that a node publishes by default and somebody else owns; ``switch`` are the parameters that stop it."""
+
+    node: str
+    parent: str
+    child: str
+    switch: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
 class Robot:
     """One robot, resolved.
 
@@ -424,6 +436,7 @@ class Robot:
     unused: dict[str, Span] = field(default_factory=dict, compare=False)
     written: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
     broken: frozenset[tuple[str, str]] = frozenset()
+    claims: tuple[Claim, ...] = ()
     parts: tuple[Part, ...] = ()
     hardware: tuple[Hardware, ...] = ()
     blocks: tuple[Block, ...] = ()

@@ -7,6 +7,7 @@ in hertz.
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -204,6 +205,16 @@ class GuardPolicy:
 
 
 @dataclass(frozen=True, slots=True)
+class Claim:
+    """An edge that a node publishes by default and somebody else owns; ``switch`` stops it, empty: nothing does."""
+
+    node: str
+    parent: str
+    child: str
+    switch: str
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
     """Everything that ``tfcompose up`` needs, and nothing that it has to compile."""
 
@@ -214,6 +225,7 @@ class Plan:
     edges: tuple[PlanEdge, ...]
     processes: tuple[PlanProcess, ...]
     guard: GuardPolicy = field(default_factory=GuardPolicy)
+    claims: tuple[Claim, ...] = ()
     description: str = DESCRIPTION
     version: int = VERSION
 
@@ -228,6 +240,11 @@ class Plan:
                 return process
         raise KeyError(name)
 
+    def claim_on(self, nodes: tuple[str, ...], parent: str, child: str) -> Claim | None:
+        """Return what is known of one of the nodes publishing the edge by default, or None."""
+        ends = (parent, child)
+        return next((one for one in self.claims if one.node in nodes and (one.parent, one.child) == ends), None)
+
     def edges_of(self, owner: str) -> tuple[PlanEdge, ...]:
         """Return the edges that the process publishes, in the plan's order."""
         return tuple(edge for edge in self.edges if edge.owner == owner)
@@ -239,3 +256,8 @@ def told_at_start(value: Any) -> bool:
         return bool(_AT_START.search(value))
     items = value.values() if isinstance(value, dict) else value if isinstance(value, (list, tuple)) else ()
     return any(told_at_start(item) for item in items)
+
+
+def switch_text(switch: dict[str, Any]) -> str:
+    """Return parameters as they are written in YAML."""
+    return ", ".join(f"{key}: {json.dumps(value, ensure_ascii=False)}" for key, value in switch.items())

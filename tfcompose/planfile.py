@@ -14,6 +14,7 @@ from tfcompose.plan import (
     READY_KINDS,
     STOP_SIGNALS,
     VERSION,
+    Claim,
     Driven,
     GuardPolicy,
     Joint,
@@ -43,6 +44,7 @@ def write_plan(plan: Plan) -> str:
     lines = [f"  {_json(key)}: {_json(value)}" for key, value in head.items()]
     lines.append(_block("edges", [_edge_to_json(edge) for edge in plan.edges]))
     lines.append(_block("processes", [_process_to_json(process) for process in plan.processes]))
+    lines.append(_block("claims", [_fields(claim) for claim in plan.claims]))
     lines.append(f'  "guard": {_json(_guard_to_json(plan.guard))}')
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
@@ -84,7 +86,7 @@ def _block(key: str, rows: list[dict[str, Any]]) -> str:
 
 
 def _fields(
-    value: Joint | Driven | GuardPolicy | PlanProcess | Ready | RosSettings | Simulation | StopRule | Sweep,
+    value: Claim | Joint | Driven | GuardPolicy | PlanProcess | Ready | RosSettings | Simulation | StopRule | Sweep,
 ) -> dict[str, Any]:
     return {name: getattr(value, name) for name in value.__slots__}
 
@@ -255,6 +257,10 @@ def _guard_from_json(data: dict[str, Any]) -> GuardPolicy:
     )
 
 
+def _claim_from_json(data: dict[str, Any]) -> Claim:
+    return Claim(*(get(data, key, str, "claim") for key in ("node", "parent", "child", "switch")))
+
+
 def _plan_from_json(data: dict[str, Any]) -> Plan:
     ros = get(data, "ros", dict, "plan")
     return Plan(
@@ -272,5 +278,6 @@ def _plan_from_json(data: dict[str, Any]) -> Plan:
         edges=rows(data, "edges", _edge_from_json),
         processes=rows(data, "processes", _process_from_json),
         guard=_guard_from_json(get(data, "guard", dict, "plan")),
+        claims=tuple(_claim_from_json(claim) for claim in get(data, "claims", list, "plan")),
         description=get(data, "description", str, "plan"),
     )

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.plan import Claim, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.pose import Pose
 from tfcompose.run.events import Clear, Complete, Found, GuardEvent, Live, OwnerReady, Recovered, Taken
 from tfcompose.run.health import statuses
@@ -67,6 +67,7 @@ class History:
     settle_s: float = SETTLE_S
     gids: bool = True
     edges: tuple[PlanEdge, ...] = EDGES
+    claims: tuple[Claim, ...] = ()
     now: float = 1000.0
     events: list[GuardEvent] = field(default_factory=list)
     graph: list[Publisher] = field(default_factory=list)
@@ -75,7 +76,8 @@ class History:
     looked: float = field(init=False)
 
     def __post_init__(self) -> None:
-        plan = Plan("rover", "0", "base", RosSettings(clock=self.clock), self.edges, self.processes, self.guard)
+        settings = RosSettings(clock=self.clock)
+        plan = Plan("rover", "0", "base", settings, self.edges, self.processes, self.guard, self.claims)
         self.judge = Judge(plan, self.settle_s, self.now, self.wall_ns())
         self.looked = self.now
 
@@ -911,3 +913,25 @@ def test_what_is_wrong_now_is_on_the_page_and_gone_when_it_is_over(running: Hist
     running.leaves(rogue)
     running.wait(5)
     assert running.judge.wrong() == []
+
+
+# What a node publishes by default.
+
+
+@pytest.mark.parametrize(("switch", "advice"), [
+    ("enable_odom_tf: false", "/diff publishes it by default: set enable_odom_tf: false"),
+    ("", "/diff publishes it by default and has no switch: let its process own the edge"),
+])  # fmt: skip
+def test_the_guard_names_the_switch_of_a_node_that_publishes_by_default(switch: str, advice: str) -> None:
+    history = History(claims=(Claim("/diff", "odom", "base", switch),)).clear()
+    history.repeat(history.joins("/drive"), "odom base", 5)
+    history.repeat(history.joins("/diff"), "odom base", 10)
+    (found,) = history.found()
+    assert (found.code, found.help) == ("TF801", advice)
+
+
+def test_the_guard_names_no_switch_for_another_node_or_edge() -> None:
+    history = History(claims=(Claim("/diff", "odom", "base", "x: false"),)).clear()
+    history.repeat(history.joins("/other"), "odom base", 10)
+    history.repeat(history.joins("/diff"), "map odom", 10)
+    assert [("set" in found.help) for found in history.found()] == [False, False]

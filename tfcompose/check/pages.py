@@ -118,6 +118,22 @@ All processes of a plan share them. Set it in the robot that holds the part, or 
 
 The part's pose is that of its root. Say which frame that is with root: what is not below it is left out. A root that
 is shared needs no parent: it is the holder's frame.""",
+    "TF333": """A parameter of a node says something else than the tree.
+
+Names of frames, and the switches of what a node publishes, follow from the tree and its owners, and are written by
+tfcompose. Remove the parameter, or change the tree.""",
+    "TF330": """A node publishes an edge by default that somebody else owns, and tfcompose cannot switch it off.
+
+Both would publish, and tf2 takes the last writer. tfcompose writes the switch into the parameters of processes that it
+starts itself; the help names the parameter for the others, or says that there is none.""",
+    "TF331": """A node publishes an edge by default that nobody declared.
+
+Declare the edge with the node's process as its owner, so that the guard expects it; or give the parameter that stops
+it. Edges that come and go, such as those of tags, are allowed in the guard.""",
+    "TF332": """An edge's owner is not known to publish it.
+
+The process has nodes of which it is known what they publish, or several nodes, and none of them publishes this edge.
+The guard blames whoever sends it. Name another owner, or say which node does: publishes: [{parent, child, off}].""",
     "TF402": """A quaternion does not have length 1.
 
 tf2 drops transforms whose quaternion is off, and the frame never appears. Write the digits that are missing, or check

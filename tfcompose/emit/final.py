@@ -31,5 +31,6 @@ def with_final_names(robot: Robot) -> Robot:
             for edge in robot.edges
         ),
         base=robot.base and final(robot.base),
+        claims=tuple(replace(one, parent=final(one.parent), child=final(one.child)) for one in robot.claims),
         guard=replace(robot.guard, allow=allow),
     )

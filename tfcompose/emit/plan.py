@@ -13,7 +13,7 @@ from tfcompose.emit.numbers import clean
 from tfcompose.emit.params import written_params
 from tfcompose.emit.target import AS_WRITTEN, Target
 from tfcompose.model import JOINTS, STATIC
-from tfcompose.plan import DESCRIPTION, Driven, Joint, Plan, PlanEdge, PlanProcess, told_at_start
+from tfcompose.plan import DESCRIPTION, Claim, Driven, Joint, Plan, PlanEdge, PlanProcess, switch_text, told_at_start
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -45,7 +45,10 @@ def plan_of(robot: Robot, target: Target = AS_WRITTEN) -> Plan:
     relative = {file: _relative(file, robot.file) for file in {edge.at.file for edge in robot.edges}}
     prefixes = {f"{part.name}/{JOINTS}": part.prefix for part in robot.parts}
     edges = tuple(
-        [_edge(edge, nodes[edge.owner], relative[edge.at.file], prefixes.get(edge.owner, "")) for edge in robot.edges]
+        [
+            _edge(edge, edge.node or nodes[edge.owner], relative[edge.at.file], prefixes.get(edge.owner, ""))
+            for edge in robot.edges
+        ]
     )
     owned: dict[str, list[tuple[str, str]]] = {}
     for edge in edges:
@@ -60,6 +63,7 @@ def plan_of(robot: Robot, target: Target = AS_WRITTEN) -> Plan:
             _at(target, _process(process, robot, owned.get(process.name, []), names)) for process in needed
         ),
         guard=robot.guard,
+        claims=tuple(_claims(robot)),
     )
 
 
@@ -85,6 +89,12 @@ def _digest(robot: Robot) -> str:
     """Return the digest of what was written: it changes when a key or value does, and not with layout or comments."""
     text = json.dumps(robot.written, sort_keys=True, ensure_ascii=False)
     return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
+
+
+def _claims(robot: Robot) -> Iterator[Claim]:
+    """Yield what nodes would publish by default and somebody else owns."""
+    for claim in robot.claims:
+        yield Claim(claim.node, claim.parent, claim.child, switch_text(claim.switch))
 
 
 def _edge(edge: Edge, node: str, file: str, prefix: str) -> PlanEdge:

@@ -64,7 +64,7 @@ def driver_node(sensor: Sensor, spec: RobotSpec) -> str:
     """Return the full name of the driver's node."""
     driver, said = sensor.preset.driver, sensor.spec.driver
     own = f"{sensor.named(driver.namespace)}/{sensor.named(driver.node)}".strip("/") if driver else sensor.name
-    return full_name(spec.ros.namespace, (said.node if said else None) or own)
+    return full_name(spec.ros.namespace, (said.node.name if said and said.node else None) or own)
 
 
 def driver_parameters(sensor: Sensor, prefix: str = "") -> dict[str, Any]:

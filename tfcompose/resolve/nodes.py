@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, finding
 from tfcompose.model import Node
+from tfcompose.resolve.node_presets import node_preset, node_preset_names
 
 if TYPE_CHECKING:
     from tfcompose.load import Path, Source
     from tfcompose.validate.process import ProcessSpec
+    from tfcompose.validate.spec import RobotSpec
 
 
 def full_name(namespace: str, name: str) -> str:
@@ -19,13 +21,29 @@ def full_name(namespace: str, name: str) -> str:
     return "/" + "/".join(part for part in (namespace.strip("/"), name) if part)
 
 
+def has_claims(spec: RobotSpec) -> bool:
+    """Return whether anything is said of what nodes publish, or a process has several nodes."""
+    return any(said.nodes or said.publishes or (said.node and said.node.preset) for said in spec.processes.values())
+
+
+def _usual(said: ProcessSpec) -> str | None:
+    """Return the name that a known node has where tfcompose cannot give it another."""
+    if said.node is None or said.node.preset is None or (said.run and said.run.package):
+        return None
+    return node_preset(said.node.preset).node if said.node.preset in node_preset_names() else None
+
+
 def nodes_of(name: str, said: ProcessSpec, namespace: str, source: Source) -> tuple[tuple[Node, ...], list[Diagnostic]]:
     """Return the nodes of a process, at least one, and what is wrong with them."""
     at: Path = ("processes", name)
     if not said.nodes:
         place = source.at(("processes", name, "node")) if said.node else source.at_key(at)
-        return (Node(full_name(namespace, said.node or name), place, at, said.params, said.lifecycle),), []
+        own_name = (said.node.name if said.node else None) or _usual(said) or name
+        return (Node(full_name(namespace, own_name), place, at, said.params, said.lifecycle),), []
     found = []
+    for key in ("publishes",) if said.publishes else ():
+        message = f"{name} has nodes, and {key} names none of them"
+        found.append(finding("TF107", message, source.at_key((*at, key)), help="write it under one of its nodes"))
     for key in said.params:
         advice = f"write it under nodes: {{{next(iter(said.nodes))}: {{params: {{{key}: …}}}}}}"
         message = f"{name} has nodes, and the parameter {key} names none of them"

@@ -70,6 +70,7 @@ def renamed(robot: Robot, names: Names) -> Robot:
         base=robot.base and names.frame(robot.base),
         guard=_policy(robot.guard, robot, names),
         sensors=tuple(_sensor(sensor, names) for sensor in robot.sensors),
+        claims=tuple(replace(c, parent=names.frame(c.parent), child=names.frame(c.child)) for c in robot.claims),
         broken=frozenset(broken),
         parts=tuple(_part(part, names) for part in robot.parts),
         hardware=tuple(_hardware(hardware, names) for hardware in robot.hardware),

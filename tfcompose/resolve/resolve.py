@@ -14,6 +14,7 @@ from tfcompose.resolve.bodies import Bodies, with_colours
 from tfcompose.resolve.built_in import built_in
 from tfcompose.resolve.edges import Drafts
 from tfcompose.resolve.isolation import isolate, settings_of
+from tfcompose.resolve.nodes import has_claims
 from tfcompose.resolve.packages import Packages
 from tfcompose.resolve.poses import Solver
 from tfcompose.resolve.presets import sensor_of
@@ -119,6 +120,7 @@ def resolve(
         ros=settings_of(spec.ros),
         guard=_guard(spec, joined),
         sensors=tuple(drafts.sensors),
+        claims=tuple(one for part in joined for one in part.robot.claims),
         as_written=as_written(validated.data, source) + tuple(one for part in joined for one in part.robot.as_written),
         unused={name: source.at_key(("vars", name)) for name in validated.unused},
         written=_written(source, joined),
@@ -141,6 +143,9 @@ def _completed(robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None,
         found += refused
     robot, refused = isolate(robot, spec.ros, source, disk)
     found += refused
+    if has_claims(spec):  # what knows them is loaded only then
+        robot, refused = import_module("tfcompose.resolve.claims").settled(robot, spec, source)
+        found += refused
     return robot
 
 

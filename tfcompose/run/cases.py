@@ -108,7 +108,7 @@ class Cases:
         if any(self._was_first(case, now) for case in cases):
             return Taken(taken(offences, where))
         driven = sensor_of(offences[0], self._drives)
-        return Found(violation(offences, self._plan.guard, where, driven), self._process(offences[0]))
+        return Found(violation(offences, self._plan, where, driven), self._process(offences[0]))
 
     def _process(self, offence: Offence) -> str:
         """Return the plan's process that did it, where that is sure and it can be stopped for it."""

@@ -155,7 +155,7 @@ class Judge:
 
     def wrong(self) -> list[Diagnostic]:
         """Return what was told and is not over, worst first; silence and low rates are part of ``health``."""
-        told = [violation([case.offence], self.plan.guard) for case in self.cases.open.values() if case.told]
+        told = [violation([case.offence], self.plan) for case in self.cases.open.values() if case.told]
         return sorted(told, key=lambda one: (one.severity, one.code))
 
     def absent(self, owner: str) -> None:

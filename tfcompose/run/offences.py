@@ -12,7 +12,7 @@ from tfcompose.run.stamps import BACK, REPEATED, WRONG_CLOCK
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tfcompose.plan import Driven, GuardPolicy, Plan, PlanEdge
+    from tfcompose.plan import Driven, Plan, PlanEdge
 
 LISTED_AT_MOST = 12
 NAMELESS = "a publisher without a node name"
@@ -77,16 +77,14 @@ class Offence:
         return f"{self.name} is no longer published by {self.who}"
 
 
-def violation(
-    offences: Sequence[Offence], guard: GuardPolicy, where: str = "", driven: Driven | None = None
-) -> Diagnostic:
+def violation(offences: Sequence[Offence], plan: Plan, where: str = "", driven: Driven | None = None) -> Diagnostic:
     """Return the finding for offences of one kind by one node, that runs ``where`` and may drive a sensor."""
     first = offences[0]
-    mild = first.code in _WARNINGS or (first.code == "TF803" and guard.unknown_edges == "warn")
+    mild = first.code in _WARNINGS or (first.code == "TF803" and plan.guard.unknown_edges == "warn")
     severity: Severity = "warning" if mild else "error"
     notes = [*_others(offences), *_declared(first), *_runs(first, where)]
     message = message_of(first, _more(offences), driven) or _message(offences)
-    advice = advice_of(first, driven) or _help(first)
+    advice = advice_of(first, driven) or _switch(first, plan) or _help(first)
     return finding(first.code, message, None, help=advice, notes=notes, severity=severity)
 
 
@@ -187,6 +185,16 @@ def _help(first: Offence) -> str:
     if first.code == "TF809":
         return "static: true says that the owner sends it on /tf_static"
     return f"end {first.whom}, or switch its TF off; tf2 takes whatever came last"
+
+
+def _switch(first: Offence, plan: Plan) -> str:
+    """Return what to set, where it is known that the node publishes the edge by default."""
+    claim = plan.claim_on(first.nodes, first.parent, first.child)
+    if claim is None or first.namesake:
+        return ""
+    if not claim.switch:
+        return f"{first.who} publishes it by default and has no switch: let its process own the edge"
+    return f"{first.who} publishes it by default: set {claim.switch}"
 
 
 def _others(offences: Sequence[Offence]) -> list[Note]:

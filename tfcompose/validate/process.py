@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.validate.claims import ClaimSpec
 from tfcompose.validate.fields import (
     ANYTHING,
     BOOLEAN,
@@ -163,9 +164,15 @@ def _ready(value: Any, path: Path, problems: Problems) -> Any:
 LIFECYCLE = choice("inactive", "active")
 
 
+PUBLISHES = listing(record(ClaimSpec))
+_PUBLISHES_ABOUT = "edges that the node publishes by default, and what stops it; a preset knows them"
+
+
 class NodeSpec(Model):
     """One node of a process."""
 
+    preset: str | None = key(TEXT, None, "what is known of this node: its edges and parameters", ("slam_toolbox",))
+    publishes: tuple[ClaimSpec, ...] = key(PUBLISHES, (), _PUBLISHES_ABOUT)
     params: dict[str, Any] = key(mapping(ANYTHING), {}, "the node's parameters, passed on as they are")
     lifecycle: str | None = key(LIFECYCLE, None, "a lifecycle node is brought into this state after the start")
 
@@ -175,6 +182,16 @@ def _nodes(value: Any, path: Path, problems: Problems) -> Any:
         if not re.fullmatch(_NODE, name):
             problems.refuse("TF106", (*path, name), f"{shown(name)} is not {_NODE_MEANS}", on_key=True)
     return mapping(record(NodeSpec)).read(value, path, problems)
+
+
+NODE_NAME = text(_NODE, _NODE_MEANS)
+
+
+class NamedNode(Model):
+    """The one node of a process: its name, and what is known of it."""
+
+    name: str | None = key(NODE_NAME, None, "left out: the process's name, or, where others start it, its usual one")
+    preset: str | None = key(TEXT, None, "what is known of this node: its edges and parameters", ("slam_toolbox",))
 
 
 class Started(Model):
@@ -192,12 +209,13 @@ class Started(Model):
     simulate: Simulate | None = key(record(Simulate), None)
     external: bool | None = key(ONLY_TRUE, None, "somebody else starts it")
     shell: bool | None = key(ONLY_TRUE, None, "run is one text, and /bin/sh reads it")
-    node: str | None = key(
-        text(_NODE, _NODE_MEANS),
+    node: NamedNode | None = key(
+        record(NamedNode, lambda value: {"name": value} if isinstance(value, str) else value, NODE_NAME),
         None,
-        "the node's name; below ros.namespace unless it begins with /",
-        ("slam_toolbox",),
+        "its name, or {preset, name}; below ros.namespace unless it begins with /",
+        ("slam_toolbox", {"preset": "slam_toolbox"}),
     )
+    publishes: tuple[ClaimSpec, ...] = key(PUBLISHES, (), _PUBLISHES_ABOUT)
     params: dict[str, Any] = key(mapping(ANYTHING), {}, "the node's parameters, passed on as they are")
     lifecycle: str | None = key(LIFECYCLE, None, "the lifecycle node is brought into this state after the start")
     log_level: str | None = key(choice("debug", "info", "warn", "error", "fatal"), None, "of its nodes' loggers")

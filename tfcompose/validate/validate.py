@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Edit, Note, RejectedError, finding
 from tfcompose.load.overlay import CHOICES
+from tfcompose.validate.claims import NodePresetSpec
 from tfcompose.validate.preset import PresetSpec
 from tfcompose.validate.preset_names import check_names
 from tfcompose.validate.schema import BROKEN, Model, Problem, Problems, record
@@ -67,6 +68,20 @@ def validate_preset(source: Source) -> PresetSpec:
         raise RejectedError(found)
     result: PresetSpec = preset
     return result
+
+
+def validate_node_preset(source: Source) -> NodePresetSpec:
+    """Return the typed preset of a node.
+
+    Raises:
+        RejectedError: with every finding, if anything is wrong with it.
+    """
+    problems = Problems()
+    preset: NodePresetSpec = _read(NodePresetSpec, source.data, problems)
+    found = (*source.found, *(_finding(problem, source) for problem in _once(problems.all)))
+    if found:
+        raise RejectedError(found)
+    return preset
 
 
 def _read(cls: type[Model], data: dict[str, Any], problems: Problems) -> Any:

@@ -22,7 +22,8 @@ def process_without_role(robot: Robot) -> Iterator[Diagnostic]:
     owners = {edge.owner for edge in robot.edges}
     drivers = {sensor.driver for sensor in robot.sensors}
     awaited = {name for process in robot.processes for name in process.after}
-    busy = owners | drivers | awaited
+    publishers = {claim.node for claim in robot.claims}
+    busy = owners | drivers | awaited | {process.name for process in robot.processes if process.node in publishers}
     names = {process.name for process in robot.processes}
     if (owners | drivers) - names - {""}:
         return  # a name is misspelt, and that has been said

@@ -1,0 +1,259 @@
+"""What nodes publish by themselves: switched off where somebody else owns the edge, and told the frames' names.
+
+A claim that cannot be settled by parameters of a process that tfcompose starts is a finding, with the exact switch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.diagnostic import Diagnostic, RejectedError, Span, did_you_mean, finding
+from tfcompose.model import BUILT_IN, Claim, Edge, Node, Process
+from tfcompose.plan import switch_text
+from tfcompose.resolve.node_presets import node_preset, node_preset_names
+from tfcompose.resolve.roles import Roles
+
+if TYPE_CHECKING:
+    from tfcompose.load import Path, Source
+    from tfcompose.model import Robot
+    from tfcompose.validate.claims import ClaimSpec, NodePresetSpec
+    from tfcompose.validate.spec import RobotSpec
+
+
+def settled(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Diagnostic]]:
+    """Return the robot with each node told what to publish and under which names, and what cannot be settled."""
+    work = _Work(robot, spec, source)
+    processes = tuple(work.process(process) for process in robot.processes)
+    edges = tuple(work.edge(edge) for edge in robot.edges)
+    return replace(robot, processes=processes, edges=edges, claims=(*robot.claims, *work.claims)), work.found
+
+
+def flat(params: dict[str, Any], above: str = "") -> dict[str, Any]:
+    """Return nested parameters by their full names, with dots."""
+    found: dict[str, Any] = {}
+    for key, value in params.items():
+        found |= flat(value, f"{above}{key}.") if isinstance(value, dict) else {f"{above}{key}": value}
+    return found
+
+
+@dataclass(slots=True)
+class _Told:
+    """One node: what is known of it, what the user told it, and what tfcompose tells it."""
+
+    process: Process
+    node: Node
+    claims: tuple[ClaimSpec, ...]
+    preset: NodePresetSpec | None
+    roles: Roles
+    given: dict[str, Any]
+    computed: dict[str, Any] = field(default_factory=dict)
+
+    def ends(self, claim: ClaimSpec) -> tuple[str, str]:
+        return self.roles.fill(claim.parent), self.roles.fill(claim.child)
+
+    def has(self, params: dict[str, Any]) -> bool:
+        """Return whether the user gave exactly these parameters."""
+        return bool(params) and all(self.given.get(key) == value for key, value in params.items())
+
+    def is_published(self, claim: ClaimSpec) -> bool:
+        """Return whether the node publishes the edge as the user has set it."""
+        return (claim.by_default or self.has(claim.on)) and not self.has(claim.off)
+
+    @property
+    def can_be_told(self) -> bool:
+        """Return whether parameters that tfcompose writes reach the node."""
+        process = self.process
+        return process.kind == "run" and (process.package is not None or "${params_file}" in " ".join(process.argv))
+
+
+@dataclass(slots=True)
+class _Work:
+    robot: Robot
+    spec: RobotSpec
+    source: Source
+    found: list[Diagnostic] = field(default_factory=list)
+    claims: list[Claim] = field(default_factory=list)
+    publishers: dict[tuple[str, str], str] = field(default_factory=dict)
+    known: set[str] = field(default_factory=set)
+
+    def process(self, process: Process) -> Process:
+        """Return the process with its nodes told."""
+        if process.name not in self.spec.processes or process.kind not in {"run", "external"}:
+            return process
+        told = [self._node(process, node) for node in process.nodes]
+        if all(one is not None for one in told):
+            self.known.add(process.name)
+        nodes = (
+            replace(node, params=node.params | one.computed) if one and one.can_be_told else node
+            for node, one in zip(process.nodes, told, strict=True)
+        )
+        return replace(process, nodes=tuple(nodes))
+
+    def edge(self, edge: Edge) -> Edge:
+        """Return the edge with its publisher; an owner of whose nodes none is known to publish it is a finding."""
+        node = self.publishers.get((edge.owner, edge.child))
+        if node is not None:
+            return replace(edge, node=node)
+        owner = next((process for process in self.robot.processes if process.name == edge.owner), None)
+        if owner is None or owner.name in BUILT_IN or owner.name not in self.spec.processes:
+            return edge
+        at = edge.owner_at or edge.at
+        if owner.name in self.known and owner.kind != "simulate":
+            message = f"{owner.name} is not known to publish {edge.name}"
+            advice = (
+                f"processes: {{{owner.name}: {{publishes: [{{parent: {edge.parent}, child: {edge.child}, off: …}}]}}}}"
+            )
+            self.found.append(finding("TF332", message, at, help=advice, severity="warning"))
+        elif len(owner.nodes) > 1:
+            message = f"{owner.name} has {len(owner.nodes)} nodes, and none is said to publish {edge.name}"
+            entry = f"publishes: [{{parent: {edge.parent}, child: {edge.child}, off: …}}]"
+            advice = f"write at the node that does: {entry}"
+            self.found.append(finding("TF332", message, at, help=advice, severity="warning"))
+        return edge
+
+    def _node(self, process: Process, node: Node) -> _Told | None:
+        """Return what is known of a node and what it is told, or None where nothing is said."""
+        said = self.spec.processes[process.name]
+        inner = said.nodes.get(str(node.path[-1])) if len(node.path) > 2 else None  # noqa: PLR2004 (below nodes)
+        name = inner.preset if inner else said.node.preset if said.node and not said.nodes else None
+        by_hand = inner.publishes if inner else said.publishes
+        preset = self._preset(name, (*node.path, *(() if inner else ("node",)), "preset")) if name else None
+        if preset is None and not by_hand:
+            return None
+        claims = (*(preset.publishes if preset else ()), *by_hand)
+        roles = Roles(self.robot, process.name, preset, claims)
+        told = _Told(process, node, claims, preset, roles, flat(node.params))
+        self._tell_names(told)
+        for claim in self._of_one(told) if preset and preset.one_of else claims:
+            self._settle(told, claim)
+        return told
+
+    def _preset(self, name: str, path: Path) -> NodePresetSpec | None:
+        try:
+            return node_preset(name)
+        except KeyError:
+            names = node_preset_names()
+            advice = did_you_mean(name, names, f"there is {', '.join(names)}")
+            self.found.append(finding("TF601", f"no preset {name} of a node", self.source.at(path), help=advice))
+        except RejectedError as error:
+            self.found += error.diagnostics
+        return None
+
+    def _of_one(self, told: _Told) -> tuple[ClaimSpec, ...]:
+        """Return the claim that a node makes which makes one out of several: its own, or the one that is chosen."""
+        for claim in told.claims:
+            if self._is_own(told, claim):
+                return (claim,)
+        for claim in told.claims:
+            if told.has({key: told.roles.final(value) for key, value in claim.chosen_by.items()} or claim.on):
+                return (claim,)
+        return told.claims[:1]
+
+    def _tell_names(self, told: _Told) -> None:
+        """Write the parameters that hold frames' names, and those without which they would mean something else."""
+        preset = told.preset
+        if preset is None:
+            return
+        for role, described in preset.frames.items():
+            frame = told.roles.frames.get(role)
+            if described.parameter is None or frame is None:
+                continue
+            given = told.given.get(described.parameter)
+            if given is not None and not told.roles.is_bound(role) and self._is_frame(given):
+                continue  # the tree leaves it open
+            self._tell(told, described.parameter, self.robot.final(frame))
+        for key, value in preset.set.items():
+            self._tell(told, key, value)
+
+    def _is_frame(self, name: Any) -> bool:
+        return any(name == self.robot.final(frame) for frame in self.robot.frames)
+
+    def _tell(self, told: _Told, key: str, value: Any) -> None:
+        given = told.given.get(key)
+        if given is None:
+            told.computed[key] = value
+        elif given != value:
+            message = f"{key} of {told.process.name} is {given!r}, and by the tree it is {value!r}"
+            self.found.append(finding("TF333", message, self._at(told, key), help="remove it: tfcompose writes it"))
+
+    def _is_own(self, told: _Told, claim: ClaimSpec) -> bool:
+        edge = self._edge(*told.ends(claim))
+        return edge is not None and edge.owner == told.process.name
+
+    def _edge(self, parent: str, child: str) -> Edge | None:
+        edges = (edge for edge in self.robot.edges if edge.child == child)
+        return next((edge for edge in edges if parent in {edge.parent, *edge.switched}), None)
+
+    def _settle(self, told: _Told, claim: ClaimSpec) -> None:
+        parent, child = told.ends(claim)
+        if "*" in parent + child:
+            self._settle_pattern(told, claim, parent, child)
+            return
+        edge = self._edge(parent, child)
+        if edge is not None and edge.owner == told.process.name:
+            self._own(told, claim, edge)
+            return
+        if told.is_published(claim) or claim.by_default:
+            self.claims.append(Claim(told.node.name, parent, child, claim.off))
+        if not told.is_published(claim):
+            return
+        other = edge or self.robot.parent_edge(child)
+        if other is None:
+            self._undeclared(told, claim, parent, child)
+        else:
+            self._foreign(told, claim, f"{parent} → {child}", other)
+
+    def _own(self, told: _Told, claim: ClaimSpec, edge: Edge) -> None:
+        self.publishers[told.process.name, edge.child] = told.node.name
+        for key, value in claim.chosen_by.items():
+            self._tell(told, key, told.roles.final(value))
+        for key, value in claim.on.items() if not claim.by_default else ():
+            self._tell(told, key, value)
+        if told.has(claim.off):
+            message = f"{told.process.name} owns {edge.name}, and is told not to publish it: {switch_text(claim.off)}"
+            place = self._at(told, next(iter(claim.off)))
+            self.found.append(finding("TF333", message, place, help="remove it, or name another owner"))
+
+    def _foreign(self, told: _Told, claim: ClaimSpec, name: str, other: Edge) -> None:
+        """Write the switch, or say that it cannot be written."""
+        needed = any(self._is_own(told, own) and set(own.off) & set(claim.off) for own in told.claims)
+        if claim.off and told.can_be_told and not needed and not told.has(claim.on):
+            told.computed |= claim.off
+            return
+        owner = f"{other.owner} owns" if other.name == name else f"{other.owner} owns {other.name}"
+        message = f"{told.process.name} publishes {name} by default, which {other.owner} owns"
+        if other.name != name:
+            message = f"{told.process.name} publishes {name} by default, and {owner}"
+        self.found.append(finding("TF330", message, told.node.at, help=self._way_out(told, claim, needed=needed)))
+
+    def _way_out(self, told: _Told, claim: ClaimSpec, *, needed: bool) -> str:
+        hint = f"; {told.preset.hint}" if told.preset and told.preset.hint else ""
+        if not claim.off:
+            return f"it has no switch: name {told.process.name} as the owner{hint}"
+        if needed:
+            return f"its switch, {switch_text(claim.off)}, stops its own edge too: name it as the owner of both{hint}"
+        return f"set {switch_text(claim.off)} where {told.process.name} is started, or name it as the owner{hint}"
+
+    def _undeclared(self, told: _Told, claim: ClaimSpec, parent: str, child: str) -> None:
+        static = ", static: true" if claim.static else ""
+        advice = f"frames: {{{child}: {{parent: {parent}, owner: {told.process.name}{static}}}}}"
+        if claim.off:
+            advice += f"; or params: {{{switch_text(claim.off)}}}"
+        message = f"{told.process.name} publishes {parent} → {child} by default, which nobody declared"
+        self.found.append(finding("TF331", message, told.node.at, help=advice, severity="warning"))
+
+    def _settle_pattern(self, told: _Told, claim: ClaimSpec, parent: str, child: str) -> None:
+        self.claims.append(Claim(told.node.name, parent, child, claim.off))
+        guard = self.robot.guard
+        owns = any(edge.owner == told.process.name for edge in self.robot.edges)
+        allowed = any(fnmatchcase(one, child) or fnmatchcase(child, one) for _, one in guard.allow)
+        if owns or allowed or guard.unknown_edges == "ignore" or not told.is_published(claim):
+            return
+        message = f"{told.process.name} publishes {parent} → {child} by default, which the guard does not allow"
+        advice = f'guard: {{allow: [{{child: "{child}"}}]}}'
+        self.found.append(finding("TF331", message, told.node.at, help=advice, severity="warning"))
+
+    def _at(self, told: _Told, key: str) -> Span:
+        return self.source.at((*told.node.path, "params", *key.split(".")))

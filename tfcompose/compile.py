@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from tfcompose.check import apply, check, levelled, unknown_rules, with_edits
-from tfcompose.diagnostic import Allow, Diagnostic, Note, RejectedError, Span
+from tfcompose.check import apply, check, levelled, unknown_rules, with_edits, with_replaced
+from tfcompose.diagnostic import Allow, Diagnostic, Note, RejectedError
 from tfcompose.load import Source, composed, load, with_includes
 from tfcompose.resolve import Disk, Library, resolve
 from tfcompose.validate import validate
@@ -28,13 +28,15 @@ _IDLE = frozenset({"TF504", "TF619", "TF815"})
 class Compiled:
     """A robot and everything that was found; ``robot`` is None where the text did not get that far.
 
-    ``allows`` are the comments that let findings stand, ``used`` those that did, with the code.
+    ``allows`` are the comments that let findings stand, ``used`` those that did, with the code. ``source`` is what the
+    robot was made from, overlays laid over it.
     """
 
     robot: Robot | None
     found: tuple[Diagnostic, ...]
     allows: tuple[Allow, ...] = ()
     used: frozenset[tuple[Allow, str]] = frozenset()
+    source: Source | None = None
 
     @property
     def errors(self) -> tuple[Diagnostic, ...]:
@@ -85,10 +87,10 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     found = [*validated.found, *(one for one in later if _stands(one, validated) and (plain or one.code not in _IDLE))]
     rules = validated.spec.rules
     found += unknown_rules({word: source.at_key(("rules", word)) for word in rules})
-    found = with_edits(found, source)
+    found = with_replaced(with_edits(found, source), source)
     kept, used = apply(levelled(dict.fromkeys(found), rules), (*source.allows, *resolved.whole.allows))
     ordered = sorted(kept, key=lambda one: one.sort_key)
-    return Compiled(resolved.robot, tuple(ordered), source.allows, frozenset(used))
+    return Compiled(resolved.robot, tuple(ordered), source.allows, frozenset(used), source)
 
 
 def _about_parts(found: list[Diagnostic], files: dict[str, Note]) -> list[Diagnostic]:
@@ -114,12 +116,7 @@ def _stands(found: Diagnostic, validated: Validated) -> bool:
         return True
     at = found.span
     spans = (validated.source.exactly_at(entry) for entry in validated.broken)
-    return at is None or not any(span and _holds(span, at) for span in spans)
-
-
-def _holds(span: Span, at: Span) -> bool:
-    begin, end = (span.line, span.column), (span.end_line, span.end_column)
-    return span.file == at.file and begin <= (at.line, at.column) < end
+    return at is None or not any(span and span.holds(at) for span in spans)
 
 
 def profiles_of(source: Source) -> list[str]:

@@ -38,7 +38,7 @@ def test_each_value_knows_its_file_and_what_it_replaced() -> None:
     files = {"robot.yaml": "include: base.yaml\nlinks: {b: {x: 3}}\n", "base.yaml": "links: {b: {x: 1, y: 2}}\n"}
     source = included(files)
     assert (source.at(("links", "b", "x")).file, source.at(("links", "b", "y")).file) == ("robot.yaml", "base.yaml")
-    assert source.replaced[("links", "b", "x")] == Span("base.yaml", 1, 16, 1, 17)
+    assert source.replaced[("links", "b", "x")] == (Span("base.yaml", 1, 16, 1, 17),)
 
 
 def test_later_includes_are_laid_over_earlier_ones() -> None:

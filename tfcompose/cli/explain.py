@@ -1,7 +1,7 @@
 """``tfcompose explain``: a code's page, or the chain between two frames.
 
 Explain a code (TF301) or a rule's name: what is wrong, why it matters, what to do. Or, with FILE A B, show the chain
-from A to B: each edge with its owner, its pose and its place in the file.
+from A to B: each edge with its owner and its pose, and where each of its values is written, and over what.
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 
 from tfcompose.check import code_of
 from tfcompose.check.pages import page, rule_table
-from tfcompose.cli.compiling import robot_or_code
+from tfcompose.cli.compiling import source_and_robot
 from tfcompose.cli.options import add_variant
+from tfcompose.cli.provenance import written_values
 from tfcompose.cli.terminal import UNREADABLE, complain
 from tfcompose.codes import CODES
 from tfcompose.diagnostic import did_you_mean
@@ -22,6 +23,7 @@ from tfcompose.emit.tree import edge_facts
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
+    from tfcompose.load import Source
     from tfcompose.model import Calibration, Edge, Robot
 
 
@@ -45,8 +47,8 @@ def run(arguments: Namespace) -> int:
     if len(words) != 3:  # noqa: PLR2004 (FILE A B)
         complain("explain takes a code, or FILE A B")
         return UNREADABLE
-    robot = robot_or_code(words[0], arguments)
-    return robot if isinstance(robot, int) else _explain_chain(robot, words[1], words[2])
+    made = source_and_robot(words[0], arguments)
+    return made if isinstance(made, int) else _explain_chain(*made, words[1], words[2])
 
 
 def _explain_code(word: str) -> int:
@@ -58,7 +60,7 @@ def _explain_code(word: str) -> int:
     return 0
 
 
-def _explain_chain(robot: Robot, a: str, b: str) -> int:
+def _explain_chain(source: Source, robot: Robot, a: str, b: str) -> int:
     for frame in (a, b):
         if frame not in robot.frames:
             complain(f"no frame {frame}; {did_you_mean(frame, robot.frames, f'{robot.file} has other frames')}")
@@ -71,8 +73,8 @@ def _explain_chain(robot: Robot, a: str, b: str) -> int:
         complain(f"{a} and {b} are in two trees")
         return 1
     lines = [f"pose of {b} in {a}\n"]
-    lines += [f"  up    {_line(edge)}" for edge in rising]
-    lines += [f"  down  {_line(edge)}" for edge in reversed(falling)]
+    lines += [f"  up    {_line(edge, source)}" for edge in rising]
+    lines += [f"  down  {_line(edge, source)}" for edge in reversed(falling)]
     sys.stdout.write("".join(lines))
     return 0
 
@@ -85,11 +87,13 @@ def _ancestry(robot: Robot, frame: str) -> list[Edge]:
     return chain
 
 
-def _line(edge: Edge) -> str:
+def _line(edge: Edge, source: Source) -> str:
     facts = edge_facts(edge)
     inside = f" (inside {edge.sensor})" if edge.sensor and not edge.given else ""
     measured = f"          {_measured(edge.calibration)}\n" if edge.calibration else ""
-    return f"{edge.name}\n          {facts}\n{measured}          {edge.at}{inside}\n"
+    values = "".join(f"          {line}\n" for line in written_values(edge, source))
+    at = f"          {edge.at}{inside}\n" if inside or not values else ""
+    return f"{edge.name}\n          {facts}\n{measured}{at}{values}"
 
 
 def _measured(calibration: Calibration) -> str:

@@ -92,8 +92,8 @@ def set_value(setting: str) -> Source:
         raise RejectedError([finding("TF016", message, span, help="for example sensors.camera.tf=driver")])
     read = load(f"value: {value_text.strip() or 'null'}", span.file)
     data: Any = read.data["value"]
-    whole = Place(span)
     below = read.places.inside["value"]
+    whole = Place(Span(span.file, 1, 1, below.span.end_line, below.span.end_column))
     place = whole.with_inside(below.inside, below.keys)
     for step in reversed(path):
         data, place = {step: data}, whole.with_inside({step: place}, {str(step): whole})

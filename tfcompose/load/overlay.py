@@ -93,13 +93,16 @@ def lay_over(base: Source, overlay: Source, *, is_overlay: bool = True) -> Sourc
 
     With ``is_overlay`` a value that changes nothing is a finding.
     """
-    merger = _Merger(is_overlay=is_overlay)
+    merger = _Merger(base.replaced, overlay.replaced, is_overlay=is_overlay)
     data, places = merger.merge((base.data, base.places), (overlay.data, overlay.places), ())
     found = (*base.found, *overlay.found, *merger.found)
     allows = tuple(dict.fromkeys((*base.allows, *overlay.allows)))
     has_nulls = base.has_nulls or overlay.has_nulls
-    return Source(base.file, data, places, found, allows, base.replaced | merger.replaced, has_nulls)
+    return Source(base.file, data, places, found, allows, merger.replaced, has_nulls)
 
+
+Replaced = dict[Path, tuple["Span", ...]]
+"""Where values stood that others were laid over, the last one first."""
 
 Part = tuple[dict[str, Any], Place]
 """A mapping, and where it and what is in it stands."""
@@ -108,9 +111,11 @@ Part = tuple[dict[str, Any], Place]
 class _Merger:
     """Merges in time proportional to the overlay and to the mappings that it reaches; neither side is changed."""
 
-    def __init__(self, *, is_overlay: bool) -> None:
+    def __init__(self, below: Replaced, above: Replaced, *, is_overlay: bool) -> None:
         self.is_overlay = is_overlay
-        self.replaced: dict[Path, Span] = {}
+        self.below = below
+        self.above = above
+        self.replaced = below | above
         self.found: list[Diagnostic] = []
 
     def merge(self, base: Part, overlay: Part, path: Path) -> Part:
@@ -118,6 +123,8 @@ class _Merger:
         data, inside, keys = dict(base[0]), dict(base[1].inside), dict(base[1].keys)
         for choice in _choices_at(path, overlay[0]):
             for dropped in choice & (data.keys() - overlay[0].keys()):
+                new = next(key for key in overlay[0] if key in choice and overlay[0][key] is not None)
+                self.remember((*path, new), inside[dropped])
                 _drop(dropped, data, inside, keys)
         for key, value in overlay[0].items():
             at, place = (*path, key), overlay[1].inside[key]
@@ -126,6 +133,8 @@ class _Merger:
                 _drop(key, data, inside, keys)
             elif isinstance(value, dict):
                 old = data.get(key)
+                if key in data and not isinstance(old, dict):
+                    self.remember(at, inside[key])
                 under = (old, inside[key]) if isinstance(old, dict) else ({}, place.with_inside({}, {}))
                 data[key], inside[key] = self.merge(under, (value, place), at)
                 keys[key] = overlay[1].keys[key]
@@ -141,9 +150,13 @@ class _Merger:
             message = f"{'.'.join(map(str, path))} is removed here, but nothing is there"
             self.found.append(finding("TF010", message, key.span, severity="warning"))
 
+    def remember(self, path: Path, old: Place) -> None:
+        """Remember that the value at the path was laid over the old one."""
+        self.replaced[path] = (*self.above.get(path, ()), old.span, *self.below.get(path, ()))
+
     def note(self, old: Any, old_place: Place, new: Any, place: Place, path: Path) -> None:
         """Remember what is replaced, and say so if that changes nothing."""
-        self.replaced[path] = old_place.span
+        self.remember(path, old_place)
         if self.is_overlay and type(old) is type(new) and old == new:
             message = f"{'.'.join(map(str, path))} is {_shown(new)} already"
             notes = [Note("here", old_place.span)]

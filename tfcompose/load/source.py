@@ -19,8 +19,8 @@ MOST_CHARACTERS = 4_000_000
 class Source:
     """A file's plain data, where each key and value stands, and what was found on the way.
 
-    Aliases of one anchor are one object in ``data``, which nothing changes. ``replaced`` has the place of the value
-    that an overlay replaced, by path. ``has_nulls`` says that values may be null.
+    Aliases of one anchor are one object in ``data``, which nothing changes. ``replaced`` has the places of the
+    values that others were laid over, by path, the last one first. ``has_nulls`` says that values may be null.
     """
 
     file: str
@@ -28,7 +28,7 @@ class Source:
     places: Place
     found: tuple[Diagnostic, ...] = field(default=(), compare=False)
     allows: tuple[Allow, ...] = field(default=(), compare=False)
-    replaced: dict[Path, Span] = field(default_factory=dict, compare=False)
+    replaced: dict[Path, tuple[Span, ...]] = field(default_factory=dict, compare=False)
     has_nulls: bool = field(default=True, compare=False)
 
     def at(self, path: Path) -> Span:

@@ -1,0 +1,97 @@
+"""Where each value is from, and what it was laid over: in findings, and in ``tfcompose explain FILE A B``."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tfcompose.cli import main
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+BASE = """\
+tfcompose: 1
+robot: rover
+links: {base_link: {}}
+frames:
+  mast: {parent: base_link, xyz: [0, 0, 0.3]}
+  head_optical: {parent: mast, rpy: [-90 deg, 0, -90 deg], owner: static}
+"""
+ROBOT = """\
+include: [base.yaml]
+frames:
+  mast: {xyz: [0, 0, 0.4]}
+profiles:
+  tilt: {frames: {head_optical: {axis_angle: {axis: [0, 1, 0], angle: 0}}}}
+  far: {frames: {mast: {xyz: [0, 0, 400]}}}
+  lost: {frames: {mast: {parent: base_lnk}}}
+"""
+
+
+@pytest.fixture
+def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "base.yaml").write_text(BASE, "utf-8")
+    (tmp_path / "robot.yaml").write_text(ROBOT, "utf-8")
+    (tmp_path / "over.yaml").write_text("frames: {mast: {xyz: [0, 0, 0.5]}}\n", "utf-8")
+    return "robot.yaml"
+
+
+def test_explain_names_the_place_of_each_value_and_of_all_that_it_replaced(
+    robot: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["explain", robot, "base_link", "mast", "-f", "over.yaml", "--set", "frames.mast.xyz=[0, 0, 0.6]"]
+    assert main(words) == 0
+    lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    assert "parent: base_link  base.yaml:5:18" in lines
+    assert (
+        "xyz: [0, 0, 0.6]  --set frames.mast.xyz=[0, 0, 0.6]:1:1"
+        ", over over.yaml:1:22, over robot.yaml:3:15, over base.yaml:5:34"
+    ) in lines
+
+
+def test_explain_names_the_rotation_that_another_way_to_write_it_replaced(
+    robot: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main(["explain", robot, "mast", "head_optical", "--set", "frames.head_optical.look=forward"])
+    assert "look: forward  --set frames.head_optical.look=forward:1:1, over base.yaml:6:37" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("profile", "found_at", "note"),
+    [
+        ("far", "TF414 robot.yaml:6:37", ("it replaces the value here", "robot.yaml:3:15")),
+        ("lost", "TF203 robot.yaml:7:34", ("it replaces the value here", "base.yaml:5:18")),
+        (
+            "tilt",
+            "TF401 base.yaml:6:26",
+            ("axis_angle is given at robot.yaml:5:46, and replaces the value here", "base.yaml:6:37"),
+        ),
+    ],
+)
+def test_a_finding_about_a_replaced_value_names_what_it_replaced(
+    robot: str, profile: str, found_at: str, note: tuple[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    main(["lint", robot, "--profile", profile, "--format", "json"])
+    found = {
+        f"{one['code']} {one['file']}:{one['line']}:{one['column']}": one["notes"]
+        for one in json.loads(capsys.readouterr().out)
+    }
+    notes = [(n["message"], f"{n['file']}:{n['line']}:{n['column']}") for n in found[found_at]]
+    assert notes == [note]
+
+
+def test_a_finding_in_a_setting_names_what_it_replaced(robot: str, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["build", robot, "-o", "out", "--set", "frames.mast.xyz=[0, 0, 400]"])
+    said = capsys.readouterr().err
+    assert "TF414" in said
+    assert "robot.yaml:3:15: it replaces the value here" in said
+
+
+def test_a_finding_about_what_nothing_replaced_has_no_such_note(robot: str, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["lint", robot, "--profile", "far", "--format", "json"])
+    others = [one for one in json.loads(capsys.readouterr().out) if one["code"] != "TF414"]
+    assert not [note for one in others for note in one["notes"] if "replaces" in note["message"]]

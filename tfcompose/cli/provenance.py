@@ -1,0 +1,56 @@
+"""Where the values of an edge are written, and what they were laid over."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.load import Path, Source
+    from tfcompose.model import Edge
+
+#: What says where an edge is, and who sends it.
+_KEYS = (
+    *("parent", "child", "type", "axis", "xyz", "rpy", "quat_xyzw", "axis_angle", "matrix", "look"),
+    *("relative_to", "place", "calibration", "owner", "rate", "static"),
+)
+
+
+def written_values(edge: Edge, source: Source) -> list[str]:
+    """Return a line for each value that the edge was made of: key, value, place, and the places of what it replaced."""
+    lines = []
+    for path, value in _values(edge, source):
+        over = ", over ".join(str(old) for old in source.replaced.get(path, ()))
+        place = f"{source.at(path)}, over {over}" if over else str(source.at(path))
+        lines.append(f"{path[-1]}: {_shown(value)}  {place}")
+    return lines
+
+
+def _values(edge: Edge, source: Source) -> Iterator[tuple[Path, Any]]:
+    for entry in _entries(edge):
+        data: Any = source.data
+        for step in entry:
+            data = data.get(step) if isinstance(data, dict) else None
+        if isinstance(data, dict) and (source.at((*entry, "parent")) == edge.at or not edge.given):
+            yield from (((*entry, key), data[key]) for key in _KEYS if key in data)
+            return
+
+
+def _entries(edge: Edge) -> Iterator[Path]:
+    """Yield where the edge may be written."""
+    if edge.joint_name:
+        yield ("joints", edge.joint_name)
+    elif edge.sensor:
+        yield ("sensors", edge.sensor) if edge.given else ("sensors", edge.sensor, "frames", edge.child)
+    else:
+        yield ("frames", edge.child)
+        yield ("links", edge.child)
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{key}: {_shown(item)}' for key, item in value.items())}}}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_shown, value))}]"
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -14,6 +14,7 @@ from tfcompose.plan import Plan, RosSettings
 from tfcompose.run.place import Lock, PlaceError, place_of, places
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
 ROVER = Plan("rover", "", None, RosSettings(domain_id=7), (), ())

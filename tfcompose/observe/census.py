@@ -1,0 +1,220 @@
+"""Who publishes which edge, how often and how late: what monitor, verify, the live tree and doctor look at.
+
+A census is given messages as they come, from a subscription or a bag, and who is in the graph; it reads no clock and
+no topic. What it keeps does not grow with time, and with strange names up to a bound only. Times are nanoseconds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import TYPE_CHECKING
+
+from tfcompose.observe.refusal import DENORMALISED, Refusal, refusal
+from tfcompose.observe.tally import Tally, Timing
+from tfcompose.pose import Pose
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from tfcompose.ros.decoder import Row
+
+#: So many edges are kept, counting an edge once for each publisher; what comes beyond is counted only.
+MOST_STRANDS = 20_000
+_SECOND_NS = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Publisher:
+    """One publisher on a TF topic, as the graph shows it.
+
+    ``node`` is its node's full name, None while that is not known. ``static`` says that it is one of /tf_static,
+    ``latched`` and ``reliable`` are its QoS. ``where`` says on which machine and as which process it runs, empty where
+    that is not known. ``topic`` and ``type`` are the full names of its topic and its type.
+    """
+
+    gid: bytes
+    node: str | None
+    static: bool
+    latched: bool = True
+    reliable: bool = True
+    where: str = ""
+    topic: str = ""
+    type: str = ""
+
+
+@dataclass(slots=True)
+class Strand:
+    """An edge, as one publisher sends it on one kind of topic.
+
+    Attributes:
+        parent: the frame in which the pose is given.
+        child: the frame whose pose it is.
+        static: whether it came on /tf_static.
+        gid: the publisher's id, 16 bytes; None where that is not known, as in a bag.
+        row: the newest transform.
+        stamp_ns: the newest message's stamp.
+        newest_ns: the largest stamp so far.
+        first_ns: when the first message came, by the receiver's clock.
+        lag_ns: how old the newest message's stamp was when it came; negative: ahead of the receiver's clock.
+        stamps_back: how many stamps were before the one that came before them.
+        stamps_repeated: how many stamps were the one that came before them.
+        refused: why tf2 does not take it, the newest time that it did not.
+        refusals: how many were not taken.
+        tally: the arrivals; ``tally.count`` are all, ``tally.last_ns`` is when the newest came.
+    """
+
+    parent: str
+    child: str
+    static: bool
+    gid: bytes | None
+    tally: Tally
+    first_ns: int
+    row: Row
+    newest_ns: int = -1
+    stamp_ns: int = -1
+    lag_ns: int = 0
+    stamps_back: int = 0
+    stamps_repeated: int = 0
+    refused: Refusal | None = None
+    refusals: int = 0
+
+    @property
+    def pose(self) -> Pose:
+        """The newest pose of the child in the parent, as it was sent; nothing is normalised."""
+        return Pose(self.row[4:7], self.row[7:11])
+
+    def take(self, row: Row, received_ns: int, clock_ns: int) -> None:
+        """Note a transform; ``clock_ns`` is the time that its stamp is compared with."""
+        stamp_ns = row[2] * _SECOND_NS + row[3]
+        self.row = row
+        if stamp_ns > self.newest_ns:
+            self.newest_ns = stamp_ns
+        elif stamp_ns < self.stamp_ns:
+            self.stamps_back += 1
+        elif stamp_ns == self.stamp_ns:
+            self.stamps_repeated += 1
+        self.stamp_ns = stamp_ns
+        self.lag_ns = clock_ns - stamp_ns
+        self.tally.arrived(received_ns, None if self.static else self.lag_ns)
+        _, _, _, _, px, py, pz, x, y, z, w = row
+        far = px + py + pz
+        sound = abs(x * x + y * y + z * z + w * w - 1) < DENORMALISED and isfinite(far)
+        if not sound or self.parent == self.child or not self.parent or not self.child:
+            self.refuse()
+
+    def refuse(self) -> None:
+        """Count the newest transform as one that tf2 does not take, if that is so."""
+        why = refusal(self.parent, self.child, self.row[4:])
+        if why is not None:
+            self.refused, self.refusals = why, self.refusals + 1
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeSeen:
+    """What is known of a strand at one time.
+
+    ``nodes`` are the nodes of which one is the publisher: one where that is certain, none where nobody has a name.
+    ``age_s`` is the time since the newest message came, ``data_age_s`` that since the newest stamp, None for fixed
+    edges; ``present`` says that the publisher is in the graph, None where there is none to ask.
+    """
+
+    strand: Strand
+    nodes: tuple[str, ...]
+    timing: Timing
+    age_s: float
+    data_age_s: float | None
+    present: bool | None = None
+
+    @property
+    def name(self) -> str:
+        """The edge as people read it."""
+        return f"{self.strand.parent} → {self.strand.child}"
+
+    @property
+    def publisher(self) -> str:
+        """The publisher as people read it, empty where nothing is known."""
+        return self.nodes[0] if len(self.nodes) == 1 else f"one of {', '.join(self.nodes)}" if self.nodes else ""
+
+
+@dataclass(slots=True)
+class Census:
+    """Everything that was seen of a TF tree.
+
+    ``window_s`` is the stretch of time of which rates, jitter, gaps and delays are told (one to two of them); 0: all.
+    """
+
+    window_s: float = 0.0
+    messages: int = 0
+    begun_ns: int = 0
+    last_ns: int = 0
+    beyond: int = 0
+    malformed: dict[bytes | None, int] = field(default_factory=dict)
+    publishers: dict[bytes, Publisher] = field(default_factory=dict)
+    present: frozenset[bytes] | None = None
+    _strands: dict[tuple[str, str, bytes | None, bool], Strand] = field(default_factory=dict)
+
+    def take(
+        self, rows: Iterable[Row], *, static: bool, gid: bytes | None, received_ns: int, clock_ns: int | None = None
+    ) -> None:
+        """Take one message; ``clock_ns`` is the time that stamps should have, ``received_ns`` unless that is given."""
+        self.begun_ns = self.begun_ns or received_ns
+        self.messages += 1
+        self.last_ns = received_ns
+        clock = received_ns if clock_ns is None else clock_ns
+        strands = self._strands
+        for row in rows:
+            strand = strands.get((row[0], row[1], gid, static))
+            if strand is None:
+                if len(strands) >= MOST_STRANDS:
+                    self.beyond += 1
+                    continue
+                tally = Tally(int(self.window_s * _SECOND_NS))
+                strand = Strand(row[0], row[1], static, gid, tally, received_ns, row)
+                strands[row[0], row[1], gid, static] = strand
+            strand.take(row, received_ns, clock)
+
+    def take_malformed(self, gid: bytes | None) -> None:
+        """Count a message that is no TFMessage."""
+        if gid in self.malformed or len(self.malformed) < MOST_STRANDS:
+            self.malformed[gid] = self.malformed.get(gid, 0) + 1
+
+    def graph(self, publishers: Sequence[Publisher]) -> None:
+        """Take who is in the graph now; what is known of one that has left is kept."""
+        self.present = frozenset(each.gid for each in publishers)
+        for each in publishers:
+            known = self.publishers.get(each.gid)
+            if known is None and len(self.publishers) >= MOST_STRANDS:
+                self.publishers = {gid: one for gid, one in self.publishers.items() if gid in self.present}
+            if known is None or each.node is not None:
+                self.publishers[each.gid] = each
+
+    def is_known(self, gid: bytes | None) -> bool:
+        """Whether the publisher's node has a name."""
+        known = self.publishers.get(gid) if gid is not None else None
+        return known is not None and known.node is not None
+
+    def nodes(self, gid: bytes | None, *, static: bool) -> tuple[str, ...]:
+        """Return the publisher's node; where there is no id, all on the topic; nothing while none has a name."""
+        if gid is not None:
+            known = self.publishers.get(gid)
+            return (known.node,) if known is not None and known.node is not None else ()
+        names = {each.node for each in self.publishers.values() if each.static == static and each.node is not None}
+        return tuple(sorted(names))
+
+    def edges(self, now_ns: int) -> list[EdgeSeen]:
+        """Return what is known of each edge at ``now_ns`` of the receiver's clock, sorted by parent and child."""
+        strands = sorted(self._strands.values(), key=_order)
+        return [self._seen(strand, now_ns) for strand in strands]
+
+    def _seen(self, strand: Strand, now_ns: int) -> EdgeSeen:
+        timing = strand.tally.timing(now_ns)
+        age_s = max(0, now_ns - strand.tally.last_ns) * 1e-9
+        # By the clock that its stamps were compared with: the last delay is that of the last arrival.
+        data_age_s = None if strand.static else age_s + strand.lag_ns * 1e-9
+        present = None if self.present is None or strand.gid is None else strand.gid in self.present
+        return EdgeSeen(strand, self.nodes(strand.gid, static=strand.static), timing, age_s, data_age_s, present)
+
+
+def _order(strand: Strand) -> tuple[str, str, bool, int]:
+    return strand.parent, strand.child, not strand.static, strand.first_ns

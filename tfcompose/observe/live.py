@@ -1,0 +1,126 @@
+"""Feeds a census from the running system: what comes on /tf and /tf_static, and who publishes there."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tfcompose.observe.census import Census, Publisher
+from tfcompose.ros.clock import SimClock, wall_ns
+from tfcompose.ros.decoder import Decoder
+from tfcompose.ros.graph import UNKNOWN_NODE, own_gid, writers
+from tfcompose.ros.origin import origin
+from tfcompose.ros.tf import TFSubscription, wait
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+    from tfcompose.ros.decoder import Row
+    from tfcompose.ros.stop import Stop
+
+#: The graph is looked at so often, in seconds, and sooner where somebody sends who has no name yet.
+LOOK_EVERY_S = 0.5
+LOOK_AGAIN_S = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """One message: its transforms, whether it came on /tf_static, its publisher's id, and when it came."""
+
+    rows: tuple[Row, ...]
+    static: bool
+    gid: bytes | None
+    received_ns: int
+
+
+class Live:
+    """Listens to /tf and /tf_static, or those below a namespace, as long as its node lives.
+
+    ``topics`` are the names of the moving and of the fixed one. Where a simulator publishes /clock, stamps that are
+    nearer to it than to the system's time are compared with it.
+    """
+
+    def __init__(self, node: Node, census: Census, namespace: str = "") -> None:
+        prefix = f"/{namespace.strip('/')}" if namespace.strip("/") else ""
+        self.node = node
+        self.census = census
+        self.topics = f"{prefix}/tf", f"{prefix}/tf_static"
+        self._subscriptions = [
+            (TFSubscription(node, static=static, topic=self.topics[static]), static) for static in (True, False)
+        ]
+        self._clock = SimClock(node)
+        self._decoder = Decoder()
+        self._where: dict[bytes, str] = {}
+        self._own = b""
+        self._looked = float("-inf")
+
+    @property
+    def clock_ns(self) -> int | None:
+        """The newest time on /clock in nanoseconds, or None."""
+        return self._clock.now_ns()
+
+    def look(self, timeout_s: float, stop: Stop) -> list[Heard]:
+        """Wait for messages, at most so long, put what has come into the census, and return it.
+
+        Raises:
+            RosError: if ROS cannot take messages.
+        """
+        wait(self.node, [subscription for subscription, _ in self._subscriptions], timeout_s, stop)
+        sim_ns, now_ns = self.clock_ns, wall_ns()
+        heard = []
+        for subscription, static in self._subscriptions:
+            for received in subscription.take():
+                try:
+                    rows = tuple(self._decoder.rows(received.data))
+                except ValueError:
+                    self.census.take_malformed(received.gid)
+                    continue
+                # Fast DDS tells when a message came; what waited here for its turn is not late.
+                heard.append(Heard(rows, static, received.gid, received.received_ns or now_ns))
+        for each in heard:
+            clock_ns = _clock_of(each, sim_ns)
+            self.census.take(
+                each.rows, static=each.static, gid=each.gid, received_ns=each.received_ns, clock_ns=clock_ns
+            )
+        self._look_around({each.gid for each in heard if each.gid is not None})
+        return heard
+
+    def _look_around(self, senders: set[bytes]) -> None:
+        """Look who publishes, where it is time, or somebody without a name sends."""
+        since = time.monotonic() - self._looked
+        nameless = not all(self.census.is_known(gid) for gid in senders)
+        if since >= LOOK_EVERY_S or (nameless and since >= LOOK_AGAIN_S):
+            self._looked = time.monotonic()
+            self.census.graph(self.publishers())
+
+    def publishers(self) -> list[Publisher]:
+        """Return who publishes on the two topics now."""
+        return [
+            Publisher(
+                one.gid,
+                None if one.node.endswith(UNKNOWN_NODE) else one.node,
+                static,
+                one.durability == "transient_local",
+                one.reliability == "reliable",
+                self._origin(one.gid),
+                topic,
+                one.type,
+            )
+            for topic, static in zip(self.topics, (False, True), strict=True)
+            for one in writers(self.node, topic)
+        ]
+
+    def _origin(self, gid: bytes) -> str:
+        if gid not in self._where:
+            self._own = self._own or own_gid(self.node, self.topics[0])
+            self._where[gid] = origin(gid, self._own)
+        return self._where[gid]
+
+
+def _clock_of(heard: Heard, sim_ns: int | None) -> int | None:
+    """Return the time to compare stamps with: that of /clock where they are nearer to it, else None."""
+    if sim_ns is None or heard.static or not heard.rows:
+        return None
+    stamp_ns = heard.rows[0][2] * 1_000_000_000 + heard.rows[0][3]
+    return sim_ns if abs(stamp_ns - sim_ns) < abs(stamp_ns - heard.received_ns) else None

@@ -61,4 +61,4 @@ def _location(span: Span) -> dict[str, Any]:
         "endLine": span.end_line,
         "endColumn": span.end_column,
     }
-    return {"artifactLocation": {"uri": quote(span.file)}, "region": region}
+    return {"artifactLocation": {"uri": quote(span.file, errors="surrogateescape")}, "region": region}

@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+import time
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -263,3 +264,30 @@ def test_the_rules_that_are_named_are_known() -> None:
         "TF708",
         "TF709",
     }
+
+
+def large(links: int, first: str) -> str:
+    """Return a URDF of a base and so many links on it, with a comment in the beginning."""
+    parts = [
+        f'<link name="l{at}"/><joint name="j{at}" type="fixed"><parent link="b"/><child link="l{at}"/></joint>'
+        for at in range(links)
+    ]
+    return f'<!-- {first} --><robot name="r"><link name="b"/>{"".join(parts)}<joint nmae="end"/></robot>'
+
+
+def test_letters_beyond_ascii_cost_no_more_than_others_and_places_are_right_after_them() -> None:
+    seconds = {}
+    for first in ("u", "ü"):
+        text = large(8000, first)
+        began = time.process_time()
+        (one, *_) = [found for found in lint_text(text) if "nmae" in found.message]
+        seconds[first] = time.process_time() - began
+        assert one.span
+        assert text[one.span.column - 1 : one.span.end_column - 1] in {"<joint", "end"}
+    assert seconds["ü"] < 3 * seconds["u"]
+
+
+def test_a_urdf_as_large_as_that_of_10_000_frames_is_read_and_a_larger_one_is_refused() -> None:
+    text = large(2, "x" * 6_000_000)
+    assert "TF008" not in {one.code for one in lint_text(text)}
+    assert [one.code for one in lint_text(large(2, "x" * 16_000_000))] == ["TF008"]

@@ -83,7 +83,9 @@ def test_each_rule_stands_once_with_its_page_and_in_one_line_what_it_says() -> N
         assert "\n" not in rule["shortDescription"]["text"]
 
 
-@pytest.mark.parametrize("file", ["a b.yaml", "ü/r#1.yaml", "50%.yaml", "--set a=b c", "../r.yaml", "/abs/r.yaml", "\udcff.yaml"])
+@pytest.mark.parametrize(
+    "file", ["a b.yaml", "ü/r#1.yaml", "50%.yaml", "--set a=b c", "../r.yaml", "/abs/r.yaml", "\udcff.yaml"]
+)
 def test_a_file_with_any_name_is_a_uri_that_leads_back_to_it(file: str) -> None:
     one = Diagnostic(
         "TF101", "unknown_key", "error", "m", Span(file, 2, 3, 2, 4), (Note("n", Span(file)), Note("no place"))

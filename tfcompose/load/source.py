@@ -79,14 +79,14 @@ def load(text: str, file: str) -> Source:
     return Source(file, data, place, tuple(reader.found), allows_in(text, file), has_nulls=reader.has_nulls)
 
 
-def refuse_unreadable(text: str, file: str) -> None:
+def refuse_unreadable(text: str, file: str, most_characters: int = MOST_CHARACTERS) -> None:
     """Do nothing for a text that can be a file of this language.
 
     Raises:
         RejectedError: if it is too large, or no text.
     """
-    if len(text) > MOST_CHARACTERS:
-        message = f"the file has {len(text):,} characters; a robot has at most {MOST_CHARACTERS:,}"
+    if len(text) > most_characters:
+        message = f"the file has {len(text):,} characters; a robot has at most {most_characters:,}"
         raise RejectedError([finding("TF008", message, Span(file))])
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1

@@ -46,6 +46,7 @@ ONLY_IN: dict[str, set[str]] = {
     "xacro": {"cli"},
     "trimesh": {"cli"},
     "rclpy": {"ros"},
+    "rosbags": {"observe"},
     "tf2_msgs": {"ros"},
     "geometry_msgs": {"ros"},
     "sensor_msgs": {"ros"},

@@ -165,4 +165,6 @@ CODES = {
     "TF903": "rule_crashed",
     "TF904": "no_xacro",
     "TF905": "no_trimesh",
+    "TF906": "no_rosbags",
+    "TF907": "bad_bag",
 }

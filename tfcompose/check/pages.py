@@ -319,6 +319,12 @@ It comes with ROS, and from PyPI: pip install xacro.""",
     "TF905": """An inertia is to be computed from a mesh, and trimesh is not installed.
 
 pip install 'tfcompose[mesh]', or give the inertia.""",
+    "TF906": """A bag is to be read, and the package rosbags is not there.
+
+pip install 'tfcompose[bag]' brings it. ROS is not needed to read bags.""",
+    "TF907": """A bag cannot be read: it is not there, is damaged, is none of ROS 2, or holds no TF.
+
+MCAP and SQLite bags are read, as folders with metadata.yaml or as single .mcap and .db3 files.""",
     "TF903": """A rule crashed.
 
 The other rules went on. This is a fault of tfcompose; please report it with the robot file.""",

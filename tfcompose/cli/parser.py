@@ -33,6 +33,7 @@ COMMANDS = {
     "wait": "wait until a running robot has ended, or is ready",
     "down": "stop a running robot",
     "echo": "the live pose of B in A",
+    "monitor": "who publishes each live edge, how often, how evenly and how late",
     "tree": "the tree with kinds, owners and poses",
     "pose": "the pose of B in A, from the spec alone",
     "explain": "a code's page, or the chain between two frames",
@@ -43,7 +44,7 @@ COMMANDS = {
 
 
 #: Commands that run until somebody ends them.
-LASTING = frozenset({"up", "echo"})
+LASTING = frozenset({"up", "echo", "monitor"})
 
 #: The exit code of a command whose output nobody reads any more: what a shell says of a program ended by SIGPIPE.
 UNREAD = 141

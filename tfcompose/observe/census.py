@@ -21,7 +21,15 @@ if TYPE_CHECKING:
 
 #: So many edges are kept, counting an edge once for each publisher; what comes beyond is counted only.
 MOST_STRANDS = 20_000
+#: So long after an edge first came its times are not counted: who joins a running tree gets at once what was kept.
+SETTLE_S = 0.3
 _SECOND_NS = 1_000_000_000
+
+
+def topics_below(namespace: str) -> tuple[str, str]:
+    """Return the topics of moving and of fixed edges below a namespace."""
+    prefix = f"/{namespace.strip('/')}" if namespace.strip("/") else ""
+    return f"{prefix}/tf", f"{prefix}/tf_static"
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,9 +150,11 @@ class Census:
     """Everything that was seen of a TF tree.
 
     ``window_s`` is the stretch of time of which rates, jitter, gaps and delays are told (one to two of them); 0: all.
+    Of the first ``settle_s`` of each edge they tell nothing.
     """
 
     window_s: float = 0.0
+    settle_s: float = 0.0
     messages: int = 0
     begun_ns: int = 0
     last_ns: int = 0
@@ -169,7 +179,7 @@ class Census:
                 if len(strands) >= MOST_STRANDS:
                     self.beyond += 1
                     continue
-                tally = Tally(int(self.window_s * _SECOND_NS))
+                tally = Tally(int(self.window_s * _SECOND_NS), int(self.settle_s * _SECOND_NS))
                 strand = Strand(row[0], row[1], static, gid, tally, received_ns, row)
                 strands[row[0], row[1], gid, static] = strand
             strand.take(row, received_ns, clock)

@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.observe.census import Census, Publisher
+from tfcompose.observe.census import Census, Publisher, topics_below
 from tfcompose.ros.clock import SimClock, wall_ns
 from tfcompose.ros.decoder import Decoder
 from tfcompose.ros.graph import UNKNOWN_NODE, own_gid, writers
@@ -37,15 +37,14 @@ class Heard:
 class Live:
     """Listens to /tf and /tf_static, or those below a namespace, as long as its node lives.
 
-    ``topics`` are the names of the moving and of the fixed one. Where a simulator publishes /clock, stamps that are
+    ``topics`` (moving, fixed) may be given instead. Where a simulator publishes /clock, stamps that are
     nearer to it than to the system's time are compared with it.
     """
 
-    def __init__(self, node: Node, census: Census, namespace: str = "") -> None:
-        prefix = f"/{namespace.strip('/')}" if namespace.strip("/") else ""
+    def __init__(self, node: Node, census: Census, namespace: str = "", topics: tuple[str, str] | None = None) -> None:
         self.node = node
         self.census = census
-        self.topics = f"{prefix}/tf", f"{prefix}/tf_static"
+        self.topics = topics or topics_below(namespace)
         self._subscriptions = [
             (TFSubscription(node, static=static, topic=self.topics[static]), static) for static in (True, False)
         ]

@@ -73,9 +73,13 @@ class Timing:
 
 @dataclass(slots=True)
 class Tally:
-    """Counts arrivals. What it says is about the last one to two ``window_ns``, or about all where that is 0."""
+    """Counts arrivals. What it says is about the last one to two ``window_ns``, or about all where that is 0.
+
+    Of arrivals in the first ``settle_ns`` only the number counts: who joins gets at once what was kept for it.
+    """
 
     window_ns: int = 0
+    settle_ns: int = 0
     count: int = 0
     last_ns: int = 0
     _now: _Sums = field(default_factory=_Sums)
@@ -83,15 +87,19 @@ class Tally:
 
     def arrived(self, at_ns: int, delay_ns: int | None) -> None:
         """Note an arrival, and how old its stamp was where that is known."""
-        if self.count == 0:
+        self.count += 1
+        if self.count == 1:
             self._now.begun_ns = at_ns
+        elif at_ns - self._now.begun_ns < self.settle_ns:
+            self.last_ns = at_ns
+            return
         else:
+            self.settle_ns = 0
             if self.window_ns and at_ns - self._now.begun_ns > self.window_ns:
                 self._before, self._now = self._now, _Sums(at_ns)
             self._now.gap(max(0, at_ns - self.last_ns))
-        self.count += 1
         self.last_ns = at_ns
-        if delay_ns is not None:
+        if delay_ns is not None and not self.settle_ns:
             self._now.delay(delay_ns)
 
     def timing(self, now_ns: int) -> Timing:

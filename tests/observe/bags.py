@@ -1,0 +1,40 @@
+"""Bags as ros2 bag records them, written with the library rosbags and its own encoder."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+#: Topic, seconds of the recording, and (parent, child, stamp in seconds, xyz, quaternion x y z w).
+Sent = tuple[str, float, str, str, float, tuple[float, float, float], tuple[float, float, float, float]]
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+START_S = 1_700_000_000
+
+
+def write_bag(folder: Path, sent: Iterable[Sent], *, mcap: bool = True) -> Path:
+    """Write a bag with one message for each transform; times count from START_S."""
+    types = STORE.types
+    kind = "tf2_msgs/msg/TFMessage"
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP if mcap else StoragePlugin.SQLITE3) as writer:
+        connections = {}
+        for topic, at_s, parent, child, stamp_s, xyz, quat_xyzw in sent:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=STORE)
+            seconds, nanoseconds = divmod(round((START_S + stamp_s) * 1e9), 10**9)
+            transform = types["geometry_msgs/msg/TransformStamped"](
+                types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](seconds, nanoseconds), parent),
+                child,
+                types["geometry_msgs/msg/Transform"](
+                    types["geometry_msgs/msg/Vector3"](*xyz), types["geometry_msgs/msg/Quaternion"](*quat_xyzw)
+                ),
+            )
+            data = STORE.serialize_cdr(types[kind]([transform]), kind)
+            writer.write(connections[topic], round((START_S + at_s) * 1e9), data)
+    return folder

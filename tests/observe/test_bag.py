@@ -1,0 +1,104 @@
+"""``--bag``: MCAP and SQLite, without ROS."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tests.observe.bags import write_bag
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from tests.observe.bags import Sent
+
+UP = (0.0, 0.0, 0.0, 1.0)
+
+
+def tfcompose(*words: str, code: int = 0) -> subprocess.CompletedProcess[str]:
+    """Run the command line where rclpy cannot be imported."""
+    program = "import sys; sys.modules['rclpy'] = None; from tfcompose.cli import main; sys.exit(main())"
+    command = [sys.executable, "-c", program, *words]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert "Traceback" not in done.stderr, done.stderr
+    assert done.returncode == code, done.stdout + done.stderr
+    return done
+
+
+def drive(seconds: float = 4.0, rate: float = 50.0, topic: str = "/tf", late_s: float = 0.004) -> list[Sent]:
+    """A base that moves along x at 1 m/s, and comes a little late."""
+    count = round(seconds * rate)
+    return [
+        (topic, at / rate + late_s, "odom", "base_link", at / rate, (at / rate, 0.0, 0.0), UP) for at in range(count)
+    ]
+
+
+FIXED: list[Sent] = [("/tf_static", 0.0, "base_link", "laser_link", 0.0, (0.0, 0.0, 0.3), UP)]
+
+
+def edges(done: subprocess.CompletedProcess[str]) -> dict[str, Any]:
+    return {each["child"]: each for each in json.loads(done.stdout)["edges"]}
+
+
+@pytest.mark.parametrize("mcap", [True, False], ids=["mcap", "sqlite"])
+def test_monitor_tells_rates_and_delays_of_a_bag(tmp_path: Path, *, mcap: bool) -> None:
+    bag = write_bag(tmp_path / "bag", [*FIXED, *drive()], mcap=mcap)
+    seen = edges(tfcompose("monitor", "--bag", str(bag), "--format", "json"))
+    base, laser = seen["base_link"], seen["laser_link"]
+    assert (base["kind"], base["count"], base["publisher"]) == ("dynamic", 200, None)
+    assert base["rate"] == pytest.approx(50, rel=1e-3)
+    assert base["jitter_s"] == pytest.approx(0, abs=1e-5)
+    assert base["delay_s"] == pytest.approx(0.004, abs=1e-6)
+    assert (laser["kind"], laser["count"], laser["rate"]) == ("static", 1, None)
+
+
+@pytest.mark.parametrize("mcap", [True, False], ids=["mcap", "sqlite"])
+def test_a_single_file_and_a_folder_without_metadata_are_read_too(tmp_path: Path, *, mcap: bool) -> None:
+    bag = write_bag(tmp_path / "bag", [*FIXED, *drive()], mcap=mcap)
+    (bag / "metadata.yaml").unlink()
+    [file] = bag.iterdir()
+    for path in (bag, file):
+        assert set(edges(tfcompose("monitor", "--bag", str(path), "--format", "json"))) == {"base_link", "laser_link"}
+
+
+def test_the_table_has_a_line_for_each_edge(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "bag", [*FIXED, *drive()])
+    lines = tfcompose("monitor", "--bag", str(bag)).stdout.splitlines()
+    assert lines[0] == "2 edges, 201 messages in 4.0 s"
+    assert lines[1].split() == ["edge", "publisher", "kind", "rate", "jitter", "gap", "age", "delay"]
+    assert lines[3].split() == ["base_link", "→", "laser_link", "–", "static"]
+    assert lines[2].split()[3:] == ["–", "dynamic", "50.0", "Hz", "0.0", "ms", "20.0", "ms", "4.0", "ms", "4.0", "ms"]
+
+
+def test_a_namespace_is_looked_at_alone_and_where_tf_is_instead_is_said(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "bag", drive(topic="/robot1/tf"))
+    assert edges(tfcompose("monitor", "--bag", str(bag), "--namespace", "robot1", "--format", "json"))
+    errors = tfcompose("monitor", "--bag", str(bag), code=2).stderr
+    assert "has neither /tf nor /tf_static" in errors
+    assert "TF is on /robot1/tf: see --namespace" in errors
+
+
+def test_what_is_no_bag_is_said_in_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "text.mcap").write_text("this is no recording, however long it is\n" * 10)
+    (tmp_path / "text.db3").write_text("nor is this")
+    (tmp_path / "old.bag").write_text("#ROSBAG V2.0\n")
+    whole = write_bag(tmp_path / "whole", drive())
+    [file] = whole.glob("*.mcap")
+    (tmp_path / "cut.mcap").write_bytes(file.read_bytes()[:2000])
+    for name, why in [
+        ("none", "there is no bag"),
+        ("empty", "no recording"),
+        ("text.mcap", "cannot be read as a bag"),
+        ("text.db3", "cannot be read as a bag"),
+        ("old.bag", "a bag of ROS 1"),
+        ("cut.mcap", "cannot be read as a bag"),
+    ]:
+        done = tfcompose("monitor", "--bag", str(tmp_path / name), code=2)
+        assert "error[TF907]" in done.stderr
+        assert why in done.stderr
+        assert done.stdout == ""

@@ -1,0 +1,120 @@
+"""``tfcompose monitor`` on real nodes."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.node import open_node
+from tfcompose.ros.tf import TFPublisher
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
+
+UP = (0.0, 0.0, 0.0, 1.0)
+
+
+def monitor(*words: str, code: int = 0) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tfcompose", "monitor", *words]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=40, check=False)
+    assert done.returncode == code, done.stdout + done.stderr
+    return done
+
+
+@contextmanager
+def sending(  # noqa: PLR0913 (all but three are named)
+    name: str, parent: str, child: str, *, rate: float, late_s: float = 0.0, topic: str = "/tf", bad: bytes = b""
+) -> Iterator[None]:
+    """Send an edge from a node of this name, stamped ``late_s`` ago, and from time to time the ``bad`` message."""
+    over = threading.Event()
+
+    def send() -> None:
+        due = time.monotonic()
+        while not over.wait(max(0.0, due - time.monotonic())):
+            due += 1 / rate
+            stamp_ns = time.time_ns() - int(late_s * 1e9)
+            publisher.publish(encode([Transform(stamp_ns, parent, child, (1.0, 0.0, 0.0), UP)]))
+            if bad:
+                publisher.publish(bad)
+
+    with open_node(name, "") as node:
+        publisher = TFPublisher(node, static=False, topic=topic)
+        thread = threading.Thread(target=send)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
+
+
+def rows(done: subprocess.CompletedProcess[str]) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = json.loads(done.stdout)["edges"]
+    return found
+
+
+def test_each_publisher_of_an_edge_is_named_with_its_rate_and_delay() -> None:
+    with sending("drive", "odom", "base_link", rate=50), sending("ekf", "odom", "base_link", rate=20, late_s=0.25):
+        found = {each["publisher"]: each for each in rows(monitor("--for", "5", "--format", "json"))}
+    assert set(found) == {"/drive", "/ekf"}
+    assert found["/drive"]["rate"] == pytest.approx(50, rel=0.15)
+    assert found["/ekf"]["rate"] == pytest.approx(20, rel=0.15)
+    assert 0 <= found["/drive"]["least_delay_s"] < 0.1
+    assert 0.25 <= found["/ekf"]["least_delay_s"] < 0.35
+    assert found["/ekf"]["present"]
+
+
+def test_the_table_says_that_a_publisher_is_not_the_only_one() -> None:
+    with sending("drive", "odom", "base_link", rate=50), sending("ekf", "map", "base_link", rate=50):
+        lines = monitor("--for", "4").stdout.splitlines()
+    assert lines[0].startswith("2 edges, 2 publishers, ")
+    assert [line.split()[3] for line in lines[2:]] == ["/ekf", "/drive"]
+    assert all(line.endswith("not the only one") for line in lines[2:])
+
+
+def test_bytes_that_are_no_tf_are_counted_and_the_rest_is_still_told() -> None:
+    with sending("drive", "odom", "base_link", rate=50, bad=b"\x00\x01\x00\x00\xff\xff\xff\xff"):
+        done = monitor("--for", "4", "--format", "json")
+    assert json.loads(done.stdout)["malformed"] > 10
+    assert rows(done)[0]["rate"] == pytest.approx(50, rel=0.15)
+
+
+def test_below_a_namespace_only_its_topics_are_heard() -> None:
+    with sending("a", "odom", "base_link", rate=20, topic="/robot1/tf"), sending("b", "x", "y", rate=20):
+        assert [
+            each["child"] for each in rows(monitor("--for", "4", "--namespace", "/robot1/", "--format", "json"))
+        ] == ["base_link"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_piped_it_prints_a_table_each_second_and_ends_with_exit_code_0_on_a_signal(number: int) -> None:
+    command = [sys.executable, "-m", "tfcompose", "monitor", "--every", "0.2"]
+    with (
+        sending("drive", "odom", "base_link", rate=50),
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process,
+    ):
+        assert process.stdout
+        for line in process.stdout:
+            if line.startswith("odom → base_link") and "/drive" in line:
+                break
+        process.send_signal(number)
+        _, errors = process.communicate(timeout=10)
+        assert process.returncode == 0
+    assert errors == ""
+
+
+def test_where_nothing_comes_it_says_so_with_exit_code_1() -> None:
+    done = monitor("--for", "0.5", code=1)
+    assert done.stdout == ""
+    assert "error[TF811] no TF message came on /tf and /tf_static" in done.stderr

@@ -1,0 +1,133 @@
+"""Edges as they were seen: a table for people, an object for programs."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tfcompose.observe.census import Census, EdgeSeen
+
+#: A stamp that is farther off is taken to be of another clock.
+_CLOCKS_AGREE_S = 1e6
+_HEADS = ("edge", "publisher", "kind", "rate", "jitter", "gap", "age", "delay", "")
+_RIGHT = range(3, 8)
+
+
+def lines_of(edges: Sequence[EdgeSeen], census: Census, now_ns: int, width: int | None = None) -> list[str]:
+    """Return a line about all, and a table with a line for each edge of each publisher.
+
+    Names are cut to what is readable where the table is wider than ``width``.
+    """
+    several = _several(edges)
+    rows = [_HEADS, *(_row(seen, several) for seen in edges)]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(_HEADS))]
+    if width is not None:
+        for column in (1, 0):
+            over = sum(widths) + 2 * (len(widths) - 1) - width + 1
+            widths[column] = max(widths[column] - max(over, 0), min(widths[column], 20))
+    table = [_line(row, widths) for row in rows] if edges else []
+    return [_summary(edges, census, now_ns), *table]
+
+
+def _several(edges: Sequence[EdgeSeen]) -> set[str]:
+    """Return the children that more than one publisher sends, or that have more than one parent."""
+    children = [seen.strand.child for seen in edges if seen.present is not False]
+    return {child for child in children if children.count(child) > 1} if len(set(children)) < len(children) else set()
+
+
+def _summary(edges: Sequence[EdgeSeen], census: Census, now_ns: int) -> str:
+    seconds = max(0, now_ns - census.begun_ns) / 1e9 if census.begun_ns else 0.0
+    names = {(seen.strand.parent, seen.strand.child) for seen in edges}
+    parts = [f"{len(names)} edge{'' if len(names) == 1 else 's'}", f"{census.messages} messages in {seconds:.1f} s"]
+    senders = {seen.publisher for seen in edges if seen.publisher}
+    if senders:
+        parts.insert(1, f"{len(senders)} publisher{'' if len(senders) == 1 else 's'}")
+    bad = sum(census.malformed.values())
+    parts += [f"{bad} not readable"] if bad else []
+    parts += [f"{census.beyond} transforms of further edges not kept"] if census.beyond else []
+    return ", ".join(parts)
+
+
+def _row(seen: EdgeSeen, several: set[str]) -> tuple[str, ...]:
+    strand, timing = seen.strand, seen.timing
+    remarks = []
+    if strand.refused is not None:
+        remarks.append(f"tf2 refuses it: {strand.refused.text}")
+    if strand.child in several and seen.present is not False:
+        remarks.append("not the only one")
+    if seen.present is False:
+        remarks.append("publisher left")
+    if strand.stamps_back and not strand.static:
+        remarks.append(f"{strand.stamps_back}× back in time")
+    name, who = _printable(seen.name), _printable(seen.publisher) or "–"
+    if strand.static:
+        return (name, who, "static", "", "", "", "", "", ", ".join(remarks))
+    return (
+        name, who, "dynamic",
+        f"{timing.rate:.1f} Hz" if timing.rate is not None else "–",
+        _time(timing.jitter_s), _time(timing.longest_gap_s), _time(seen.data_age_s), _time(timing.delay_s),
+        ", ".join(remarks),
+    )  # fmt: skip
+
+
+def _time(seconds: float | None) -> str:
+    """Return milliseconds or seconds, with as many digits as matter."""
+    if seconds is None:
+        return "–"
+    if abs(seconds) > _CLOCKS_AGREE_S:
+        return "other clock"
+    return f"{seconds * 1e3:.1f} ms" if abs(seconds) < 1 else f"{seconds:.2f} s"
+
+
+def _line(row: Sequence[str], widths: Sequence[int]) -> str:
+    cells = []
+    for column, (cell, width) in enumerate(zip(row, widths, strict=True)):
+        text = cell if len(cell) <= width else f"{cell[: width - 1]}…"
+        cells.append(f"{text:>{width}}" if column in _RIGHT else f"{text:<{width}}")
+    return "  ".join(cells).rstrip()
+
+
+def _printable(text: str) -> str:
+    """Return the text without what would move a terminal's cursor."""
+    return "".join(character if character.isprintable() else "?" for character in text)
+
+
+def objects_of(edges: Sequence[EdgeSeen], census: Census, now_ns: int) -> str:
+    """Return one line of JSON: what was counted, and a list of edges; times in seconds, stamps in nanoseconds."""
+    data = {
+        "time_ns": now_ns,
+        "messages": census.messages,
+        "malformed": sum(census.malformed.values()),
+        "edges": [object_of(seen) for seen in edges],
+    }
+    return json.dumps(data, ensure_ascii=False) + "\n"
+
+
+def object_of(seen: EdgeSeen) -> dict[str, Any]:
+    """Return one edge for programs; what is not known is null."""
+    strand, timing = seen.strand, seen.timing
+    return {
+        "parent": strand.parent,
+        "child": strand.child,
+        "kind": "static" if strand.static else "dynamic",
+        "publisher": seen.nodes[0] if len(seen.nodes) == 1 else None,
+        "publishers": list(seen.nodes),
+        "present": seen.present,
+        "count": strand.tally.count,
+        "rate": timing.rate,
+        "jitter_s": timing.jitter_s,
+        "longest_gap_s": timing.longest_gap_s,
+        "age_s": seen.age_s,
+        "data_age_s": seen.data_age_s,
+        "delay_s": timing.delay_s,
+        "least_delay_s": timing.least_delay_s,
+        "most_delay_s": timing.most_delay_s,
+        "stamp_ns": strand.stamp_ns,
+        "stamps_back": strand.stamps_back,
+        "stamps_repeated": strand.stamps_repeated,
+        "refused": strand.refused.value if strand.refused else None,
+        "refusals": strand.refusals,
+    }

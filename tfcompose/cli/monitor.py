@@ -1,0 +1,73 @@
+"""``tfcompose monitor``: who publishes each edge, how often, how evenly, and how late.
+
+Print each edge of the running tree, or of a bag, with its publisher's node, rate, jitter (the standard deviation of the
+time between two messages), longest gap, age of the newest stamp, and delay (arrival minus stamp). Rates, jitter, gaps
+and delays are those of the last 10 s; with --for or --bag of all. On a terminal the table is drawn again and again
+until Ctrl-C; into a pipe each table follows the last.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from functools import partial
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.edge_table import lines_of, objects_of
+from tfcompose.cli.looking import add_bag, add_for, add_namespace, from_bag, from_live, nothing_came
+from tfcompose.cli.options import positive
+from tfcompose.cli.redrawn import Redrawn
+from tfcompose.observe.census import SETTLE_S, Census, topics_below
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+
+#: Of the running tree the last 5 to 10 s are told.
+WINDOW_S = 5.0
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Add the command's arguments."""
+    add_for(parser, "end after S seconds, with one table of all of them; default: until Ctrl-C")
+    add_bag(parser)
+    add_namespace(parser)
+    parser.add_argument("--every", type=positive, default=1.0, metavar="S", help="a table each S seconds; default: 1")
+    parser.add_argument(
+        "--format", choices=("text", "json"), default="text", help="json: one object for each table; default: text"
+    )
+
+
+def run(arguments: Namespace) -> int:
+    """Monitor until a signal comes; exit code 1 if no TF came at all, 2 if a bag cannot be read."""
+    topics = topics_below(arguments.namespace)
+    whole = arguments.bag or arguments.duration
+    census = Census(0.0 if whole else WINDOW_S, 0.0 if arguments.bag else SETTLE_S)
+    if arguments.bag:
+        code = from_bag(arguments.bag, {topics: census})
+        if code is None:
+            _show(arguments, census, None, census.last_ns)
+        return code or 0
+    begun = time.monotonic()
+    redrawn = Redrawn(sys.stdout) if arguments.format == "text" and sys.stdout.isatty() else None
+    show = None if arguments.duration and not redrawn else partial(_show, arguments, census, redrawn)
+    code = from_live(
+        "tfcompose_monitor", {topics: census}, duration_s=arguments.duration, every_s=arguments.every, show=show
+    )
+    if code is not None:
+        return code
+    if arguments.duration and census.messages:
+        _show(arguments, census, redrawn, time.time_ns())
+    return 0 if census.messages else nothing_came(" and ".join(topics), time.monotonic() - begun)
+
+
+def _show(arguments: Namespace, census: Census, redrawn: Redrawn | None, now_ns: int) -> None:
+    edges = sorted(census.edges(now_ns), key=lambda seen: seen.strand.static)  # what moves first
+    if arguments.format == "json":
+        sys.stdout.write(objects_of(edges, census, now_ns))
+    elif redrawn is not None:
+        redrawn.draw(lines_of(edges, census, now_ns, width=os.get_terminal_size(sys.stdout.fileno()).columns))
+        return
+    else:
+        sys.stdout.write("".join(f"{line}\n" for line in lines_of(edges, census, now_ns)))
+    sys.stdout.flush()

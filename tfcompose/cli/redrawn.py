@@ -1,0 +1,37 @@
+"""Lines on a terminal that are drawn again in their place, without flicker."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import TextIO
+
+_ESCAPE = "\033["
+
+
+class Redrawn:
+    """Some lines at the end of a terminal's output; each drawing replaces the last one."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._drawn = 0
+
+    def draw(self, lines: Sequence[str]) -> None:
+        """Draw the lines where the last ones were; those that the terminal has no room for are counted only."""
+        try:
+            size = os.get_terminal_size(self._stream.fileno())
+            columns, rows = size.columns or 80, size.lines or 24
+        except OSError:
+            columns, rows = 80, 24
+        room = max(rows - 1, 2)
+        shown = list(lines)
+        if len(shown) > room:
+            shown = [*shown[: room - 1], f"… {len(shown) - room + 1} more; a larger window shows them, or a pipe"]
+        up = f"\r{_ESCAPE}{self._drawn}A" if self._drawn else ""
+        body = "".join(f"{line[: columns - 1]}{_ESCAPE}K\n" for line in shown)
+        self._stream.write(f"{up}{body}{_ESCAPE}J")  # what was below the last line goes
+        self._stream.flush()
+        self._drawn = len(shown)

@@ -22,6 +22,7 @@ DESCRIPTION = "robot.full.urdf"
 EdgeKind = Literal["static", "joint", "dynamic"]
 ProcessKind = Literal["static", "joints", "guard", "simulate", "external", "run"]
 GuardMode = Literal["off", "watch", "strict"]
+OnViolation = Literal["report", "stop-offender", "stop"]
 
 ReadyKind = Literal["edges", "topic", "service", "lifecycle", "log", "exit", "time"]
 
@@ -200,7 +201,7 @@ class GuardPolicy:
 
     mode: GuardMode = "watch"
     unknown_edges: Literal["ignore", "warn", "error"] = "warn"
-    on_violation: Literal["report", "stop"] = "report"
+    on_violation: OnViolation = "report"
     allow: tuple[tuple[str, str], ...] = ()
 
 

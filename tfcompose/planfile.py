@@ -252,7 +252,7 @@ def _guard_from_json(data: dict[str, Any]) -> GuardPolicy:
     return GuardPolicy(
         mode=one_of(data, "mode", ("off", "watch", "strict"), "guard"),
         unknown_edges=one_of(data, "unknown_edges", ("ignore", "warn", "error"), "guard"),
-        on_violation=one_of(data, "on_violation", ("report", "stop"), "guard"),
+        on_violation=one_of(data, "on_violation", ("report", "stop-offender", "stop"), "guard"),
         allow=tuple((str(edge["parent"]), str(edge["child"])) for edge in get(data, "allow", list, "guard")),
     )
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import subprocess
 import sys
 import time
 from typing import TYPE_CHECKING, Any
 
+import psutil
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -101,6 +103,14 @@ class Running:
                     return "\n".join(lines[index : index + 8])
             time.sleep(0.02)
         pytest.fail(f"{words} not in\n{self.output.read_text(encoding='utf-8')}")
+
+    def child(self, name: str) -> psutil.Process:
+        """Return one of the robot's processes."""
+        return next(p for p in psutil.Process(self.popen.pid).children() if name in p.cmdline()[-1:])
+
+    def count(self, *words: str) -> int:
+        """Return how many lines hold all the words."""
+        return sum(all(word in line for word in words) for line in self.output.read_text(encoding="utf-8").splitlines())
 
     def end(self) -> int:
         self.leaves()
@@ -199,3 +209,52 @@ def test_what_the_guard_knows_and_finds_is_on_the_diagnostics_page(up: Callable[
     assert [pair.key for pair in slam.values] == ["map → odom"]
     assert " Hz" in slam.values[0].value
     assert "from /slam" in slam.values[0].value
+
+
+def test_a_guard_that_is_killed_is_back_with_what_it_knew_and_tells_nothing_twice(up: Callable[[str], Running]) -> None:
+    robot = up(ROBOT)
+    robot.joins("/drive", "odom base_link")
+    robot.says("complete")
+    robot.joins("/rogue", "map odom")
+    robot.says("TF801", "/rogue")
+    time.sleep(0.2)  # what it has told has been kept by then
+    robot.child("guard").kill()
+    robot.says("warning[TF808] guard was ended by SIGKILL: nobody watches the tree until it is back")
+    robot.says("over", "guard watches again after")
+    robot.joins("/rogue_too", "map odom")
+    robot.says("TF801", "/rogue_too")
+    time.sleep(6)  # by then it misses whom it has not found
+    robot.leaves()
+    robot.says("over", "map → odom is no longer published by /rogue")
+    assert robot.count("TF801", "/rogue;") == 1
+    assert (robot.count("| live "), robot.count("complete"), robot.count("watching 2 edges again")) == (2, 1, 1)
+    assert robot.count("fell silent", "slam") == 0
+
+
+#: A child that owns an edge, and from a while after its start sends that of another.
+TRAITOR = NODE.replace(
+    "    while True:\n",
+    "    begun_s = time.monotonic()\n    while True:\n        lies = time.monotonic() > begun_s + 4\n",
+).replace("for edge in edges]", "for edge in edges[: 1 + lies]]")
+
+
+def test_the_policy_stop_offender_stops_the_plans_own_offender_and_no_stranger(
+    up: Callable[[str], Running], tmp_path: Path
+) -> None:
+    (tmp_path / "traitor.py").write_text(TRAITOR, encoding="utf-8")
+    run = json.dumps([sys.executable, "traitor.py", "/traitor", "reliable", "right", "odom cup", "map odom"])
+    text = ROBOT.replace(
+        "processes:\n", f"  cup: {{parent: odom, owner: traitor}}\nprocesses:\n  traitor: {{run: {run}}}\n"
+    )
+    robot = up(text.replace("guard: {", "guard: {on_violation: stop-offender, "))
+    robot.joins("/drive", "odom base_link")
+    robot.joins("/stranger", "map odom")
+    robot.says("error[TF801]", "map → odom is published by /stranger")
+    robot.says("error[TF801]", "map → odom is published by /traitor; the owner is slam (/slam)")
+    robot.says("traitor is stopped for it, and stays so: on_violation is stop-offender")
+    robot.says("over", "map → odom is no longer published by /traitor")
+    assert robot.count("is stopped for it") == 1
+    assert robot.popen.poll() is None
+    children = [p.cmdline() for p in psutil.Process(robot.popen.pid).children()]
+    assert {"guard", "slam"} <= {words[-1] for words in children if words}
+    assert not any("traitor.py" in words for words in children)

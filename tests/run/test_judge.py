@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -141,6 +142,14 @@ class History:
         """Look until all is clear."""
         self.wait(self.settle_s + LOOK_S)
         assert Clear() in self.events
+        return self
+
+    def dies(self, down_s: float = 1.5) -> History:
+        """Let another judge follow with this one's memory, after a time in which nobody looked, and forget events."""
+        memory = json.loads(json.dumps(self.judge.memory()))
+        self.now += down_s
+        self.judge = Judge(self.judge.plan, 0.0, self.now, 0)
+        self.events = self.judge.recall(memory, self.now)
         return self
 
     def found(self) -> list[Diagnostic]:
@@ -935,3 +944,82 @@ def test_the_guard_names_no_switch_for_another_node_or_edge() -> None:
     history.repeat(history.joins("/other"), "odom base", 10)
     history.repeat(history.joins("/diff"), "map odom", 10)
     assert [("set" in found.help) for found in history.found()] == [False, False]
+
+
+# A guard that follows one that died.
+
+
+def test_a_judge_that_follows_another_tells_nothing_twice_and_goes_on(running: History) -> None:
+    static, slam, rogue = running.joins("/static", static=True), running.joins("/slam"), running.joins("/rogue")
+    volatile = running.joins("/volatile", static=True, volatile=True)
+    running.send(static, FIXED).repeat(slam, "map odom", 5).repeat(rogue, "map odom, map cup", 5)
+    assert [line[:5] for line in running.said()] == ["TF806", "TF801", "TF803"]
+    assert running.all(Live) != []
+    running.dies()
+    assert running.events == [Clear()]
+    running.send(static, FIXED, ago=10)
+    for _ in range(100):
+        running.send(slam, "map odom").send(rogue, "map odom, map cup").wait(0.1)
+    assert running.events == [Clear()]
+    running.leaves(rogue)
+    running.leaves(volatile)
+    running.repeat(slam, "map odom", 50)
+    assert [type(event) for event in running.events[1:]] == [Recovered, Recovered]
+    running.repeat(running.joins("/other"), "map odom", 5)
+    assert running.said() == ["TF801 map → odom is published by /other; the owner is slam (/slam)"]
+
+
+def test_a_judge_that_follows_another_does_not_miss_whom_it_has_not_found_yet(running: History) -> None:
+    running = History(edges=(edge("map odom", "slam", rate=10.0), edge("base lidar", "static", "static"))).clear()
+    static, slam, rogue = running.joins("/static", static=True), running.joins("/slam"), running.joins("/rogue")
+    running.send(static, FIXED[:10]).repeat(slam, "map odom", 30).repeat(rogue, "map odom", 3)
+    running.graph.clear()
+    running.dies().wait(4)
+    assert running.events == [Clear()]
+    running.graph += [static, slam, rogue]
+    for _ in range(40):
+        running.send(slam, "map odom").send(rogue, "map odom").wait(0.1)
+    assert running.events == [Clear()]
+    running.leaves(static)
+    running.repeat(rogue, "map odom", 20)
+    assert sorted(line[:10] for line in running.said()) == ["TF804 slam", "TF804 stat"]
+
+
+def test_an_owner_that_was_silent_is_not_said_to_be_again_and_is_back_when_it_is() -> None:
+    running = History(edges=(edge("map odom", "slam", rate=10.0),)).clear()
+    slam = running.joins("/slam")
+    running.repeat(slam, "map odom", 30).wait(2)
+    assert [line[:5] for line in running.said()] == ["TF804"]
+    running.dies().wait(8)
+    assert running.events == [Clear()]
+    running.repeat(slam, "map odom", 5)
+    assert [event for event in running.events if not isinstance(event, Clear)] == running.all(Recovered) != []
+
+
+def test_a_namesake_is_still_told_from_the_owner_after_the_guard_died(running: History) -> None:
+    slam, other = running.joins("/slam"), running.joins("/slam")
+    running.repeat(slam, "map odom", 5).dies()
+    running.send(other, "map odom").repeat(slam, "map odom", 5)
+    assert running.said()[0].startswith("TF801 map → odom is published by another /slam")
+
+
+def test_only_an_offender_that_is_surely_of_the_run_can_be_stopped_for_it() -> None:
+    processes = (PlanProcess("slam", "run", nodes=("/slam",)), PlanProcess("drive", "external", nodes=("/drive",)))
+    for namesakes, process in ((0, "slam"), (1, "")):
+        running = History(processes=processes).clear()
+        slam = running.joins("/slam")
+        for _ in range(namesakes):
+            running.joins("/slam")
+        running.repeat(slam, "odom base", 5)
+        assert [event.process for event in running.events if isinstance(event, Found)] == [process]
+
+
+@pytest.mark.parametrize(("ours", "process"), [(True, "slam"), (False, ""), (None, "slam")])
+def test_an_offender_whose_process_is_seen_is_of_the_run_or_is_not(*, ours: bool | None, process: str) -> None:
+    running = History(processes=(PlanProcess("slam", "run", nodes=("/slam",)),)).clear()
+    slam = running.joins("/slam")
+    running.send(slam, "odom base")
+    running.judge.graph([Writer(slam.gid, "/slam", static=False, volatile=False, ours=ours)], running.now)
+    (found,) = running.judge.tick(running.now + 0.2)
+    assert isinstance(found, Found)
+    assert found.process == process

@@ -10,10 +10,19 @@ import pytest
 
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, Ready, RosSettings, StopRule
 from tfcompose.pose import Pose
-from tfcompose.run.events import Clear, Complete, GateOpen, GateShut, Live, OwnerReady
+from tfcompose.run.events import Clear, Complete, GateOpen, GateShut, Live, OwnerReady, Remember
 from tfcompose.run.lives import refusal
 from tfcompose.run.machine import step
-from tfcompose.run.notice import AllReady, AllStarted, FindingShown, Notice, ProcessReady, ProcessState, Replanned
+from tfcompose.run.notice import (
+    AllReady,
+    AllStarted,
+    FindingShown,
+    Notice,
+    ProcessReady,
+    ProcessState,
+    RecoveredShown,
+    Replanned,
+)
 from tfcompose.run.orders import Absent, Gate, GuardOrder, Present
 from tfcompose.run.state import (
     Action,
@@ -302,6 +311,57 @@ def test_a_guard_that_is_restarted_is_told_who_is_absent_and_which_gates_are_shu
     assert history.started[-1] == "guard"
     assert history.orders == [Absent("slam"), Gate("lidar", topic="/scan")]
     assert history.found() == []
+
+
+def test_a_guard_that_dies_is_told_and_started_again_with_what_it_said_and_what_is_live_stays_so() -> None:
+    history = Life(GUARD, STATIC, SLAM).feed(Clear(), Live("map", "odom", "slam", "/slam"), OwnerReady("slam"))
+    history.feed(Remember({"a": 1, "b": 1}), Remember({"b": 2}))
+    history.told.clear()
+    history.feed(Exited("guard", -SIGKILL, ("last words",)))
+    (found,) = history.found()
+    assert (found.code, found.severity) == ("TF808", "warning")
+    assert found.message == "guard was ended by SIGKILL: nobody watches the tree until it is back"
+    assert [note.message for note in found.notes] == ["guard: last words"]
+    assert history.states("guard") == ["BACKOFF"]
+    assert history.state.live == {"odom"}
+    assert history.sleep_until_due() == pytest.approx(1)
+    assert (history.started[-1], history.state.memory) == ("guard", {"a": 1, "b": 2})
+    assert history.orders == [Absent("static"), Present("static")]
+    history.wait(0.5).feed(Clear())
+    (back,) = history.all(RecoveredShown)
+    assert back.text == "guard watches again after 1.5 s"
+    assert (history.state.stop, history.state.shown, history.killed) == (None, frozenset(), [])
+    assert history.state.tracked["guard"].restarts == 1
+
+
+def test_an_owner_that_ended_while_nobody_watched_is_to_be_seen_anew() -> None:
+    slam = replace(SLAM, restart="always")
+    history = Life(GUARD, slam).feed(Clear(), Live("map", "odom", "slam", "/slam"), Remember({"a": 1}))
+    history.feed(Exited("guard", 1), Exited("slam", 1))
+    history.orders.clear()
+    history.wait(1)
+    assert history.started == ["guard", "slam", "guard", "slam"]
+    assert (history.orders[0], history.orders[-1]) == (Absent("slam"), Present("slam"))
+    assert history.state.missing[0].child == "odom"
+
+
+def test_a_guard_that_dies_again_and_again_ends_everything_with_1() -> None:
+    history = Life(GUARD, STATIC).feed(Clear(), Remember({"a": 1}))
+    for _ in range(5):
+        history.feed(Exited("guard", 1)).sleep_until_due()
+    history.feed(Exited("guard", 1))
+    assert history.found()[-1].message == "guard ended with exit code 1, after 5 restarts"
+    assert [found.severity for found in history.found()] == ["warning"] * 5 + ["error"]
+    assert history.feed(Exited("static", 0)).exit_code == 1
+
+
+def test_a_guard_that_is_asked_for_anew_or_follows_another_plan_begins_without_memory() -> None:
+    history = Life(GUARD, STATIC).feed(Clear(), Remember({"a": 1}), Live("base_link", "laser", "static", "/static"))
+    history.feed(Asked("guard", "restart"), Exited("guard", 0))
+    assert (history.state.memory, history.state.live, history.found()) == ({}, frozenset(), [])
+    history.feed(Clear(), Remember({"a": 1}), Exited("guard", 1))
+    history.feed(NewPlan(plan_of(GUARD, STATIC), frozenset({"guard"})))
+    assert (history.state.memory, history.state.live, history.started[-1]) == ({}, frozenset(), "guard")
 
 
 # Other plans.

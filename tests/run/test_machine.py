@@ -255,9 +255,9 @@ def test_a_failed_process_ends_everything_with_exit_1_and_is_named(code: int, wo
     assert history.feed(Exited("static", -SIGINT)).exit_code == 1
 
 
-@pytest.mark.parametrize("kind", ["static", "joints", "simulate", "guard"])
+@pytest.mark.parametrize("kind", ["static", "joints", "simulate"])
 def test_a_built_in_process_that_ends_has_failed_even_with_exit_code_0(
-    kind: Literal["static", "joints", "simulate", "guard"],
+    kind: Literal["static", "joints", "simulate"],
 ) -> None:
     history = begin(PlanProcess("it", kind), SLAM).feed(Clear(), Exited("it", 0))
     assert history.found()[0].message == "it ended with exit code 0"
@@ -337,6 +337,30 @@ def test_a_violation_ends_everything_with_exit_1_where_the_policy_is_stop() -> N
     assert history.found() == [WARNING, ERROR]
     assert history.all(Stopping) == [Stopping("TF801 foreign_publisher")]
     assert history.feed(Exited("static", 0), Exited("guard", 0)).exit_code == 1
+
+
+def test_the_plans_own_offender_is_stopped_and_stays_so_where_the_policy_is_stop_offender() -> None:
+    policy = GuardPolicy(on_violation="stop-offender")
+    history = begin(GUARD, STATIC, run_process("slam", restart="always"), guard=policy).feed(Clear())
+    history.feed(Found(WARNING, "slam"), Found(ERROR))
+    assert (history.killed, history.found()) == ([], [WARNING, ERROR])
+    history.feed(Found(ERROR, "slam"))
+    assert history.killed == [("slam", SIGINT)]
+    assert "slam is stopped for it" in history.found()[-1].notes[-1].message
+    history.feed(Exited("slam", -SIGINT)).wait(60)
+    assert (history.started, history.states("slam")[-1], history.exit_code) == (
+        ["guard", "static", "slam"],
+        "STOPPED",
+        None,
+    )
+    assert "nothing is stopped: slam does not run" in history.feed(Found(ERROR, "slam")).found()[-1].notes[-1].message
+
+
+def test_an_offender_that_somebody_else_started_is_not_stopped() -> None:
+    history = begin(GUARD, DRIVE, STATIC, guard=GuardPolicy(on_violation="stop-offender")).feed(Clear())
+    history.feed(Found(ERROR, "drive"))
+    assert history.found()[-1].notes[-1].message == "nothing is stopped: somebody else starts and stops drive"
+    assert history.killed == []
 
 
 def test_a_violation_is_only_shown_where_the_policy_is_report() -> None:

@@ -18,7 +18,7 @@ import pytest
 from tests.waiting import until
 from tfcompose.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.planfile import write_plan
-from tfcompose.run.events import Clear, Complete, Live, OwnerReady, to_line
+from tfcompose.run.events import Clear, Complete, Live, OwnerReady, Remember, to_line
 from tfcompose.run.notice import Ended, FindingShown, LogLine, Notice, ProcessState
 from tfcompose.run.state import Times
 from tfcompose.run.supervisor import supervise
@@ -305,6 +305,25 @@ def test_a_guard_that_dies_before_it_is_clear_ends_everything_with_1(tmp_path: P
     assert [notice.process for notice in told if isinstance(notice, ProcessState) and notice.state == "STARTING"] == [
         "guard"
     ]
+
+
+def test_a_guard_that_dies_is_followed_by_one_that_is_given_its_memory_and_leaves_no_descriptor(tmp_path: Path) -> None:
+    code = """
+import os
+from pathlib import Path
+if "TFCOMPOSE_MEMORY_FD" in os.environ:
+    print("remembers", os.read(int(os.environ["TFCOMPOSE_MEMORY_FD"]), 1000).decode(), flush=True)
+    print("descriptors", len(os.listdir(f"/proc/{os.getppid()}/fd")), flush=True)
+os.write(int(os.environ["TFCOMPOSE_EVENTS_FD"]), SAID)
+"""
+    said = to_line(Clear()) + to_line(Remember({"é": [1, None]}))
+    dies = program("guard", code.replace("SAID", repr(said.encode())), kind="guard")
+    times = Times(backoff_s=0.05, backoff_limit_s=0.05)
+    returncode, told = run(tmp_path, dies, program("a", SLEEPER), times=times)
+    remembered, counted = logged(told, "guard")[::2], logged(told, "guard")[1::2]
+    assert remembered == ['remembers {"\\u00e9": [1, null]}'] * 5
+    assert len(set(counted)) == 1, counted
+    assert returncode == 1
 
 
 def test_output_that_nobody_reads_any_more_ends_everything_with_141_and_nothing_more_is_told(tmp_path: Path) -> None:

@@ -206,7 +206,11 @@ def _guard(spec: RobotSpec, joined: list[Joined]) -> GuardPolicy:
         else "error"
         if guard.unknown_edges == "error"
         else "warn",
-        on_violation="stop" if guard.on_violation == "stop" else "report",
+        on_violation="stop"
+        if guard.on_violation == "stop"
+        else "stop-offender"
+        if guard.on_violation == "stop-offender"
+        else "report",
         allow=allow,
     )
 

@@ -30,6 +30,24 @@ def origin(gid: bytes, own_gid: bytes) -> str:
     return f"on this machine as pid {pid}: {line}"
 
 
+def carries(gid: bytes, own_gid: bytes, variable: str) -> bool | None:
+    """Return whether the publisher's process has ``variable`` (NAME=VALUE) in its environment; None: nobody can say."""
+    if gid[:2] != _VENDOR or own_gid[:2] != _VENDOR:
+        return None
+    if gid[2:4] != own_gid[2:4]:
+        return False
+    found = [_environment(pid) for pid in _candidates(int.from_bytes(gid[4:6], "little")) if _command(pid)]
+    wanted = variable.encode()
+    return len(found) == 1 and wanted in found[0].split(b"\0")
+
+
+def _environment(pid: int) -> bytes:
+    try:
+        return Path(f"/proc/{pid}/environ").read_bytes()
+    except OSError:
+        return b""
+
+
 def _candidates(low: int) -> range:
     try:
         most = int(Path("/proc/sys/kernel/pid_max").read_text(encoding="ascii"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.run.driven import drives_of, sensor_of
 from tfcompose.run.events import Found, GuardEvent, Recovered, Taken
@@ -11,7 +11,7 @@ from tfcompose.run.offences import NAMELESS, Offence, taken, violation
 from tfcompose.run.senders import FEWEST_GAPS
 
 if TYPE_CHECKING:
-    from tfcompose.plan import Plan
+    from tfcompose.plan import Plan, PlanEdge
     from tfcompose.run.senders import Senders
 
 #: For how long after the start a publisher can turn out to have been there first, and by how much it must have been.
@@ -58,10 +58,11 @@ class Case:
 
 
 class Cases:
-    """All that were seen and are not over."""
+    """All that were seen and are not over; ``changes`` counts what was told."""
 
     def __init__(self, plan: Plan, senders: Senders, start: Start) -> None:
         self.open: dict[Key, Case] = {}
+        self.changes = 0
         self._plan = plan
         self._senders = senders
         self._start = start
@@ -97,6 +98,7 @@ class Cases:
             if now - self._reported.get(group, -COLLECTED_S) < COLLECTED_S:
                 continue
             self._reported[group] = now
+            self.changes += 1
             events.append(self._event(cases, now))
             for case in cases:
                 case.told = True
@@ -108,13 +110,13 @@ class Cases:
         if any(self._was_first(case, now) for case in cases):
             return Taken(taken(offences, where))
         driven = sensor_of(offences[0], self._drives)
-        return Found(violation(offences, self._plan, where, driven), self._process(offences[0]))
+        return Found(violation(offences, self._plan, where, driven), self._process(offences[0], cases[0].gid))
 
-    def _process(self, offence: Offence) -> str:
+    def _process(self, offence: Offence, gid: bytes | None) -> str:
         """Return the plan's process that did it, where that is sure and it can be stopped for it."""
         if offence.namesake or len(offence.nodes) != 1 or offence.code not in _STOPPED_FOR:
             return ""
-        return self._processes.get(offence.nodes[0], "")
+        return self._processes.get(offence.nodes[0], "") if self._senders.is_of_this_run(gid) else ""
 
     def _may_tell_more(self, gid: bytes | None, now: float) -> bool:
         """Whether more messages of this publisher can tell if it was there before the start."""
@@ -136,12 +138,39 @@ class Cases:
             return False
         return bool(sender.began_before(self._start.cleared_ns - FIRST_BY_NS, FEWEST_GAPS))
 
+    def memory(self) -> list[list[Any]]:
+        """Return what was told and is not over, as values of JSON."""
+        return [_to_json(case) for case in self.open.values() if case.told]
+
+    def recall(self, memory: list[list[Any]], until: float) -> None:
+        """Take these as told by the guard before, and as going on ``until`` then at least."""
+        planned = {edge.child: edge for edge in self._plan.edges}
+        for one in memory:
+            case = _from_json(one, planned, until)
+            key = (case.offence.code, case.offence.parent, case.offence.child, case.offence.who if case.gid else "")
+            self.open[key] = case
+
     def over(self, now: float) -> list[GuardEvent]:
         """Forget offences that have ended, and say so; the next of their kind is a new case."""
         ended = [key for key, case in self.open.items() if case.told and self._has_ended(case, now)]
+        self.changes += len(ended)
         return [Recovered(self.open.pop(key).offence.over) for key in ended]
 
     def _has_ended(self, case: Case, now: float) -> bool:
         if self._senders.is_present(case.gid) and not case.offence.of_stamps:
             return not case.offence.static and now - case.last > QUIET_S
         return now - case.last > OVER_S
+
+
+def _to_json(case: Case) -> list[Any]:
+    one = case.offence
+    gid = None if case.gid is None else case.gid.hex()
+    what = (one.code, one.parent, one.child, list(one.nodes), one.static, one.edge is not None)
+    return [*what, one.namesake, list(one.loop), one.detail, gid]
+
+
+def _from_json(data: list[Any], planned: dict[str, PlanEdge], last: float) -> Case:
+    code, parent, child, nodes, static, is_planned, namesake, loop, detail, gid = data
+    edge = planned.get(child) if is_planned else None
+    offence = Offence(code, parent, child, tuple(nodes), static, edge, namesake, tuple(loop), detail)
+    return Case(offence, None if gid is None else bytes.fromhex(gid), last, told=True)

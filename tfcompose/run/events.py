@@ -82,10 +82,18 @@ class GateShut:
     seen: str
 
 
-GuardEvent = Clear | Taken | Live | OwnerReady | Complete | Found | Recovered | GateOpen | GateShut
+@dataclass(frozen=True, slots=True)
+class Remember:
+    """What the next guard must know, should this one die: the launcher keeps it by key and does not look into it."""
+
+    changed: dict[str, Any]
+
+
+GuardEvent = Clear | Taken | Live | OwnerReady | Complete | Found | Recovered | GateOpen | GateShut | Remember
 
 _KINDS: dict[str, type[GuardEvent]] = {
-    kind.__name__: kind for kind in (Clear, Taken, Live, OwnerReady, Complete, Found, Recovered, GateOpen, GateShut)
+    kind.__name__: kind
+    for kind in (Clear, Taken, Live, OwnerReady, Complete, Found, Recovered, GateOpen, GateShut, Remember)
 }
 
 

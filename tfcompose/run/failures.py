@@ -9,7 +9,7 @@ from tfcompose.diagnostic import Diagnostic, Note, finding
 
 if TYPE_CHECKING:
     from tfcompose.plan import PlanEdge
-    from tfcompose.run.state import Tracked
+    from tfcompose.run.state import Exited, Tracked
 
 
 #: How many of an owner's edges a finding names.
@@ -39,6 +39,15 @@ def ended_by_itself(name: str, returncode: int, when: str, last_lines: tuple[str
     verb = "was ended by" if returncode < 0 else "ended with"
     notes = [Note(f"{name}: {line}") for line in last_lines]
     return finding("TF808", f"{name} {verb} {how_ended(returncode)}{when}", None, notes=notes)
+
+
+def guard_lost(name: str, event: Exited) -> Diagnostic:
+    """Return the finding for a guard that ended while the others run, and is started again."""
+    verb = "was ended by" if event.returncode < 0 else "ended with"
+    message = f"{name} {verb} {how_ended(event.returncode)}: nobody watches the tree until it is back"
+    notes = [Note(f"{name}: {line}") for line in event.last_lines]
+    advice = "it is started again, and knows what it has told"
+    return finding("TF808", message, None, severity="warning", notes=notes, help=advice)
 
 
 def not_started(name: str, why: str) -> Diagnostic:

@@ -10,7 +10,7 @@ tree's shape or a case changes.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.run.cases import Case, Cases, Start
 from tfcompose.run.events import Clear, Found, GuardEvent
@@ -34,6 +34,8 @@ NAMELESS_S = 0.7
 NAMELESS_OWNER_S = 5.0
 #: For so many kinds of messages what was judged of them is remembered.
 MOST_STREAMS = 4096
+#: A guard that follows one that died misses nobody for so long: it takes that to find all publishers again.
+FINDING_S = 5.0
 #: What was judged of a message with edges that the plan does not have holds for so long.
 STRANGE_S = 1.0
 
@@ -66,6 +68,7 @@ class Judge:
     _streams: dict[tuple[bytes | None, bool, tuple[tuple[str, str], ...]], _Stream] = field(default_factory=dict)
     _told: set[tuple[str, bytes]] = field(default_factory=set)
     _law: Law = field(init=False)
+    _finds_until: float = 0.0
 
     def __post_init__(self) -> None:
         self.live = Liveness(self.plan)
@@ -103,7 +106,7 @@ class Judge:
             if writer.best_effort:
                 topic = "/tf_static" if writer.static else "/tf"
                 events += self._once("TF826", writer, best_effort_writer(writer.node, topic))
-        if self._start.cleared is not None:
+        if self._start.cleared is not None and now >= self._finds_until:
             events += self.live.static_writers({w.node for w in writers if w.static and w.node is not None})
         return events
 
@@ -166,6 +169,37 @@ class Judge:
         for edge in edges:
             self._law.owners.forget(edge.child)
         self._law.changes += 1
+
+    # What the next guard must know.
+
+    @property
+    def mark(self) -> tuple[int, ...]:
+        """What changes when there is more to remember."""
+        return (self._law.changes, self.cases.changes, self.live.changes, len(self._told), *self._senders.mark)
+
+    def memory(self) -> dict[str, Any]:
+        """Return what the guard that follows this one must know, part by part, as values of JSON."""
+        start, told = self._start, sorted([code, gid.hex()] for code, gid in self._told)
+        return {
+            "start": [start.begun, start.begun_ns, start.cleared, start.cleared_ns],
+            "owners": self._law.owners.memory(),
+            "senders": self._senders.memory(),
+            "cases": self.cases.memory(),
+            "told": told,
+            "live": self.live.memory(),
+        }
+
+    def recall(self, memory: dict[str, Any], now: float) -> list[GuardEvent]:
+        """Know what the guard before knew, and return that the look before the start is over."""
+        self._finds_until = now + FINDING_S
+        start = self._start
+        start.begun, start.begun_ns, start.cleared, start.cleared_ns = memory["start"]
+        self._law.owners.recall(memory["owners"])
+        self._senders.recall(memory["senders"])
+        self.cases.recall(memory["cases"], self._finds_until)
+        self._told = {(code, bytes.fromhex(gid)) for code, gid in memory["told"]}
+        self.live.recall(memory["live"], now, self._finds_until)
+        return [Clear()]
 
     # What is seen.
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.run.events import Complete, Found, GuardEvent, Live, OwnerReady, Recovered
 from tfcompose.run.silence import change_event, left
@@ -54,6 +54,10 @@ class Watched:
         if self._looked is None or now < self._catching_up_until:
             return self._seconds
         return self._seconds + min(max(now - self._looked, 0.0), LOOK_COUNTS_S)
+
+    def begins_late(self, until: float) -> None:
+        """Take what is missing until then as not found yet."""
+        self._catching_up_until = until
 
     def look(self, now: float) -> float:
         """Note that the guard looks now, and return the seconds until then."""
@@ -121,9 +125,10 @@ class Track:
 
 
 class Liveness:
-    """The planned edges and their owners."""
+    """The planned edges and their owners; ``changes`` counts what was told, and what became of owners."""
 
     def __init__(self, plan: Plan) -> None:
+        self.changes = 0
         self._order = {edge.child: index for index, edge in enumerate(plan.edges)}
         together: dict[tuple[str, str, float | None], list[PlanEdge]] = {}
         for edge in plan.edges:
@@ -140,6 +145,7 @@ class Liveness:
     def absent(self, owner: str) -> None:
         """Take the owner as stopped on purpose: nobody misses its edges, and none of them is live."""
         self._absent.add(owner)
+        self.changes += 1
         self._gone.discard(owner)
         self._complete = False
         tracks = [track for track in self.tracks if track.edge.owner == owner]
@@ -151,6 +157,26 @@ class Liveness:
     def present(self, owner: str) -> None:
         """Take the owner as started: its edges are to be seen anew."""
         self._absent.discard(owner)
+
+    def memory(self) -> dict[str, Any]:
+        """Return what the next guard must know, as values of JSON: who is live, slow, silent (since when)."""
+        silent = [[track.silent_since, _children([track])] for track in self.tracks if track.silent]
+        live, slow = ([t for t in self.tracks if t.live], [t for t in self.tracks if t.slow])
+        return {"live": _children(live), "slow": _children(slow), "silent": silent, "gone": sorted(self._gone)}
+
+    def recall(self, memory: dict[str, Any], now: float, until: float) -> None:
+        """Know what the guard before knew, and miss nobody before ``until``: publishers have to be found again."""
+        self._watched.begins_late(until)
+        self._gone = set(memory["gone"])
+        for track in self._parted(tuple(memory["live"])):
+            track.live, track.last = True, now
+            self._waiting[track.edge.owner].difference_update(edge.child for edge in track.edges)
+        for track in self._parted(tuple(memory["slow"])):
+            track.slow = True
+        for since, children in memory["silent"]:
+            for track in self._parted(tuple(children)):
+                track.silent, track.silent_since, track.last = True, since, since
+        self._complete = not any(self._waiting.values())
 
     def arrived(self, children: tuple[str, ...], now: float, delay_s: float | None = None) -> list[GuardEvent]:
         """Note that owners sent these edges, in one message, and return what that means."""
@@ -187,6 +213,7 @@ class Liveness:
     def _began(self, track: Track) -> list[GuardEvent]:
         """Return that the track's edges are live."""
         owner = track.edge.owner
+        self.changes += 1
         events: list[GuardEvent] = [Live(e.parent, e.child, e.owner, e.node) for e in track.edges]
         waiting = self._waiting[owner]
         waiting.difference_update(edge.child for edge in track.edges)
@@ -213,6 +240,7 @@ class Liveness:
             change = _change(track, seen) if track.live and track.silent_after is not None else None
             if change:
                 changed.setdefault((change, track.edge.owner), []).append(track)
+        self.changes += len(changed)
         return [change_event(change, self._in_order(tracks), seen, now) for (change, _), tracks in changed.items()]
 
     def _in_order(self, tracks: list[Track]) -> list[Track]:
@@ -234,7 +262,12 @@ class Liveness:
             elif edge.node in nodes and owner in self._gone:
                 self._gone.discard(owner)
                 events.append(Recovered(f"{owner} ({edge.node}) is back"))
+        self.changes += len(events)
         return events
+
+
+def _children(tracks: list[Track]) -> list[str]:
+    return [edge.child for track in tracks for edge in track.edges]
 
 
 def _change(track: Track, seen: float) -> str | None:

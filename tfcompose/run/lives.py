@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import did_you_mean
-from tfcompose.run.failures import ended_by_itself, how_ended
+from tfcompose.run.failures import ended_by_itself, guard_lost, how_ended
 from tfcompose.run.notice import Replanned
 from tfcompose.run.orders import Absent
 from tfcompose.run.state import MAX_RESTARTS, Order, Tracked
@@ -23,6 +23,9 @@ def exited(turn: Turn, event: Exited) -> None:
     one = turn.state.tracked[name]
     if turn.state.stop:
         turn.enter(name, "STOPPED", how)
+        return
+    if name == turn.state.guard and turn.state.clear is not None and not one.leaving:
+        _guard_ended(turn, one, event)
         return
     lose(turn, one)
     one = turn.state.tracked[name]
@@ -45,12 +48,23 @@ def exited(turn: Turn, event: Exited) -> None:
         turn.fail(ended_by_itself(name, event.returncode, when, event.last_lines))
 
 
+def _guard_ended(turn: Turn, one: Tracked, event: Exited) -> None:
+    """Have a guard that died follow itself: what it said holds, and the next one is given its memory."""
+    if not turn.state.memory:
+        lose(turn, one)
+    unwatched = turn.now if turn.state.unwatched is None else turn.state.unwatched
+    turn.know(unwatched=unwatched)
+    _restart_later(turn, turn.state.tracked[event.name], event)
+    if turn.state.stop is None:
+        turn.show(guard_lost(event.name, event))
+
+
 def lose(turn: Turn, one: Tracked) -> None:
     """Take the edges of a process as not live: it has ended, or is about to."""
     state, name = turn.state, one.process.name
     turn.track(name, replace(one, ready=False, ready_since=None, seen="", late=False))
     if name == state.guard:
-        turn.know(live=frozenset(), complete=not state.plan.edges)
+        turn.know(live=frozenset(), complete=not state.plan.edges, memory={})
     elif one.process.owns:
         live = state.live - {child for _, child in one.process.owns}
         turn.know(live=live, complete=False, waiting_said=None if state.waiting_said is None else turn.now)
@@ -130,6 +144,8 @@ def follow(turn: Turn, event: NewPlan) -> None:
         waiting_said=turn.now,
         begun_anew=turn.now,
     )
+    if state.guard is not None and not before[state.guard].alive:
+        turn.know(memory={}, live=frozenset())  # the next one looks anew, at the new plan
     gone = {name: one for name, one in before.items() if name not in turn.state.tracked}
     for name, one in gone.items():
         if one.alive:

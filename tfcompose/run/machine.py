@@ -12,12 +12,24 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.run.events import Clear, Complete, Found, GateOpen, GateShut, Live, OwnerReady, Recovered, Taken
+from tfcompose.run.events import (
+    Clear,
+    Complete,
+    Found,
+    GateOpen,
+    GateShut,
+    Live,
+    OwnerReady,
+    Recovered,
+    Remember,
+    Taken,
+)
 from tfcompose.run.failures import in_short, never_clear, never_seen, not_started, signal_name
 from tfcompose.run.gates import kind_of, look, opened, order_gate, say_progress
 from tfcompose.run.lives import asked, exited, follow, lose
 from tfcompose.run.notice import Missing, OwnerLive, RecoveredShown, TreeComplete, Waiting
-from tfcompose.run.orders import Absent
+from tfcompose.run.offender import judged
+from tfcompose.run.orders import Absent, Present
 from tfcompose.run.state import (
     UNREAD,
     Action,
@@ -139,10 +151,20 @@ def _started(turn: Turn, name: str, pid: int) -> None:
         order_gate(turn, turn.state.tracked[name])
     elif turn.state.clear is not None:  # it joins the others
         for other in turn.state.tracked.values():
-            if other.process.owns and other.state not in ("STARTING", "RUNNING", "EXPECTED"):
-                turn.actions.append(Order(Absent(other.process.name)))
+            _say_of(turn, other)
             if not other.ready and other.state in ("RUNNING", "EXPECTED"):
                 order_gate(turn, other)
+
+
+def _say_of(turn: Turn, owner: Tracked) -> None:
+    """Tell a guard that joins what became of an owner meanwhile, whatever the one before it knew."""
+    name = owner.process.name
+    runs = owner.state in ("STARTING", "RUNNING", "EXPECTED")
+    missing = any(child not in turn.state.live for _, child in owner.process.owns)
+    if owner.process.owns and not runs:
+        turn.actions.append(Order(Absent(name)))
+    elif missing and turn.state.memory:
+        turn.actions += [Order(Absent(name)), Order(Present(name))]
 
 
 def _signalled(turn: Turn, name: str) -> None:
@@ -175,19 +197,28 @@ def _guard_said(turn: Turn, event: Event) -> None:
     seconds = turn.now - (turn.state.begun or 0.0)
     match event:
         case Clear():
-            turn.know(clear=turn.now if turn.state.clear is None else turn.state.clear)
+            _cleared(turn, seconds)
         case Live(child=child):
             turn.know(live=turn.state.live | {child})
         case Complete(edges):
             _complete(turn, edges)
-        case Found(found):
-            turn.show(found)
-            if found.severity == "error" and turn.state.plan.guard.on_violation == "stop":
-                turn.stop(Stop("failure", 1), in_short(found))
+        case Found(found, process):
+            judged(turn, found, process)
         case Recovered(message):
             turn.tell(RecoveredShown(message, seconds))
+        case Remember(changed):
+            turn.know(memory=turn.state.memory | changed)
         case _:
             pass
+
+
+def _cleared(turn: Turn, seconds: float) -> None:
+    state = turn.state
+    if state.clear is None:
+        turn.know(clear=turn.now)
+    if state.unwatched is not None:
+        turn.know(unwatched=None)
+        turn.tell(RecoveredShown(f"{state.guard} watches again after {turn.now - state.unwatched:.1f} s", seconds))
 
 
 def _complete(turn: Turn, edges: int) -> None:

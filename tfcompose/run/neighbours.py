@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING
 
 from tfcompose.ros.graph import UNKNOWN_NODE, own_gid, writers, writers_unmapped
-from tfcompose.ros.origin import origin
+from tfcompose.ros.origin import carries, origin
+from tfcompose.run.place import RUN_ID
 from tfcompose.run.senders import Writer
 
 if TYPE_CHECKING:
@@ -26,6 +28,8 @@ class Graph:
         self.topics = topics
         self._node = node
         self._where: dict[bytes, str] = {}
+        self._ours: dict[bytes, bool | None] = {}
+        self._run = f"{RUN_ID}={os.environ[RUN_ID]}" if RUN_ID in os.environ else ""
         self._own = b""
 
     def writers(self) -> list[Writer]:
@@ -45,9 +49,10 @@ class Graph:
         where = self._where.get(one.gid)
         if where is None:
             where = self._where[one.gid] = origin(one.gid, self._own_gid())
+            self._ours[one.gid] = carries(one.gid, self._own_gid(), self._run) if self._run else None
         node = None if one.node.endswith(UNKNOWN_NODE) else one.node
         volatile, best_effort = one.durability == "volatile", one.reliability == "best_effort"
-        return Writer(one.gid, node, static, volatile, best_effort, where)
+        return Writer(one.gid, node, static, volatile, best_effort, where, self._ours[one.gid])
 
     def _own_gid(self) -> bytes:
         """Return an id of this process's: that of its reader."""

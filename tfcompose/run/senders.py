@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from statistics import median
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -14,6 +14,8 @@ GAPS, FEWEST_GAPS = 5, 2
 #: A gap that was seen may be shorter than usual by this factor.
 UNSURE = 3.0
 UNCOUNTED = 2**64 - 1
+#: So many bytes of an id are its participant's (RTPS: a GUID's prefix).
+PARTICIPANT = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +39,8 @@ class Message:
 class Writer:
     """A publisher in the graph; ``node`` is None while its name is not known.
 
-    ``where`` says on which machine and as which process it runs, as far as that is known.
+    ``where`` says on which machine and as which process it runs, as far as that is known. ``ours`` says whether that
+    process is of the guard's own run; None: not known.
     """
 
     gid: bytes
@@ -46,6 +49,7 @@ class Writer:
     volatile: bool
     best_effort: bool = False
     where: str = ""
+    ours: bool | None = None
 
 
 @dataclass(slots=True)
@@ -109,6 +113,34 @@ class Senders:
         """Return where the publisher runs, empty where that is not known."""
         return "" if gid is None else self._where.get(gid, "")
 
+    def is_of_this_run(self, gid: bytes | None) -> bool:
+        """Whether the publisher is surely a process of the guard's own run.
+
+        Where its process cannot be seen, its node's name says so if no other participant has a node of that name.
+        """
+        writer = self.writers.get(gid) if gid is not None else None
+        if writer is None or writer.ours is not None:
+            return writer is not None and bool(writer.ours)
+        return len({one.gid[:PARTICIPANT] for one in self.writers.values() if one.node == writer.node}) == 1
+
+    @property
+    def mark(self) -> tuple[int, int]:
+        """What changes when there is more to remember."""
+        return len(self._heard), len(self._names)
+
+    def memory(self) -> dict[str, list[Any]]:
+        """Return what the next guard must know of those that are there, as values of JSON."""
+        known = {gid: sender for gid, sender in self._heard.items() if gid in self.writers}
+        return {gid.hex(): [self._names.get(gid), *_to_json(one)] for gid, one in known.items()}
+
+    def recall(self, memory: dict[str, list[Any]]) -> None:
+        """Know what the guard before knew."""
+        for hexed, (name, *said) in memory.items():
+            gid = bytes.fromhex(hexed)
+            self._heard[gid] = Sender(*said)
+            if name is not None:
+                self._names[gid] = name
+
     def sender(self, gid: bytes | None) -> Sender | None:
         """Return what is known of that publisher's messages."""
         return None if gid is None else self._heard.get(gid)
@@ -122,3 +154,8 @@ class Senders:
     def is_present(self, gid: bytes | None) -> bool:
         """Whether the publisher is in the graph; one without an id is while anybody is."""
         return bool(self.writers) if gid is None else gid in self.writers
+
+
+def _to_json(one: Sender) -> list[Any]:
+    first = (one.first_seen, one.first_ns, one.first_sequence)
+    return [*first, one.last_ns, one.last_sequence, list(one.gaps_ns)]

@@ -5,8 +5,8 @@ Times are seconds of one monotonic clock.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
 
 from tfcompose.run.events import GuardEvent
 
@@ -255,6 +255,7 @@ class State:
     """Everything that is known about a running plan.
 
     ``live`` holds the children of the edges that were seen; ``begun_anew`` is when another plan came, if one did.
+    ``memory`` is what the guard said that the next one must know; ``unwatched`` is since when it is dead, if it is.
     """
 
     plan: Plan
@@ -274,6 +275,8 @@ class State:
     stop: Stop | None = None
     because: tuple[str, ...] = ()
     finished: bool = False
+    memory: dict[str, Any] = field(default_factory=dict)
+    unwatched: float | None = None
 
     @property
     def missing(self) -> tuple[PlanEdge, ...]:

@@ -222,7 +222,7 @@ class _Supervisor:
             self._events.append(StartFailed(name, _reason(error)))
 
     def _spawn_guard(self, name: str) -> None:
-        pipes = GuardPipes(joins=self._state.clear is not None)
+        pipes = GuardPipes(joins=self._state.clear is not None, memory=self._state.memory)
         command = self._commands[name]
         try:
             child = self._spawn(name, replace(command, env=command.env | pipes.env), pipes.theirs)

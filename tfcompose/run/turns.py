@@ -30,6 +30,15 @@ class Turns:
         """Whether somebody has sent the frame."""
         return child in self._gids
 
+    def memory(self) -> dict[str, list[str]]:
+        """Return what the next guard must know, as values of JSON."""
+        return {child: [gid.hex(), before.hex() if before else ""] for child, (gid, before) in self._gids.items()}
+
+    def recall(self, memory: dict[str, list[str]]) -> None:
+        """Know what the guard before knew."""
+        for child, (gid, before) in memory.items():
+            self._gids[child] = (bytes.fromhex(gid), bytes.fromhex(before) or None)
+
     def current(self, child: str) -> bytes | None:
         """Return who sent it last."""
         return self._gids[child][0] if child in self._gids else None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 import time
 from typing import TYPE_CHECKING
 
@@ -12,18 +11,20 @@ from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFSubscription, wait
 from tfcompose.run.bulletin import Bulletin
 from tfcompose.run.clock_watch import ClockWatch
-from tfcompose.run.events import EVENTS_FD, Clear, Complete, GateOpen, GateShut, Live, OwnerReady, to_line
 from tfcompose.run.gatekeeper import Gates
 from tfcompose.run.hearing import Hearing
 from tfcompose.run.heeding import Orders
 from tfcompose.run.judge import Judge
+from tfcompose.run.memory import Memory, recalled
 from tfcompose.run.neighbours import GLOBAL, Graph
 from tfcompose.run.orders import JOINS
 from tfcompose.run.own import say
 from tfcompose.run.topics import plans_by_topics, together
+from tfcompose.run.voice import Voice
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from typing import Any
 
     from rclpy.node import Node
 
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
     from tfcompose.run.own import Own
 
 SETTLE = "TFCOMPOSE_SETTLE_S"
-#: What a guard says that is switched off: it looks, and judges nobody.
-_SEEN = (Clear, Live, OwnerReady, Complete, GateOpen, GateShut)
 DEFAULT_SETTLE_S = 1.0
 LOOK_EVERY_S = 0.1
 
@@ -46,7 +45,9 @@ def guard(own: Own, stop: Stop) -> None:
     joins = bool(os.environ.get(JOINS))
     settle_s = float(os.environ.get(SETTLE, DEFAULT_SETTLE_S)) if judges and not joins else 0.0
     plans = plans_by_topics(own.plan, own.process)
-    emit = together(_emitter(judges=judges), list(plans.values()))
+    voice = Voice(judges=judges)
+    emit = together(voice.emit, list(plans.values()))
+    left = recalled(os.environ)
     with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
         now = time.monotonic()
         watches = []
@@ -55,11 +56,15 @@ def guard(own: Own, stop: Stop) -> None:
             judge = Judge(plan, settle_s, now, 0 if joins or not judges else time.time_ns())
             watches.append(_Watch(node, topics, judge, emit))
             if joins or not judges:
-                watches[-1].begin(now)
+                watches[-1].begin(now, left.get(" ".join(topics)))
         if GLOBAL not in plans:
             watches[0].watch_global_topics()
         orders = Orders([watch.judge for watch in watches], Gates(node, emit))
-        say(f"watching {_counted(own.plan)}{'' if judges else ', and judging nobody'}")
+        memories = [
+            Memory(" ".join(topics), watch.judge, voice.emit) for topics, watch in zip(plans, watches, strict=True)
+        ]
+        say(f"watching {_counted(own.plan)}{'' if judges else ', and judging nobody'}{' again' if left else ''}")
+        voice.flush()
         clock = ClockWatch(own, node)
         bulletin = Bulletin(node, own.plan.robot)
         while not stop.requested:
@@ -67,6 +72,9 @@ def guard(own: Own, stop: Stop) -> None:
             orders.take()
             for watch in watches:
                 watch.look()
+            for memory in memories:
+                memory.look()
+            voice.flush()
             bulletin.look([watch.judge for watch in watches])
             clock.look()
 
@@ -91,9 +99,9 @@ class _Watch:
         """Look for nodes of the plan on the global topics too, where they do not belong."""
         self._leaks_to = self._graph.topics
 
-    def begin(self, now: float) -> None:
+    def begin(self, now: float, memory: dict[str, Any] | None) -> None:
         """Look at nothing before the start: it was long ago, or is nobody's business."""
-        self._pass_on(self.judge.tick(now))
+        self._pass_on(self.judge.tick(now) if memory is None else self.judge.recall(memory, now))
 
     def look(self) -> None:
         """Take what has come, and from time to time the graph."""
@@ -135,23 +143,3 @@ class _Watch:
 
 def _counted(plan: Plan) -> str:
     return f"{len(plan.edges)} edge{'s' if len(plan.edges) != 1 else ''}"
-
-
-def _emitter(*, judges: bool) -> Callable[[GuardEvent], None]:
-    """Return what takes an event: a writer to the launcher's pipe, or, without a launcher, to the output."""
-    pipe = (
-        os.fdopen(int(os.environ[EVENTS_FD]), "w", encoding="utf-8", buffering=1) if EVENTS_FD in os.environ else None
-    )
-
-    def emit(event: GuardEvent) -> None:
-        if not judges and not isinstance(event, _SEEN):
-            return
-        if pipe is None:
-            say(to_line(event).rstrip())
-            return
-        try:
-            pipe.write(to_line(event))
-        except BrokenPipeError:
-            sys.exit(1)  # the launcher is gone
-
-    return emit

@@ -73,7 +73,11 @@ class GuardSpec(Model):
 
     mode: str = key(choice("off", "watch"), "watch")
     unknown_edges: str = key(choice("ignore", "warn", "error"), "warn", "an edge that nobody declared")
-    on_violation: str = key(choice("report", "stop"), "report")
+    on_violation: str = key(
+        choice("report", "stop-offender", "stop"),
+        "report",
+        "stop-offender ends the plan's own process that surely did it, stop ends everything",
+    )
     allow: tuple[AllowedEdge, ...] = key(listing(record(AllowedEdge)), ())
 
 

@@ -66,6 +66,8 @@ CODES = {
     "TF331": "claim_not_declared",
     "TF332": "owner_not_known_to_publish",
     "TF333": "parameter_disagrees",
+    "TF334": "parameters_of_another_node",
+    "TF335": "clocks_mixed",
     # poses and conventions
     "TF401": "optical_frame_not_rotated",
     "TF402": "quaternion_not_unit",
@@ -151,6 +153,7 @@ CODES = {
     "TF815": "process_without_role",
     "TF816": "path_cannot_be_told",
     "TF817": "process_not_ready",
+    "TF818": "required_without_role",
     "TF820": "live_loop",
     "TF821": "self_transform",
     "TF822": "two_writers",

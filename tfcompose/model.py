@@ -331,6 +331,12 @@ class Edge:
         return f"{self.parent} → {self.child}"
 
 
+class AsInFile(str):
+    """A parameter as it stands without quotes in somebody's parameter file: what it is, is for ROS to say."""
+
+    __slots__ = ()
+
+
 @dataclass(frozen=True, slots=True)
 class Node:
     """One ROS node of a process, by its full name; ``lifecycle`` is the state that it is brought into.

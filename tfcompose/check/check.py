@@ -25,6 +25,8 @@ from tfcompose.check.rules.tf309_many_static_publishers import many_static_publi
 from tfcompose.check.rules.tf310_switched_edge_without_owner import switched_edge_without_owner
 from tfcompose.check.rules.tf311_switched_edge_static import switched_edge_static
 from tfcompose.check.rules.tf314_publish_frequency_too_low import publish_frequency_too_low
+from tfcompose.check.rules.tf334_parameters_of_another_node import parameters_of_another_node
+from tfcompose.check.rules.tf335_clocks_mixed import clocks_mixed
 from tfcompose.check.rules.tf401_optical_frame_not_rotated import optical_frame_not_rotated
 from tfcompose.check.rules.tf410_degrees_as_radians import degrees_as_radians
 from tfcompose.check.rules.tf411_rounded_right_angle import rounded_right_angle
@@ -62,6 +64,7 @@ from tfcompose.check.rules.tf717_interface_claimed_twice import interface_claime
 from tfcompose.check.rules.tf718_mimic_joint_commanded import mimic_joint_commanded
 from tfcompose.check.rules.tf812_start_order_loop import start_order_loop
 from tfcompose.check.rules.tf815_process_without_role import process_without_role
+from tfcompose.check.rules.tf818_required_without_role import required_without_role
 from tfcompose.diagnostic import Diagnostic, Severity, Span, finding
 
 if TYPE_CHECKING:
@@ -108,6 +111,8 @@ RULES: tuple[Rule, ...] = (
     Rule("TF310", switched_edge_without_owner),
     Rule("TF311", switched_edge_static),
     Rule("TF314", publish_frequency_too_low),
+    Rule("TF334", parameters_of_another_node),
+    Rule("TF335", clocks_mixed),
     Rule("TF401", optical_frame_not_rotated),
     Rule("TF410", degrees_as_radians, WARNING),
     Rule("TF411", rounded_right_angle, WARNING),
@@ -145,6 +150,7 @@ RULES: tuple[Rule, ...] = (
     Rule("TF718", mimic_joint_commanded),
     Rule("TF812", start_order_loop),
     Rule("TF815", process_without_role, WARNING),
+    Rule("TF818", required_without_role, WARNING),
 )
 
 

@@ -6,6 +6,7 @@ import json
 import re
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.model import AsInFile
 from tfcompose.plan import told_at_start
 
 if TYPE_CHECKING:
@@ -51,6 +52,14 @@ def _mapping(values: dict[str, Any], indent: str) -> list[str]:
     return lines
 
 
+#: A word that YAML takes for one, wherever it stands.
+_PLAIN = re.compile(r"[A-Za-z0-9_.+-]+")
+
+
 def _text(value: Any) -> str:
-    """Return the value as JSON that is YAML as well."""
+    """Return the value as JSON that is YAML as well; a word of somebody's parameter file as it stood there."""
+    if isinstance(value, AsInFile) and _PLAIN.fullmatch(value):
+        return str(value)
+    if isinstance(value, list):
+        return f"[{', '.join(map(_text, value))}]"
     return _ESCAPED.sub(lambda found: f"\\u{ord(found[0]):04x}", json.dumps(value, ensure_ascii=False))

@@ -129,6 +129,9 @@ def resolve(
         hardware=tuple(one for part in joined if not part.said.namespace for one in part.robot.hardware),
         blocks=tuple(one for part in joined if not part.said.namespace for one in part.robot.blocks),
     )
+    if any(isinstance(node.params.get("file"), (str, list)) for process in processes for node in process.nodes):
+        robot, refused = import_module("tfcompose.resolve.param_files").with_param_files(robot, source, read)
+        found += refused
     return Resolved(_completed(robot, spec, source, disk, found), tuple(found), whole)
 
 

@@ -173,7 +173,11 @@ class NodeSpec(Model):
 
     preset: str | None = key(TEXT, None, "what is known of this node: its edges and parameters", ("slam_toolbox",))
     publishes: tuple[ClaimSpec, ...] = key(PUBLISHES, (), _PUBLISHES_ABOUT)
-    params: dict[str, Any] = key(mapping(ANYTHING), {}, "the node's parameters, passed on as they are")
+    params: dict[str, Any] = key(
+        mapping(ANYTHING),
+        {},
+        "the node's parameters, passed on as they are; file: names parameter files, over which the others are laid",
+    )
     lifecycle: str | None = key(LIFECYCLE, None, "a lifecycle node is brought into this state after the start")
 
 
@@ -216,7 +220,11 @@ class Started(Model):
         ("slam_toolbox", {"preset": "slam_toolbox"}),
     )
     publishes: tuple[ClaimSpec, ...] = key(PUBLISHES, (), _PUBLISHES_ABOUT)
-    params: dict[str, Any] = key(mapping(ANYTHING), {}, "the node's parameters, passed on as they are")
+    params: dict[str, Any] = key(
+        mapping(ANYTHING),
+        {},
+        "the node's parameters, passed on as they are; file: names parameter files, over which the others are laid",
+    )
     lifecycle: str | None = key(LIFECYCLE, None, "the lifecycle node is brought into this state after the start")
     log_level: str | None = key(choice("debug", "info", "warn", "error", "fatal"), None, "of its nodes' loggers")
     remap: dict[str, str] = key(mapping(TEXT), {}, "topic names: from, to")

@@ -1,0 +1,138 @@
+"""Parameter files that processes name: which parameters are taken, under which name, and how they are written."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tfcompose.cli.compiling import library
+from tfcompose.compile import Compiled, compile_robot
+from tfcompose.diagnostic import RejectedError, Span, finding
+from tfcompose.emit import emit
+from tfcompose.load.params import load_params
+from tfcompose.planfile import read_plan
+from tfcompose.resolve.param_files import matches
+
+HEAD = "tfcompose: 1\nrobot: r\nros: {namespace: robot1}\nframes: {base_link: {}}\nprocesses:\n"
+PLANNER = "  planner: {run: {package: p, executable: e}, params: PARAMS}\n"
+FILE = """
+/**: {ros__parameters: {common: 1, deep: {a: 1, b: 2}}}
+planner:
+  ros__parameters: {deep: {b: 3}, flag: on, octal: 012, text: "on", names: [base, "7", .5], empty: []}
+/robot1/planner: {ros__parameters: {last: yes}}
+/planner: {ros__parameters: {not_mine: 1}}
+robot1:
+  planner: {ros__parameters: {nested: 1}}
+/*/planner: {ros__parameters: {one_part: 1}}
+"""
+
+
+def compiled(params: str, **files: str) -> Compiled:
+    texts = {"p.yaml": FILE} | {f"{name}.yaml": text for name, text in files.items()}
+
+    def read(name: str) -> str:
+        if name not in texts:
+            raise RejectedError([finding("TF001", "cannot be read: no such file", Span(name))])
+        return texts[name]
+
+    return compile_robot(HEAD + PLANNER.replace("PARAMS", params), "r.yaml", library(), read=read)
+
+
+def written(params: str, **files: str) -> str:
+    result = compiled(params, **files)
+    assert not result.errors, [one.message for one in result.errors]
+    assert result.robot
+    return {file.path: file.text for file in emit(result.robot)}["params/planner.yaml"]
+
+
+def test_what_the_file_says_to_the_node_is_taken_in_its_order_and_inline_parameters_are_laid_over_it() -> None:
+    params = yaml.safe_load(written("{file: p.yaml, deep: {a: 9}, own: x}"))
+    assert list(params) == ["/robot1/planner"]
+    said = params["/robot1/planner"]["ros__parameters"]
+    assert said["deep"] == {"a": 9, "b": 3}
+    assert said["common"] == said["one_part"] == 1
+    assert said["own"] == "x"
+    assert "not_mine" not in said
+    assert "nested" not in said  # robot1/planner below robot1 is /robot1/robot1/planner
+
+
+def test_words_stay_as_they_were_written() -> None:
+    text = written("{file: p.yaml}")
+    assert '"flag": on\n' in text
+    assert '"octal": 012\n' in text
+    assert '"text": "on"\n' in text
+    assert '"names": [base, "7", .5]\n' in text
+    assert '"last": yes\n' in text
+
+
+def test_later_files_are_laid_over_earlier_ones() -> None:
+    text = written("{file: [p.yaml, q.yaml]}", q="planner: {ros__parameters: {common: 2}}")
+    assert yaml.safe_load(text)["/robot1/planner"]["ros__parameters"]["common"] == 2
+
+
+def test_the_digest_of_the_plan_changes_with_the_file() -> None:
+    def digest(file: str) -> str:
+        robot = compiled("{file: q.yaml}", q=file).robot
+        assert robot
+        return read_plan(next(file.text for file in emit(robot) if file.path == "plan.json"), "p").spec_digest
+
+    one, other = "planner: {ros__parameters: {a: 1}}", "planner: {ros__parameters: {a: 2}}"
+    assert digest(one) == digest(one) != digest(other)
+
+
+@pytest.mark.parametrize(
+    ("params", "file", "code", "message"),
+    [
+        ("{file: none.yaml}", "", "TF001", "no such file"),
+        ("{file: [3]}", "", "TF103", "names of files"),
+        ("{file: q.yaml}", "[1, 2]", "TF002", "mapping of nodes"),
+        ("{file: q.yaml}", "a: {b: [}", "TF002", ""),
+        ("{file: q.yaml}", "a: 3", "TF018", "no node"),
+        ("{file: q.yaml}", "planer: {ros__parameters: {a: 1}}", "TF334", "/robot1/planner"),
+        ("{file: q.yaml}", "x: &x [1]\n" * 1, "TF018", "no node"),
+        ("{planner: {ros__parameters: {a: 1}}}", "", "TF334", "stand under planner"),
+        ("{ros__parameters: {a: 1}}", "", "TF334", "stand under ros__parameters"),
+    ],
+)
+def test_what_is_no_parameter_of_the_node_is_a_finding(params: str, file: str, code: str, message: str) -> None:
+    errors = compiled(params, q=file).errors
+    assert [one.code for one in errors] == [code], [one.message for one in errors]
+    assert message in errors[0].message
+
+
+def test_an_alias_bomb_is_refused() -> None:
+    bomb = "a: &a0 {ros__parameters: {x: [1,1,1,1,1,1,1,1,1,1]}}\n"
+    lines = [bomb, "b: &b0 [1,1,1,1,1,1,1,1,1,1]\n"]
+    lines += [f"b{i}: &b{i} [{', '.join([f'*b{i - 1}'] * 10)}]\n" for i in range(1, 9)]
+    lines.append("planner: {ros__parameters: {x: *b8}}\n")
+    errors = compiled("{file: q.yaml}", q="".join(lines)).errors
+    assert "TF008" in {one.code for one in errors}
+
+
+@pytest.mark.parametrize(
+    ("pattern", "name", "does"),
+    [
+        ("/a/b", "/a/b", True),
+        ("/a", "/a/b", False),
+        ("/*/b", "/a/b", True),
+        ("/*", "/a/b", False),
+        ("/**", "/a/b", True),
+        ("/**/b", "/b", True),
+        ("/**/c", "/a/b", False),
+    ],
+)
+def test_stars_are_one_part_and_two_are_any_number(pattern: str, name: str, *, does: bool) -> None:
+    assert matches(pattern, name) is does
+
+
+@given(
+    st.text(max_size=60) | st.recursive(st.text(max_size=3), lambda inner: st.lists(inner, max_size=3)).map(json.dumps)
+)
+def test_any_text_is_a_parameter_file_or_a_finding(text: str) -> None:
+    with contextlib.suppress(RejectedError):
+        load_params(text, "p.yaml")

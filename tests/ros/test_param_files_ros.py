@@ -1,0 +1,71 @@
+"""What rcl reads from the built file is what it reads from the user's own, value by value and type by type."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from tests.conftest import Domain
+
+pytestmark = pytest.mark.ros
+
+FILE = """
+/planner:
+  ros__parameters:
+    flag: on
+    off_flag: no
+    count: 012
+    mask: 0x1F
+    gain: 1e-3
+    far: .inf
+    half: .5
+    word: hello
+    quoted: "on"
+    digits: "7"
+    names: [base, "7", tail]
+    numbers: [1, 2, 3]
+    floats: [1.5, 2.0]
+    deep: {inner: {value: yes}}
+"""
+READER = """
+import json, rclpy, sys
+rclpy.init(args=["--ros-args", "--params-file", sys.argv[1]])
+given = {"allow_undeclared_parameters": True, "automatically_declare_parameters_from_overrides": True}
+node = rclpy.create_node("planner", **given)
+read = {name: repr(p.value) for name, p in node.get_parameters_by_prefix("").items() if name != "use_sim_time"}
+print(json.dumps(read, sort_keys=True))
+node.destroy_node()
+rclpy.shutdown()
+"""
+ROBOT = """
+tfcompose: 1
+robot: r
+frames: {base_link: {}}
+processes: {planner: {run: {package: p, executable: e}, params: {file: mine.yaml}}}
+"""
+
+
+def test_rcl_reads_the_same_values_from_the_built_file(tmp_path: Path, domain: Domain) -> None:
+    (tmp_path / "mine.yaml").write_text(FILE, encoding="utf-8")
+    (tmp_path / "r.yaml").write_text(ROBOT, encoding="utf-8")
+    build = [sys.executable, "-m", "tfcompose", "build", "r.yaml", "-o", "out"]
+    subprocess.run(build, cwd=tmp_path, check=True, timeout=60, capture_output=True)
+
+    def read(file: Path) -> dict[str, str]:
+        command = [sys.executable, "-W", "ignore", "-c", READER, str(file)]
+        done = subprocess.run(
+            command, env=dict(domain.environment), timeout=60, capture_output=True, text=True, check=True
+        )
+        values: dict[str, str] = json.loads(done.stdout.splitlines()[-1])
+        return values
+
+    mine = read(tmp_path / "mine.yaml")
+    assert mine["flag"] == "True"
+    assert read(tmp_path / "out" / "params" / "planner.yaml") == mine

@@ -1,0 +1,135 @@
+"""Parameter files that a process names: what they say to its nodes, with the inline parameters laid over it."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.diagnostic import Diagnostic, Note, RejectedError, finding, nearest
+from tfcompose.load.params import NodeParams, ParamsFile, Word, load_params
+from tfcompose.model import AsInFile
+from tfcompose.resolve.beside import beside
+from tfcompose.resolve.nodes import full_name
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from tfcompose.diagnostic import Span
+    from tfcompose.load import Source
+    from tfcompose.model import Node, Process, Robot
+
+KEY = "file"
+
+
+def with_param_files(robot: Robot, source: Source, read: Callable[[str], str] | None) -> tuple[Robot, list[Diagnostic]]:
+    """Return the robot whose nodes have the parameters of the files that they name, and what is wrong with these."""
+    work = _Work(source, read, robot.ros.namespace)
+    processes = tuple(work.process(process) for process in robot.processes)
+    written = robot.written | ({"parameter files": work.digests} if work.digests else {})
+    return replace(robot, processes=processes, written=written), work.found
+
+
+def names_files(params: dict[str, Any]) -> bool:
+    """Return whether parameters name files."""
+    return isinstance(params.get(KEY), (str, list))
+
+
+@dataclass(slots=True)
+class _Work:
+    source: Source
+    read: Callable[[str], str] | None
+    namespace: str
+    found: list[Diagnostic] = field(default_factory=list)
+    digests: dict[str, str] = field(default_factory=dict)
+    _known: dict[str, ParamsFile] = field(default_factory=dict)
+
+    def process(self, process: Process) -> Process:
+        nodes = tuple(self._node(node, process) if names_files(node.params) else node for node in process.nodes)
+        return replace(process, nodes=nodes)
+
+    def _node(self, node: Node, process: Process) -> Node:
+        named = node.params[KEY]
+        at = (*node.path, "params", KEY)
+        files = [(named, at)] if isinstance(named, str) else [(one, (*at, i)) for i, one in enumerate(named)]
+        params: dict[str, Any] = {}
+        for file, path in files:
+            place = self.source.at(path)
+            if isinstance(file, str) and file:
+                params = _laid_over(params, self._said(file, place, node, process))
+            else:
+                self.found.append(finding("TF103", "params: file takes the names of files", place))
+        inline = {key: value for key, value in node.params.items() if key != KEY}
+        return replace(node, params=_laid_over(params, inline))
+
+    def _said(self, file: str, at: Span, node: Node, process: Process) -> dict[str, Any]:
+        """Return what a file says to the node; a file that says nothing to it is a finding."""
+        path = beside(file, at)
+        loaded = self._load(path, at)
+        if loaded is None:
+            return {}
+        meant = [one for one in loaded.nodes if matches(full_name(self.namespace, one.name), node.name)]
+        if not meant and not loaded.found:
+            self.found.append(_nothing(path, at, node, process, loaded.nodes))
+        params: dict[str, Any] = {}
+        for one in meant:
+            params = _laid_over(params, _words(one.params))
+        return params
+
+    def _load(self, path: str, at: Span) -> ParamsFile | None:
+        if path in self._known:
+            return self._known[path]
+        note = Note("named here", at)
+        if self.read is None:
+            self.found.append(finding("TF001", f"{path}: files cannot be read here", at))
+            return None
+        try:
+            text = self.read(path)
+            loaded = load_params(text, path)
+        except RejectedError as error:
+            self.found += [replace(one, notes=(*one.notes, note)) for one in error.diagnostics]
+            return None
+        self.found += [replace(one, notes=(*one.notes, note)) for one in loaded.found]
+        self.digests[path] = hashlib.sha256(text.encode()).hexdigest()
+        self._known[path] = loaded
+        return loaded
+
+
+def _nothing(path: str, at: Span, node: Node, process: Process, there: Sequence[NodeParams]) -> Diagnostic:
+    names = [one.name for one in there]
+    near = nearest(node.name.rpartition("/")[2], [name.rpartition("/")[2] for name in names])
+    meant = next((one for one in there if near and one.name.endswith(near)), None)
+    notes = [Note(f"it has {meant.name}", meant.at)] if meant else []
+    advice = f"call it {node.name} there, or give the process that node: it has {', '.join(names) or 'no node'}"
+    message = f"{path} has no parameters for {node.name}, the node of {process.name}"
+    return finding("TF334", message, at, help=advice, notes=notes)
+
+
+def matches(pattern: str, name: str) -> bool:
+    """Return whether a pattern of a parameter file means the node: * is one part of a name, ** any number of them."""
+    return _matches(pattern.strip("/").split("/"), name.strip("/").split("/"))
+
+
+def _matches(pattern: list[str], parts: list[str]) -> bool:
+    if not pattern:
+        return not parts
+    if pattern[0] == "**":
+        return any(_matches(pattern[1:], parts[skipped:]) for skipped in range(len(parts) + 1))
+    return bool(parts) and pattern[0] in {"*", parts[0]} and _matches(pattern[1:], parts[1:])
+
+
+def _laid_over(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    """Return parameters with others laid over them; mappings merge."""
+    merged = dict(below)
+    for key, value in above.items():
+        old = merged.get(key)
+        merged[key] = _laid_over(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+    return merged
+
+
+def _words(value: Any) -> Any:
+    if isinstance(value, Word):
+        return AsInFile(value.text) if value.plain else value.text
+    if isinstance(value, dict):
+        return {key: _words(item) for key, item in value.items()}
+    return [_words(item) for item in value]

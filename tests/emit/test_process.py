@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from tfcompose.diagnostic import Diagnostic
 
-HEAD = "tfcompose: 1\nrobot: r\nros: {namespace: r1}\nframes: {map: {}}\nprocesses:\n"
+HEAD = "tfcompose: 1\nrobot: r\nros: {namespace: r1}\nframes: {map: {}}\nrules: {TF818: off}\nprocesses:\n"
 EXE = "run: {package: p, executable: e}"
 
 

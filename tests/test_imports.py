@@ -12,24 +12,25 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "tfcompose"
 
-FOUNDATIONS = {"__init__", "codes", "diagnostic", "pose", "model", "plan", "planfields", "planfile"}
+FOUNDATIONS = {"__init__", "codes", "diagnostic", "frozen", "pose", "model", "plan", "planfields", "planfile"}
 STAGES = {"load", "validate", "resolve", "check"}
 
 #: Which parts of the package each part may import, besides itself.
 MAY_IMPORT: dict[str, set[str]] = {
     "__init__": set(),
     "codes": set(),
-    "diagnostic": {"codes"},
+    "frozen": set(),
+    "diagnostic": {"codes", "frozen"},
     "pose": set(),
-    "plan": {"pose"},
-    "model": {"diagnostic", "plan", "pose"},
+    "plan": {"frozen", "pose"},
+    "model": {"diagnostic", "frozen", "plan", "pose"},
     "planfields": set(),
     "planfile": {"diagnostic", "plan", "planfields", "pose"},
-    "load": {"diagnostic"},
+    "load": {"diagnostic", "frozen"},
     "render": {"codes", "diagnostic", "pose"},
-    "validate": {"diagnostic", "load", "pose"},
-    "resolve": {"diagnostic", "load", "model", "plan", "pose", "validate"},
-    "check": {"codes", "diagnostic", "load", "model", "pose"},
+    "validate": {"diagnostic", "frozen", "load", "pose"},
+    "resolve": {"diagnostic", "frozen", "load", "model", "plan", "pose", "validate"},
+    "check": {"codes", "diagnostic", "frozen", "load", "model", "pose"},
     "emit": {"model", "plan", "planfile", "pose"},
     "ros": {"diagnostic", "plan", "pose"},
     "run": {"diagnostic", "plan", "planfile", "pose", "ros"},

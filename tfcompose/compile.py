@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.check import apply, check, levelled, unknown_rules, with_edits, with_replaced
 from tfcompose.diagnostic import Allow, Diagnostic, Note, RejectedError
+from tfcompose.frozen import dataclass
 from tfcompose.load import Source, composed, load, with_includes
 from tfcompose.resolve import Disk, Library, resolve
 from tfcompose.validate import validate

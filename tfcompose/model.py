@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
+from tfcompose.frozen import dataclass
 from tfcompose.plan import EdgeKind, GuardPolicy, ProcessKind, Ready, RosSettings, Simulation, StopRule
 from tfcompose.pose import angle_between
 

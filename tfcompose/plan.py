@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal
 
+from tfcompose.frozen import dataclass
 from tfcompose.pose import Pose
 
 VERSION = 1

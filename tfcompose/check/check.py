@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.check.rules.tf201_two_parents import two_parents
@@ -66,6 +66,7 @@ from tfcompose.check.rules.tf812_start_order_loop import start_order_loop
 from tfcompose.check.rules.tf815_process_without_role import process_without_role
 from tfcompose.check.rules.tf818_required_without_role import required_without_role
 from tfcompose.diagnostic import Diagnostic, Severity, Span, finding
+from tfcompose.frozen import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import posixpath
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.frozen import dataclass
 from tfcompose.model import Edge, Process, Robot
 from tfcompose.plan import GuardPolicy
 from tfcompose.resolve.bodies import Bodies, with_colours

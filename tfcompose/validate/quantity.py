@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 
 from tfcompose.diagnostic import did_you_mean, slip_of
+from tfcompose.frozen import dataclass
 
 Dimension = tuple[int, int, int, int]
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Edit, Note, RejectedError, finding
+from tfcompose.frozen import dataclass
 from tfcompose.load.overlay import CHOICES
 from tfcompose.validate.claims import NodePresetSpec
 from tfcompose.validate.preset import PresetSpec

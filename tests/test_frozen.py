@@ -84,11 +84,16 @@ def test_two_classes_with_the_same_values_are_not_equal() -> None:
     assert made_by(frozen.dataclass)("a") != QUICK("a")
 
 
-def test_other_kinds_of_dataclasses_are_made_as_ever() -> None:
-    made: Any = frozen.dataclass(slots=True)(type("Counter", (), {"__annotations__": {"count": int}}))
+@pytest.mark.parametrize("how", [{"slots": True}, {"slots": True, "order": True}, {}], ids=str)
+@pytest.mark.parametrize("make", [frozen.dataclass, dataclasses.dataclass], ids=["ours", "dataclasses"])
+def test_what_is_not_frozen_can_be_changed_and_has_no_hash(make: Any, how: dict[str, bool]) -> None:
+    made = make(**how)(type("Counter", (), {"__annotations__": {"count": int}, "__doc__": "Counts."}))
     one = made(1)
     one.count = 2
-    assert one == made(2)
+    assert one == made(2) != made(1)
+    assert repr(one) == "Counter(count=2)"
+    with pytest.raises(TypeError, match="unhashable"):
+        hash(one)
 
 
 def test_making_one_costs_less_than_half() -> None:

@@ -1,4 +1,4 @@
-"""Frozen, slotted dataclasses that are made in a quarter of the time.
+"""Slotted dataclasses that are made in a quarter of the time, frozen or not.
 
 ``dataclasses`` writes and compiles six methods for each class, and that was a third of what ``lint`` cost. Here only
 ``__init__`` is written for each class, and the other methods are the same functions for all. The classes are
@@ -19,8 +19,10 @@ if TYPE_CHECKING:
 else:
 
     def dataclass(**how: bool) -> Callable[[type], type]:
-        """Return what makes a class a dataclass; quickly, if it is to be ``frozen=True, slots=True``."""
-        return _frozen if how == {"frozen": True, "slots": True} else _dataclass(**how)
+        """Return what makes a class a dataclass; quickly, if it is to have slots and may be frozen, and no more."""
+        if how == {"frozen": True, "slots": True}:
+            return _frozen
+        return _slotted if how == {"slots": True} else _dataclass(**how)
 
 
 def _frozen(cls: type) -> Any:
@@ -30,6 +32,13 @@ def _frozen(cls: type) -> Any:
     made: Any = _dataclass(init=False, repr=False, eq=False, slots=True)(cls)
     made.__init__ = _init_of(made)
     return made
+
+
+def _slotted(cls: type) -> Any:
+    cls.__eq__ = _equal  # type: ignore[assignment,method-assign]
+    cls.__repr__ = _shown  # type: ignore[assignment,method-assign]
+    cls.__hash__ = None  # type: ignore[assignment] # it changes
+    return _dataclass(repr=False, eq=False, slots=True)(cls)
 
 
 def _init_of(cls: type) -> Callable[..., None]:

@@ -21,6 +21,10 @@ CASES = {
     "two_rovers": ("two_rovers.yaml",),
     "autonomous_robot": ("autonomous_robot.yaml",),
     "autonomous_robot.demo": ("autonomous_robot.yaml", "--profile", "demo"),
+    "car_roof": ("car_roof.yaml",),
+    "field_rover": ("field_rover.yaml",),
+    "house_robot": ("house_robot.yaml",),
+    "picker": ("picker.yaml",),
 }
 
 

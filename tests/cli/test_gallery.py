@@ -1,0 +1,48 @@
+"""The example robots: no finding in any of them, and nothing in a demo that needs hardware."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+ROBOTS = sorted(path.name for path in (ROOT / "robots").glob("*.yaml"))
+WITH_DEMO = [name for name in ROBOTS if "\n  demo:" in (ROOT / "robots" / name).read_text("utf-8")]
+#: What tfcompose itself starts.
+OWN = {"static", "joints", "guard", "simulate"}
+
+
+def tfcompose(*words: str) -> subprocess.CompletedProcess[str]:
+    """Run it as a person does who stands in the project's folder."""
+    return subprocess.run(
+        [sys.executable, "-m", "tfcompose", *words],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_lint_finds_nothing_in_an_example_with_any_profile(robot: str) -> None:
+    found = tfcompose("lint", "--fail-on", "warning", f"robots/{robot}")
+    assert found.returncode == 0, found.stdout
+    assert found.stdout == "no findings in 1 file\n"
+
+
+@pytest.mark.parametrize("robot", WITH_DEMO)
+def test_a_demo_starts_nothing_but_what_tfcompose_brings_along(robot: str, tmp_path: Path) -> None:
+    built = tfcompose("build", f"robots/{robot}", "--profile", "demo", "-o", str(tmp_path))
+    assert built.returncode == 0, built.stderr
+    plan = json.loads((tmp_path / "plan.json").read_text("utf-8"))
+    assert {process["kind"] for process in plan["processes"]} <= OWN
+    assert all(edge["owner"] in {process["name"] for process in plan["processes"]} for edge in plan["edges"])
+
+
+def test_every_robot_of_the_gallery_has_a_demo() -> None:
+    assert set(WITH_DEMO) >= {"car_roof.yaml", "field_rover.yaml", "house_robot.yaml", "picker.yaml"}

@@ -103,6 +103,26 @@ def test_edges_float_in_robot_urdf_exactly_where_somebody_else_publishes_them(
     assert full == {"fixed", "continuous"}
 
 
+GIMBAL = """
+links: {base_link: {}}
+sensors:
+  eye: {preset: zed/zed2i, parent: base_link, owner: gimbal, rate: 50 Hz}
+processes: {gimbal: {external: true}}
+"""
+
+
+def test_a_sensor_is_one_body_though_its_driver_sends_its_lenses_on_tf_and_a_gimbal_moves_it() -> None:
+    robot = robot_of(HEAD + GIMBAL)
+    assert {edge.child for edge in robot.edges if edge.kind == "dynamic" and edge.owner == "eye"} == {
+        "eye_left_camera_frame",
+        "eye_right_camera_frame",
+    }
+    joints = xml_of(urdf(robot, full=True)).iter("joint")
+    types = {joint.attrib["name"]: joint.attrib["type"] for joint in joints}
+    assert types.pop("base_link_to_eye_camera_link") == "floating"
+    assert set(types.values()) == {"fixed"}
+
+
 def test_only_with_a_real_driver_something_floats() -> None:
     assert 'type="floating"' in urdf(example("autonomous_robot"), full=False)
     assert 'type="floating"' not in urdf(example("autonomous_robot", ("demo",)), full=False)

@@ -101,7 +101,9 @@ def _kind(edge: Edge) -> str:
     joint = edge.joint or edge.free
     if joint:
         return joint.type
-    return "floating" if edge.kind == "dynamic" else "fixed"
+    # A sensor is one body, even where its driver sends what was calibrated inside it again and again.
+    inside = edge.sensor and not edge.given
+    return "floating" if edge.kind == "dynamic" and not inside else "fixed"
 
 
 def _joint(edge: Edge, name: str, kind: str) -> list[str]:

@@ -52,6 +52,7 @@ ONLY_IN: dict[str, set[str]] = {
     "geometry_msgs": {"ros"},
     "sensor_msgs": {"ros"},
     "lifecycle_msgs": {"ros"},
+    "rcl_interfaces": {"ros"},
     "launch": {"run"},
     "launch_ros": {"run"},
     "std_msgs": {"ros"},

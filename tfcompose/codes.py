@@ -162,6 +162,8 @@ CODES = {
     "TF825": "wrong_clock",
     "TF826": "best_effort_writer",
     "TF827": "isolation_leak",
+    "TF828": "driver_pose_differs",
+    "TF829": "switch_not_taken",
     # the environment
     "TF901": "no_ros",
     "TF902": "bad_plan",

@@ -37,6 +37,8 @@ _AT_START = re.compile(r"\$\{(?:file:|build_dir\}|params_file\})")
 EDGE_KINDS: tuple[EdgeKind, ...] = ("static", "joint", "dynamic")
 PROCESS_KINDS: tuple[ProcessKind, ...] = ("static", "joints", "guard", "simulate", "external", "run")
 READY_KINDS: tuple[ReadyKind, ...] = ("edges", "topic", "service", "lifecycle", "log", "exit", "time")
+#: How well the pose of a frame is known that a driver publishes.
+KNOWN = ("exact", "nominal")
 LIFECYCLE_STATES = ("inactive", "active")
 LOG_LEVELS = ("debug", "info", "warn", "error", "fatal")
 STOP_SIGNALS = ("SIGINT", "SIGTERM", "SIGQUIT", "SIGHUP", "SIGKILL", "SIGUSR1", "SIGUSR2")
@@ -141,13 +143,15 @@ class StopRule:
 class Driven:
     """A sensor that a process drives. ``publishes`` says that the frames inside the sensor are the driver's.
 
-    ``switch`` holds the parameters, or arguments, that keep the driver from publishing what is not its own.
+    ``switch`` holds the parameters, or arguments, that keep the driver from publishing what is not its own. ``frames``
+    says of the frames that the driver publishes inside the sensor whether their poses are exact or nominal.
     """
 
     sensor: str
     preset: str
     publishes: bool
     switch: dict[str, str | int | float | bool] = field(default_factory=dict)
+    frames: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +161,8 @@ class PlanProcess:
     ``nodes`` are full names; ``lifecycle`` says of some of them into which state they are brought after the start.
     ``required`` says that the plan ends when the process does. ``max_restarts`` None is the launcher's default, as is
     ``ready`` None: the edges that the process owns, or that it was started.
-    ``drives`` are the sensors that it is the driver of, by their presets.
+    ``drives`` are the sensors that it is the driver of, by their presets. ``switches`` holds, by the full names of its
+    nodes, the parameters that were written for them and decide what they publish.
     ``description`` is the file beside the plan that a publisher sends as ``robot_description``; None: the plan's.
     """
 
@@ -182,6 +187,7 @@ class PlanProcess:
     simulate: Simulation | None = None
     description: str | None = None
     drives: tuple[Driven, ...] = ()
+    switches: dict[str, dict[str, str | int | float | bool]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from typing import Any
 from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
 from tfcompose.plan import (
     EDGE_KINDS,
+    KNOWN,
     LIFECYCLE_STATES,
     LOG_LEVELS,
     PROCESS_KINDS,
@@ -120,6 +121,8 @@ def _process_to_json(process: PlanProcess) -> dict[str, Any]:
     row["drives"] = [_fields(driven) for driven in process.drives]
     if not process.drives:
         del row["drives"]
+    if not process.switches:
+        del row["switches"]
     if simulation:
         row["simulate"] = _fields(simulation)
         pose = row["simulate"].pop("pose")
@@ -233,19 +236,32 @@ def _process_from_json(data: dict[str, Any], where: str) -> PlanProcess:
         simulate=_simulation_from_json(simulation, where) if simulation else None,
         description=get(data, "description", str, where) if "description" in data else None,
         drives=rows(data, "drives", _driven_from_json) if "drives" in data else (),
+        switches=_switches_from_json(data, where) if "switches" in data else {},
     )
 
 
 def _driven_from_json(data: dict[str, Any], where: str) -> Driven:
-    switch = get(data, "switch", dict, where)
-    if not all(isinstance(value, (str, int, float)) for value in switch.values()):
-        raise TypeError(f"{where}: switch holds something that is no parameter")
+    frames = texts(data, "frames", where)
+    if not set(frames.values()) <= set(KNOWN):
+        raise ValueError(f"{where}: frames are {' or '.join(KNOWN)}")
     return Driven(
         sensor=get(data, "sensor", str, where),
         preset=get(data, "preset", str, where),
         publishes=get(data, "publishes", bool, where),
-        switch=switch,
+        switch=_parameters(get(data, "switch", dict, where), f"{where}: switch"),
+        frames=frames,
     )
+
+
+def _switches_from_json(data: dict[str, Any], where: str) -> dict[str, dict[str, Any]]:
+    nodes = get(data, "switches", dict, where)
+    return {node: _parameters(get(nodes, node, dict, where), f"{where}: {node}") for node in nodes}
+
+
+def _parameters(values: dict[str, Any], where: str) -> dict[str, Any]:
+    if not all(isinstance(value, (str, int, float)) for value in values.values()):
+        raise TypeError(f"{where} holds something that is no parameter")
+    return values
 
 
 def _guard_from_json(data: dict[str, Any]) -> GuardPolicy:

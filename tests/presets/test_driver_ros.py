@@ -23,7 +23,7 @@ pytestmark = pytest.mark.ros
 #: frame below that; streams of index 1 once more, as aligned depth; imu below gyro with unite_imu_method. Like tf2's
 #: static broadcaster it keeps one transform a child, the one that it was given last. Its values are a unit's own.
 STAND_IN = """
-import os, signal, sys, time
+import os, signal, sys, threading, time
 import rclpy
 from rclpy.node import Node
 from tfcompose.ros.message import Transform, encode
@@ -37,16 +37,22 @@ streams |= {name: True for name in os.environ.get("STAND_IN_ALSO", "").split()}
 prefix = told.get("tf_prefix", "") + told.get("camera_name", "camera") + "_"
 base = prefix + told.get("base_frame_id", "link")
 kept = {}
+off = dict(word.split(":") for word in os.environ.get("STAND_IN_OFF", "").split())
+places = {"color": (0.0, 0.015, 0.0), "infra2": (0.0, -0.05, 0.0)}
+places |= dict.fromkeys(["gyro", "accel"], (-0.01174, -0.00552, 0.0051))
 def send(parent, child, xyz=(0.0, 0.0, 0.0), optical=False):
     turn = (-0.5, 0.5, -0.5, 0.5) if optical else (0.0, 0.0, 0.0, 1.0)
+    xyz = (xyz[0], xyz[1] + float(off.get(child.removeprefix(prefix), 0.0)), xyz[2])
     kept[child] = Transform(time.time_ns(), parent, child, xyz, turn)
-for index, name in enumerate(stream for stream, enabled in streams.items() if enabled):
+for name in (stream for stream, enabled in streams.items() if enabled):
     frame, optical = f"{prefix}{name}_frame", f"{prefix}{name}_optical_frame"
-    send(base, frame, (0.0, 0.0149 * index, 0.0003))
+    x, y, z = places.get(name, (0.0, 0.0, 0.0))
+    own = (x + 0.0004, y - 0.0012, z + 0.0003) if name != "depth" else (x, y, z)
+    send(base, frame, own)
     send(frame, optical, optical=True)
     if name == "infra1":
         aligned = f"{prefix}aligned_depth_to_{name}_frame"
-        send(base, aligned, (0.0, 0.0149 * index, 0.0003))
+        send(base, aligned, own)
         send(aligned, optical, optical=True)
 if streams["gyro"] and told.get("unite_imu_method", 0) > 0:
     send(f"{prefix}gyro_frame", f"{prefix}imu_frame")
@@ -54,7 +60,18 @@ if streams["gyro"] and told.get("unite_imu_method", 0) > 0:
 if told.get("publish_tf", True) or os.environ.get("STAND_IN_IGNORES"):
     publisher = TFPublisher(node, static=True)
     publisher.publish(encode(list(kept.values())))
+if "STAND_IN_FORCES" in os.environ:
+    node.set_parameters([rclpy.Parameter("publish_tf", value=os.environ["STAND_IN_FORCES"] == "true")])
+if "STAND_IN_LACKS" in os.environ:
+    node.undeclare_parameter(os.environ["STAND_IN_LACKS"])
 print("stand-in:", node.get_fully_qualified_name(), told.get("serial_no"), len(kept), flush=True)
+def spin():
+    try:
+        rclpy.spin(node)
+    except Exception:
+        pass
+if "STAND_IN_SLEEPS" not in os.environ:
+    threading.Thread(target=spin, daemon=True).start()
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGTERM, lambda *_: sys.exit())
 try:
@@ -170,6 +187,42 @@ def test_a_driver_with_another_stream_than_its_preset_has_is_named_with_what_was
     robot = up(ROVER % ("streams: [depth]", "tf: driver"), STAND_IN_ALSO="infra1")
     robot.says("TF803", "preset realsense/d435i expects no frame front_infra1_frame, the driver /front/front sent")
     assert "let sensors.front say what its driver does: options with that frame" in robot.text
+
+
+def test_a_driver_whose_frame_is_far_from_nominal_is_told_with_both_poses(up: Callable[..., Up]) -> None:
+    """An infra2 that is 4.5 cm further to the right is that of a D455."""
+    robot = up(ROVER % (EVERYTHING, "tf: driver"), STAND_IN_OFF="infra2_frame:-0.045")
+    robot.says("warning[TF828] preset realsense/d435i expects front_link → front_infra2_frame at xyz 0 -0.05 0")
+    assert "the driver /front/front sent xyz 0.0004 -0.0962 0.0003" in robot.text
+    assert "sensors: {front: {frames: {front_infra2_frame: {xyz: [0.0004, -0.0962, 0.0003]" in robot.text
+    time.sleep(CLEAR_S)
+    assert len(codes(robot.text)) == 1
+
+
+def test_a_frame_that_the_preset_calls_exact_may_not_be_off_by_two_millimetres(up: Callable[..., Up]) -> None:
+    robot = up(ROVER % ("streams: [depth]", "tf: driver"), STAND_IN_OFF="depth_optical_frame:0.002")
+    robot.says("TF828", "expects front_depth_frame → front_depth_optical_frame at xyz 0 0 0 rpy -90 0 -90 deg")
+    assert "sent xyz 0 0.002 0 rpy -90 0 -90 deg" in robot.text
+
+
+def test_a_switch_that_the_driver_has_otherwise_is_read_back_and_named(up: Callable[..., Up]) -> None:
+    robot = up(ROVER % (EVERYTHING, "tf: tfcompose"), STAND_IN_FORCES="true")
+    robot.says("error[TF829] /front/front has publish_tf: true, and the plan wrote publish_tf: false")
+    assert "for front (realsense/d435i)" in robot.text
+    time.sleep(CLEAR_S)
+    assert len([line for line in codes(robot.text) if "TF829" in line]) == 1
+
+
+def test_a_switch_that_the_driver_does_not_know_is_asked_for_a_while_and_named(up: Callable[..., Up]) -> None:
+    robot = up(ROVER % (EVERYTHING, "tf: driver"), STAND_IN_LACKS="publish_tf")
+    robot.says("TF829", "/front/front has no parameter publish_tf", within=60)
+
+
+def test_a_driver_that_answers_no_question_is_let_alone(up: Callable[..., Up]) -> None:
+    robot = up(ROVER % (EVERYTHING, "tf: driver"), STAND_IN_SLEEPS="1")
+    robot.says("edges live")
+    time.sleep(CLEAR_S)
+    assert codes(robot.text) == []
 
 
 def test_two_cameras_of_one_kind_get_names_and_serial_numbers_by_two_lines(

@@ -65,3 +65,13 @@ def test_what_is_no_message_is_refused_as_a_plain_decoder_does_also_after_good_o
 def test_names_are_those_that_tf2_takes_and_can_be_shown() -> None:
     data = encode([Transform(0, "/map", "od\x1bom", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
     assert Hearing().message(received(data), static=True).edges == (("map", "od\\x1bom"),)
+
+
+def test_poses_are_read_of_the_first_message_that_holds_a_frame_to_be_compared() -> None:
+    hearing = Hearing(frozenset({"odom"}))
+    other = encode([Transform(1, "map", "base_link", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))])
+    assert hearing.message(received(other), static=True).poses == ()
+    data = encode([Transform(1, "map", "/odom", (1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8))])
+    (pose,) = hearing.message(received(data), static=True).poses
+    assert pose == ((1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8))
+    assert hearing.message(received(data), static=True).poses == ()

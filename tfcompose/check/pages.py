@@ -309,6 +309,16 @@ Listeners ask for reliable, so none of them accepts it, and nothing arrives. Pub
 
 The plan keeps its transforms on topics of its own, so that robots do not hear each other; this node's go to all the
 others instead, and are missing here. Start it with the remappings /tf:=… and /tf_static:=….""",
+    "TF828": """A driver sends a frame elsewhere than its preset has it.
+
+Calibration moves a nominal frame by millimetres; beyond 2 cm or 5 degrees the device is another model, or its
+calibration is broken. A frame that the preset calls exact, such as the turn of an optical frame, may differ by 1 mm and
+0.2 degrees. Name the right preset, or give the unit's own values under sensors.NAME.frames.""",
+    "TF829": """A node has not taken a switch that the plan wrote for it.
+
+The parameter was read back from the running node, after it appeared: the value is another one, or there is no such
+parameter. Somebody else started the node, or a launch file overrides it, or this version has another switch. What the
+node publishes is then not what the plan says.""",
     "TF901": """ROS 2 is missing, or cannot be used.""",
     "TF902": """A plan cannot be used: it is not one, not whole, or of another version.
 

@@ -9,16 +9,17 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.emit.driven import driven_of, switches_of
 from tfcompose.emit.numbers import clean
 from tfcompose.emit.params import written_params
 from tfcompose.emit.target import AS_WRITTEN, Target
 from tfcompose.model import JOINTS, STATIC
-from tfcompose.plan import DESCRIPTION, Claim, Driven, Joint, Plan, PlanEdge, PlanProcess, switch_text, told_at_start
+from tfcompose.plan import DESCRIPTION, Claim, Joint, Plan, PlanEdge, PlanProcess, switch_text, told_at_start
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.model import Edge, MountedSensor, Process, Robot
+    from tfcompose.model import Edge, Process, Robot
 
 _FILE = re.compile(r"\$\{file:([^{}]*)\}")
 
@@ -149,20 +150,9 @@ def _process(process: Process, robot: Robot, owned: list[tuple[str, str]], names
         owns=tuple(owned),
         simulate=simulation,
         description=f"{process.part}/{DESCRIPTION}" if process.part and process.kind in _PUBLISHERS else None,
-        drives=tuple(_driven(sensor) for sensor in robot.sensors if sensor.driver == process.name and _can(sensor)),
+        drives=driven_of(process, robot),
+        switches=switches_of(process, robot),
     )
-
-
-def _can(sensor: MountedSensor) -> bool:
-    """Whether the sensor's driver publishes anything unless it is kept from it."""
-    return bool(sensor.driver_frames or sensor.claims)
-
-
-def _driven(sensor: MountedSensor) -> Driven:
-    switch = {key: value for off in sensor.claims.values() for key, value in off.items()}
-    if sensor.driver_frames and not sensor.publishes:
-        switch |= sensor.switch or {}
-    return Driven(sensor.name, sensor.preset, sensor.publishes, switch)
 
 
 def _argv(process: Process, robot: Robot, *, has_params: bool) -> tuple[str, ...]:

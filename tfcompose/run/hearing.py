@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.ros.message import Layout
+from tfcompose.pose import Pose
+from tfcompose.ros.message import Layout, decode
 from tfcompose.run.senders import Message
 
 if TYPE_CHECKING:
@@ -22,9 +24,10 @@ _Key = tuple[bytes | None, int, bytes]
 
 
 class Hearing:
-    """The layouts of the messages that were heard."""
+    """The layouts of the messages that were heard; of new ones that hold one of ``frames`` the poses are read too."""
 
-    def __init__(self) -> None:
+    def __init__(self, frames: frozenset[str] = frozenset()) -> None:
+        self._frames = frames
         self._known: dict[_Key, list[tuple[Layout, _Edges]]] = {}
         self._count = 0
 
@@ -43,9 +46,13 @@ class Hearing:
                 return _message(received, edges, stamps, static=static)
         layout = Layout(data)
         edges = tuple((_plain(parent), _plain(child)) for parent, child in layout.edges)
-        if len(edges) <= _LONGEST:
-            self._remember(key, (layout, edges))
-        return _message(received, edges, layout.stamps(data) or [], static=static)
+        message = _message(received, edges, layout.stamps(data) or [], static=static)
+        if len(edges) > _LONGEST:
+            return message
+        self._remember(key, (layout, edges))
+        if not any(child in self._frames for _, child in edges):
+            return message
+        return replace(message, poses=[Pose(one.xyz, one.quat_xyzw) for one in decode(data)])
 
     def _remember(self, key: _Key, one: tuple[Layout, _Edges]) -> None:
         if self._count >= _MOST:

@@ -19,6 +19,7 @@ from tfcompose.run.law import Law, Sight
 from tfcompose.run.liveness import Liveness
 from tfcompose.run.offences import Offence, best_effort_writer, leak, violation, volatile_writer
 from tfcompose.run.senders import Message, Senders, Writer
+from tfcompose.run.sent_poses import SentPoses
 from tfcompose.run.stamps import Clocks, Stamps
 
 if TYPE_CHECKING:
@@ -68,6 +69,7 @@ class Judge:
     _streams: dict[tuple[bytes | None, bool, tuple[tuple[str, str], ...]], _Stream] = field(default_factory=dict)
     _told: set[tuple[str, bytes]] = field(default_factory=set)
     _law: Law = field(init=False)
+    _sent: SentPoses = field(init=False)
     _finds_until: float = 0.0
 
     def __post_init__(self) -> None:
@@ -76,10 +78,13 @@ class Judge:
         self._start = Start(self.begun, self.begun_ns)
         self.cases = Cases(self.plan, self._senders, self._start)
         self._law = Law(self.plan, self._senders, self._start)
+        self._sent = SentPoses(self.plan, self._senders)
 
     def message(self, message: Message, now: float) -> list[GuardEvent]:
         """Take a message and return which edges it brings to life; ``tick`` tells offences."""
         self._senders.heard(message, now)
+        if message.poses:
+            self._sent.take(message)
         key = (message.gid, message.static, message.edges)
         stream = self._streams.get(key)
         if stream is None:
@@ -131,7 +136,7 @@ class Judge:
 
     def tick(self, now: float) -> list[GuardEvent]:
         """Return what the passing of time means."""
-        events = [*self._see_again(now), *self.cases.report(now)]
+        events = [*self._see_again(now), *self.cases.report(now), *self._sent.judge()]
         if self._start.cleared is not None:
             over = self.cases.over(now)
             self._law.changes += bool(over)

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from tfcompose.pose import Pose
+
 #: How many gaps between messages tell surely when a publisher began; so many at least, when time is short.
 GAPS, FEWEST_GAPS = 5, 2
 #: A gap that was seen may be shorter than usual by this factor.
@@ -24,6 +26,7 @@ class Message:
 
     ``gid`` is the publisher's id, or None where the rmw gives none; ``sequence`` counts its messages from 1.
     ``stamps_ns`` are the transforms' stamps; ``received_ns`` is when it came, by this machine's system clock.
+    ``poses`` are there where frames are compared with presets, in the first message of a publisher with these edges.
     """
 
     edges: tuple[tuple[str, str], ...]
@@ -33,6 +36,7 @@ class Message:
     sequence: int
     stamps_ns: Sequence[int] = ()
     received_ns: int = 0
+    poses: Sequence[Pose] = ()
 
 
 @dataclass(frozen=True, slots=True)

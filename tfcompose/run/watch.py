@@ -19,6 +19,8 @@ from tfcompose.run.memory import Memory, recalled
 from tfcompose.run.neighbours import GLOBAL, Graph
 from tfcompose.run.orders import JOINS
 from tfcompose.run.own import say
+from tfcompose.run.sent_poses import expected_of
+from tfcompose.run.switches import Switches
 from tfcompose.run.topics import plans_by_topics, together
 from tfcompose.run.voice import Voice
 
@@ -67,6 +69,7 @@ def guard(own: Own, stop: Stop) -> None:
         voice.flush()
         clock = ClockWatch(own, node)
         bulletin = Bulletin(node, own.plan.robot)
+        switches = Switches(node, own.plan, emit) if judges else None
         while not stop.requested:
             wait(node, [each for watch in watches for each in (watch.fixed, watch.moving)], LOOK_EVERY_S, stop)
             orders.take()
@@ -76,6 +79,8 @@ def guard(own: Own, stop: Stop) -> None:
                 memory.look()
             voice.flush()
             bulletin.look([watch.judge for watch in watches])
+            if switches:
+                switches.look()
             clock.look()
 
 
@@ -86,7 +91,7 @@ class _Watch:
         self.moving = TFSubscription(node, static=False, topic=topics[0])
         self.fixed = TFSubscription(node, static=True, topic=topics[1])
         self._clock = SimClock(node) if judge.clocks.simulated else None
-        self._hearing = Hearing()
+        self._hearing = Hearing(frozenset(expected_of(judge.plan)))
         self._graph = Graph(node, topics)
         self.judge = judge
         self._emit = emit

@@ -1,0 +1,111 @@
+"""Whether nodes have taken the switches that the plan wrote for them: their parameters are read back.
+
+Each node is asked once after it appears. Drivers declare parameters late, once they have found their device: one that
+is not there yet is asked for again, for a while. A node that leaves and comes back is asked anew.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.run.events import Found
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rclpy.node import Node
+
+    from tfcompose.plan import Driven, Plan
+    from tfcompose.ros.parameters import ParameterReader, Value
+    from tfcompose.run.events import GuardEvent
+
+#: How often nodes are looked for, in seconds.
+LOOK_EVERY_S = 0.5
+#: For so long a parameter that the node does not have is asked for again, so often.
+DECLARED_WITHIN_S = 20.0
+AGAIN_EVERY_S = 2.0
+
+
+@dataclass(slots=True)
+class _Asked:
+    """One node: what the plan wrote, for which sensors, and how far the question is."""
+
+    node: str
+    wanted: dict[str, Value]
+    drives: tuple[Driven, ...]
+    reader: ParameterReader
+    since: float | None = None
+    due: float = 0.0
+    done: bool = False
+
+
+class Switches:
+    """The nodes whose switches are read back."""
+
+    def __init__(self, node: Node, plan: Plan, emit: Callable[[GuardEvent], None]) -> None:
+        self._emit = emit
+        self._due = 0.0
+        self._nodes = [
+            _Asked(name, wanted, process.drives, _reader(node, name, tuple(wanted)))
+            for process in plan.processes
+            for name, wanted in process.switches.items()
+        ]
+
+    def look(self) -> None:
+        """Take what was answered, ask whom there is to ask, and wait for nothing."""
+        now = time.monotonic()
+        if not self._nodes or now < self._due:
+            return
+        self._due = now + LOOK_EVERY_S
+        for one in self._nodes:
+            self._at(one, now)
+
+    def _at(self, one: _Asked, now: float) -> None:
+        if not one.reader.is_there:
+            one.since, one.done = None, False
+            return
+        if one.done:
+            return
+        if one.since is None:
+            one.since = one.due = now
+        found = one.reader.take()
+        if found is None:
+            if now >= one.due:
+                one.reader.ask(now)
+        elif None in found.values() and now - one.since < DECLARED_WITHIN_S:
+            one.due = now + AGAIN_EVERY_S
+        else:
+            one.done = True
+            for wrong in not_taken(one.node, one.wanted, found, one.drives):
+                self._emit(Found(wrong))
+
+
+def not_taken(
+    node: str, wanted: dict[str, Value], found: dict[str, Value | None], drives: tuple[Driven, ...] = ()
+) -> list[Diagnostic]:
+    """Return a finding for each parameter of the node that is not what the plan wrote; None: it has no such one."""
+    return [
+        _not_taken(node, name, value, found[name], drives)
+        for name, value in wanted.items()
+        if found[name] is None or found[name] != value or isinstance(found[name], bool) != isinstance(value, bool)
+    ]
+
+
+def _not_taken(node: str, name: str, wanted: Value, found: Value | None, drives: tuple[Driven, ...]) -> Diagnostic:
+    plan = f"the plan wrote {name}: {json.dumps(wanted)}"
+    of = "".join(f" for {one.sensor} ({one.preset})" for one in drives[:1])
+    if found is None:
+        advice = "is it a version of the node that has another switch, or another node of that name?"
+        return finding("TF829", f"{node} has no parameter {name}, and {plan}{of}", None, help=advice)
+    advice = f"start it with {name}: {json.dumps(wanted)}; what it publishes is otherwise not what the plan says"
+    return finding("TF829", f"{node} has {name}: {json.dumps(found)}, and {plan}{of}", None, help=advice)
+
+
+def _reader(node: Node, name: str, parameters: tuple[str, ...]) -> ParameterReader:
+    made: ParameterReader = import_module("tfcompose.ros.parameters").ParameterReader(node, name, parameters)
+    return made

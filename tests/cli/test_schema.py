@@ -26,7 +26,7 @@ def validator(language: str) -> Any:
     return jsonschema.Draft202012Validator(schema)
 
 
-@pytest.mark.parametrize("language", ["robot", "preset"])
+@pytest.mark.parametrize("language", ["robot", "preset", "node"])
 def test_the_schema_in_the_repository_is_fresh(language: str) -> None:
     assert (ROOT / "schemas" / f"{language}.schema.json").read_text("utf-8") == schema_text(language)
 
@@ -43,6 +43,13 @@ def test_the_example_robots_are_valid(file: Path) -> None:
 @pytest.mark.parametrize("file", sorted((ROOT / "tfcompose/presets").glob("*/*.yaml")), ids=lambda file: file.stem)
 def test_the_presets_are_valid(file: Path) -> None:
     validator("preset").validate(load(file.read_text("utf-8"), file.name).data)
+
+
+@pytest.mark.parametrize(
+    "file", sorted((ROOT / "tfcompose/presets/nodes").glob("*/*.yaml")), ids=lambda file: file.stem
+)
+def test_the_presets_of_nodes_are_valid(file: Path) -> None:
+    validator("node").validate(load(file.read_text("utf-8"), file.name).data)
 
 
 FINE = [

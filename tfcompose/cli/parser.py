@@ -38,7 +38,7 @@ COMMANDS = {
     "pose": "the pose of B in A, from the spec alone",
     "explain": "a code's page, or the chain between two frames",
     "diff": "what moved or changed owner between two robots",
-    "presets": "the sensors that are known; one of them in full",
+    "presets": "the sensors and nodes that are known; one of them in full",
     "schema": "the JSON Schema of the language",
 }
 

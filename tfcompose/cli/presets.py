@@ -1,7 +1,8 @@
-"""``tfcompose presets``: the sensors that are known, and one of them in full.
+"""``tfcompose presets``: the sensors and nodes that are known, and one of them in full.
 
-List the presets of sensors by vendor, or show one: its frames with their values, which of them its driver publishes
-and the switch for that, the frame of each message, and where the figures are from.
+List the presets of sensors by vendor, and of nodes that publish TF by package; or show one. Of a sensor: its frames
+with their values, which of them its driver publishes and the switch for that, the frame of each message. Of a node:
+which edges it publishes, the parameters that name their frames, and its switch. And where the figures are from.
 """
 
 from __future__ import annotations
@@ -10,22 +11,25 @@ import json
 import sys
 from importlib import import_module
 from itertools import groupby
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from tfcompose.cli import node_page as _nodes
 from tfcompose.cli.shelves import library
 from tfcompose.cli.terminal import complain, print_findings
 from tfcompose.diagnostic import RejectedError, did_you_mean
+from tfcompose.resolve.node_presets import node_preset_names
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
     from tfcompose.resolve import Library
-    from tfcompose.validate.preset import PresetSpec
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("name", nargs="?", metavar="NAME", help="a preset; or a vendor or a kind, to list only those")
+    parser.add_argument(
+        "name", nargs="?", metavar="NAME", help="a preset; or a vendor, a package or a kind, to list only those"
+    )
     parser.add_argument(
         "--preset-path", action="append", default=[], metavar="DIR", help="a folder of your own before them; repeatable"
     )
@@ -38,32 +42,34 @@ def run(arguments: Namespace) -> int:
     name = arguments.name
     try:
         if name and known.file(name) and "/_" not in name:
-            return _show(name, known, arguments.format)
+            return _show(import_module("tfcompose.cli.preset_page").facts(name, known), arguments.format)
+        if name in node_preset_names():
+            return _show(_nodes.facts(name), arguments.format)
         return _list(name, known, arguments.format)
     except RejectedError as error:
         print_findings(error.diagnostics, sys.stderr)
         return 1
 
 
-def _show(name: str, known: Library, form: str) -> int:
-    page = import_module("tfcompose.cli.preset_page")
-    facts = page.facts(name, known)
+def _show(facts: dict[str, Any], form: str) -> int:
+    page = _nodes if facts["kind"] == "node" else import_module("tfcompose.cli.preset_page")
     sys.stdout.write(json.dumps(facts, indent=2, ensure_ascii=False) + "\n" if form == "json" else page.text(facts))
     return 0
 
 
 def _list(only: str | None, known: Library, form: str) -> int:
     presets = {name: known.get(name) for name in known.names}
-    chosen = {name: preset for name, preset in presets.items() if not only or only in _words(name, preset)}
-    if only and not chosen:
-        words = sorted({word for name, preset in presets.items() for word in _words(name, preset)})
-        complain(f"no preset, vendor or kind {only}; {did_you_mean(only, words, 'tfcompose presets lists them')}")
-        return 1
-    rows = [
+    rows: list[dict[str, str]] = [
         {"name": name, "vendor": preset.vendor, "model": preset.model, "kind": preset.kind, "about": preset.about}
         | ({"same_as": preset.extends} if preset.extends and "/_" not in preset.extends else {})
-        for name, preset in chosen.items()
+        for name, preset in presets.items()
     ]
+    rows += _nodes.rows()
+    words = sorted({word for row in rows for word in _words(row)})
+    rows = [row for row in rows if not only or only in _words(row)]
+    if not rows:
+        complain(f"no preset, vendor or kind {only}; {did_you_mean(only or '', words, 'tfcompose presets lists them')}")
+        return 1
     if form == "json":
         sys.stdout.write(json.dumps(rows, indent=2, ensure_ascii=False) + "\n")
         return 0
@@ -81,5 +87,6 @@ def _about(row: dict[str, str]) -> str:
     return f"{row['model']}: {row['about']}{same}"
 
 
-def _words(name: str, preset: PresetSpec) -> tuple[str, ...]:
-    return (name, name.partition("/")[0], preset.kind)
+def _words(row: dict[str, str]) -> tuple[str, ...]:
+    name = row["name"]
+    return (name, row["vendor"] if row["kind"] == "node" else name.partition("/")[0], row["kind"])

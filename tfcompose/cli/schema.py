@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("language", nargs="?", choices=("robot", "preset"), default="robot", help="default: robot")
+    parser.add_argument(
+        "language", nargs="?", choices=("robot", "preset", "node"), default="robot", help="default: robot"
+    )
 
 
 def run(arguments: Namespace) -> int:

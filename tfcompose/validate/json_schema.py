@@ -5,15 +5,16 @@ from __future__ import annotations
 import inspect
 from typing import Any
 
+from tfcompose.validate.claims import NodePresetSpec
 from tfcompose.validate.preset import PresetSpec
 from tfcompose.validate.schema import Model, Type
 from tfcompose.validate.spec import RobotSpec
 
-LANGUAGES: dict[str, type[Model]] = {"robot": RobotSpec, "preset": PresetSpec}
+LANGUAGES: dict[str, type[Model]] = {"robot": RobotSpec, "preset": PresetSpec, "node": NodePresetSpec}
 
 
 def json_schema(language: str) -> dict[str, Any]:
-    """Return the schema of ``robot`` or ``preset``."""
+    """Return the schema of ``robot``, ``preset`` or ``node``, which is a preset of a node that publishes TF."""
     root = LANGUAGES[language]
     definitions: dict[str, Any] = {}
     _plain(root, definitions)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from tfcompose.check import apply, check, idle
 from tfcompose.cli.disk import disk
@@ -13,6 +14,12 @@ from tfcompose.load.comments import allows_in_xml
 from tfcompose.load.urdf import load_xml
 from tfcompose.resolve.packages import Packages
 from tfcompose.resolve.urdf import robot_of_urdf
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from tfcompose.load.urdf import Element
+    from tfcompose.model import Robot
 
 #: The rules that make sense without owners, sensors and processes.
 CODES = frozenset(
@@ -37,15 +44,40 @@ _HELP = {
 def lint_urdf(file: str) -> list[Diagnostic]:
     """Return what is wrong with the file, by place. A xacro file is expanded, and places are those of the result."""
     try:
-        packages = Packages(disk())
-        is_xacro = file.endswith(".xacro")
-        name, text = (f"{file} (expanded)", expanded(file, packages)) if is_xacro else (file, read_text(file))
-        robot, found = robot_of_urdf(load_xml(text, name), name, packages.asset)
+        read = read_urdf(file, Packages(disk()))
     except RejectedError as error:
         return list(error.diagnostics)
-    allows = allows_in_xml(text, name)
-    kept, used = apply(dict.fromkeys([*found, *(_said(one) for one in check(robot, CODES))]), allows)
-    return sorted([*kept, *idle(allows, used)], key=lambda one: one.sort_key)
+    return read.judged()
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """A URDF that was read: its elements, the robot that it describes, and what was found by reading it."""
+
+    name: str
+    text: str
+    root: Element
+    robot: Robot
+    found: tuple[Diagnostic, ...]
+
+    def judged(self) -> list[Diagnostic]:
+        """Return what is wrong with it, by place, but for what its comments let stand."""
+        allows = allows_in_xml(self.text, self.name)
+        said = (_said(one) for one in check(self.robot, CODES))
+        kept, used = apply(dict.fromkeys([*self.found, *said]), allows)
+        return sorted([*kept, *idle(allows, used)], key=lambda one: one.sort_key)
+
+
+def read_urdf(file: str, packages: Packages, arguments: Mapping[str, str] | None = None) -> Read:
+    """Return what the file says; a xacro file is expanded, with arguments.
+
+    Raises:
+        RejectedError: if it cannot be read, or is no URDF.
+    """
+    is_xacro = file.endswith(".xacro")
+    name, text = (f"{file} (expanded)", expanded(file, packages, arguments)) if is_xacro else (file, read_text(file))
+    root = load_xml(text, name)
+    return Read(name, text, root, *robot_of_urdf(root, name, packages.asset))
 
 
 def _said(found: Diagnostic) -> Diagnostic:

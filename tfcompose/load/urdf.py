@@ -25,7 +25,10 @@ _BREAK = re.compile("\r\n|\r|\n")
 
 @dataclass(slots=True, eq=False)
 class Element:
-    """A tag with its attributes; ``places`` are those of the attributes' values, ``raw`` is the element as written."""
+    """A tag with its attributes; ``places`` are those of the attributes' values, ``raw`` is the element as written.
+
+    ``text`` is what stands directly in it, where that was asked for.
+    """
 
     tag: str
     at: Span
@@ -33,6 +36,7 @@ class Element:
     places: dict[str, Span] = field(default_factory=dict)
     children: list[Element] = field(default_factory=list)
     raw: str = ""
+    text: str = ""
 
     def all(self, tag: str) -> list[Element]:
         """Return the children of a tag."""
@@ -47,14 +51,17 @@ class Element:
         return self.places.get(name, self.at)
 
 
-def load_xml(text: str, file: str) -> Element:
-    """Return the document's root.
+def load_xml(text: str, file: str, *, with_text: bool = False) -> Element:
+    """Return the document's root; ``with_text``, elements have the text that stands in them too.
 
     Raises:
         RejectedError: if the text is not XML, declares entities, or is too large or too deep.
     """
     refuse_unreadable(text, file, MOST_CHARACTERS)
-    return _Reader(text, file).read()
+    reader = _Reader(text, file)
+    if with_text:
+        reader.parser.CharacterDataHandler = reader.add_text
+    return reader.read()
 
 
 class _Reader:
@@ -82,6 +89,10 @@ class _Reader:
         if self.root is None:
             raise RejectedError([finding("TF018", "no element", Span(self.file))])
         return self.root
+
+    def add_text(self, piece: str) -> None:
+        if self.stack:
+            self.stack[-1].text += piece
 
     def _refuse_type(self, *_: object) -> None:
         at = self._span(self._position(self.parser.CurrentByteIndex), 9)

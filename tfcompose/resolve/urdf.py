@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, finding
@@ -60,7 +61,17 @@ def _blocks(root: Element) -> Iterator[Block]:
     for element in root.children:
         if element.tag not in _READ:
             counts[element.tag] = counts.get(element.tag, 0) + 1
-            yield Block(f"{element.tag}_{counts[element.tag]}", element.at, element.raw)
+            name = f"{element.tag.replace(':', '_')}_{counts[element.tag]}"
+            yield Block(name, element.at, _declared(element, root))
+
+
+def _declared(element: Element, root: Element) -> str:
+    """Return the element as it is written, with the namespaces that it takes from the root."""
+    spaces = {name: value for name, value in root.attributes.items() if name.startswith("xmlns:")}
+    needed = {name: value for name, value in spaces.items() if re.search(rf"[<\s]{re.escape(name[6:])}:", element.raw)}
+    more = "".join(f' {name}="{_quoted(value)}"' for name, value in needed.items() if name not in element.attributes)
+    begin = 1 + len(element.tag)
+    return element.raw[:begin] + more + element.raw[begin:]
 
 
 def _add(known: dict[str, Element], element: Element, values: Values) -> None:
@@ -73,3 +84,7 @@ def _add(known: dict[str, Element], element: Element, values: Values) -> None:
         values.found.append(finding("TF722", message, element.place("name"), notes=[note], help=advice))
     elif name:
         known[name] = element
+
+
+def _quoted(value: str) -> str:
+    return value.replace("&", "&amp;").replace("<", "&lt;").replace('"', "&quot;")

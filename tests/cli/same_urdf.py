@@ -1,0 +1,169 @@
+"""Whether two URDFs describe the same robot; read with the standard library, poses computed with scipy."""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+FAR = 1e-12
+#: An emitted tensor has 12 significant digits.
+TENSOR = 1e-11
+
+
+def same(source: str, source_folder: Path, built: str, built_folder: Path) -> list[str]:
+    """Return in what the two differ; the folders are those that their relative paths begin in."""
+    documents = ((source, source_folder), (built, built_folder))
+    there, here = (_robot(_found(ET.fromstring(text), folder)) for text, folder in documents)  # noqa: S314 (our own)
+    return [one for kind in there for one in _differ(kind, there[kind], here[kind])]
+
+
+def _found(root: Any, folder: Path) -> Any:
+    for element in (*root.iter("mesh"), *root.iter("texture")):
+        name = element.get("filename", "")
+        if "://" not in name:
+            element.set("filename", os.path.normpath(folder / name))
+    return root
+
+
+def _robot(root: Any) -> dict[str, Any]:
+    colours = _colours(root)
+    links = {one.get("name"): one for one in root.findall("link")}
+    joints = [one for one in root.findall("joint") if one.find("parent") is not None]
+    return {
+        "links": {name: "" for name in links},
+        "edges": {one.find("child").get("link"): _joint(one) for one in joints},
+        "inertials": {name: _inertial(one) for name, one in links.items() if _mass(one)},
+        "visuals": {name: _shapes(one, "visual", colours) for name, one in links.items()},
+        "collisions": {name: _shapes(one, "collision", colours) for name, one in links.items()},
+        "blocks": _blocks(root),
+    }
+
+
+def _differ(kind: str, there: Any, here: Any) -> list[str]:
+    if not isinstance(there, dict):
+        return [] if there == here else [f"{kind}: {there} is {here}"]
+    found = [f"{kind}: {name} is missing" for name in there if name not in here]
+    found += [f"{kind}: {name} is new" for name in here if name not in there]
+    for name in there:
+        if name in here and not _equal(there[name], here[name]):
+            found.append(f"{kind}: {name}: {there[name]} is {here[name]}")
+    return found
+
+
+def _equal(a: Any, b: Any) -> bool:
+    if isinstance(a, dict):
+        return set(a) == set(b) and all(_equal(a[key], b[key]) for key in a)
+    if isinstance(a, (list, tuple)):
+        return len(a) == len(b) and all(map(_equal, a, b))
+    if isinstance(a, np.ndarray):
+        return bool(np.allclose(a, b, rtol=0, atol=FAR * max(1.0, float(np.abs(a).max()))))
+    if isinstance(a, float) and isinstance(b, float):
+        return abs(a - b) <= TENSOR * max(abs(a), abs(b)) or abs(a - b) < FAR
+    return bool(a == b)
+
+
+def _numbers(element: Any, key: str, default: str) -> list[float]:
+    return [float(word) for word in (default if element is None else element.get(key, default)).split()]
+
+
+def _pose(element: Any) -> Any:
+    origin = element.find("origin")
+    matrix = np.eye(4)
+    matrix[:3, 3] = _numbers(origin, "xyz", "0 0 0")
+    matrix[:3, :3] = Rotation.from_euler("xyz", _numbers(origin, "rpy", "0 0 0")).as_matrix()
+    return matrix
+
+
+def _mass(link: Any) -> float:
+    mass = link.find("inertial/mass")
+    return 0.0 if mass is None else float(mass.get("value"))
+
+
+def _inertial(link: Any) -> Any:
+    inertial = link.find("inertial")
+    tensor = inertial.find("inertia")
+    return {
+        "pose": _pose(inertial),
+        "mass": _mass(link),
+        **{key: float(tensor.get(key, "0")) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")},
+    }
+
+
+def _colours(root: Any) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for said in [*root.findall("material"), *root.findall("link/visual/material")]:
+        if len(said):
+            found.setdefault(said.get("name", ""), said)
+    return found
+
+
+def _shapes(link: Any, tag: str, colours: dict[str, Any]) -> list[Any]:
+    shapes = []
+    for one in link.findall(tag):
+        for form in one.find("geometry"):
+            if form.tag == "capsule":
+                continue
+            said = {
+                key: value if key == "filename" else [float(word) for word in value.split()]
+                for key, value in form.attrib.items()
+            }
+            said["scale"] = said.get("scale", [1.0, 1.0, 1.0])
+            shapes.append({"form": form.tag, "pose": _pose(one), "colour": _colour(one, tag, colours), **said})
+    return shapes
+
+
+def _colour(shape: Any, tag: str, colours: dict[str, Any]) -> Any:
+    said = shape.find("material") if tag == "visual" else None
+    if said is None:
+        return None
+    said = said if len(said) else colours.get(said.get("name", ""))
+    if said is None:
+        return None
+    colour, texture = said.find("color"), said.find("texture")
+    rgba = None if colour is None else [min(max(part, 0), 1) for part in _numbers(colour, "rgba", "0.5 0.5 0.5 1")]
+    return [rgba, None if texture is None else texture.get("filename")]
+
+
+def _joint(joint: Any) -> dict[str, Any]:
+    kind = joint.get("type")
+    said = {"parent": joint.find("parent").get("link"), "type": kind, "pose": _pose(joint)}
+    if kind == "fixed":
+        return said
+    said["name"] = joint.get("name")
+    if kind == "floating":
+        return said
+    axis = np.array(_numbers(joint.find("axis"), "xyz", "1 0 0"))
+    said["axis"] = axis / np.linalg.norm(axis)
+    limit = joint.find("limit")
+    effort = kind in {"revolute", "prismatic"} or limit is not None
+    said["limit"] = {
+        key: float(limit.get(key)) if limit is not None and key in limit.attrib else 0.0 if "f" in key or "v" in key else None
+        for key in ("lower", "upper", "effort", "velocity")
+        if effort
+    }
+    defaults = {"dynamics": {"damping": 0.0, "friction": 0.0}, "calibration": {"rising": None, "falling": None}}
+    keys = ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity")
+    defaults["safety_controller"] = dict.fromkeys(keys, 0.0)
+    for tag, values in defaults.items():
+        element = joint.find(tag)
+        if element is not None:
+            said[tag] = {key: float(element.get(key)) if key in element.attrib else was for key, was in values.items()}
+    mimic = joint.find("mimic")
+    if mimic is not None:
+        said["mimic"] = [mimic.get("joint"), float(mimic.get("multiplier", "1")), float(mimic.get("offset", "0"))]
+    return said
+
+
+def _blocks(root: Any) -> list[Any]:
+    return sorted(_tree(one) for one in root if one.tag not in {"link", "joint", "material"} and isinstance(one.tag, str))
+
+
+def _tree(element: Any) -> str:
+    inside = "".join(_tree(one) for one in element if isinstance(one.tag, str))
+    text = " ".join((element.text or "").split())
+    return f"<{element.tag} {sorted(element.attrib.items())}>{text}{inside}"

@@ -1,0 +1,162 @@
+"""``tfcompose import``: a robot file from what somebody else wrote.
+
+Write a robot file with the tree, bodies and joints of a URDF or xacro file; building it gives the same URDF. Sensors
+whose frames are a preset's become sensors; what has no place in a robot file is said in comments.
+"""
+
+from __future__ import annotations
+
+import os
+import posixpath
+import re
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.compiling import library
+from tfcompose.cli.disk import disk
+from tfcompose.cli.terminal import UNREADABLE, complain, print_findings, read_text, unreadable
+from tfcompose.cli.urdf import read_urdf
+from tfcompose.compile import Compiled, compile_robot
+from tfcompose.diagnostic import RejectedError, Span
+from tfcompose.emit import Target
+from tfcompose.emit.spec import robot_name, spec
+from tfcompose.imported import Imported
+from tfcompose.resolve.packages import Packages
+from tfcompose.resolve.recognise import recognised
+from tfcompose.resolve.urdf_control import with_hardware
+from tfcompose.resolve.urdf_lost import angles, lost
+from tfcompose.resolve.urdf_names import with_material_names
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+    from collections.abc import Iterable
+
+    from tfcompose.cli.urdf import Read
+    from tfcompose.diagnostic import Diagnostic
+
+_ROBOT = re.compile(r"[a-z][a-z0-9_]*")
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("file", metavar="FILE", help="a .urdf or .xacro file")
+    parser.add_argument("args", nargs="*", metavar="NAME:=VALUE", help="arguments of the xacro file")
+    parser.add_argument("-o", "--output", metavar="FILE", help="the robot file to write; default: print it")
+    parser.add_argument("--force", action="store_true", help="write over a file that is there")
+    parser.add_argument("--robot", metavar="NAME", help="the robot's name; default: as the source says")
+    parser.add_argument(
+        "--package", action="append", default=[], metavar="NAME=FOLDER", dest="packages",
+        help="where a package is that is not installed; repeatable",
+    )  # fmt: skip
+    parser.add_argument("--no-sensors", action="store_true", help="leave frames frames, do not look for presets")
+    parser.add_argument(
+        "--keep-going", action="store_true", help="write what can be taken of a source with errors in it"
+    )
+
+
+def run(arguments: Namespace) -> int:
+    """Import; exit code 0, 1 with errors in the source, 2 after wrong use or where something cannot be read."""
+    try:
+        given, packages = _pairs(arguments.args, ":="), _pairs(arguments.packages, "=")
+    except ValueError as error:
+        complain(str(error))
+        return 2
+    wrong = _refusal(arguments)
+    if wrong:
+        complain(wrong)
+        return 2
+    try:
+        named = {name: (str(Path(folder).absolute()), Span(folder)) for name, folder in packages.items()}
+        read = read_urdf(arguments.file, Packages(disk(), named), given)
+    except RejectedError as error:
+        print_findings(error.diagnostics, sys.stderr)
+        return UNREADABLE if unreadable(error.diagnostics) else 1
+    errors = [one for one in read.judged() if one.severity == "error"]
+    print_findings(errors, sys.stderr)
+    if errors and not arguments.keep_going:
+        complain("nothing was written; --keep-going writes what can be taken")
+        return 1
+    text, failed = _written(read, arguments, packages)
+    if failed and not arguments.keep_going:
+        print_findings(failed, sys.stderr)
+        complain("nothing was written: the source has what a robot file cannot; --keep-going writes it all the same")
+        return 1
+    return _write(text, arguments.output) or int(bool(errors or failed))
+
+
+def _pairs(words: list[str], between: str) -> dict[str, str]:
+    wrong = next((word for word in words if not word.partition(between)[0] or between not in word), None)
+    if wrong is not None:
+        raise ValueError(f"{wrong} is not NAME{between}VALUE")
+    return {name: value for name, _, value in (word.partition(between) for word in words)}
+
+
+def _refusal(arguments: Namespace) -> str:
+    """Return what is wrong with how the command is used, or an empty text."""
+    if not arguments.file.endswith((".urdf", ".xacro")):
+        return f"{arguments.file}: a .urdf or .xacro file can be imported"
+    if arguments.args and not arguments.file.endswith(".xacro"):
+        return f"{arguments.file} takes no arguments: it is no xacro file"
+    if arguments.robot and not _ROBOT.fullmatch(arguments.robot):
+        return f"--robot {arguments.robot}: lower case letters, digits and _, a letter first"
+    if arguments.output and Path(arguments.output).exists() and not arguments.force:
+        return f"{arguments.output} is there already; --force writes over it"
+    return ""
+
+
+def _written(read: Read, arguments: Namespace, packages: dict[str, str]) -> tuple[str, list[Diagnostic]]:
+    """Return the robot file, and the errors that it has where the source has none."""
+    robot, renamed = with_material_names(with_hardware(read.robot))
+    folder = posixpath.dirname(arguments.output or "") or "."
+    words = frozenset(re.findall(r"[^\s<>\"'=]+", " ".join(block.text for block in robot.blocks)))
+    sensors, undecided = ([], {}) if arguments.no_sensors else recognised(robot, library(), words)
+    notes = lost(read.root, read.robot, read.found)
+    for mount, said in undecided.items():
+        notes.setdefault(("frames", mount), []).append(said)
+    notes.setdefault(("", ""), []).extend(renamed)
+    name = arguments.robot or robot_name(robot.name)
+    if name != robot.name:
+        notes.setdefault(("", ""), []).append(f"the source calls it {robot.name}")
+    given = Imported(
+        robot,
+        arguments.file,
+        tuple(sensors),
+        {at: tuple(said) for at, said in notes.items()},
+        angles(read.root),
+        {name: os.path.relpath(where, folder) for name, where in packages.items()},
+    )
+    target = Target("as-written", folder, Path.cwd().as_posix())
+    head = [f"imported from {posixpath.basename(arguments.file)} by tfcompose"]
+    text = spec(given, name, target, head)
+    compiled = _compiled(text, arguments.output)
+    return spec(given, name, target, [*head, *_faults(compiled)]), list(compiled.errors)
+
+
+def _compiled(text: str, output: str | None) -> Compiled:
+    return compile_robot(text, output or "robot.yaml", library(), read=read_text, disk=disk())
+
+
+def _faults(compiled: Compiled) -> Iterable[str]:
+    """Yield what lint says of the result, each rule once: these are faults of the source."""
+    several: dict[str, list[Diagnostic]] = {}
+    for one in compiled.found:
+        several.setdefault(one.code, []).append(one)
+    if several:
+        yield "what lint says of this file is true of the source:"
+    for code, found in several.items():
+        more = f" (and {len(found) - 1} more)" if found[1:] else ""
+        yield f"{code}: {found[0].message}{more}"
+
+
+def _write(text: str, output: str | None) -> int:
+    if output is None:
+        sys.stdout.write(text)
+        return 0
+    try:
+        Path(output).write_text(text, encoding="utf-8")
+    except OSError as error:
+        complain(f"{output} cannot be written: {error.strerror}")
+        return UNREADABLE
+    sys.stdout.write(f"wrote {output}\n")
+    return 0

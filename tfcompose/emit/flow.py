@@ -1,0 +1,133 @@
+"""YAML as people write robot files: an entry on a line where it fits, numbers and names bare, all else in quotes."""
+
+from __future__ import annotations
+
+import re
+from textwrap import dedent, indent
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.emit.numbers import number
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+WIDTH = 120
+
+#: What needs no quotes: a name, a path, an address.
+_PLAIN = re.compile(r"(?:[a-z]+://)?[A-Za-z_][A-Za-z0-9_./+-]*")
+#: What readers of other versions of YAML take for something else than a text.
+_WORDS = frozenset({"true", "false", "null", "yes", "no", "on", "off", "y", "n", "nan", "inf"})
+_ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
+
+
+class Bare(str):
+    """A text that stands in YAML as it is: a quantity with its unit."""
+
+    __slots__ = ()
+
+
+class Literal(str):
+    """A text of several lines, which keeps them."""
+
+    __slots__ = ()
+
+
+def entry(key: str, value: Any, depth: int = 0) -> list[str]:
+    """Return the lines of a key and its value: one line where it fits, else an indented block."""
+    before = "  " * depth
+    head = f"{before}{text(key)}:"
+    if isinstance(value, Literal):
+        lines = _literal(value)
+        return (
+            [f"{head} {text(value)}"]
+            if lines is None
+            else [f"{head} |", *(indent(one, before + "  ") for one in lines)]
+        )
+    line = f"{head} {flow(value)}"
+    if len(line) <= WIDTH or not isinstance(value, (dict, list)) or not _splits(value):
+        return [line]
+    if isinstance(value, list):
+        return [head, *(one for item in value for one in _item(item, depth + 1))]
+    return [head, *(one for inner, said in value.items() for one in entry(inner, said, depth + 1))]
+
+
+def _splits(value: Any) -> bool:
+    """Whether the value is longer in lines: a list of numbers is not."""
+    return isinstance(value, dict) or any(isinstance(item, dict) for item in value)
+
+
+def _item(value: Any, depth: int) -> list[str]:
+    before = "  " * depth
+    line = f"{before}- {flow(value)}"
+    if len(line) <= WIDTH or not isinstance(value, dict):
+        return [line]
+    lines = [one for key, said in value.items() for one in entry(key, said, depth + 1)]
+    return [f"{before}- {lines[0].lstrip()}", *lines[1:]]
+
+
+def flow(value: Any) -> str:
+    """Return the value on one line."""
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{text(key)}: {flow(item)}' for key, item in value.items())}}}"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(flow, value))}]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (int, float)):
+        return number(float(value))
+    return text(value)
+
+
+def text(value: str) -> str:
+    """Return a text, in quotes where YAML would take it for something else."""
+    if isinstance(value, Bare):
+        return str(value)
+    if _PLAIN.fullmatch(value) and value.lower() not in _WORDS:
+        return value
+    return '"' + "".join(_ESCAPES.get(letter) or _printed(letter) for letter in value) + '"'
+
+
+def _printed(letter: str) -> str:
+    return letter if letter.isprintable() else f"\\U{ord(letter):08x}"
+
+
+def _literal(value: str) -> list[str] | None:
+    """Return the lines of a literal block, or None for a text that cannot be one."""
+    lines = value.splitlines()
+    ends = any(line != line.rstrip() for line in lines)
+    if not lines or ends or lines[0][:1].isspace() or not all(line.replace("\t", " ").isprintable() for line in lines):
+        return None
+    return lines
+
+
+def leaned(block: str) -> Literal:
+    """Return an element as it stands in a file, without what its lines are indented by."""
+    first, _, rest = block.strip().partition("\n")
+    below = dedent(rest.expandtabs(2)) if rest else ""
+    return Literal("\n".join(line.rstrip() for line in [first, *below.splitlines()]))
+
+
+def comment(said: Iterable[str], depth: int = 0) -> list[str]:
+    """Return texts as lines of comment, folded where they are long."""
+    before = "  " * depth + "# "
+    return [before + line for one in said for line in _folded(" ".join(one.split()), WIDTH - len(before))]
+
+
+def _folded(said: str, width: int) -> list[str]:
+    lines = [""]
+    for word in said.split(" "):
+        if lines[-1] and len(lines[-1]) + 1 + len(word) > width:
+            lines.append("  " + word)
+        else:
+            lines[-1] = f"{lines[-1]} {word}".strip() if len(lines) == 1 else f"{lines[-1]} {word}"
+    return lines
+
+
+def section(name: str, entries: Mapping[str, Any], notes: Mapping[str, Iterable[str]]) -> list[str]:
+    """Return a section with its entries and the comments above them; nothing for an empty one."""
+    if not entries:
+        return []
+    lines = ["", f"{name}:"]
+    for key, value in entries.items():
+        lines += [*comment(notes.get(key, ()), 1), *entry(key, value, 1)]
+    return lines

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import os
 import xml.etree.ElementTree as ET
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+if TYPE_CHECKING:
+    from pathlib import Path
+
 FAR = 1e-12
 #: An emitted tensor has 12 significant digits.
 TENSOR = 1e-11
+#: The shapes of URDF; simulators have others of their own.
+FORMS = ("box", "cylinder", "sphere", "mesh")
 
 
 def same(source: str, source_folder: Path, built: str, built_folder: Path) -> list[str]:
@@ -25,7 +29,7 @@ def same(source: str, source_folder: Path, built: str, built_folder: Path) -> li
 def _found(root: Any, folder: Path) -> Any:
     for element in (*root.iter("mesh"), *root.iter("texture")):
         name = element.get("filename", "")
-        if "://" not in name:
+        if name and "://" not in name:
             element.set("filename", os.path.normpath(folder / name))
     return root
 
@@ -35,7 +39,7 @@ def _robot(root: Any) -> dict[str, Any]:
     links = {one.get("name"): one for one in root.findall("link")}
     joints = [one for one in root.findall("joint") if one.find("parent") is not None]
     return {
-        "links": {name: "" for name in links},
+        "links": dict.fromkeys(links, ""),
         "edges": {one.find("child").get("link"): _joint(one) for one in joints},
         "inertials": {name: _inertial(one) for name, one in links.items() if _mass(one)},
         "visuals": {name: _shapes(one, "visual", colours) for name, one in links.items()},
@@ -106,7 +110,7 @@ def _shapes(link: Any, tag: str, colours: dict[str, Any]) -> list[Any]:
     shapes = []
     for one in link.findall(tag):
         for form in one.find("geometry"):
-            if form.tag == "capsule":
+            if form.tag not in FORMS:
                 continue
             said = {
                 key: value if key == "filename" else [float(word) for word in value.split()]
@@ -126,7 +130,7 @@ def _colour(shape: Any, tag: str, colours: dict[str, Any]) -> Any:
         return None
     colour, texture = said.find("color"), said.find("texture")
     rgba = None if colour is None else [min(max(part, 0), 1) for part in _numbers(colour, "rgba", "0.5 0.5 0.5 1")]
-    return [rgba, None if texture is None else texture.get("filename")]
+    return [rgba, None if texture is None else texture.get("filename") or None]
 
 
 def _joint(joint: Any) -> dict[str, Any]:
@@ -139,28 +143,38 @@ def _joint(joint: Any) -> dict[str, Any]:
         return said
     axis = np.array(_numbers(joint.find("axis"), "xyz", "1 0 0"))
     said["axis"] = axis / np.linalg.norm(axis)
-    limit = joint.find("limit")
-    effort = kind in {"revolute", "prismatic"} or limit is not None
-    said["limit"] = {
-        key: float(limit.get(key)) if limit is not None and key in limit.attrib else 0.0 if "f" in key or "v" in key else None
-        for key in ("lower", "upper", "effort", "velocity")
-        if effort
-    }
-    defaults = {"dynamics": {"damping": 0.0, "friction": 0.0}, "calibration": {"rising": None, "falling": None}}
-    keys = ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity")
-    defaults["safety_controller"] = dict.fromkeys(keys, 0.0)
-    for tag, values in defaults.items():
+    for tag, values in _motion(kind, joint.find("limit") is not None).items():
         element = joint.find(tag)
-        if element is not None:
-            said[tag] = {key: float(element.get(key)) if key in element.attrib else was for key, was in values.items()}
+        if element is not None or tag == "limit":
+            given = {} if element is None else element.attrib
+            said[tag] = {key: float(given[key]) if key in given else usual for key, usual in values.items()}
     mimic = joint.find("mimic")
     if mimic is not None:
         said["mimic"] = [mimic.get("joint"), float(mimic.get("multiplier", "1")), float(mimic.get("offset", "0"))]
     return said
 
 
+def _motion(kind: str, limited: bool) -> dict[str, dict[str, float | None]]:  # noqa: FBT001 (here only)
+    """Return what may stand in a joint, each with what it is where nothing is said."""
+    ends: dict[str, float | None] = {"lower": None, "upper": None, "effort": 0.0, "velocity": 0.0}
+    has_limit = limited or kind in {"revolute", "prismatic"}  # URDF requires one of these
+    return {
+        "limit": ends if has_limit else {},
+        "dynamics": {"damping": 0.0, "friction": 0.0},
+        "calibration": {"rising": None, "falling": None},
+        "safety_controller": {
+            "soft_lower_limit": 0.0,
+            "soft_upper_limit": 0.0,
+            "k_position": 0.0,
+            "k_velocity": 0.0,
+        },
+    }
+
+
 def _blocks(root: Any) -> list[Any]:
-    return sorted(_tree(one) for one in root if one.tag not in {"link", "joint", "material"} and isinstance(one.tag, str))
+    return sorted(
+        _tree(one) for one in root if one.tag not in {"link", "joint", "material"} and isinstance(one.tag, str)
+    )
 
 
 def _tree(element: Any) -> str:

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import os
+import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import pytest
 
 from tests.cli.same_urdf import same
+from tests.readers.family import spec as family
 from tfcompose.cli import main
 from tfcompose.cli.disk import disk
 from tfcompose.cli.shelves import library
 from tfcompose.cli.terminal import read_text
 from tfcompose.compile import compile_robot
 from tfcompose.emit import Target, emit
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+from tfcompose.load import load
+from tfcompose.resolve.presets import holds
 
 #: Folders of installed packages that hold URDFs; nothing of them is kept here.
 PACKAGES = ("cmeel.prefix/share/example-robot-data/robots", "pybullet_data", "pydrake/share/drake/examples", "mujoco")
@@ -50,3 +50,58 @@ def test_building_what_import_writes_gives_the_robot_of_the_source(
         assert "error[TF" in capsys.readouterr().err
         pytest.skip("has errors of its own")
     assert not same(file.read_text("utf-8"), file.parent, built(out), tmp_path)
+
+
+def imported(urdf: str, folder: Path, *words: str) -> str:
+    """Return the robot file that import writes for a URDF that it takes."""
+    source, out = folder / "source.urdf", folder / "robot.yaml"
+    source.write_text(urdf, encoding="utf-8")
+    assert main(["import", str(source), "-o", str(out), "--force", *words]) == 0
+    return out.read_text("utf-8")
+
+
+def urdf_of(spec: dict[str, Any], folder: Path) -> str:
+    file = folder / "spec.yaml"
+    file.write_text(json.dumps(spec), encoding="utf-8")
+    return built(file)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_generated_robot_comes_back_the_same(seed: int, tmp_path: Path) -> None:
+    """Every joint type, every shape, masses of all kinds."""
+    urdf = urdf_of(family(seed), tmp_path)
+    imported(urdf, tmp_path)
+    assert not same(urdf, tmp_path, built(tmp_path / "robot.yaml"), tmp_path)
+
+
+PRESETS = library()
+#: Presets that other ones cannot be told from by their frames, and those that the frame itself is all of.
+ALIKE = {"generic/camera", "generic/rgbd"}
+
+
+@pytest.mark.parametrize("name", PRESETS.names)
+def test_a_sensor_is_recognised_or_left_as_frames_and_the_tree_is_the_same(name: str, tmp_path: Path) -> None:
+    preset = PRESETS.get(name)
+    sensor: dict[str, Any] = {"preset": name, "parent": "base_link", "xyz": [0.1, 0, 0.2], "rpy": [0, 0.3, 0]}
+    sensor |= {"driver": "none"} if preset.driver else {}
+    frames = {key: one for key, one in preset.frames.items() if holds(one.when, _usual(preset), "tfcompose")}
+    own = {key.replace("{name}", "front"): UNIT for key, one in frames.items() if one.xyz is None}
+    sensor |= {"frames": own} if own else {}
+    spec = {"tfcompose": 1, "robot": "r", "links": {"base_link": {}}, "sensors": {"front": sensor}}
+    spec["rules"] = {"TF401": "off"}
+    urdf = urdf_of(spec, tmp_path)
+    source = tmp_path / "source.urdf"
+    source.write_text(urdf, encoding="utf-8")
+    main(["import", str(source), "-o", str(tmp_path / "robot.yaml"), "--keep-going"])
+    found = load((tmp_path / "robot.yaml").read_text("utf-8"), "robot.yaml").data.get("sensors", {})
+    taken = found.get("front", {}).get("preset")
+    assert taken in {name, None} | ALIKE
+    (tmp_path / "robot.yaml").write_text((tmp_path / "robot.yaml").read_text("utf-8") + "\nrules: {TF401: off}\n")
+    assert not same(urdf, tmp_path, built(tmp_path / "robot.yaml"), tmp_path)
+
+
+UNIT = {"xyz": [0.01, 0.02, 0.03], "rpy": [0, 0, 0]}
+
+
+def _usual(preset: Any) -> dict[str, Any]:
+    return {key: option.default for key, option in preset.options.items()}

@@ -6,7 +6,7 @@ import math
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from tfcompose.pose import Pose, multiply, quat_from_rpy, rpy_from_quat
+from tfcompose.pose import Pose, angle_between, matrix_from_quat, multiply, quat_from_rpy, rpy_from_quat
 
 if TYPE_CHECKING:
     from tfcompose.pose import Quaternion, Vector
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 METRE_DECIMALS = 12
 QUATERNION_DECIMALS = 14
 ANGLE_NOISE_RAD = 1e-12
+NEAR_UPRIGHT_RAD = 1e-6
 
 
 #: Numbers and rotations repeat, in one file and from file to file.
@@ -68,6 +69,19 @@ def clean_rpy(quat_xyzw: Quaternion) -> Vector:
 @lru_cache(maxsize=_REMEMBERED)
 def _clean_rpy(quat_xyzw: Quaternion) -> Vector:
     _, pitch, yaw = (_whole_degree(angle) for angle in rpy_from_quat(quat_xyzw))
+    first = _with_roll(pitch, yaw, quat_xyzw)
+    if abs(abs(pitch) - math.pi / 2) > NEAR_UPRIGHT_RAD:
+        return first
+    # So near to ±π/2 it may be on either side of it, and where that is not all, roll and yaw are far from round.
+    (r00, _, _), (r10, _, _), (r20, _, _) = matrix_from_quat(quat_xyzw)
+    other = _with_roll(math.copysign(math.pi, pitch) - pitch, yaw, quat_xyzw)
+    exact = _with_roll(math.atan2(-r20, math.hypot(r00, r10)), math.atan2(r10, r00), quat_xyzw)
+    off = {rpy: angle_between(quat_from_rpy(*rpy), quat_xyzw) for rpy in (first, other, exact)}
+    return next((rpy for rpy, angle in off.items() if angle < ANGLE_NOISE_RAD), min(off, key=off.__getitem__))
+
+
+def _with_roll(pitch: float, yaw: float, quat_xyzw: Quaternion) -> Vector:
+    """Return the angles with the roll that remains to be turned."""
     x, y, z, w = quat_from_rpy(0.0, pitch, yaw)
     turn = multiply((-x, -y, -z, w), quat_xyzw)
     roll = 2 * (math.atan2(turn[0], turn[3]) if turn[3] >= 0 else math.atan2(-turn[0], -turn[3]))

@@ -67,6 +67,7 @@ class _Writer:
         if any("${" in value for value in _texts(sections)):
             lines += entry("vars", {"dollar": "$"})
             sections = _without_holes(sections)
+        lines += comment(self._homeless(sections))
         for title, entries in sections.items():
             notes = {key: self._of(title, key) for key in entries}
             lines += section(title, entries, notes)
@@ -74,6 +75,16 @@ class _Writer:
 
     def _of(self, title: str, name: str) -> list[str]:
         return self.notes.get((title, name), [])
+
+    def _homeless(self, sections: dict[str, dict[str, Any]]) -> list[str]:
+        """Return the notes of what has no entry of its own; a frame with a body has its notes there."""
+        homeless = []
+        for (title, name), several in list(self.notes.items()):
+            if title == "frames" and name not in sections["frames"] and name in sections["links"]:
+                self.notes["links", name] = self._of("links", name) + several
+            elif title and name not in sections[title]:
+                homeless += [f"{name}: {said}" for said in several]
+        return homeless
 
     def _note(self, title: str, name: str, said: str) -> None:
         self.notes.setdefault((title, name), []).append(said)

@@ -75,8 +75,8 @@ def _chosen(rivals: list[_Fit], best: _Fit) -> Recognised | None:
     if len({one.found.preset for one in rivals}) == 1:
         return best.found
     generic = [one.found for one in rivals if one.found.preset.startswith("generic/")]
-    named = [one.found for one in rivals if _says(one.found)]
-    if len({one.preset for one in named}) == 1:
+    named = sorted((one.found for one in rivals if _says(one.found)), key=lambda one: -len(one.preset))
+    if named:  # of d435 and d435i, both in a name, the longer one
         return named[0]
     return generic[0] if generic else None
 

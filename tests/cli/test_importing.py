@@ -11,7 +11,7 @@ import pytest
 
 from tests.cli.same_urdf import same
 from tests.readers.family import spec as family
-from tfcompose.cli import main
+from tfcompose.cli import importing, main
 from tfcompose.cli.disk import disk
 from tfcompose.cli.shelves import library
 from tfcompose.cli.terminal import read_text
@@ -20,6 +20,7 @@ from tfcompose.emit import Target, emit
 from tfcompose.load import load
 from tfcompose.resolve.presets import holds
 
+PRESETS = library()
 #: Folders of installed packages that hold URDFs; nothing of them is kept here.
 PACKAGES = ("cmeel.prefix/share/example-robot-data/robots", "pybullet_data", "pydrake/share/drake/examples", "mujoco")
 
@@ -31,7 +32,7 @@ def shipped() -> list[Path]:
 
 
 def built(file: Path) -> str:
-    compiled = compile_robot(read_text(str(file)), str(file), library(), read=read_text, disk=disk())
+    compiled = compile_robot(read_text(str(file)), str(file), PRESETS, read=read_text, disk=disk())
     assert compiled.robot, compiled.found
     assert not compiled.errors, [str(one) for one in compiled.errors][:3]
     files = {one.path: one.text for one in emit(compiled.robot, Target(folder=str(file.parent)))}
@@ -74,7 +75,12 @@ def test_a_generated_robot_comes_back_the_same(seed: int, tmp_path: Path) -> Non
     assert not same(urdf, tmp_path, built(tmp_path / "robot.yaml"), tmp_path)
 
 
-PRESETS = library()
+@pytest.fixture(autouse=True)
+def _one_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read the presets once for all tests: that is most of what importing a small robot costs."""
+    monkeypatch.setattr(importing, "library", lambda: PRESETS)
+
+
 #: Presets that other ones cannot be told from by their frames, and those that the frame itself is all of.
 ALIKE = {"generic/camera", "generic/rgbd"}
 

@@ -292,3 +292,43 @@ def test_a_joint_limit_takes_units_of_turning_and_of_sliding(limit: str, velocit
     assert said
     assert not validated.found
     assert (said.velocity, said.effort) == pytest.approx((velocity, effort))
+
+
+@pytest.mark.parametrize("name", ["pi", "a b", "ü", "1a", "build_dir", "params_file", ""])
+def test_a_variable_that_no_expression_can_mean_is_refused_where_it_stands(name: str) -> None:
+    (one,) = validated(f"vars: {{{name!r}: 3}}\nframes: {{f: {{}}}}\n").found
+    assert one.code == "TF105"
+    assert (one.span and one.span.line) == 3
+
+
+@pytest.mark.parametrize("what", ["frame(f)", "file(maps/a.yaml)", "frame(f) + 1"])
+@pytest.mark.parametrize("where", ["vars: {a: %s}", "frames: {f: {parent: %s}}", "base: %s", "calibrations: [%s]"])
+def test_what_only_processes_are_told_is_named_elsewhere(what: str, where: str) -> None:
+    (one,) = validated(where % f"'${{{what}}}'" + "\n").found
+    assert one.code == "TF105"
+    assert one.message.endswith("is for processes only")
+    assert "run, params" in one.help
+
+
+@pytest.mark.parametrize("what", ["frame(f) + 1", "2 * file(a/b.yaml)", "frame(${a})"])
+def test_in_a_process_they_stand_alone(what: str) -> None:
+    found = validated(f"processes: {{p: {{run: [x, '${{{what}}}']}}}}\n").found
+    assert {one.code for one in found} == {"TF105"}
+
+
+def test_a_computed_number_is_a_word_of_a_command_and_of_its_environment() -> None:
+    text = (
+        "vars: {h: 30 cm, n: 2}\nprocesses:\n"
+        "  a: {run: [x, '${h}', '${n}', 'h=${h}'], env: {H: '${n * 2}'}}\n"
+        "  b: {run: {package: p, executable: e, args: ['${n}']}}\n"
+    )
+    spec = validated(text).spec
+    assert spec
+    run = spec.processes["a"].run
+    assert run
+    assert run.argv == ("x", "0.3", "2", "h=0.3")
+    assert spec.processes["a"].env == {"H": "4"}
+    again = spec.processes["b"].run
+    assert again
+    assert again.args == ("2",)
+    assert codes_of("processes: {a: {run: [x, 3]}}\n") == ["TF103"]

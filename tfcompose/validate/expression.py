@@ -32,7 +32,14 @@ _TOKEN = re.compile(
     r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<sign>[-+*/()]))"
 )
 _HOLE = re.compile(r"\$\{([^{}]*)\}")
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+_TOLD = re.compile(r"\$\{\s*(frame|file)\s*\(")
+_TOLD_EXAMPLES = {"frame": "base_link", "file": "maps/a.yaml"}
+
+#: What an expression takes for something else.
+RESERVED = {"pi": "a number already", "params_file": "for launch arguments", "build_dir": "for launch arguments"}
 
 
 class ExpressionError(ValueError):
@@ -57,8 +64,14 @@ def fill(text: str, lookup: Callable[[str], Value], later: re.Pattern[str] | Non
             text[a:b]
             for a, b in zip([0, *(k.end() for k in kept)], [*(k.start() for k in kept), len(text)], strict=True)
         ]
-        filled = [_inserted(fill(piece, lookup)) if "${" in piece else piece for piece in pieces]
+        filled = [inserted(fill(piece, lookup, later)) if "${" in piece else piece for piece in pieces]
         return "".join(part for pair in zip(filled, [*(k[0] for k in kept), ""], strict=True) for part in pair)
+    told = _TOLD.search(text)
+    if told:
+        what = f"{told[1]}(…)"
+        if later:
+            raise ExpressionError(f"{what} stands alone, with one name", f"${{{told[1]}({_TOLD_EXAMPLES[told[1]]})}}")
+        raise ExpressionError(f"${{{what}}} is for processes only", "it can stand in run, params, remap and env")
     whole = _HOLE.fullmatch(text.strip())
     if whole:
         return evaluate(whole[1], lookup)
@@ -66,7 +79,7 @@ def fill(text: str, lookup: Callable[[str], Value], later: re.Pattern[str] | Non
         raise ExpressionError("${ without its }", "close the expression: ${name}")
     parts, length, end = [], 0, 0
     for hole in _HOLE.finditer(text):
-        parts += [text[end : hole.start()], _inserted(evaluate(hole[1], lookup))]
+        parts += [text[end : hole.start()], inserted(evaluate(hole[1], lookup))]
         end = hole.end()
         length += len(parts[-1])
         if length > LONGEST_TEXT:
@@ -90,10 +103,11 @@ def evaluate(text: str, lookup: Callable[[str], Value]) -> Value:
 
 def names_in(text: str) -> list[str]:
     """Return the names in the text's expressions, in order: variables, and also units and functions."""
-    return [name for hole in _HOLE.findall(text) for name in _NAME.findall(hole)]
+    return [name for hole in _HOLE.findall(text) for name in IDENTIFIER.findall(hole)]
 
 
-def _inserted(value: Value) -> str:
+def inserted(value: Value) -> str:
+    """Return a value as it is written in a text: a quantity is its number, in SI units."""
     if isinstance(value, str):
         return value
     number = value.value

@@ -6,6 +6,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.validate.claims import ClaimSpec
+from tfcompose.validate.expression import inserted
 from tfcompose.validate.fields import (
     ANYTHING,
     BOOLEAN,
@@ -34,10 +35,18 @@ _NODE_MEANS = "a node's name: letters, digits and _"
 _LIST = {"type": "array", "items": {"type": "string"}}
 
 
+def _word(value: Any, path: Path, problems: Problems) -> Any:
+    return TEXT.read(inserted(value) if isinstance(value, Quantity) else value, path, problems)
+
+
+#: A text; a computed number is written as one.
+WORD = Type(_word, TEXT.schema)
+
+
 def _arguments(value: Any, path: Path, problems: Problems) -> Any:
     """Read a command's arguments: words, or names with values, as launch files take them."""
     if not isinstance(value, dict):
-        return listing(TEXT).read(value, path, problems)
+        return listing(WORD).read(value, path, problems)
     words = [_argument(name, item, (*path, name), problems) for name, item in value.items()]
     return BROKEN if BROKEN in words else tuple(words)
 
@@ -67,7 +76,7 @@ class Run(Model):
     args: tuple[str, ...] = key(
         ARGUMENTS, (), "words; for a launch file name: value", (["--verbose"], {"use_composition": False})
     )
-    argv: tuple[str, ...] = key(listing(TEXT), (), "the whole command instead of package and executable")
+    argv: tuple[str, ...] = key(listing(WORD), (), "the whole command instead of package and executable")
 
 
 class Circle(Model):
@@ -116,7 +125,7 @@ def _environment(value: Any, path: Path, problems: Problems) -> Any:
     for name in value if isinstance(value, dict) else ():
         if not name or "=" in name:
             problems.refuse("TF106", (*path, name), f"{name!r} cannot name a variable", on_key=True)
-    return mapping(TEXT).read(value, path, problems)
+    return mapping(WORD).read(value, path, problems)
 
 
 class StopSpec(Model):

@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import did_you_mean
-from tfcompose.validate.expression import ExpressionError, Value, fill, names_in
+from tfcompose.validate.expression import IDENTIFIER, RESERVED, ExpressionError, Value, fill, names_in
 from tfcompose.validate.quantity import NUMBER, Quantity, UnitError, quantity
 from tfcompose.validate.schema import BROKEN, Problems, shown
 
@@ -129,6 +129,10 @@ class _Variables:
         raise ExpressionError(f"unknown variable {name}", did_you_mean(name, self.written, there))
 
     def _value(self, name: str, written: Any) -> Value:
+        if name in RESERVED:
+            raise ExpressionError(f"{name} is {RESERVED[name]}", "give the variable another name")
+        if not IDENTIFIER.fullmatch(name):
+            raise ExpressionError(f"{name!r} cannot name a variable", "letters, digits and _: for example mast_height")
         if isinstance(written, bool) or not isinstance(written, (int, float, str)):
             raise ExpressionError(f"the variable {name} is {shown(written)}", "a number, a quantity or a text")
         if not isinstance(written, str):

@@ -100,7 +100,8 @@ def test_overlays_come_after_profiles_and_settings_last() -> None:
 
 def test_an_overlay_can_bring_a_profile() -> None:
     source = load("a: 0\n", "f")
-    assert composed(source, ["p"], [load("profiles: {p: {a: 1}}\n", "o")]).data == {"a": 1}
+    made = composed(source, ["p"], [load("profiles: {p: {a: 1}}\n", "o")])
+    assert (made.data, made.found) == ({"a": 1}, ())
 
 
 def test_an_overlay_that_changes_nothing_is_a_finding_at_both_places() -> None:
@@ -108,6 +109,30 @@ def test_an_overlay_that_changes_nothing_is_a_finding_at_both_places() -> None:
     assert [(one.code, str(one.span), [str(note.span) for note in one.notes]) for one in found] == [
         ("TF014", "o:1:8", ["f:1:8"])
     ]
+
+
+@pytest.mark.parametrize(
+    ("overlay", "place"),
+    [("{}", "o:1:1"), ("a: {}\n", "o:1:4"), ("a: {b: {}}\n", "o:1:8"), ("a: {b: {}, x: 2}\n", "o:1:8")],
+)
+def test_an_overlay_that_is_empty_where_something_stands_is_a_finding(overlay: str, place: str) -> None:
+    (one,) = composed(load("a: {x: 1, b: {y: 2}}\n", "f"), [], [load(overlay, "o")]).found
+    assert (one.code, str(one.span)) == ("TF014", place)
+
+
+def test_an_overlay_may_say_which_language_it_is_in_and_bring_what_is_new_and_empty() -> None:
+    assert not composed(load("tfcompose: 1\na: {}\n", "f"), [], [load("tfcompose: 1\na: {b: {}}\n", "o")]).found
+
+
+def test_an_included_file_may_be_completed_by_what_stands_there_already() -> None:
+    files = {"base": "links: {a: {}, b: {}}\n"}
+    assert not with_includes(load("include: [base]\nlinks: {a: {}}\n", "f"), files.__getitem__).found
+
+
+def test_a_setting_cannot_include() -> None:
+    with pytest.raises(RejectedError) as refused:
+        set_value("include=[a.yaml]")
+    assert [one.code for one in refused.value.diagnostics] == ["TF016"]
 
 
 def test_true_is_not_one() -> None:

@@ -49,7 +49,7 @@ class _Includer:
                 message = f"files include each other: {circle}" if file in chain else f"more than {MOST_FILES} files"
                 raise RejectedError([*source.found, finding("TF015", message, at, help="remove one include")])
             included = self.include(self._load(file, at, source), (*chain, file))
-            base = lay_over(base, included) if base else included
+            base = lay_over(base, included, is_overlay=False) if base else included
         own = without(source, "include")
         if base is None:
             return own
@@ -82,7 +82,7 @@ def set_value(setting: str) -> Source:
     """Return the overlay that ``PATH=VALUE`` means; the value is read as YAML: ``sensors.camera.xyz=[0.2, 0, 10 cm]``.
 
     Raises:
-        RejectedError: if there is no ``=``, or the value is not YAML.
+        RejectedError: if there is no ``=``, the value is not YAML, or the key is one that is read before.
     """
     span = Span(f"--set {setting}")
     path_text, sign, value_text = setting.partition("=")
@@ -90,6 +90,9 @@ def set_value(setting: str) -> Source:
     if not sign or not all(path):
         message = f"--set takes PATH=VALUE, not {setting!r}"
         raise RejectedError([finding("TF016", message, span, help="for example sensors.camera.tf=driver")])
+    if path[0] == "include":
+        message = "--set cannot include files: it is laid over what they hold"
+        raise RejectedError([finding("TF016", message, span, help="--overlay FILE")])
     read = load(f"value: {value_text.strip() or 'null'}", span.file)
     data: Any = read.data["value"]
     below = read.places.inside["value"]

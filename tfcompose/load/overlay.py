@@ -84,7 +84,9 @@ def composed(source: Source, profiles: Sequence[str] = (), overlays: Sequence[So
     for name in profiles:
         result = lay_over(result, source.part(("profiles", name)))
     for overlay in overlays:
-        result = lay_over(result, without(overlay, "profiles"))
+        rest = without(overlay, "profiles")
+        if rest.data or rest is overlay:
+            result = lay_over(result, rest)
     return _without_nulls(result)
 
 
@@ -94,6 +96,8 @@ def lay_over(base: Source, overlay: Source, *, is_overlay: bool = True) -> Sourc
     With ``is_overlay`` a value that changes nothing is a finding.
     """
     merger = _Merger(base.replaced, overlay.replaced, is_overlay=is_overlay)
+    if is_overlay and not overlay.data:
+        merger.found.append(_idle("nothing is laid over the robot here", overlay.places))
     data, places = merger.merge((base.data, base.places), (overlay.data, overlay.places), ())
     found = (*base.found, *overlay.found, *merger.found)
     allows = tuple(dict.fromkeys((*base.allows, *overlay.allows)))
@@ -133,6 +137,9 @@ class _Merger:
                 _drop(key, data, inside, keys)
             elif isinstance(value, dict):
                 old = data.get(key)
+                if self.is_overlay and not value and isinstance(old, dict):
+                    message = f"{'.'.join(map(str, at))} is there already, and {{}} changes nothing"
+                    self.found.append(_idle(message, place, inside[key]))
                 if key in data and not isinstance(old, dict):
                     self.remember(at, inside[key])
                 under = (old, inside[key]) if isinstance(old, dict) else ({}, place.with_inside({}, {}))
@@ -157,10 +164,14 @@ class _Merger:
     def note(self, old: Any, old_place: Place, new: Any, place: Place, path: Path) -> None:
         """Remember what is replaced, and say so if that changes nothing."""
         self.remember(path, old_place)
-        if self.is_overlay and type(old) is type(new) and old == new:
+        if self.is_overlay and type(old) is type(new) and old == new and path != ("tfcompose",):
             message = f"{'.'.join(map(str, path))} is {_shown(new)} already"
-            notes = [Note("here", old_place.span)]
-            self.found.append(finding("TF014", message, place.span, notes=notes, help="remove it", severity="warning"))
+            self.found.append(_idle(message, place, old_place))
+
+
+def _idle(message: str, place: Place, old: Place | None = None) -> Diagnostic:
+    notes = [Note("here", old.span)] if old else []
+    return finding("TF014", message, place.span, notes=notes, help="remove it", severity="warning")
 
 
 def _is_for_later(path: Path) -> bool:

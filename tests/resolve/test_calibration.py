@@ -333,6 +333,7 @@ def test_an_inverse_is_suspected_by_the_nominal_pose_or_by_the_robots_bodies() -
     assert (
         "pose of lens in base_link, from c.yaml:2 (autoware) is probably that of base_link in lens" in found[0].message
     )
+    assert found[0].message.endswith("it is 0 mm and 0 deg from nominal")
     # A body 1 m to the left; the sensor is said to be 1 m ahead, looking left, so the way back leads to that body.
     mast = "joints: {j: {type: fixed, parent: base_link, child: mast, xyz: [0, 1, 0]}}\n"
     head = HEAD.replace(

@@ -225,6 +225,8 @@ def test_warnings_about_somebody_elses_file_are_left_to_its_own_lint(cell: Any, 
             "did you mean arm?",
             "cell.yaml",
         ),
+        ("a: {xacro: third/arm/mast.xacro, parent: table}", "TF206", "has no links", "macro: mast", "cell.yaml"),
+        ("a: {urdf: third/arm/mast.xacro, parent: table}", "TF206", "has no links", "macro: mast", "cell.yaml"),
         ("a: {urdf: none.urdf, parent: table}", "TF001", "cannot be read", "", "none.urdf"),
         ("a: {urdf: cell.yaml, parent: table}", "TF001", "cannot be read", "", "cell.yaml"),
         (

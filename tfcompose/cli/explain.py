@@ -100,4 +100,5 @@ def _measured(calibration: Calibration) -> str:
     if calibration.nominal is None:
         return f"{calibration.name}; no nominal pose is given"
     metres, radians = calibration.off(calibration.pose)
-    return f"{calibration.name}, {metres * 1000:.3g} mm and {math.degrees(radians):.2g} deg from nominal"
+    mm, deg = round(metres * 1000, 3), round(math.degrees(radians), 3)
+    return f"{calibration.name}, {mm:.3g} mm and {deg:.2g} deg from nominal"

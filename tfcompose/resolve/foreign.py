@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from tfcompose.resolve.packages import Packages
     from tfcompose.resolve.part import PartEntry
 
+_MACRO = re.compile(r"""<xacro:macro\s[^>]*?\bname\s*=\s*["'](?:xacro:)?([^"']+)""")
 _PACKAGE = re.compile(r"(?:package://|\$\(find(?:-pkg-share)?\s+)([A-Za-z][A-Za-z0-9_]*)\)?/(.+)")
 
 
@@ -56,6 +57,10 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
     else:
         name, text = f"{file} (expanded)", _expanded(part, file, at, packages)
     robot, found = robot_of_urdf(load_xml(text, name), name, packages.asset)
+    if not robot.frames:
+        macros = dict.fromkeys(_MACRO.findall(read(file)))
+        advice = f"it defines macros; name one, as xacro: and macro: {', '.join(macros)}" if macros else ""
+        raise RejectedError([finding("TF206", f"{file} has no links", at, help=advice)])
     parents = {edge.parent for edge in robot.edges}
     implied = frozenset(parents - robot.frames.keys()) if said.macro is not None else frozenset[str]()
     digest = hashlib.sha256(text.encode()).hexdigest()

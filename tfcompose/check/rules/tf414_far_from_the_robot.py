@@ -50,8 +50,9 @@ def far_from_the_robot(robot: Robot) -> Iterator[Diagnostic]:
         distance = norm(tuple(n for n, unit in zip(value.numbers, value.with_unit, strict=True) if not unit))
         if child in below and distance > limit:
             message = f"{value.entry} is {distance:g} m away; the rest of the robot is within {limit:.3g} m"
-            at = value.place(max(range(len(value.numbers)), key=lambda index: abs(value.numbers[index])))
-            yield finding("TF414", message, at, help="a bare number is in metres: 250 mm")
+            farthest = max(range(len(value.numbers)), key=lambda index: abs(value.numbers[index]))
+            advice = f"a bare number is in metres; in millimetres: {value.numbers[farthest]:g} mm"
+            yield finding("TF414", message, value.place(farthest), help=advice)
 
 
 _OF_AN_EDGE = 3  # section, name, xyz

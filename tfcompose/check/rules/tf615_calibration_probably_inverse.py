@@ -48,7 +48,8 @@ def why_inverse(robot: Robot, edge: Edge) -> str:
 def _nearer(made: Calibration, back: Pose) -> str:
     far, turned = made.off(back)
     if _size(made, made.pose) > 1 and _size(made, back) < NEARER * _size(made, made.pose):
-        return f"turned round it is {far * 1000:.3g} mm and {math.degrees(turned):.2g} deg from nominal"
+        mm, deg = round(far * 1000, 3), round(math.degrees(turned), 3)
+        return f"turned round it is {mm:.3g} mm and {deg:.2g} deg from nominal"
     return ""
 
 

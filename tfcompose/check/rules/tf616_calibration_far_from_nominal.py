@@ -35,4 +35,4 @@ def calibration_far_from_nominal(robot: Robot) -> Iterator[Diagnostic]:
 
 
 def _both(metres: float, radians: float) -> str:
-    return f"{metres * 1000:.3g} mm and {math.degrees(radians):.2g} deg"
+    return f"{round(metres * 1000, 3):.3g} mm and {round(math.degrees(radians), 3):.2g} deg"

@@ -1,6 +1,7 @@
 """``tfcompose build``: the robot's files, all of them or nothing.
 
-Write plan.json, the URDF, xacro and tree.txt, and parameter files where there are any: all, or nothing.
+Write plan.json, the URDF, xacro, tree.txt and tree.svg, and parameter files where there are any: all, or
+nothing.
 """
 
 from __future__ import annotations

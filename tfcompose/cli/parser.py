@@ -34,6 +34,7 @@ COMMANDS = {
     "down": "stop a running robot",
     "echo": "the live pose of B in A",
     "monitor": "who publishes each live edge, how often, how evenly and how late",
+    "graph": "the tree as a picture: SVG, PDF, PNG, DOT or Mermaid",
     "tree": "the tree with kinds, owners and poses",
     "pose": "the pose of B in A, from the spec alone",
     "explain": "a code's page, or the chain between two frames",

@@ -6,7 +6,10 @@ import posixpath
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.draw.picture import draw
+from tfcompose.draw.svg import svg
 from tfcompose.emit.final import with_final_names
+from tfcompose.emit.graph import graph_of
 from tfcompose.emit.params import params_file, written_params
 from tfcompose.emit.plan import plan_of
 from tfcompose.emit.target import AS_WRITTEN, Target
@@ -42,6 +45,7 @@ def emit(robot: Robot, target: Target = AS_WRITTEN) -> tuple[File, ...]:
         File("plan.json", write_plan(plan_of(live, target))),
         *(file for files in descriptions.values() for file in files),
         File("tree.txt", tree(live)),
+        File("tree.svg", svg(draw(graph_of(live)))),
         *(_params(process, nodes, stock) for process in robot.processes if (nodes := written_params(process))),
     )
 

@@ -33,7 +33,7 @@ def _row(name: str, edge: Edge | None, width: int, owners: int) -> str:
     if edge is None:
         return name
     rate = f"{number(edge.rate)} Hz" if edge.rate else ""
-    rest = "  ".join(part for part in (_pose(edge), _switched(edge)) if part)
+    rest = "  ".join(part for part in (pose_text(edge), _switched(edge)) if part)
     said = f"{name:<{width}}  {edge.kind:<7}  {edge.owner:<{owners}}  {rate:<6}  {rest}"
     return said.rstrip()
 
@@ -41,14 +41,15 @@ def _row(name: str, edge: Edge | None, width: int, owners: int) -> str:
 def edge_facts(edge: Edge) -> str:
     """Return kind, owner, rate and pose of an edge, in one line."""
     rate = f"{number(edge.rate)} Hz" if edge.rate else ""
-    return "  ".join(part for part in (edge.kind, f"by {edge.owner}", rate, _pose(edge), _switched(edge)) if part)
+    return "  ".join(part for part in (edge.kind, f"by {edge.owner}", rate, pose_text(edge), _switched(edge)) if part)
 
 
 def _switched(edge: Edge) -> str:
     return f"or on {', '.join(edge.switched)}" if edge.switched else ""
 
 
-def _pose(edge: Edge) -> str:
+def pose_text(edge: Edge) -> str:
+    """Return position and rotation of an edge, as far as they are not zero."""
     parts = []
     xyz = clean_xyz(edge.pose.xyz)
     if any(xyz):

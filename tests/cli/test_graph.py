@@ -1,0 +1,90 @@
+"""``tfcompose graph``: each ending gives its format, and what cannot be drawn is said in one sentence."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+ROBOT = ROOT / "robots" / "two_rovers.yaml"
+BEGIN = {"svg": b"<svg ", "pdf": b"%PDF-1.4", "png": b"\x89PNG", "dot": b"digraph ", "mmd": b"flowchart LR"}
+
+
+def graph(*words: object, cwd: Path, without: str = "") -> subprocess.CompletedProcess[str]:
+    """Run the command, ``without`` a package."""
+    hide = f"import sys; sys.modules[{without!r}] = None; " if without else ""
+    program = f"{hide}from tfcompose.cli import main; raise SystemExit(main({['graph', *map(str, words)]!r}))"
+    return subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, cwd=cwd, timeout=60, check=False
+    )
+
+
+@pytest.mark.parametrize("ending", BEGIN)
+def test_the_ending_says_what_is_written(ending: str, tmp_path: Path) -> None:
+    done = graph(ROBOT, "-o", f"out.{ending.upper()}", cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"wrote out.{ending.upper()}\n", "")
+    (written,) = tmp_path.iterdir()
+    assert written.read_bytes().startswith(BEGIN[ending])
+    assert written.stat().st_mode & 0o444 == 0o444
+
+
+def test_without_options_it_writes_what_build_writes(tmp_path: Path) -> None:
+    assert graph(ROBOT, cwd=tmp_path).returncode == 0
+    golden = ROOT / "tests" / "golden" / "two_rovers" / "tree.svg"
+    assert (tmp_path / "tree.svg").read_bytes() == golden.read_bytes()
+
+
+def test_poses_are_written_where_they_are_asked_for(tmp_path: Path) -> None:
+    for name, options in (("without.svg", ()), ("with.svg", ("--poses",))):
+        graph(ROBOT, "-o", name, *options, cwd=tmp_path)
+    assert "xyz 0.1 0 0.2<" in (tmp_path / "with.svg").read_text("utf-8")
+    assert "xyz 0.1 0 0.2<" not in (tmp_path / "without.svg").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        (
+            "tree.jpg",
+            "tfcompose: .jpg is no kind of picture that graph writes; -o takes a file that ends in svg, pdf, ",
+        ),
+        ("tree", "tfcompose: tree has no ending; -o takes a file that ends in svg, pdf, png, dot or mmd\n"),
+        ("no/folder/tree.svg", "tfcompose: no/folder/tree.svg was not written: No such file or directory\n"),
+    ],
+)
+def test_what_cannot_be_written_is_said_in_one_sentence(name: str, said: str, tmp_path: Path) -> None:
+    done = graph(ROBOT, "-o", name, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith(said)
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_the_package_only_png_is_refused_and_says_what_to_install(tmp_path: Path) -> None:
+    done = graph(ROBOT, "-o", "tree.png", cwd=tmp_path, without="pypdfium2")
+    assert done.returncode == 2
+    assert "pip install 'tfcompose[pictures]'" in done.stderr
+    assert graph(ROBOT, "-o", "tree.pdf", cwd=tmp_path, without="pypdfium2").returncode == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["tree.pdf"]
+
+
+def test_a_robot_with_errors_is_not_drawn(tmp_path: Path) -> None:
+    (tmp_path / "bad.yaml").write_text("tfcompose: 1\nrobot: bad\nframes: {a: {parent: b}}\n", encoding="utf-8")
+    done = graph("bad.yaml", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "error[TF" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.yaml"]
+
+
+def test_an_earlier_picture_is_replaced_and_a_link_is_followed(tmp_path: Path) -> None:
+    (tmp_path / "old.svg").write_text("old", encoding="utf-8")
+    (tmp_path / "old.svg").chmod(0o640)
+    (tmp_path / "link.svg").symlink_to("target.svg")
+    for name in ("old.svg", "link.svg"):
+        assert graph(ROBOT, "-o", name, cwd=tmp_path).returncode == 0
+    assert (tmp_path / "old.svg").read_text("utf-8").startswith("<svg ")
+    assert (tmp_path / "old.svg").stat().st_mode & 0o777 == 0o640
+    assert (tmp_path / "link.svg").is_symlink()
+    assert (tmp_path / "target.svg").read_text("utf-8").startswith("<svg ")

@@ -1,0 +1,300 @@
+"""Pictures: everything is in them once, nothing lies on anything else, and other people's readers open them."""
+
+from __future__ import annotations
+
+import ctypes
+import io
+import random
+import re
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree as ET
+
+import pydot
+import pypdf
+import pypdfium2
+import pytest
+from PIL import Image
+
+from tfcompose.draw import Arrow, Graph, Group
+from tfcompose.draw.dot import dot
+from tfcompose.draw.letters import width_of
+from tfcompose.draw.mermaid import mermaid
+from tfcompose.draw.pdf import pdf
+from tfcompose.draw.picture import draw
+from tfcompose.draw.png import png
+from tfcompose.draw.shapes import Box, Drawing, Text
+from tfcompose.draw.style import STYLES
+from tfcompose.draw.svg import svg
+
+if TYPE_CHECKING:
+    from tfcompose.draw.graph import Kind
+
+SVG = "{http://www.w3.org/2000/svg}"
+KINDS: tuple[Kind, ...] = ("static", "joint", "dynamic")
+ODD = (
+    "a<b>&\"c'",
+    "back\\slash\\",
+    "new\nline",
+    "bell\x07",
+    "\u202eturned",
+    "底盤",
+    "#35;`x`",
+    "end",
+    "a -> b; }",
+    " ",
+    "]",
+)
+
+
+def tree(seed: int, frames: int, *, poses: bool = False, odd: bool = False) -> Graph:
+    """A tree that grows at random: deep where the seed is even, with sensors, of which some carry others."""
+    rng = random.Random(seed)
+    names = [f"frame_{index}_{'x' * rng.randrange(20)}" for index in range(frames)]
+    if odd:
+        names[1 : 1 + len(ODD)] = ODD[: frames - 1]
+    owners = [f"owner{index}" for index in range(rng.randint(1, 12))]
+    arrows, groups = [], {names[0]: -1}
+    for index in range(1, frames):
+        low = max(0, index - 3) if seed % 2 == 0 else 0
+        parent = names[rng.randrange(low, index)]
+        same, new = groups[parent], len(groups) if rng.random() < 0.3 else -1
+        groups[names[index]] = same if rng.random() < 0.5 else new
+        pose = "xyz 0.123456 -4 5.25  rpy 0 -90 12.5 deg" if poses and rng.random() < 0.7 else ""
+        rate = "50 Hz" if rng.random() < 0.2 else ""
+        arrows.append(Arrow(parent, names[index], rng.choice(KINDS), rng.choice(owners), rate, pose))
+    rng.shuffle(arrows)
+    members: dict[int, list[str]] = {}
+    for name, group in groups.items():
+        if group >= 0:
+            members.setdefault(group, []).append(name)
+    return Graph(
+        f"robot <{seed}>",
+        tuple(names),
+        tuple(arrows),
+        tuple(Group(f"sensor{index} · vendor/model", tuple(own)) for index, own in members.items()),
+        tuple(owners),
+    )
+
+
+def parsed(drawing: Drawing) -> ET.Element:
+    return ET.fromstring(svg(drawing))  # noqa: S314 (our own)
+
+
+def read_dot(graph: Graph) -> Any:
+    return (pydot.graph_from_dot_data(dot(graph)) or [])[0]
+
+
+FAMILY = [(seed, frames, poses) for seed in range(12) for frames in (1, 2, 9, 100) for poses in (False, True)]
+
+
+def looks(drawing: Drawing, *prefixes: str) -> list[Box]:
+    return [shape for shape in drawing.shapes if isinstance(shape, Box) and shape.look.startswith(prefixes)]
+
+
+def overlaps(first: tuple[float, ...], second: tuple[float, ...]) -> bool:
+    slack = 1e-6
+    return (
+        first[0] < second[2] - slack
+        and second[0] < first[2] - slack
+        and first[1] < second[3] - slack
+        and second[1] < first[3] - slack
+    )
+
+
+def around(shape: Box | Text) -> tuple[float, float, float, float]:
+    if isinstance(shape, Box):
+        return shape.x, shape.y, shape.x + shape.width, shape.y + shape.height
+    left = shape.x - shape.width / 2 if shape.middle else shape.x
+    size = STYLES[shape.look].size
+    return left, shape.y - 0.75 * size, left + shape.width, shape.y + 0.2 * size
+
+
+@pytest.mark.parametrize(("seed", "frames", "poses"), FAMILY)
+def test_no_boxes_and_no_texts_overlap_and_all_is_on_the_paper(seed: int, frames: int, *, poses: bool) -> None:
+    drawing = draw(tree(seed, frames, poses=poses))
+    texts = [around(shape) for shape in drawing.shapes if isinstance(shape, Text)]
+    boxes = [around(box) for box in looks(drawing, "box", "root")]
+    assert len(boxes) == frames
+    for some in (texts, boxes):
+        some.sort()
+        for index, one in enumerate(some):
+            assert not any(overlaps(one, other) for other in some[index + 1 :])
+    for left, top, right, bottom in (*texts, *boxes):
+        assert left > 0
+        assert top > 0
+        assert right < drawing.width
+        assert bottom < drawing.height
+
+
+@pytest.mark.parametrize(("seed", "frames", "poses"), FAMILY)
+def test_the_area_of_a_group_holds_its_frames_whole_and_cuts_no_box(seed: int, frames: int, *, poses: bool) -> None:
+    graph = tree(seed, frames, poses=poses)
+    drawing = draw(graph)
+    areas = [around(box) for box in looks(drawing, "group")]
+    boxes = {name: around(box) for name, box in zip(_names(drawing), looks(drawing, "box", "root"), strict=True)}
+    for box in boxes.values():
+        for area in areas:
+            inside = area[0] <= box[0] and area[1] <= box[1] and area[2] >= box[2] and area[3] >= box[3]
+            assert inside or not overlaps(box, area)
+    for frame in (frame for group in graph.groups for frame in group.frames):
+        assert any(overlaps(boxes[frame], area) for area in areas)
+
+
+def _names(drawing: Drawing) -> list[str]:
+    return [shape.text for shape in drawing.shapes if isinstance(shape, Text) and shape.look == "name"]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_every_frame_and_every_edge_is_in_the_svg_once(seed: int) -> None:
+    graph = tree(seed, 60)
+    root = parsed(draw(graph))
+    names = Counter(text.text for text in root.iter(f"{SVG}text") if text.get("class") == "name")
+    assert names == Counter(graph.frames)
+    titles = Counter((path.find(f"{SVG}title") or path[0]).text for path in root.iter(f"{SVG}path") if len(path))
+    edges = Counter(str(title).partition(": ")[0] for title in titles.elements())
+    assert edges == Counter(f"{arrow.parent} → {arrow.child}" for arrow in graph.arrows)
+
+
+def test_what_is_no_tree_is_drawn_with_every_edge() -> None:
+    arrows = (
+        Arrow("map", "odom", "dynamic", "slam"),
+        Arrow("odom", "base", "dynamic", "ekf"),
+        Arrow("base", "odom", "dynamic", "rogue"),
+        Arrow("other", "base", "dynamic", "rogue"),
+        Arrow("a", "b", "dynamic", "rogue"),
+        Arrow("b", "a", "dynamic", "rogue"),
+        Arrow("self", "self", "static", "rogue"),
+        Arrow("base", "tool", "dynamic", "changer"),
+        Arrow("rack", "tool", "dynamic", "changer", alternative=True),
+    )
+    drawing = draw(Graph("live", ("map", "alone"), arrows, (Group("g", ("b", "a")),)))
+    root = parsed(drawing)
+    titles = [str(path[0].text).partition(": ")[0] for path in root.iter(f"{SVG}path") if len(path)]
+    assert sorted(titles) == sorted(f"{arrow.parent} → {arrow.child}" for arrow in arrows)
+    assert sorted(_names(drawing)) == ["a", "alone", "b", "base", "map", "odom", "other", "rack", "self", "tool"]
+
+
+def test_a_graph_without_frames_is_a_picture_too() -> None:
+    drawing = draw(Graph("nothing", (), ()))
+    parsed(drawing)
+    assert len(pypdf.PdfReader(io.BytesIO(pdf(drawing)), strict=True).pages) == 1
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # pydot's, about pyparsing
+def test_odd_names_are_well_formed_and_escaped_in_every_format() -> None:
+    graph = tree(3, 20, odd=True)
+    drawing = draw(graph)
+    root = parsed(drawing)
+    shown = [text.text for text in root.iter(f"{SVG}text") if text.get("class") == "name"]
+    assert {"a<b>&\"c'", "back\\slash\\", "new\\nline", "bell\\x07", "\\u202eturned", "底盤"} <= set(shown)
+    read = read_dot(graph)
+    assert len(read.get_edges()) == len(graph.arrows)
+    assert len(pypdf.PdfReader(io.BytesIO(pdf(drawing)), strict=True).pages) == 1
+    labels = re.findall(r'\["(.*)"\](?::::owner\d+)?$', mermaid(graph), re.MULTILINE)
+    assert len(labels) == len(graph.frames) + len(graph.groups)
+    assert not [label for label in labels if re.search(r'["`<>]|#(?!\d+;)', label)]
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # as above
+@pytest.mark.parametrize("seed", range(4))
+def test_graphviz_text_has_each_frame_edge_and_group(seed: int) -> None:
+    graph = tree(seed, 40, poses=True)
+    read = read_dot(graph)
+    nodes = [node.get_name().strip('"') for node in read.get_nodes()]
+    assert Counter(nodes) == Counter((*graph.frames, "node", "edge"))
+    edges = Counter((edge.get_source().strip('"'), edge.get_destination().strip('"')) for edge in read.get_edges())
+    assert edges == Counter((arrow.parent, arrow.child) for arrow in graph.arrows)
+    assert len(read.get_subgraphs()) == len(graph.groups)
+    moving = sum(edge.get_style() == "dashed" for edge in read.get_edges())
+    assert moving == sum(arrow.kind != "static" for arrow in graph.arrows)
+
+
+def test_mermaid_text_has_each_edge_once_and_draws_moving_ones_otherwise() -> None:
+    graph = tree(5, 40)
+    lines = mermaid(graph).splitlines()
+    assert lines[0] == "flowchart LR"
+    assert sum(" --> " in line or " -->|" in line for line in lines) == sum(
+        one.kind == "static" for one in graph.arrows
+    )
+    assert sum(" -.->|" in line for line in lines) == sum(one.kind != "static" for one in graph.arrows)
+    styled = [int(number) for line in lines if "linkStyle" in line for number in line.split()[1].split(",")]
+    assert sorted(styled) == list(range(len(graph.arrows)))
+
+
+def test_a_pdf_holds_every_name_as_text_and_fits_its_page() -> None:
+    graph = tree(8, 100, poses=True)
+    drawing = draw(graph)
+    (page,) = pypdf.PdfReader(io.BytesIO(pdf(drawing)), strict=True).pages
+    text = page.extract_text()
+    assert [frame for frame in graph.frames if frame not in text] == []
+    assert float(page.mediabox.width) == pytest.approx(drawing.width * 0.75, abs=0.01)
+    assert float(page.mediabox.height) == pytest.approx(drawing.height * 0.75, abs=0.01)
+
+
+def test_a_png_shows_boxes_and_letters_where_the_drawing_has_them() -> None:
+    drawing = draw(tree(2, 9))
+    image = Image.open(io.BytesIO(png(drawing))).convert("RGB")
+    image.load()
+    assert image.size == pytest.approx((2 * drawing.width, 2 * drawing.height), abs=2)
+    assert image.getpixel((4, 4)) == (255, 255, 255)
+    for badge in looks(drawing, "badge"):
+        corner = image.getpixel((round(2 * (badge.x + 3)), round(2 * (badge.y + badge.height - 3))))
+        assert corner == _rgb(STYLES[badge.look].fill[0])
+    for text in (shape for shape in drawing.shapes if isinstance(shape, Text) and shape.look == "name"):
+        left, top, right, bottom = (round(2 * edge) for edge in around(text))
+        dark = sum(image.crop((left, top, right, bottom)).convert("L").histogram()[:80])
+        assert dark > 20, text.text
+
+
+def _rgb(digits: str) -> tuple[int, ...]:
+    return tuple(bytes.fromhex(digits))
+
+
+def test_a_very_large_tree_gives_a_page_and_an_image_of_bounded_size() -> None:
+    drawing = draw(tree(1, 3000))
+    assert drawing.height > 20_000
+    (page,) = pypdf.PdfReader(io.BytesIO(pdf(drawing)), strict=True).pages
+    assert max(page.mediabox.width, page.mediabox.height) <= 14_400
+    width, height = Image.open(io.BytesIO(png(drawing))).size
+    assert 30e6 < width * height < 51e6
+
+
+def test_the_same_graph_gives_the_same_bytes() -> None:
+    first, second = (draw(tree(4, 50, poses=True)) for _ in range(2))
+    assert svg(first) == svg(second)
+    assert pdf(first) == pdf(second)
+
+
+def test_letters_are_as_wide_as_pdfium_draws_helvetica() -> None:
+    letters = "".join(map(chr, range(33, 127)))
+    shape = Text(10.0, 50.0, letters, "name", width_of(letters, 12.0))
+    page = pypdfium2.PdfDocument(pdf(Drawing("", 1000.0, 100.0, (shape,))))[0].get_textpage()
+    left = 10.0
+    x, y = ctypes.c_double(), ctypes.c_double()
+    for index, letter in enumerate(letters):
+        assert page.get_text_range(index, 1) == letter
+        assert pypdfium2.raw.FPDFText_GetCharOrigin(page, index, x, y)
+        assert x.value / 0.75 == pytest.approx(left, abs=0.02), letter
+        left += width_of(letter, 1000.0) * 0.012
+
+
+def _contrast(first: str, second: str) -> float:
+    """The ratio of luminances as WCAG 2 defines it."""
+    lights = []
+    for digits in (first, second):
+        parts = [part / 255 for part in bytes.fromhex(digits)]
+        red, green, blue = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+        lights.append(0.2126 * red + 0.7152 * green + 0.0722 * blue + 0.05)
+    return max(lights) / min(lights)
+
+
+@pytest.mark.parametrize("night", [0, 1])
+@pytest.mark.parametrize("index", range(7))
+def test_texts_and_lines_stand_out_from_what_is_behind_them(index: int, night: int) -> None:
+    """WCAG 2: 4.5 for text, 3 for lines and for the bold numbers, which the legend repeats."""
+    box, number = STYLES[f"box{index}"], STYLES[f"number{index}"]
+    for text in ("name", "more"):
+        assert _contrast(STYLES[text].fill[night], box.fill[night]) >= 4.5
+    assert _contrast(box.stroke[night], STYLES["group"].fill[night]) >= 3
+    assert _contrast(number.fill[night], STYLES[f"badge{index}"].fill[night]) >= 3

@@ -1,0 +1,120 @@
+"""What a picture shows: frames, edges, groups and owners, whether they were declared or seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+Kind = Literal["static", "joint", "dynamic"]
+
+
+@dataclass(frozen=True, slots=True)
+class Arrow:
+    """An edge: ``beside`` stands in the child's box behind its name, ``below`` under it.
+
+    An ``alternative`` is a parent that the child may get, as with a tool changer; it takes no part in the layout.
+    """
+
+    parent: str
+    child: str
+    kind: Kind
+    owner: str
+    beside: str = ""
+    below: str = ""
+    alternative: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Frames that belong together, such as those of a sensor."""
+
+    label: str
+    frames: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Graph:
+    """A tree, or whatever there is instead: several roots, second parents and loops are drawn as they are.
+
+    Frames that only edges name need not stand in ``frames``. The order of frames and edges is that of the picture;
+    ``owners`` are in the order of their colours.
+    """
+
+    title: str
+    frames: tuple[str, ...]
+    arrows: tuple[Arrow, ...]
+    groups: tuple[Group, ...] = ()
+    owners: tuple[str, ...] = ()
+
+    def all_frames(self) -> list[str]:
+        """Return every frame once: those that were given, then those that only edges and groups name."""
+        ends = (end for arrow in self.arrows for end in (arrow.parent, arrow.child))
+        return list(dict.fromkeys((*self.frames, *ends, *(frame for group in self.groups for frame in group.frames))))
+
+    def all_owners(self) -> list[str]:
+        """Return every owner once: those that were given, then those that only edges name."""
+        return list(dict.fromkeys((*self.owners, *(arrow.owner for arrow in self.arrows))))
+
+
+@dataclass(frozen=True, slots=True)
+class Forest:
+    """A graph as trees: ``order`` holds the frames from top to bottom, each before all that hangs on it.
+
+    ``up`` is the arrow that a frame hangs on, ``extra`` are the others, ``group`` the index of a frame's group.
+    """
+
+    order: tuple[str, ...]
+    up: dict[str, Arrow]
+    children: dict[str, list[str]]
+    extra: tuple[Arrow, ...]
+    group: dict[str, int]
+
+    def enters(self, frame: str) -> bool:
+        """Return whether the frame is where its group begins."""
+        group = self.group.get(frame)
+        return group is not None and (frame not in self.up or self.group.get(self.up[frame].parent) != group)
+
+
+def forest_of(graph: Graph) -> Forest:
+    """Return the graph as trees: of several parents a frame hangs on the first, and a loop is cut once.
+
+    Children of the same group as their parent come first, so that a group stays together.
+    """
+    group = {frame: index for index, one in enumerate(graph.groups) for frame in one.frames}
+    frames = graph.all_frames()
+    first: dict[str, Arrow] = {}
+    for arrow in graph.arrows:
+        if not arrow.alternative and arrow.parent != arrow.child:
+            first.setdefault(arrow.child, arrow)
+    below: dict[str, list[str]] = {frame: [] for frame in frames}
+    for child, arrow in first.items():
+        below[arrow.parent].append(child)
+    if group:
+        for parent, children in below.items():
+            mine = group.get(parent, -1)
+            children.sort(key=lambda child, mine=mine: group.get(child) != mine)  # type: ignore[misc]
+    order, up = _walk(frames, first, below)
+    kept = {child: [one for one in children if up.get(one) is first[one]] for child, children in below.items()}
+    extra = tuple(arrow for arrow in graph.arrows if up.get(arrow.child) is not arrow)
+    return Forest(order, up, kept, extra, group)
+
+
+def _walk(
+    frames: Iterable[str], first: dict[str, Arrow], below: dict[str, list[str]]
+) -> tuple[tuple[str, ...], dict[str, Arrow]]:
+    """Return the frames in the order of the picture, and the arrow that each hangs on; what is in a loop comes last."""
+    order: dict[str, None] = {}
+    up: dict[str, Arrow] = {}
+    for root in (*(frame for frame in frames if frame not in first), *frames):
+        waiting = [root] if root not in order else []
+        while waiting:
+            frame = waiting.pop()
+            order[frame] = None
+            for child in reversed(below[frame]):
+                if child not in order:
+                    up[child] = first[child]
+                    waiting.append(child)
+    return tuple(order), up

@@ -32,7 +32,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "validate": {"diagnostic", "frozen", "load", "pose"},
     "resolve": {"diagnostic", "frozen", "imported", "load", "model", "plan", "pose", "validate"},
     "check": {"codes", "diagnostic", "frozen", "load", "model", "pose"},
-    "draw": set(),
+    "draw": {"frozen"},
     "emit": {"draw", "imported", "model", "plan", "planfile", "pose"},
     "ros": {"diagnostic", "plan", "pose"},
     "run": {"diagnostic", "plan", "planfile", "pose", "ros"},

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tfcompose.draw.letters import shown, width_of
+from tfcompose.frozen import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tfcompose.draw.areas import PAD
@@ -12,6 +11,7 @@ from tfcompose.draw.legend import legend
 from tfcompose.draw.letters import shown, width_of
 from tfcompose.draw.shapes import Box, Curve, Drawing, Text, hanging, level
 from tfcompose.draw.style import STYLES, colour_of
+from tfcompose.frozen import dataclass
 
 if TYPE_CHECKING:
     from tfcompose.draw.areas import Area, Place

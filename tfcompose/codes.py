@@ -164,6 +164,8 @@ CODES = {
     "TF827": "isolation_leak",
     "TF828": "driver_pose_differs",
     "TF829": "switch_not_taken",
+    "TF831": "refused_transform",
+    "TF846": "wrong_live_pose",
     # the environment
     "TF901": "no_ros",
     "TF902": "bad_plan",

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import field
+from fnmatch import fnmatchcase
 from typing import Any, Literal
 
 from tfcompose.frozen import dataclass
@@ -31,6 +32,12 @@ ReadyKind = Literal["edges", "topic", "service", "lifecycle", "log", "exit", "ti
 #: ``${executable:PACKAGE/NAME}`` is a package's program, and ``${launch:PACKAGE/FILE}`` a package's launch file; the
 #: words after that are the launch file's arguments, ``name:=value``.
 PLACEHOLDERS = ("${python}", "${plan}", "${build_dir}", "${params_file}")
+
+#: An edge is silent after four periods, and never before this: what a loaded machine can delay.
+SILENT_AT_LEAST_S = 0.6
+SILENT_PERIODS = 4.0
+#: It is too slow below this part of the rate that is declared.
+SLOW_BELOW = 0.8
 
 _AT_START = re.compile(r"\$\{(?:file:|build_dir\}|params_file\})")
 
@@ -82,6 +89,13 @@ class PlanEdge:
     def name(self) -> str:
         """The edge as people read it."""
         return f"{self.parent} → {self.child}"
+
+    @property
+    def silent_after_s(self) -> float | None:
+        """How long a moving edge may be quiet, in seconds, or None if it says no rate."""
+        if not self.rate or self.kind == "static":
+            return None
+        return max(SILENT_AT_LEAST_S, SILENT_PERIODS / self.rate)
 
     def may_hang_on(self, parent: str) -> bool:
         """Return whether the owner may publish the child below this parent."""
@@ -252,6 +266,15 @@ class Plan:
         """Return what is known of one of the nodes publishing the edge by default, or None."""
         ends = (parent, child)
         return next((one for one in self.claims if one.node in nodes and (one.parent, one.child) == ends), None)
+
+    def may_be_undeclared(self, parent: str, child: str) -> bool:
+        """Whether nobody needs to have declared the edge: by policy, or because it is another robot's."""
+        policy, ros = self.guard, self.ros
+        if ros.frame_prefix and not child.startswith(ros.frame_prefix) and child not in ros.shared_frames:
+            return True
+        return policy.unknown_edges == "ignore" or any(
+            fnmatchcase(parent, parents) and fnmatchcase(child, children) for parents, children in policy.allow
+        )
 
     def edges_of(self, owner: str) -> tuple[PlanEdge, ...]:
         """Return the edges that the process publishes, in the plan's order."""

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.observe.bags import write_bag
+from tests.observe.bags import START_S, write_bag
+from tfcompose.cli import main
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -102,3 +103,50 @@ def test_what_is_no_bag_is_said_in_one_sentence(tmp_path: Path) -> None:
         assert "error[TF907]" in done.stderr
         assert why in done.stderr
         assert done.stdout == ""
+
+
+def test_without_the_library_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    monkeypatch.setitem(sys.modules, "rosbags", None)
+    for words in (["monitor"], ["verify", "robots/my_robot.yaml"], ["tree"], ["echo", "a", "b"]):
+        assert main([*words, "--bag", "some.mcap"]) == 1
+        output = capsys.readouterr()
+        assert "error[TF906] bags are read with the package rosbags" in output.err
+        assert "pip install 'tfcompose[bag]'" in output.err
+        assert output.out == ""
+
+
+def poses(*words: str) -> list[Any]:
+    """Return x in metres and the time in seconds of the recording of what is echoed."""
+    rows = [json.loads(line) for line in tfcompose("echo", *words, "--format", "json").stdout.splitlines()]
+    return [(row["xyz"][0], row["stamp_ns"] and row["stamp_ns"] / 1e9 - START_S) for row in rows]
+
+
+@pytest.mark.parametrize("mcap", [True, False], ids=["mcap", "sqlite"])
+def test_echo_follows_a_recording_at_the_rate_that_is_asked_for(tmp_path: Path, *, mcap: bool) -> None:
+    bag = str(write_bag(tmp_path / "bag", [*FIXED, *drive()], mcap=mcap))
+    found = poses("odom", "laser_link", "--bag", bag, "--rate", "2")
+    assert found == [(pytest.approx(at), pytest.approx(at, abs=1e-6)) for at in (0, 0.5, 1, 1.5, 2, 2.5, 3, 3.5)]
+
+
+def test_echo_says_the_first_pose_the_one_at_a_time_or_the_fixed_one(tmp_path: Path) -> None:
+    bag = str(write_bag(tmp_path / "bag", [*FIXED, *drive(30.0)]))
+    assert poses("odom", "base_link", "--bag", bag, "--once") == [(0.0, 0.0)]
+    for at in (0.013, 2.25, 29.5):
+        [(x, stamp)] = poses("odom", "base_link", "--bag", bag, "--at", f"{START_S + at:.9f}")
+        assert (x, stamp) == (pytest.approx(at, abs=1e-6), pytest.approx(at, abs=1e-6))
+    [(x, _)] = poses("odom", "base_link", "--bag", bag, "--at=-0.5")
+    assert x == pytest.approx(29.98 - 0.5)
+    assert poses("base_link", "laser_link", "--bag", bag) == [(0.0, None)]
+
+
+def test_where_echo_finds_no_pose_in_a_bag_it_says_why(tmp_path: Path) -> None:
+    bag = str(write_bag(tmp_path / "bag", [*FIXED, *drive(30.0)]))
+    for words, why in [
+        (("odom", "lasr_link"), "no frame lasr_link; did you mean laser_link?"),
+        (("odom", "base_link", "--at", f"{START_S - 1}"), "its oldest sample is 1000 ms"),
+        (("odom", "base_link", "--at", f"{START_S + 31}"), "its newest sample is 1020 ms"),
+    ]:
+        errors = tfcompose("echo", *words, "--bag", bag, code=1).stderr
+        assert "error[TF814]" in errors
+        assert why in errors
+    assert "there is no bag" in tfcompose("echo", "a", "b", "--bag", "none", code=2).stderr

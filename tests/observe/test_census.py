@@ -79,6 +79,8 @@ def test_an_edge_from_two_publishers_is_told_twice_each_with_its_node() -> None:
     assert (second.publisher, census.is_known(B)) == ("", False)
     census.graph([Publisher(B, "/ekf", static=False)])
     assert [(each.publisher, each.present) for each in census.edges(S)] == [("/drive", False), ("/ekf", True)]
+    census.graph([Publisher(B, None, static=False)])
+    assert census.is_known(B), "a name is not forgotten"
 
 
 def test_without_ids_the_publisher_is_one_of_those_on_its_topic() -> None:

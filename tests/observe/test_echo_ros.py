@@ -176,7 +176,7 @@ def test_at_a_time_the_pose_is_interpolated_and_printed_with_as_many_decimals_as
 def test_a_time_that_is_over_is_a_miss_with_the_milliseconds(
     running: Callable[..., subprocess.Popen[str]], until: Callable[..., bool]
 ) -> None:
-    process = running("odom", "base_link", "--at", "99.9", "--timeout", "1")
+    process = running("odom", "base_link", "--at", "99.9", "--timeout", "4")
     with open_node("talks", "") as node:
         talker = Talker(node)
         talker.until_heard(until)
@@ -207,7 +207,7 @@ def test_under_a_namespace_only_its_topics_are_heard(
 def test_when_the_time_starts_again_it_says_so(
     running: Callable[..., subprocess.Popen[str]], until: Callable[..., bool]
 ) -> None:
-    process = running("odom", "base_link", "--timeout", "1", "--rate", "100")
+    process = running("odom", "base_link", "--timeout", "4", "--rate", "100")
     with open_node("talks", "") as node:
         talker = Talker(node)
         talker.until_heard(until)

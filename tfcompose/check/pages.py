@@ -319,6 +319,14 @@ calibration is broken. A frame that the preset calls exact, such as the turn of 
 The parameter was read back from the running node, after it appeared: the value is another one, or there is no such
 parameter. Somebody else started the node, or a launch file overrides it, or this version has another switch. What the
 node publishes is then not what the plan says.""",
+    "TF831": """tf2 refuses a transform that is published.
+
+A value is not a finite number, the quaternion is not of length 1, a name is empty, or the frame is its own parent. The
+frame is not there for any listener.""",
+    "TF846": """A frame is not where the robot's file says.
+
+verify compares what is fixed: millimetres and degrees beyond --tolerance are told. A build that is older than the file,
+another calibration, or a driver with values of its own are the usual reasons.""",
     "TF901": """ROS 2 is missing, or cannot be used.""",
     "TF902": """A plan cannot be used: it is not one, not whole, or of another version.
 

@@ -1,7 +1,8 @@
 """``tfcompose echo``: where one frame is in another, now.
 
 Print the pose of B in A from the live tree: position in metres, quaternion x y z w, roll pitch yaw about fixed axes in
-radians and degrees. Where there is none it says why, with exit code 1. Without --once it goes on until Ctrl-C.
+radians and degrees. Where there is none it says why, with exit code 1. Without --once it goes on until Ctrl-C. With
+--bag it is where it was in a recording: with --once the first pose, with --at the one at that time.
 """
 
 from __future__ import annotations
@@ -14,10 +15,12 @@ from argparse import ArgumentTypeError
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from tfcompose.cli.looking import add_bag, add_namespace, reading
 from tfcompose.cli.options import positive
 from tfcompose.cli.terminal import print_findings
 from tfcompose.diagnostic import finding
 from tfcompose.emit.numbers import clean
+from tfcompose.observe.asked import Asked
 from tfcompose.plan import RosSettings
 from tfcompose.render.pose import pose_json, pose_text
 from tfcompose.ros.environment import RosError, child_environment, missing_ros
@@ -25,7 +28,9 @@ from tfcompose.ros.stop import Stop
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
+    from collections.abc import Callable
 
+    from tfcompose.observe.asked import Missed
     from tfcompose.pose import Pose
 
 
@@ -54,7 +59,8 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--precision", type=_digits, default=4, metavar="N", help="decimals of metres and radians in text; default: 4"
     )
-    parser.add_argument("--namespace", default="", metavar="NS", help="listen to /NS/tf and /NS/tf_static")
+    add_bag(parser)
+    add_namespace(parser)
     parser.add_argument(
         "--format", choices=("text", "json"), default="text", help="json: one object a line; default: text"
     )
@@ -62,6 +68,24 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Echo until a signal comes; exit code 1 if there was no pose."""
+    asked = Asked(
+        arguments.a.removeprefix("/"), arguments.b.removeprefix("/"), arguments.once, arguments.rate,
+        arguments.timeout, arguments.namespace, arguments.at,
+    )  # fmt: skip
+
+    def say(pose: Pose, stamp_ns: int | None) -> None:
+        sys.stdout.write(_written(arguments, clean(pose), stamp_ns))
+        sys.stdout.flush()
+
+    missed = _of_bag(arguments.bag, asked, say) if arguments.bag else _live(asked, say)
+    if missed is None or isinstance(missed, int):
+        return missed or 0
+    message = f"no pose of {arguments.b} in {arguments.a}: {missed.reason}"
+    print_findings([finding("TF814", message, None)], sys.stderr)
+    return 1
+
+
+def _live(asked: Asked, say: Callable[[Pose, int | None], None]) -> Missed | int | None:
     missing = missing_ros()
     if missing:
         print_findings([finding("TF901", missing, None)], sys.stderr)
@@ -69,25 +93,16 @@ def run(arguments: Namespace) -> int:
     os.environ.update(child_environment(os.environ, RosSettings(), own=True))
     with Stop() as stop:
         module = import_module("tfcompose.observe.echo")
-        asked = module.Asked(
-            arguments.a.removeprefix("/"), arguments.b.removeprefix("/"), arguments.once, arguments.rate,
-            arguments.timeout, arguments.namespace, arguments.at,
-        )  # fmt: skip
-
-        def say(pose: Pose, stamp_ns: int | None) -> None:
-            sys.stdout.write(_written(arguments, clean(pose), stamp_ns))
-            sys.stdout.flush()
-
         try:
-            missed = module.echo(asked, say, stop)
+            missed: Missed | None = module.echo(asked, say, stop)
         except RosError as error:
             print_findings([finding("TF901", str(error), None)], sys.stderr)
             return 1
-    if missed is None:
-        return 0
-    message = f"no pose of {arguments.b} in {arguments.a}: {missed.reason}"
-    print_findings([finding("TF814", message, None)], sys.stderr)
-    return 1
+    return missed
+
+
+def _of_bag(path: str, asked: Asked, say: Callable[[Pose, int | None], None]) -> Missed | int | None:
+    return reading(lambda: import_module("tfcompose.observe.replay").echo_bag(asked, path, say))
 
 
 def _written(arguments: Namespace, pose: Pose, stamp_ns: int | None) -> str:

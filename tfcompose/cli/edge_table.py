@@ -62,18 +62,18 @@ def _row(seen: EdgeSeen, several: set[str]) -> tuple[str, ...]:
         remarks.append("publisher left")
     if strand.stamps_back and not strand.static:
         remarks.append(f"{strand.stamps_back}× back in time")
-    name, who = _printable(seen.name), _printable(seen.publisher) or "–"
+    name, who = printable(seen.name), printable(seen.publisher) or "–"
     if strand.static:
         return (name, who, "static", "", "", "", "", "", ", ".join(remarks))
     return (
         name, who, "dynamic",
         f"{timing.rate:.1f} Hz" if timing.rate is not None else "–",
-        _time(timing.jitter_s), _time(timing.longest_gap_s), _time(seen.data_age_s), _time(timing.delay_s),
+        duration(timing.jitter_s), duration(timing.longest_gap_s), duration(seen.data_age_s), duration(timing.delay_s),
         ", ".join(remarks),
     )  # fmt: skip
 
 
-def _time(seconds: float | None) -> str:
+def duration(seconds: float | None) -> str:
     """Return milliseconds or seconds, with as many digits as matter."""
     if seconds is None:
         return "–"
@@ -90,7 +90,7 @@ def _line(row: Sequence[str], widths: Sequence[int]) -> str:
     return "  ".join(cells).rstrip()
 
 
-def _printable(text: str) -> str:
+def printable(text: str) -> str:
     """Return the text without what would move a terminal's cursor."""
     return "".join(character if character.isprintable() else "?" for character in text)
 

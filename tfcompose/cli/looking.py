@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from tfcompose.cli.options import positive
 from tfcompose.cli.terminal import UNREADABLE, print_findings
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from tfcompose.observe.census import Census
 
     Topics = tuple[str, str]
+
+T = TypeVar("T")
 
 
 def add_namespace(parser: ArgumentParser) -> None:
@@ -45,18 +47,21 @@ def from_bag(path: str, censuses: Mapping[Topics, Census]) -> int | None:
 
     Return None, or the exit code after saying why not.
     """
+    return reading(lambda: import_module("tfcompose.observe.bag").take_bag(path, censuses))
+
+
+def reading(read: Callable[[], T]) -> T | int:
+    """Return what is read from a bag, or the exit code after saying why it cannot be."""
     bag = import_module("tfcompose.observe.bag")
     missing = bag.missing_rosbags()
     if missing:
         print_findings([finding("TF906", missing, None)], sys.stderr)
         return 1
     try:
-        for topics, census in censuses.items():
-            bag.take_bag(path, topics, census)
+        return read()
     except bag.BagError as error:
         print_findings([finding("TF907", str(error), None, help=error.help)], sys.stderr)
         return UNREADABLE
-    return None
 
 
 def from_live(  # noqa: PLR0913 (all but two are named)

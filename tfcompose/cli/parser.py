@@ -35,7 +35,8 @@ COMMANDS = {
     "echo": "the live pose of B in A",
     "monitor": "who publishes each live edge, how often, how evenly and how late",
     "graph": "the tree as a picture: SVG, PDF, PNG, DOT or Mermaid",
-    "tree": "the tree with kinds, owners and poses",
+    "verify": "what a robot file says, against what is published, live or in a bag",
+    "tree": "the tree with kinds, owners and poses; --live: as it is published",
     "pose": "the pose of B in A, from the spec alone",
     "explain": "a code's page, or the chain between two frames",
     "diff": "what moved or changed owner between two robots",
@@ -48,7 +49,7 @@ _MODULES = {"import": "importing"}
 
 
 #: Commands that run until somebody ends them.
-LASTING = frozenset({"up", "echo", "monitor"})
+LASTING = frozenset({"up", "echo", "monitor", "verify"})
 
 #: The exit code of a command whose output nobody reads any more: what a shell says of a program ended by SIGPIPE.
 UNREAD = 141

@@ -1,15 +1,18 @@
-"""``tfcompose tree``: the tree of a robot file, on the terminal.
+"""``tfcompose tree``: the tree of a robot file, on the terminal, or the one that is published.
 
-Print the tree: each frame with the kind, owner, rate and pose of its edge.
+Print the tree: each frame with the kind, owner, rate and pose of its edge. With --live or --bag it is the published
+one: each frame with the kind, the publishing node, rate and age of the newest stamp; with FILE also what is expected,
+unexpected or missing. Trees that do not hang together are shown one after the other.
 """
 
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import robot_or_code
-from tfcompose.cli.options import add_file, add_variant
+from tfcompose.cli.options import DEFAULT_FILE, add_variant, positive
 from tfcompose.emit.final import with_final_names
 from tfcompose.emit.tree import tree
 
@@ -19,13 +22,23 @@ if TYPE_CHECKING:
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    add_file(parser)
+    parser.add_argument("file", nargs="?", metavar="FILE", help="default: robot.yaml; with --live or --bag: none")
     add_variant(parser)
+    parser.add_argument("--live", action="store_true", help="the tree that is published now")
+    parser.add_argument("--bag", metavar="BAG", help="the tree of a recording: a rosbag2 folder, .mcap or .db3")
+    parser.add_argument(
+        "--for", dest="duration", type=positive, default=3.0, metavar="S", help="look so long; default: 3"
+    )
+    parser.add_argument("--namespace", default="", metavar="NS", help="/NS/tf and /NS/tf_static instead, without FILE")
+    parser.add_argument("--format", choices=("text", "json"), default="text", help="json with --live or --bag")
 
 
 def run(arguments: Namespace) -> int:
     """Print the tree; exit code as for build."""
-    robot = robot_or_code(arguments.file, arguments)
+    if arguments.live or arguments.bag:
+        code: int = import_module("tfcompose.cli.live_tree").live_tree(arguments)
+        return code
+    robot = robot_or_code(arguments.file or DEFAULT_FILE, arguments)
     if isinstance(robot, int):
         return robot
     sys.stdout.write(tree(with_final_names(robot)))

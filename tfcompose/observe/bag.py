@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.ros.decoder import Decoder
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from tfcompose.observe.census import Census
     from tfcompose.ros.decoder import Row
@@ -27,6 +27,10 @@ class BagError(Exception):
     def __init__(self, message: str, advice: str = "") -> None:
         super().__init__(message)
         self.help = advice
+
+
+class NoTopicError(BagError):
+    """Raised when a bag has none of the topics."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +55,8 @@ def recorded(path: str, topics: tuple[str, str]) -> Iterator[Recorded]:
     ``path`` is a bag's folder, or a single .mcap or .db3 file.
 
     Raises:
-        BagError: if it is no bag, is damaged, or has neither of the topics.
+        NoTopicError: if it has neither of the topics.
+        BagError: if it is no bag, or is damaged.
     """
     library = import_module("rosbags.rosbag2")
     bag = _bag_at(Path(path))
@@ -67,17 +72,24 @@ def recorded(path: str, topics: tuple[str, str]) -> Iterator[Recorded]:
         raise BagError(f"{path} cannot be read as a bag: {words}") from None
 
 
-def take_bag(path: str, topics: tuple[str, str], census: Census) -> None:
-    """Put the messages of a bag into a census.
+def take_bag(path: str, censuses: Mapping[tuple[str, str], Census]) -> None:
+    """Put the messages of a bag into the censuses of these topics (moving, fixed).
 
     Raises:
-        BagError: as ``recorded`` does.
+        BagError: as ``recorded`` does; topics may be missing as long as some are there.
     """
-    for each in recorded(path, topics):
-        if each.rows is None:
-            census.take_malformed(None)
-        else:
-            census.take(each.rows, static=each.static, gid=None, received_ns=each.received_ns)
+    missing = None
+    for topics, census in censuses.items():
+        try:
+            for each in recorded(path, topics):
+                if each.rows is None:
+                    census.take_malformed(None)
+                else:
+                    census.take(each.rows, static=each.static, gid=None, received_ns=each.received_ns)
+        except NoTopicError as error:
+            missing = error
+    if missing is not None and not any(census.messages for census in censuses.values()):
+        raise missing
 
 
 def _rows(decoder: Decoder, data: bytes) -> Sequence[Row] | None:
@@ -111,7 +123,7 @@ def _of_tf(path: str, topics: tuple[str, str], connections: Sequence[Any]) -> li
     """Return the connections of the topics.
 
     Raises:
-        BagError: if there are none; it says which TF topics the bag has instead.
+        NoTopicError: if there are none; it says which TF topics the bag has instead.
     """
     wanted = [each for each in connections if each.topic in topics and each.msgtype == TF_MESSAGE]
     if wanted:
@@ -119,6 +131,6 @@ def _of_tf(path: str, topics: tuple[str, str], connections: Sequence[Any]) -> li
     others = sorted({each.topic for each in connections if each.msgtype == TF_MESSAGE})
     if others:
         names = ", ".join(others[:_NAMED_AT_MOST])
-        raise BagError(f"{path} has neither {' nor '.join(topics)}", f"TF is on {names}: see --namespace")
+        raise NoTopicError(f"{path} has neither {' nor '.join(topics)}", f"TF is on {names}: see --namespace")
     held = ", ".join(sorted({each.topic for each in connections})[:_NAMED_AT_MOST])
-    raise BagError(f"{path} holds no TF", f"it holds {held}" if held else "it holds nothing")
+    raise NoTopicError(f"{path} holds no TF", f"it holds {held}" if held else "it holds nothing")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tfcompose.observe.asked import Asked, Missed
 from tfcompose.observe.buffer import Buffer, TransformException
 from tfcompose.observe.refusal import Refusal
 from tfcompose.ros.decoder import Decoder
@@ -17,29 +17,6 @@ if TYPE_CHECKING:
 
     from tfcompose.pose import Pose
     from tfcompose.ros.stop import Stop
-
-
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """What to echo: the pose of ``b`` in ``a``; once, or ``rate`` times a second; ``timeout_s`` without one ends it.
-
-    ``at_ns`` is the time of the pose, in nanoseconds since the epoch; from 0 down it is counted from the newest.
-    """
-
-    a: str
-    b: str
-    once: bool
-    rate: float
-    timeout_s: float
-    namespace: str
-    at_ns: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Missed:
-    """Why there was no pose."""
-
-    reason: str
 
 
 def echo(asked: Asked, say: Callable[[Pose, int | None], None], stop: Stop) -> Missed | None:

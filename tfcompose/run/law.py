@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -70,7 +69,7 @@ class Law:
         parent, child, static = sight.parent, sight.child, sight.static
         if self._shape.saw(parent, child, now, static=static):
             self.changes += 1
-        undeclared = not self._may_be_undeclared(parent, child)
+        undeclared = not self._plan.may_be_undeclared(parent, child)
         loop = self._shape.loop(parent, child, now)
         ours = any(self._shape.is_planned(*edge) for edge in pairwise(loop))
         if loop and (ours or undeclared):
@@ -103,12 +102,3 @@ class Law:
             return False
         self.changes += 1
         return (before == gid and not sight.static) or (edge.owner in _OWN and self._senders.is_present(current))
-
-    def _may_be_undeclared(self, parent: str, child: str) -> bool:
-        """Whether nobody needs to have declared the edge: by policy, or because it is another robot's."""
-        policy, ros = self._plan.guard, self._plan.ros
-        if ros.frame_prefix and not child.startswith(ros.frame_prefix) and child not in ros.shared_frames:
-            return True
-        return policy.unknown_edges == "ignore" or any(
-            fnmatchcase(parent, parents) and fnmatchcase(child, children) for parents, children in policy.allow
-        )

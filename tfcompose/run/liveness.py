@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.plan import SLOW_BELOW
 from tfcompose.run.events import Complete, Found, GuardEvent, Live, OwnerReady, Recovered
 from tfcompose.run.silence import change_event, left
 
@@ -22,13 +23,9 @@ if TYPE_CHECKING:
 
     from tfcompose.plan import Plan, PlanEdge
 
-#: An edge is silent after four periods, and never before this: what a loaded machine can delay.
-SILENT_AT_LEAST_S = 0.6
-SILENT_PERIODS = 4.0
-#: A rate is judged over this time, or so many periods, and is too slow below this part of what is declared.
+#: A rate is judged over this time, or so many periods, and is fast enough again above this part of what is declared.
 WINDOW_S = 2.0
 WINDOW_PERIODS = 8.0
-SLOW_BELOW = 0.8
 FAST_AGAIN_ABOVE = 0.9
 #: What is kept of the arrivals before the window: a rate needs two gaps, the longer of which may be a hiccup.
 FEWEST_ARRIVALS = 4
@@ -96,9 +93,7 @@ class Track:
     def __post_init__(self) -> None:
         rate = self.edge.rate
         self._window = max(WINDOW_S, WINDOW_PERIODS / (rate or WINDOW_PERIODS))
-        self.silent_after = None
-        if rate and self.edge.kind != "static":
-            self.silent_after = max(SILENT_AT_LEAST_S, SILENT_PERIODS / rate)
+        self.silent_after = self.edge.silent_after_s
 
     def arrived(self, seen: float, now: float) -> None:
         """Note an arrival. An edge that was silent is steady again with two arrivals close enough to each other."""

@@ -1,0 +1,277 @@
+"""Expected against seen, replayed: each thing that can be wrong with an edge, and nothing where all is right."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from tfcompose.observe.census import Census, Publisher
+from tfcompose.observe.offset import Offset, offset_of
+from tfcompose.observe.verify import edges_by_topics, verify
+from tfcompose.plan import Driven, GuardPolicy, Joint, Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.pose import Pose, quat_from_rpy
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tfcompose.diagnostic import Diagnostic
+
+S = 10**9
+TOPICS = ("/tf", "/tf_static")
+TOLERANCE = Offset(1e-3, math.radians(0.1))
+LASER = Pose((0.0, 0.0, 0.3))
+DRIVE, STATIC, CAMERA, JOINTS, OTHER = (f"/rover/{name}" for name in ("drive", "static", "camera", "joints", "other"))
+
+
+@pytest.fixture
+def plan(edge: Callable[..., PlanEdge]) -> Plan:
+    wheel = Joint("wheel_joint", "continuous", (0.0, 0.0, 1.0))
+    edges = (
+        replace(edge("odom base", "drive"), rate=10.0),
+        edge("base laser", pose=LASER),
+        edge("base wheel", "joints", Pose((0.0, 0.2, 0.0)), wheel),
+        replace(edge("camera lens", "camera", Pose((0.0, 0.015, 0.0))), kind="static"),
+        replace(edge("base rack", "other", Pose((1.0, 0.0, 0.0))), kind="static"),
+    )
+    processes = (
+        PlanProcess("drive", "external", nodes=(DRIVE,)),
+        PlanProcess("static", "static", nodes=(STATIC,)),
+        PlanProcess("joints", "joints", nodes=(JOINTS,)),
+        PlanProcess("camera", "run", nodes=(CAMERA,), drives=(Driven("camera", "realsense/d435i", publishes=True),)),
+        PlanProcess("other", "external", nodes=(OTHER,)),
+    )
+    return Plan("rover", "0", "base", RosSettings(), edges, processes)
+
+
+class Tree:
+    """A census that hears ten seconds of the plan's edges, unless something is changed."""
+
+    def __init__(self) -> None:
+        self.census = Census()
+        self.sent: dict[str, dict[str, Any]] = {
+            "base": {"parent": "odom", "node": DRIVE, "rate": 10.0},
+            "laser": {"parent": "base", "node": STATIC, "pose": LASER},
+            "wheel": {"parent": "base", "node": JOINTS, "rate": 10.0, "pose": Pose((0.0, 0.2, 0.0), (0, 0, 1, 0))},
+            "lens": {"parent": "camera", "node": CAMERA, "pose": Pose((0.0, 0.0151, 0.0), quat_from_rpy(0.01, 0, 0))},
+            "rack": {"parent": "base", "node": OTHER, "pose": Pose((1.0, 0.0, 0.0))},
+        }
+
+    def send(self, child: str, parent: str, node: str, pose: Pose = Pose(), rate: float = 0.0, **more: Any) -> None:  # noqa: B008 (a Pose cannot be changed)
+        static = more.get("static", not rate)
+        times = [0.0] if not rate else [i / rate for i in range(round(10 * rate))]
+        gid = more.get("gid", node.encode())
+        for at in times:
+            if not more.get("until", 11) > at or more.get("gap", (11, 11))[0] < at < more.get("gap", (11, 11))[1]:
+                continue
+            stamp = 100 * S + round(at * S)
+            row = (parent, child, *divmod(stamp, S), *pose.xyz, *pose.quat_xyzw)
+            self.census.take([row], static=static, gid=gid, received_ns=stamp)
+
+    def told(self, plan: Plan, *, graph: bool = True) -> list[Diagnostic]:
+        for child, words in self.sent.items():
+            self.send(child, **words)
+        if graph:
+            self.census.graph(
+                [Publisher(words["node"].encode(), words["node"], static=False) for words in self.sent.values()]
+            )
+        verdicts = verify(plan, {TOPICS: self.census}, 110 * S, TOLERANCE)
+        return [found for verdict in verdicts for found in verdict.found]
+
+
+@pytest.fixture
+def tree() -> Tree:
+    return Tree()
+
+
+def only(found: list[Diagnostic]) -> tuple[str, str]:
+    [one] = found
+    return one.code, one.message
+
+
+def test_a_tree_as_planned_has_no_findings(plan: Plan, tree: Tree) -> None:
+    assert tree.told(plan) == []
+
+
+def test_a_missing_edge_is_told_with_its_owner_and_whether_that_is_there(plan: Plan, tree: Tree) -> None:
+    del tree.sent["laser"]
+    [one] = tree.told(plan)
+    assert (one.code, one.message) == ("TF811", "base → laser was never seen; its owner is static (/rover/static)")
+    assert one.help == "no /rover/static publishes TF: does it run?"
+
+
+def test_an_edge_with_a_slip_in_its_name_is_missing_and_named(plan: Plan, tree: Tree) -> None:
+    tree.sent["lasr"] = tree.sent.pop("laser")
+    missing, extra = tree.told(plan)
+    assert (missing.code, missing.help) == ("TF811", "did you mean lasr?")
+    assert (extra.code, extra.severity) == ("TF803", "warning")
+
+
+@pytest.mark.parametrize(("policy", "severity"), [("ignore", None), ("warn", "warning"), ("error", "error")])
+def test_an_edge_that_nobody_declared_counts_as_the_policy_says(
+    plan: Plan, tree: Tree, policy: Any, severity: str | None
+) -> None:
+    tree.sent["tag_1"] = {"parent": "lens", "node": OTHER, "rate": 10.0}
+    plan = replace(plan, guard=GuardPolicy(unknown_edges=policy))
+    assert [(one.code, one.severity) for one in tree.told(plan)] == ([("TF803", severity)] if severity else [])
+
+
+def test_an_allowed_edge_is_not_told(plan: Plan, tree: Tree) -> None:
+    tree.sent["tag_1"] = {"parent": "lens", "node": OTHER, "rate": 10.0}
+    assert tree.told(replace(plan, guard=GuardPolicy(allow=(("lens", "tag_*"),)))) == []
+
+
+def test_a_frame_under_another_parent_is_told(plan: Plan, tree: Tree) -> None:
+    tree.sent["laser"]["parent"] = "odom"
+    assert only(tree.told(plan)) == ("TF802", "laser was seen in odom (from /rover/static), and belongs in base")
+
+
+def test_a_switched_edge_may_hang_on_each_of_its_parents(plan: Plan, tree: Tree) -> None:
+    edges = tuple(replace(edge, switched=("rack",)) if edge.child == "base" else edge for edge in plan.edges)
+    tree.sent["base"]["parent"] = "rack"
+    assert tree.told(replace(plan, edges=edges)) == []
+
+
+def test_a_wrong_value_is_told_in_millimetres_and_degrees(plan: Plan, tree: Tree) -> None:
+    tree.sent["laser"]["pose"] = Pose((0.0, 0.003, 0.304), quat_from_rpy(0, math.radians(2), 0))
+    code, message = only(tree.told(plan))
+    assert code == "TF846"
+    assert message == (
+        "the pose of laser in base is off by 5 mm and 2 deg: seen xyz 0 0.003 0.304 m, rpy 0 2 0 deg; "
+        "expected xyz 0 0 0.3 m, rpy 0 0 0 deg"
+    )
+
+
+@pytest.mark.parametrize(
+    ("pose", "off"),
+    [
+        (Pose((0.0, 0.003, 0.3)), "3 mm"),
+        (Pose((0.0, 0.0, 0.3), quat_from_rpy(0, 0, math.radians(-90))), "90 deg"),
+    ],
+)
+def test_either_is_told_alone(plan: Plan, tree: Tree, pose: Pose, off: str) -> None:
+    tree.sent["laser"]["pose"] = pose
+    code, message = only(tree.told(plan))
+    assert (code, message.split(": ")[0]) == ("TF846", f"the pose of laser in base is off by {off}")
+
+
+def test_a_value_within_the_tolerance_is_right(plan: Plan, tree: Tree) -> None:
+    tree.sent["laser"]["pose"] = Pose((0.0, 0.0009, 0.3), quat_from_rpy(0, math.radians(0.09), 0))
+    assert tree.told(plan) == []
+
+
+def test_the_pose_that_the_robot_gives_another_owners_fixed_edge_is_compared(plan: Plan, tree: Tree) -> None:
+    tree.sent["rack"]["pose"] = Pose((1.1, 0.0, 0.0))
+    assert only(tree.told(plan))[0] == "TF846"
+
+
+def test_another_owners_fixed_edge_without_a_pose_may_be_anywhere(plan: Plan, tree: Tree) -> None:
+    edges = tuple(replace(edge, pose=Pose()) if edge.child == "rack" else edge for edge in plan.edges)
+    assert tree.told(replace(plan, edges=edges)) == []
+
+
+def test_of_a_turning_joint_the_position_is_compared(plan: Plan, tree: Tree) -> None:
+    tree.sent["wheel"]["pose"] = Pose((0.0, 0.25, 0.0))
+    code, message = only(tree.told(plan))
+    assert code == "TF846"
+    assert "off by 50 mm:" in message
+
+
+def test_an_edge_on_the_other_topic_is_told(plan: Plan, tree: Tree) -> None:
+    tree.sent["laser"] |= {"rate": 1.0, "static": False}
+    assert only(tree.told(plan)) == ("TF809", "base → laser came on /tf, declared for /tf_static")
+
+
+def test_another_publisher_is_told_with_both_names(plan: Plan, tree: Tree) -> None:
+    tree.send("base", "odom", "/ekf", rate=10.0)
+    tree.census.graph([Publisher(b"/ekf", "/ekf", static=False)])
+    code, message = only(tree.told(plan))
+    assert (code, message) == ("TF801", "odom → base is published by /ekf; the owner is drive (/rover/drive)")
+
+
+def test_two_nodes_of_the_owners_name_are_one_too_many(plan: Plan, tree: Tree) -> None:
+    tree.send("base", "odom", DRIVE, rate=10.0, gid=b"twin")
+    for child, words in tree.sent.items():
+        tree.send(child, **words)
+    known = [Publisher(words["node"].encode(), words["node"], static=False) for words in tree.sent.values()]
+    tree.census.graph([*known, Publisher(b"twin", DRIVE, static=False)])
+    [found] = [one for verdict in verify(plan, {TOPICS: tree.census}, 110 * S, TOLERANCE) for one in verdict.found]
+    assert (found.code, found.help) == ("TF801", "is the robot running twice?")
+
+
+def test_a_publisher_that_has_left_is_told(plan: Plan, tree: Tree) -> None:
+    for child, words in tree.sent.items():
+        tree.send(child, **words)
+    present = [words["node"] for child, words in tree.sent.items() if child != "laser"]
+    tree.census.graph([Publisher(STATIC.encode(), STATIC, static=True)])
+    tree.census.graph([Publisher(node.encode(), node, static=False) for node in present])
+    [found] = [one for verdict in verify(plan, {TOPICS: tree.census}, 110 * S, TOLERANCE) for one in verdict.found]
+    assert (found.code, found.message) == ("TF804", "/rover/static, which published base → laser, has left")
+
+
+def test_an_owner_that_was_started_again_has_not_left(plan: Plan, tree: Tree) -> None:
+    tree.send("base", "odom", DRIVE, rate=10.0, gid=b"before", until=1.0)
+    tree.census.graph([Publisher(b"before", DRIVE, static=False)])
+    assert tree.told(plan) == []
+
+
+def test_a_namesake_that_left_last_does_not_make_the_owner_leave(plan: Plan, tree: Tree) -> None:
+    tree.send("base", "odom", DRIVE, rate=100.0, gid=b"twin")
+    tree.census.graph([Publisher(b"twin", DRIVE, static=False)])
+    assert tree.told(plan) == []
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"until": 5.0}, "odom → base has not come for 5.10 s, declared 10 Hz"),
+        ({"gap": (4.95, 6.95)}, "odom → base did not come for 2.10 s, declared 10 Hz"),
+    ],
+)
+def test_an_edge_that_falls_silent_is_told(plan: Plan, tree: Tree, more: dict[str, Any], message: str) -> None:
+    tree.sent["base"] |= more
+    assert only(tree.told(plan)) == ("TF804", message)
+
+
+def test_an_edge_that_comes_too_rarely_is_told(plan: Plan, tree: Tree) -> None:
+    tree.sent["base"]["rate"] = 7.0
+    assert only(tree.told(plan)) == ("TF805", "odom → base comes with 7 Hz, declared 10 Hz")
+
+
+def test_what_tf2_refuses_is_told(plan: Plan, tree: Tree) -> None:
+    tree.sent["laser"]["pose"] = Pose((0.0, 0.0, 0.3), (0.0, 0.0, 0.0, 0.0))
+    code, message = only(tree.told(plan))
+    assert code == "TF831"
+    assert message.endswith("its quaternion is not of length 1")
+
+
+def test_a_bag_knows_no_publishers_and_blames_none(plan: Plan, tree: Tree) -> None:
+    for words in tree.sent.values():
+        words["gid"] = None
+    assert tree.told(plan, graph=False) == []
+
+
+def test_edges_are_looked_for_on_the_topics_of_their_owners(plan: Plan) -> None:
+    moved = replace(plan.process("static"), remap={"/tf": "/r1/tf", "/tf_static": "/r1/tf_static"})
+    plan = replace(plan, processes=tuple(moved if each.name == "static" else each for each in plan.processes))
+    topics = {pair: [edge.child for edge in edges] for pair, edges in edges_by_topics(plan).items()}
+    assert topics == {TOPICS: ["base", "wheel", "lens", "rack"], ("/r1/tf", "/r1/tf_static"): ["laser"]}
+
+
+angles = st.floats(-3.1, 3.1)
+
+
+@given(st.tuples(angles, angles, angles), st.tuples(angles, angles, angles), st.floats(0.5, 2))
+def test_the_angle_between_two_orientations_is_scipys(
+    a: tuple[float, float, float], b: tuple[float, float, float], scale: float
+) -> None:
+    expected, seen = quat_from_rpy(*a), quat_from_rpy(*b)
+    scaled = tuple(-scale * each for each in seen)
+    angle = (Rotation.from_quat(expected).inv() * Rotation.from_quat(seen)).magnitude()
+    assert offset_of(Pose(a, expected), Pose(b, scaled)).rot_rad == pytest.approx(angle, abs=1e-7)  # type: ignore[arg-type]
+    assert offset_of(Pose(a, expected), Pose(b, seen)).xyz_m == pytest.approx(math.dist(a, b))

@@ -1,0 +1,92 @@
+"""``verify`` and ``tree --live`` on a robot that runs, and on one where somebody interferes."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tests.observe.test_monitor_ros import sending
+from tfcompose.plan import PlanProcess, Simulation
+from tfcompose.planfile import read_plan, write_plan
+from tfcompose.pose import Pose
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+    from typing import Protocol
+
+    from tfcompose.plan import PlanEdge
+
+    class Started(Protocol):
+        """A process under test, as conftest starts it."""
+
+        def until_says(self, text: str) -> None: ...
+
+
+pytestmark = pytest.mark.ros
+
+
+@pytest.fixture
+def running(write: Callable[..., Path], start: Callable[..., Started], edge: Callable[..., PlanEdge]) -> Path:
+    """Start a base that is moved by a stand-in, and a laser on it; return the plan's file."""
+    edges = [replace(edge("odom base_link", "drive"), rate=50.0), edge("base_link laser", pose=Pose((0.0, 0.0, 0.3)))]
+    drive = PlanProcess("drive", "simulate", simulate=Simulation("fixed", 50.0))
+    plan = write(edges, PlanProcess("static", "static"), drive)
+    for module, name in (("static", "static"), ("simulate", "drive")):
+        start(f"tfcompose.run.{module}", plan, name).until_says("edge")
+    return plan
+
+
+def tfcompose(*words: str, code: int = 0) -> str:
+    command = [sys.executable, "-m", "tfcompose", *words]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=40, check=False)
+    assert done.returncode == code, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_a_robot_as_planned_is_as_expected(running: Path) -> None:
+    assert tfcompose("verify", str(running), "--live", "--for", "4").startswith("rover: 2 of 2 edges as expected")
+
+
+def test_a_second_publisher_and_a_strange_frame_are_told(running: Path) -> None:
+    with sending("rogue", "odom", "base_link", rate=20), sending("tags", "laser", "tag_1", rate=20):
+        output = tfcompose("verify", str(running), "--for", "5", "--format", "json", code=1)
+    found = {one["code"]: one["message"] for one in json.loads(output)}
+    assert found == {
+        "TF801": "odom → base_link is published by /rogue; the owner is drive (/rover/drive)",
+        "TF803": "laser → tag_1 was seen from /tags, and nobody declared it",
+    }
+
+
+def test_a_plan_that_changed_after_the_start_is_told(running: Path) -> None:
+    plan = read_plan(running.read_text(), str(running))
+    moved = replace(plan.edges[1], pose=Pose((0.0, 0.012, 0.3)))
+    running.write_text(write_plan(replace(plan, edges=(plan.edges[0], moved))))
+    assert "error[TF846] the pose of laser in base_link is off by 12 mm" in tfcompose("verify", str(running), code=1)
+
+
+def test_the_live_tree_names_nodes_and_what_is_unexpected(running: Path) -> None:
+    with sending("tags", "world", "tag_1", rate=20):
+        rows: list[dict[str, Any]] = json.loads(
+            tfcompose("tree", str(running), "--live", "--for", "5", "--format", "json")
+        )["trees"]
+    assert [tree["root"] for tree in rows] == ["odom", "world"]
+    told = {edge["child"]: (edge["status"], edge["seen"][0]["publisher"]) for tree in rows for edge in tree["edges"]}
+    assert told == {
+        "base_link": ("expected", "/rover/drive"),
+        "laser": ("expected", "/rover/static"),
+        "tag_1": ("unexpected", "/tags"),
+    }
+
+
+@pytest.mark.usefixtures("domain")
+def test_where_nothing_runs_verify_says_so_with_exit_code_1(
+    write: Callable[..., Path], edge: Callable[..., PlanEdge]
+) -> None:
+    plan = write([edge("base_link laser")], PlanProcess("static", "static"))
+    tfcompose("verify", str(plan), "--for", "0.5", code=1)

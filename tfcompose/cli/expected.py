@@ -1,0 +1,37 @@
+"""What is expected of a running tree: the plan of a robot file, or a plan that was built."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+    from tfcompose.diagnostic import Span
+    from tfcompose.plan import Plan
+
+PLAN = "plan.json"
+
+
+def expected(file: str, arguments: Namespace) -> tuple[Plan, dict[str, Span]] | int:
+    """Return the plan of a robot file, a plan.json or a folder with one, and where edges stand in the robot's file.
+
+    Places are by child; a built plan has none. What cannot be read is said, and the exit code returned.
+    """
+    path = Path(file)
+    if path.is_dir() and (path / PLAN).is_file():
+        path /= PLAN
+    if path.suffix == ".json":
+        terminal = import_module("tfcompose.cli.terminal")
+        if arguments.profiles or arguments.overlays or arguments.settings:
+            terminal.complain("a built plan takes no --profile, --overlay and --set: those are for building it")
+            return 2
+        plan: Plan | int = import_module("tfcompose.cli.up").plan_in(path)
+        return plan if isinstance(plan, int) else (plan, {})
+    robot = import_module("tfcompose.cli.compiling").robot_or_code(file, arguments)
+    if isinstance(robot, int):
+        return robot
+    final = import_module("tfcompose.emit.final").with_final_names(robot)
+    return import_module("tfcompose.emit.plan").plan_of(final), {edge.child: edge.at for edge in final.edges}

@@ -1,0 +1,137 @@
+"""``tfcompose tree --live`` and ``tree --bag``: the tree as it is published."""
+
+from __future__ import annotations
+
+import gc
+import json
+import sys
+import time
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.cli.edge_table import duration, object_of, printable
+from tfcompose.cli.expected import expected
+from tfcompose.cli.looking import from_bag, from_live, nothing_came
+from tfcompose.observe.census import SETTLE_S, Census, topics_below
+from tfcompose.observe.forest import forest
+from tfcompose.observe.verify import edges_by_topics
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+    from tfcompose.observe.forest import Branch, Tree
+    from tfcompose.plan import PlanEdge, RosSettings
+
+    Topics = tuple[str, str]
+
+
+def live_tree(arguments: Namespace) -> int:
+    """Print the published tree; exit code 1 if nothing is published, 2 if a file or a bag cannot be read."""
+    gc.enable()  # it may last
+    planned: dict[Topics, dict[str, PlanEdge]] | None = None
+    ros: RosSettings | None = None
+    pairs = [topics_below(arguments.namespace)]
+    if arguments.file is not None:
+        known = expected(arguments.file, arguments)
+        if isinstance(known, int):
+            return known
+        ros = known[0].ros
+        planned = {pair: {edge.child: edge for edge in some} for pair, some in edges_by_topics(known[0]).items()}
+        pairs = list(planned)
+    censuses = {pair: Census(settle_s=0.0 if arguments.bag else SETTLE_S) for pair in pairs}
+    begun = time.monotonic()
+    if arguments.bag:
+        code = from_bag(arguments.bag, censuses)
+    else:
+        code = from_live("tfcompose_tree", censuses, ros=ros, duration_s=arguments.duration)
+    if code is not None:
+        return code
+    if not any(census.messages for census in censuses.values()):
+        return nothing_came(", ".join(topic for pair in pairs for topic in pair), time.monotonic() - begun)
+    for pair, census in censuses.items():
+        now_ns = census.last_ns if arguments.bag else time.time_ns()
+        trees = forest(census.edges(now_ns), None if planned is None else planned[pair])
+        if arguments.format == "json":
+            sys.stdout.write(_objects(pair, trees, compared=planned is not None))
+        else:
+            heading = f"on {pair[0]} and {pair[1]}:\n" if len(pairs) > 1 else ""
+            sys.stdout.write(heading + _drawn(trees, compared=planned is not None))
+    return 0
+
+
+def _drawn(trees: list[Tree], *, compared: bool) -> str:
+    rows = [[_row(branch, compared=compared) for branch in tree.branches] for tree in trees]
+    widths = [max((len(row[column]) for some in rows for row in some), default=0) for column in range(5)]
+    parts = []
+    if len(trees) > 1:
+        parts.append(f"{len(trees)} trees that do not hang together:\n\n")
+    for tree, some in zip(trees, rows, strict=True):
+        if tree.loop:
+            parts.append(f"a loop, in which tf2 finds no way: {printable(' → '.join(tree.loop))}\n")
+        parts += [_line(row, widths) for row in some]
+        parts.append("\n")
+    return "".join(parts[:-1])
+
+
+def _line(row: tuple[str, ...], widths: list[int]) -> str:
+    cells = [
+        f"{cell:>{width}}" if column in {3, 4} else f"{cell:<{width}}"
+        for column, (cell, width) in enumerate(zip(row, widths, strict=False))
+    ]
+    return "  ".join([*cells, row[5]]).rstrip() + "\n"
+
+
+def _row(branch: Branch, *, compared: bool) -> tuple[str, ...]:
+    """Return the columns: frame, kind, node, rate, age, and what there is to say."""
+    name = branch.indent + printable(branch.frame)
+    if not branch.seen:
+        planned = branch.planned
+        if planned is None:
+            return (name, "", "", "", "", "")
+        return (name, planned.kind, planned.node, "", "", f"missing: owner {planned.owner}")
+    one = branch.seen[0]
+    others = [
+        f"also {printable(other.name)} from {printable(other.publisher) or 'somebody'}" for other in branch.seen[1:]
+    ]
+    remarks = [_status(branch)] if compared else []
+    rate = "" if one.strand.static else f"{one.timing.rate:.1f} Hz" if one.timing.rate is not None else "–"
+    age = "" if one.data_age_s is None else duration(one.data_age_s)
+    kind = "static" if one.strand.static else "dynamic"
+    return (name, kind, printable(one.publisher) or "–", rate, age, "; ".join([*remarks, *others]))
+
+
+def _status(branch: Branch) -> str:
+    planned, one = branch.planned, branch.seen[0] if branch.seen else None
+    if planned is None:
+        return "unexpected"
+    if one is None:
+        return "missing"
+    if not planned.may_hang_on(one.strand.parent):
+        return f"expected in {planned.parent}"
+    if one.nodes and planned.node not in one.nodes:
+        return f"expected from {planned.node}"
+    return "expected"
+
+
+def _objects(pair: Topics, trees: list[Tree], *, compared: bool) -> str:
+    data = {
+        "topics": list(pair),
+        "trees": [
+            {
+                "root": None if tree.loop else tree.branches[0].frame,
+                "loop": list(tree.loop),
+                "edges": [_object(branch, compared=compared) for branch in tree.branches if branch.parent is not None],
+            }
+            for tree in trees
+        ],
+    }
+    return json.dumps(data, ensure_ascii=False) + "\n"
+
+
+def _object(branch: Branch, *, compared: bool) -> dict[str, Any]:
+    status = {"status": _status(branch)} if compared else {}
+    return {
+        "parent": branch.parent,
+        "child": branch.frame,
+        **status,
+        "seen": [object_of(one) for one in branch.seen],
+    }

@@ -1,0 +1,108 @@
+"""``tfcompose verify``: what a robot file says, against what is published.
+
+Compare each edge of FILE (a robot, or a built plan.json) with the running tree, or with a bag: missing, not declared,
+under another parent, with another value, on the wrong topic, silent, too slow, from another publisher. Exit code 0 if
+all is as expected, 1 if not, 2 if a file or a bag cannot be read. Frames inside a sensor that its driver publishes are
+looked for, and their values are not compared: each unit is calibrated.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import sys
+import time
+from argparse import ArgumentTypeError
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.expected import expected
+from tfcompose.cli.looking import add_bag, add_for, from_bag, from_live, nothing_came
+from tfcompose.cli.options import add_file, add_variant
+from tfcompose.cli.terminal import complain, print_findings
+from tfcompose.observe.census import SETTLE_S, Census
+from tfcompose.observe.offset import Offset
+from tfcompose.observe.verify import edges_by_topics, summary, verify
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+
+    from tfcompose.observe.verify import Verdict
+    from tfcompose.plan import Plan
+
+_UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "deg": math.pi / 180, "rad": 1.0}
+_ANGLES = frozenset({"deg", "rad"})
+_QUANTITY = re.compile(r"(\d+\.?\d*|\.\d+)\s*([a-z]+)")
+DEFAULT = Offset(1e-3, math.radians(0.1))
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Add the command's arguments."""
+    add_file(parser)
+    add_variant(parser)
+    parser.add_argument("--live", action="store_true", help="look at the running tree; so it is unless --bag is given")
+    add_bag(parser)
+    add_for(parser, "look at the running tree for S seconds; default: 5", 5.0)
+    parser.add_argument(
+        "--tolerance", type=tolerance, default=DEFAULT, metavar="T",
+        help="how far a pose may be off: 2mm, 0.5deg, or both as 2mm,0.5deg; default: 1mm,0.1deg",
+    )  # fmt: skip
+    parser.add_argument("--format", choices=("text", "json", "junit"), default="text", help="default: text")
+    parser.add_argument(
+        "--fail-on", choices=("error", "warning"), default="error", help="exit code 1 from there on; default: error"
+    )
+
+
+def run(arguments: Namespace) -> int:
+    """Verify; exit code 0 if all is as expected, 1 if not, 2 if something cannot be read."""
+    if arguments.live and arguments.bag:
+        complain("--live looks at the running tree and --bag at a recording: give one of them")
+        return 2
+    known = expected(arguments.file, arguments)
+    if isinstance(known, int):
+        return known
+    plan, places = known
+    censuses = {topics: Census(settle_s=0.0 if arguments.bag else SETTLE_S) for topics in edges_by_topics(plan)}
+    begun = time.monotonic()
+    if arguments.bag:
+        code = from_bag(arguments.bag, censuses)
+    else:
+        code = from_live("tfcompose_verify", censuses, ros=plan.ros, duration_s=arguments.duration)
+    if code is not None:
+        return code
+    seconds = time.monotonic() - begun
+    if not any(census.messages for census in censuses.values()):
+        return nothing_came(", ".join(topic for pair in censuses for topic in pair), seconds)
+    now_ns = max(census.last_ns for census in censuses.values()) if arguments.bag else time.time_ns()
+    return _told(arguments, plan, verify(plan, censuses, now_ns, arguments.tolerance, places), seconds)
+
+
+def _told(arguments: Namespace, plan: Plan, verdicts: list[Verdict], seconds: float) -> int:
+    failing = frozenset({"error"} if arguments.fail_on == "error" else {"error", "warning"})
+    found = [one for verdict in verdicts for one in verdict.found]
+    if arguments.format == "junit":
+        render = import_module("tfcompose.render.junit").render_junit
+        cases = [(verdict.owner or "undeclared", verdict.edge, verdict.found) for verdict in verdicts]
+        sys.stdout.write(render(plan.robot, cases, failing=failing, seconds=seconds))
+    elif arguments.format == "json":
+        sys.stdout.write(import_module("tfcompose.render.json").render_json(found))
+    else:
+        print_findings(found, sys.stdout)
+        where = arguments.bag or "the running tree"
+        sys.stdout.write(f"{plan.robot}: {summary(verdicts)}, in {where}\n")
+    return int(any(one.severity in failing for one in found))
+
+
+def tolerance(text: str) -> Offset:
+    """Read a distance, an angle, or both.
+
+    Raises:
+        ArgumentTypeError: if it is neither.
+    """
+    given: dict[bool, float] = {}
+    for part in text.split(","):
+        match = _QUANTITY.fullmatch(part.strip())
+        if match is None or match[2] not in _UNITS or (match[2] in _ANGLES) in given:
+            raise ArgumentTypeError(f"{text} is no tolerance, such as 2mm or 2mm,0.5deg")
+        given[match[2] in _ANGLES] = float(match[1]) * _UNITS[match[2]]
+    return Offset(given.get(False, DEFAULT.xyz_m), given.get(True, DEFAULT.rot_rad))

@@ -1003,6 +1003,23 @@ def test_a_namesake_is_still_told_from_the_owner_after_the_guard_died(running: H
     assert running.said()[0].startswith("TF801 map → odom is published by another /slam")
 
 
+def test_a_message_may_pass_when_all_of_it_is_its_senders_and_only_once_that_has_a_name(running: History) -> None:
+    slam = running.joins(None)
+    for name, edges, admitted in (
+        (None, "map odom", set()),
+        ("/slam", "map odom", None),
+        ("/slam", "map odom, odom base", {("map", "odom")}),
+        ("/slam", "odom base", set()),
+        ("/slam", "map odom, map cup", {("map", "odom")}),
+        ("/slam", "odom map", set()),
+    ):
+        slam.node = name
+        running.look().send(slam, edges)
+        assert running.judge.admitted == admitted, edges
+        running.send(slam, edges)
+        assert running.judge.admitted == admitted, edges
+
+
 def test_only_an_offender_that_is_surely_of_the_run_can_be_stopped_for_it() -> None:
     processes = (PlanProcess("slam", "run", nodes=("/slam",)), PlanProcess("drive", "external", nodes=("/drive",)))
     for namesakes, process in ((0, "slam"), (1, "")):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import pytest
 
-from tfcompose.plan import Plan, PlanEdge, PlanProcess, Ready, RosSettings, StopRule
+from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, Ready, RosSettings, StopRule
 from tfcompose.pose import Pose
 from tfcompose.run.events import Clear, Complete, GateOpen, GateShut, Live, OwnerReady, Remember
 from tfcompose.run.lives import refusal
@@ -332,6 +332,13 @@ def test_a_guard_that_dies_is_told_and_started_again_with_what_it_said_and_what_
     assert back.text == "guard watches again after 1.5 s"
     assert (history.state.stop, history.state.shown, history.killed) == (None, frozenset(), [])
     assert history.state.tracked["guard"].restarts == 1
+
+
+def test_a_strict_guard_that_dies_lets_nothing_pass_and_says_so() -> None:
+    history = Life(GUARD, STATIC)
+    history.state = replace(history.state, plan=replace(history.state.plan, guard=GuardPolicy("strict")))
+    (found,) = history.feed(Clear(), Exited("guard", 1)).found()
+    assert found.message == "guard ended with exit code 1: nothing of the plan passes to /tf until it is back"
 
 
 def test_an_owner_that_ended_while_nobody_watched_is_to_be_seen_anew() -> None:

@@ -55,5 +55,10 @@ def test_a_policy_concerns_the_guard_and_a_setting_of_ros_everybody(tmp_path: Pa
     assert changed(tmp_path / "b", replace(PLAN, ros=RosSettings("r"))).changed == {"static", "slam", "guard"}
 
 
+def test_a_fence_is_put_up_when_a_process_starts_so_strict_concerns_everybody(tmp_path: Path) -> None:
+    strict = replace(PLAN, guard=GuardPolicy(mode="strict"))
+    assert changed(tmp_path, strict).changed == {"static", "slam", "guard"}
+
+
 def test_a_fixed_frame_that_vanished_is_held_by_listeners_and_a_moving_one_is_not(tmp_path: Path) -> None:
     assert changed(tmp_path, replace(PLAN, edges=())).held == ("base → laser",)

@@ -60,6 +60,8 @@ def _process(plan: Plan, process: PlanProcess, files: dict[str, str]) -> Iterato
     yield f"{process.name} ({process.kind})"
     if process.kind != "external":
         yield f"  command  {' '.join(map(_quoted, process.argv))}"
+    if plan.guard.mode == "strict" and process.kind not in ("external", "guard"):
+        yield f"  fence    its TF goes to the partition tfc_{plan.robot}, and the guard passes on what it owns"
     nodes = [name + (f" → {process.lifecycle[name]}" if name in process.lifecycle else "") for name in process.nodes]
     if nodes:
         yield f"  nodes    {', '.join(nodes)}"

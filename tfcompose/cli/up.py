@@ -42,8 +42,9 @@ def arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--dry-run", action="store_true", help="print what would be started, and start nothing")
     parser.add_argument(
-        "--guard", choices=("off", "watch"),
-        help="off: say which edges are live, and judge nobody; default: what the robot says",
+        "--guard", choices=("off", "watch", "strict"),
+        help="off: say which edges are live, and judge nobody; strict: hold back what a process does not own; "
+        "default: what the robot says",
     )  # fmt: skip
     parser.add_argument(
         "--settle",

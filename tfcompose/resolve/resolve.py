@@ -204,7 +204,7 @@ def _guard(spec: RobotSpec, joined: list[Joined]) -> GuardPolicy:
     allow = tuple((edge.parent, edge.child) for edge in guard.allow)
     allow += tuple(pattern for part in joined for pattern in part.robot.guard.allow if pattern not in allow)
     return GuardPolicy(
-        mode="off" if guard.mode == "off" else "watch",
+        mode="off" if guard.mode == "off" else "strict" if guard.mode == "strict" else "watch",
         unknown_edges="ignore"
         if guard.unknown_edges == "ignore"
         else "error"

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 FASTDDS_PROFILE = Path(__file__).with_name("fastdds.xml")
 
 # Fast DDS 2 reads the first, Fast DDS 3 the second. A user who sets either has decided.
-_PROFILE_VARIABLES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
+PROFILE_VARIABLES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
 
 _DISCOVERY = {"localhost": "LOCALHOST", "subnet": "SUBNET", "off": "OFF"}
 
@@ -54,6 +54,6 @@ def child_environment(base: Mapping[str, str], ros: RosSettings, *, own: bool) -
         if ros.discovery not in _DISCOVERY:
             raise RosError(f"ros: discovery is {ros.discovery!r}, not one of {', '.join(_DISCOVERY)}")
         environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = _DISCOVERY[ros.discovery]
-    if own and not any(base.get(name) for name in _PROFILE_VARIABLES):
-        environment[_PROFILE_VARIABLES[0]] = str(FASTDDS_PROFILE)
+    if own and not any(base.get(name) for name in PROFILE_VARIABLES):
+        environment[PROFILE_VARIABLES[0]] = str(FASTDDS_PROFILE)
     return environment

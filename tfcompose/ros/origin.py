@@ -37,8 +37,7 @@ def carries(gid: bytes, own_gid: bytes, variable: str) -> bool | None:
     if gid[2:4] != own_gid[2:4]:
         return False
     found = [_environment(pid) for pid in _candidates(int.from_bytes(gid[4:6], "little")) if _command(pid)]
-    wanted = variable.encode()
-    return len(found) == 1 and wanted in found[0].split(b"\0")
+    return any(variable.encode() in one.split(b"\0") for one in found)
 
 
 def _environment(pid: int) -> bytes:

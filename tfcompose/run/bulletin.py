@@ -6,11 +6,11 @@ import time
 from typing import TYPE_CHECKING
 
 from tfcompose.ros.diagnostics import DiagnosticsPublisher
-from tfcompose.run.health import statuses
+from tfcompose.run.health import held_status, statuses
 from tfcompose.run.own import say
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from rclpy.node import Node
 
@@ -29,8 +29,8 @@ class Bulletin:
         if self._publisher is None:
             say("nothing on /diagnostics: the package diagnostic_msgs is not installed")
 
-    def look(self, judges: Sequence[Judge]) -> None:
-        """Publish if it is time to, and somebody listens."""
+    def look(self, judges: Sequence[Judge], held: Mapping[tuple[str, str, str], int] | None) -> None:
+        """Publish if it is time to, and somebody listens; ``held`` is what a strict guard held back."""
         now = time.monotonic()
         if self._publisher is None or now < self._due:
             return
@@ -38,4 +38,7 @@ class Bulletin:
         if self._publisher.is_heard:
             edges = [edge for judge in judges for edge in judge.health(now)]
             wrong = [one for judge in judges for one in judge.wrong()]
-            self._publisher.publish(statuses(self._robot, edges, wrong), time.time_ns())
+            page = statuses(self._robot, edges, wrong)
+            if held is not None:
+                page.append(held_status(self._robot, held))
+            self._publisher.publish(page, time.time_ns())

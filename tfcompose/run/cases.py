@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.diagnostic import Note
 from tfcompose.run.driven import drives_of, sensor_of
 from tfcompose.run.events import Found, GuardEvent, Recovered, Taken
 from tfcompose.run.offences import NAMELESS, Offence, taken, violation
@@ -110,7 +111,10 @@ class Cases:
         if any(self._was_first(case, now) for case in cases):
             return Taken(taken(offences, where))
         driven = sensor_of(offences[0], self._drives)
-        return Found(violation(offences, self._plan, where, driven), self._process(offences[0], cases[0].gid))
+        found = violation(offences, self._plan, where, driven)
+        if self._plan.guard.mode == "strict" and not offences[0].of_stamps:
+            found = replace(found, notes=(*found.notes, Note(_fate(ours=self._senders.is_of_this_run(cases[0].gid)))))
+        return Found(found, self._process(offences[0], cases[0].gid))
 
     def _process(self, offence: Offence, gid: bytes | None) -> str:
         """Return the plan's process that did it, where that is sure and it can be stopped for it."""
@@ -160,6 +164,10 @@ class Cases:
         if self._senders.is_present(case.gid) and not case.offence.of_stamps:
             return not case.offence.static and now - case.last > QUIET_S
         return now - case.last > OVER_S
+
+
+def _fate(*, ours: bool) -> str:
+    return "held back: no listener gets it" if ours else "not of this run, so it cannot be held back: listeners get it"
 
 
 def _to_json(case: Case) -> list[Any]:

@@ -41,10 +41,11 @@ def ended_by_itself(name: str, returncode: int, when: str, last_lines: tuple[str
     return finding("TF808", f"{name} {verb} {how_ended(returncode)}{when}", None, notes=notes)
 
 
-def guard_lost(name: str, event: Exited) -> Diagnostic:
+def guard_lost(name: str, event: Exited, *, strict: bool) -> Diagnostic:
     """Return the finding for a guard that ended while the others run, and is started again."""
     verb = "was ended by" if event.returncode < 0 else "ended with"
-    message = f"{name} {verb} {how_ended(event.returncode)}: nobody watches the tree until it is back"
+    blind = "nothing of the plan passes to /tf" if strict else "nobody watches the tree"
+    message = f"{name} {verb} {how_ended(event.returncode)}: {blind} until it is back"
     notes = [Note(f"{name}: {line}") for line in event.last_lines]
     advice = "it is started again, and knows what it has told"
     return finding("TF808", message, None, severity="warning", notes=notes, help=advice)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from tfcompose.ros.diagnostics import ERROR, OK, STALE, WARN, Status
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from tfcompose.diagnostic import Diagnostic
     from tfcompose.plan import PlanEdge
@@ -48,6 +48,13 @@ class EdgeHealth:
         numbers += [f"{self.rate:.3g} Hz"] if self.rate is not None else []
         numbers += [f"delay {self.delay_s:.3f} s"] if self.delay_s is not None else []
         return ", ".join([*numbers, f"from {self.publisher}"])
+
+
+def held_status(robot: str, held: Mapping[tuple[str, str, str], int]) -> Status:
+    """Return the status of what a strict guard held back: transforms by their sender's node, parent and child."""
+    said = [(f"{parent} → {child} from {who}", str(count)) for (who, parent, child), count in held.items()]
+    message = f"{sum(held.values())} transforms were held back"
+    return Status(f"tfcompose {robot}: strict", WARN if held else OK, message, said)
 
 
 def statuses(robot: str, edges: Sequence[EdgeHealth], found: Sequence[Diagnostic]) -> list[Status]:

@@ -50,11 +50,15 @@ class _Stream:
     until: float = 0.0
     cases: tuple[Case, ...] = ()
     children: tuple[str, ...] = ()
+    admitted: frozenset[tuple[str, str]] | None = None
 
 
 @dataclass(slots=True)
 class Judge:
-    """The state of one watch over one plan. ``settle_s`` is how long it looks before it says that all is clear."""
+    """The state of one watch over one plan. ``settle_s`` is how long it looks before it says that all is clear.
+
+    ``admitted`` are the edges of the last message that may pass in a strict plan; None: all.
+    """
 
     plan: Plan
     settle_s: float
@@ -71,6 +75,7 @@ class Judge:
     _law: Law = field(init=False)
     _sent: SentPoses = field(init=False)
     _finds_until: float = 0.0
+    admitted: frozenset[tuple[str, str]] | None = None
 
     def __post_init__(self) -> None:
         self.live = Liveness(self.plan)
@@ -95,9 +100,20 @@ class Judge:
             self._verdict(stream, message, now)
         for case in stream.cases:
             case.last = now
+        self.admitted = stream.admitted
         if not stream.children:
             return []
         return self.live.arrived(stream.children, now, self._judge_stamps(stream, message, now))
+
+    def admits(self, message: Message, now: float) -> frozenset[tuple[str, str]] | None:
+        """Return which edges of the message may pass in a strict plan; None: all."""
+        stream = _Stream()
+        self._verdict(stream, message, now)
+        return stream.admitted
+
+    def name_of(self, gid: bytes | None) -> str:
+        """Return the publisher's node, empty while that is not known."""
+        return next(iter(self._senders.nodes(gid, static=False)), "") if gid is not None else ""
 
     def graph(self, writers: Sequence[Writer], now: float) -> list[GuardEvent]:
         """Take who publishes on /tf and /tf_static now, and return what that means."""
@@ -212,7 +228,7 @@ class Judge:
         """Judge the edges of a message whose sender has a name; the verdict holds if all is certain."""
         nodes = self._senders.nodes(message.gid, static=message.static)
         epoch, certain = self._law.changes, message.gid is not None
-        cases, children = [], []
+        cases, children, admitted = [], [], []
         for parent, child in dict.fromkeys(message.edges):
             sight = Sight(message.gid, parent, child, message.static)
             # Without ids, the sender may be one that the graph does not show yet.
@@ -224,8 +240,11 @@ class Judge:
             if case:
                 cases.append(case)
                 certain = certain and not case.offence.namesake
+            else:
+                admitted.append((parent, child))
             if arrived:
                 children.append(child)
+        stream.admitted = None if {*admitted} == {*message.edges} else frozenset(admitted)
         stream.cases, stream.children = tuple(cases), tuple(children)
         stream.epoch = epoch if certain and epoch == self._law.changes else -1
         strange = any(child not in self._law.planned for _, child in message.edges)

@@ -163,15 +163,18 @@ class Liveness:
         """Know what the guard before knew, and miss nobody before ``until``: publishers have to be found again."""
         self._watched.begins_late(until)
         self._gone = set(memory["gone"])
-        for track in self._parted(tuple(memory["live"])):
+        for track in self._parted(self._planned(memory["live"])):
             track.live, track.last = True, now
             self._waiting[track.edge.owner].difference_update(edge.child for edge in track.edges)
-        for track in self._parted(tuple(memory["slow"])):
+        for track in self._parted(self._planned(memory["slow"])):
             track.slow = True
         for since, children in memory["silent"]:
-            for track in self._parted(tuple(children)):
+            for track in self._parted(self._planned(children)):
                 track.silent, track.silent_since, track.last = True, since, since
         self._complete = not any(self._waiting.values())
+
+    def _planned(self, children: list[str]) -> tuple[str, ...]:
+        return tuple(child for child in children if child in self._track_of)
 
     def arrived(self, children: tuple[str, ...], now: float, delay_s: float | None = None) -> list[GuardEvent]:
         """Note that owners sent these edges, in one message, and return what that means."""

@@ -56,7 +56,7 @@ def _guard_ended(turn: Turn, one: Tracked, event: Exited) -> None:
     turn.know(unwatched=unwatched)
     _restart_later(turn, turn.state.tracked[event.name], event)
     if turn.state.stop is None:
-        turn.show(guard_lost(event.name, event))
+        turn.show(guard_lost(event.name, event, strict=turn.state.plan.guard.mode == "strict"))
 
 
 def lose(turn: Turn, one: Tracked) -> None:
@@ -64,7 +64,9 @@ def lose(turn: Turn, one: Tracked) -> None:
     state, name = turn.state, one.process.name
     turn.track(name, replace(one, ready=False, ready_since=None, seen="", late=False))
     if name == state.guard:
-        turn.know(live=frozenset(), complete=not state.plan.edges, memory={})
+        # A strict guard's memory holds what it latched, also for one that was asked for anew.
+        memory = state.memory if state.plan.guard.mode == "strict" else {}
+        turn.know(live=frozenset(), complete=not state.plan.edges, memory=memory)
     elif one.process.owns:
         live = state.live - {child for _, child in one.process.owns}
         turn.know(live=live, complete=False, waiting_said=None if state.waiting_said is None else turn.now)

@@ -17,8 +17,11 @@ if TYPE_CHECKING:
 
     from tfcompose.run.events import GuardEvent
     from tfcompose.run.judge import Judge
+    from tfcompose.run.relay import Relay
 
 MEMORY_FD = "TFCOMPOSE_MEMORY_FD"
+#: A longer part is not handed on: the launcher takes no longer lines; characters.
+LONGEST = 900_000
 
 
 def recalled(env: Mapping[str, str]) -> dict[str, Any]:
@@ -35,23 +38,25 @@ def recalled(env: Mapping[str, str]) -> dict[str, Any]:
 
 
 class Memory:
-    """Hands on what a judge knows, part by part, whenever a part has changed."""
+    """Hands on what a judge knows, and a relay latches, part by part, whenever a part has changed."""
 
-    def __init__(self, topics: str, judge: Judge, emit: Callable[[GuardEvent], None]) -> None:
+    def __init__(self, topics: str, judge: Judge, relay: Relay | None, emit: Callable[[GuardEvent], None]) -> None:
         self._topics = topics
         self._judge = judge
+        self._relay = relay
         self._emit = emit
         self._mark: object = None
         self._left: dict[str, Any] = {}
 
     def look(self) -> None:
         """Hand on what has changed."""
-        mark = self._judge.mark
+        mark = (self._judge.mark, self._relay and self._relay.changes)
         if mark == self._mark:
             return
         self._mark = mark
-        known = self._judge.memory()
-        changed = {part: value for part, value in known.items() if self._left.get(part) != value}
-        if changed:
-            self._left = known
-            self._emit(Remember({f"{self._topics} {part}": value for part, value in changed.items()}))
+        known = self._judge.memory() | (self._relay.memory() if self._relay else {})
+        gone = dict.fromkeys(self._left.keys() - known.keys())
+        for part, value in (known | gone).items():
+            if self._left.get(part) != value and len(json.dumps(value)) < LONGEST:
+                self._emit(Remember({f"{self._topics} {part}": value}))
+        self._left = known

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from tfcompose.ros.graph import UNKNOWN_NODE, own_gid, writers, writers_unmapped
 from tfcompose.ros.origin import carries, origin
 from tfcompose.run.place import RUN_ID
-from tfcompose.run.senders import Writer
+from tfcompose.run.senders import PARTICIPANT, Writer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,7 +22,7 @@ GLOBAL = ("/tf", "/tf_static")
 
 
 class Graph:
-    """The publishers on a plan's topics (moving, fixed), and on the global ones."""
+    """The publishers on a plan's topics (moving, fixed), and on the global ones; ``own`` are the guard's, left out."""
 
     def __init__(self, node: Node, topics: tuple[str, str]) -> None:
         self.topics = topics
@@ -31,10 +31,21 @@ class Graph:
         self._ours: dict[bytes, bool | None] = {}
         self._run = f"{RUN_ID}={os.environ[RUN_ID]}" if RUN_ID in os.environ else ""
         self._own = b""
+        self.own: set[bytes] = set()
 
     def writers(self) -> list[Writer]:
         """Return who publishes on the plan's topics now."""
         return self._on(writers, self.topics)
+
+    def is_ours(self, gid: bytes) -> bool | None:
+        """Whether the publisher is surely a process of the guard's own run; None: it is not in the graph yet."""
+        return bool(self._ours[gid]) if gid in self._ours else None
+
+    def look_for_own(self) -> None:
+        """Find out the ids of what the guard's own node publishes on the plan's topics."""
+        own = self._own_gid()[:PARTICIPANT]
+        for topic in self.topics:
+            self.own |= {one.gid for one in writers(self._node, topic) if one.gid[:PARTICIPANT] == own}
 
     def global_writers(self) -> list[Writer]:
         """Return who publishes on the global topics now."""
@@ -43,7 +54,12 @@ class Graph:
     def _on(self, look: Callable[[Node, str], list[Found]], topics: tuple[str, str]) -> list[Writer]:
         moving, fixed = topics
         pairs = ((True, fixed), (False, moving))
-        return [self._writer(one, static=static) for static, topic in pairs for one in look(self._node, topic)]
+        return [
+            self._writer(one, static=static)
+            for static, topic in pairs
+            for one in look(self._node, topic)
+            if one.gid not in self.own
+        ]
 
     def _writer(self, one: Found, *, static: bool) -> Writer:
         where = self._where.get(one.gid)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
 
 from tfcompose.diagnostic import Diagnostic, finding
-from tfcompose.ros.environment import RosError
+from tfcompose.ros.environment import PROFILE_VARIABLES, RosError
+from tfcompose.ros.fence import can_fence, profile
 from tfcompose.run.executable import NotFound, executable_of, filled_in, folder_of, not_found, own_env
 from tfcompose.run.launch_file import is_launch, launch_command
 
@@ -30,12 +31,16 @@ class Environment(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What is executed: program and arguments, environment, and folder; ``own`` says that it is one of tfcompose's."""
+    """What is executed: program and arguments, environment, and folder.
+
+    ``own`` says that it is one of tfcompose's. ``fence`` is a file that must be there first, and what it holds.
+    """
 
     argv: tuple[str, ...]
     env: dict[str, str]
     folder: Path
     own: bool = False
+    fence: tuple[Path, str] | None = None
 
 
 def started_by_us(plan: Plan) -> list[PlanProcess]:
@@ -67,6 +72,8 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
             missing.append(command)
         else:
             commands[process.name] = command
+    if plan.guard.mode == "strict":
+        found += _fence(plan, commands, plan_file.absolute().parent)
     if missing:
         found.append(not_found(missing))
     return commands, list(dict.fromkeys(found))
@@ -93,6 +100,37 @@ def _command_of(
         return Command(launched[0], env | launched[1], folder) if isinstance(launched, tuple) else launched
     program = executable_of(process, argv[0], folder, env)
     return program if isinstance(program, NotFound) else Command((program, *argv[1:]), env, folder, own)
+
+
+def _fence(plan: Plan, commands: dict[str, Command], folder: Path) -> list[Diagnostic]:
+    """Fence off what the commands send on TF, and return why that cannot be done."""
+    found = []
+    for name, command in commands.items():
+        process = plan.process(name)
+        reads = process.kind == "guard"
+        processes = plan.processes if reads else (process,)
+        topics = [one.remap.get(topic, topic) for one in processes for topic in ("/tf", "/tf_static")]
+        moved = [topic for topic in topics if not topic.startswith("/")]
+        if moved:
+            message = f"guard: strict needs full names of TF's topics, and {name} has {', '.join(moved)}"
+            found.append(finding("TF902", message, None, help="write the remapping with a leading slash"))
+            continue
+        if not can_fence(command.env):
+            rmw = command.env["RMW_IMPLEMENTATION"]
+            message = f"guard: strict needs rmw_fastrtps_cpp, and {name} is started with {rmw}"
+            found.append(
+                finding("TF902", message, None, help="unset RMW_IMPLEMENTATION, or watch: guard: {mode: watch}")
+            )
+            continue
+        try:
+            text = profile(command.env, topics, f"tfc_{plan.robot}", reads=reads)
+        except RosError as error:
+            found.append(finding("TF902", f"{name}: {error}", None))
+            continue
+        file = folder / "fence" / f"{name.replace('/', '.')}.xml"
+        env = command.env | dict.fromkeys(PROFILE_VARIABLES, str(file))
+        commands[name] = replace(command, env=env, fence=(file, text))
+    return found
 
 
 def _never_started(plan: Plan) -> list[Diagnostic]:

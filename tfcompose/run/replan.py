@@ -29,7 +29,9 @@ def change(old: Plan, old_folder: Path, new: Plan, new_folder: Path) -> Change:
         if other is None:
             continue
         same = (
-            process == other and old.ros == new.ros and _data(old, other, old_folder) == _data(new, process, new_folder)
+            process == other
+            and (old.ros, _fence(old)) == (new.ros, _fence(new))
+            and _data(old, other, old_folder) == _data(new, process, new_folder)
         )
         if not same or (described and process.kind in ("static", "joints")):
             changed.add(process.name)
@@ -41,6 +43,11 @@ def _data(plan: Plan, process: PlanProcess, folder: Path) -> tuple[object, ...]:
     edges = plan.edges if process.kind == "guard" else plan.edges_of(process.name)
     policy = plan.guard if process.kind == "guard" else None
     return (tuple(replace(edge, source=("", 0)) for edge in edges), policy, _bytes(folder, process.params_file))
+
+
+def _fence(plan: Plan) -> str | None:
+    """Return behind which fence the plan's processes send, if there is one: it is put up when they start."""
+    return plan.robot if plan.guard.mode == "strict" else None
 
 
 def _bytes(folder: Path, name: str | None) -> bytes | None:

@@ -244,6 +244,9 @@ class _Supervisor:
         run_id = self._session.run_id
         if run_id:
             command = replace(command, env=command.env | {RUN_ID: run_id})
+        if command.fence:
+            command.fence[0].parent.mkdir(exist_ok=True)
+            command.fence[0].write_text(command.fence[1], encoding="utf-8")
         child = Child(name, spawn(command, pass_fds))
         self._children[name] = child
         self._keep()

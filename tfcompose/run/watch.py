@@ -14,11 +14,12 @@ from tfcompose.run.clock_watch import ClockWatch
 from tfcompose.run.gatekeeper import Gates
 from tfcompose.run.hearing import Hearing
 from tfcompose.run.heeding import Orders
-from tfcompose.run.judge import Judge
+from tfcompose.run.judge import FINDING_S, Judge
 from tfcompose.run.memory import Memory, recalled
 from tfcompose.run.neighbours import GLOBAL, Graph
 from tfcompose.run.orders import JOINS
 from tfcompose.run.own import say
+from tfcompose.run.relay import Relay
 from tfcompose.run.sent_poses import expected_of
 from tfcompose.run.switches import Switches
 from tfcompose.run.topics import plans_by_topics, together
@@ -39,6 +40,8 @@ if TYPE_CHECKING:
 SETTLE = "TFCOMPOSE_SETTLE_S"
 DEFAULT_SETTLE_S = 1.0
 LOOK_EVERY_S = 0.1
+#: How often a strict guard says what it held back, in seconds.
+REPORT_EVERY_S = 10.0
 
 
 def guard(own: Own, stop: Stop) -> None:
@@ -63,7 +66,8 @@ def guard(own: Own, stop: Stop) -> None:
             watches[0].watch_global_topics()
         orders = Orders([watch.judge for watch in watches], Gates(node, emit))
         memories = [
-            Memory(" ".join(topics), watch.judge, voice.emit) for topics, watch in zip(plans, watches, strict=True)
+            Memory(" ".join(topics), watch.judge, watch.relay, voice.emit)
+            for topics, watch in zip(plans, watches, strict=True)
         ]
         say(f"watching {_counted(own.plan)}{'' if judges else ', and judging nobody'}{' again' if left else ''}")
         voice.flush()
@@ -78,10 +82,14 @@ def guard(own: Own, stop: Stop) -> None:
             for memory in memories:
                 memory.look()
             voice.flush()
-            bulletin.look([watch.judge for watch in watches])
+            bulletin.look([watch.judge for watch in watches], _held(watches))
             if switches:
                 switches.look()
             clock.look()
+            for watch in watches:
+                watch.report()
+        for watch in watches:
+            watch.report(0.0)
 
 
 class _Watch:
@@ -93,10 +101,12 @@ class _Watch:
         self._clock = SimClock(node) if judge.clocks.simulated else None
         self._hearing = Hearing(frozenset(expected_of(judge.plan)))
         self._graph = Graph(node, topics)
+        self.relay = Relay(node, self._graph, judge.plan) if judge.plan.guard.mode == "strict" else None
+        self._graph.look_for_own()
         self.judge = judge
         self._emit = emit
         self._leaks_to: tuple[str, str] | None = None
-        self._due = 0.0
+        self._due = self._report_due = 0.0
         self._malformed: set[bytes | None] = set()
         self._known: set[bytes | None] = set()
 
@@ -107,6 +117,8 @@ class _Watch:
     def begin(self, now: float, memory: dict[str, Any] | None) -> None:
         """Look at nothing before the start: it was long ago, or is nobody's business."""
         self._pass_on(self.judge.tick(now) if memory is None else self.judge.recall(memory, now))
+        if self.relay and memory:
+            self.relay.recall(memory, lambda message: self.judge.admits(message, now), now + FINDING_S)
 
     def look(self) -> None:
         """Take what has come, and from time to time the graph."""
@@ -115,7 +127,7 @@ class _Watch:
         strangers = {each.gid for each, _ in received} - self._known
         self._known |= strangers
         if strangers or now >= self._due:  # who sends once and goes is in the graph for a moment only
-            self._pass_on(self.judge.graph(self._graph.writers(), now))
+            self._look_round(now)
         if self._clock:
             self.judge.clock(self._clock.now_ns())
         for each, static in received:
@@ -126,10 +138,18 @@ class _Watch:
             if self._leaks_to:
                 self._pass_on(self.judge.leaks(self._graph.global_writers(), self._leaks_to))
 
+    def report(self, every_s: float = REPORT_EVERY_S) -> None:
+        """Say now and then what was held back."""
+        if self.relay and (not every_s or time.monotonic() >= self._report_due):
+            self._report_due = time.monotonic() + every_s
+            if held := self.relay.report():
+                say(f"held back: {held}")
+
     def _received(self) -> Iterator[tuple[Received, bool]]:
         for subscription, static in ((self.fixed, True), (self.moving, False)):
             for each in subscription.take():
-                yield each, static
+                if each.gid not in self._graph.own:
+                    yield each, static
 
     def _hear(self, received: Received, now: float, *, static: bool) -> None:
         try:
@@ -140,10 +160,29 @@ class _Watch:
                 say(f"dropped a TF message: {error} (said once for each publisher)")
             return
         self._pass_on(self.judge.message(message, now))
+        if self.relay:
+            self.relay.pass_on(received, message, self.judge.admitted, self.judge.name_of(received.gid))
+
+    def _look_round(self, now: float) -> None:
+        """Take who publishes now; what waited for a name may pass."""
+        writers = self._graph.writers()
+        self._pass_on(self.judge.graph(writers, now))
+        if self.relay:
+            self.relay.forget({writer.gid for writer in writers}, now)
+            waiting, self.relay.waiting = self.relay.waiting, []
+            for received, message in waiting:
+                admitted = self.judge.admits(message, now)
+                self.relay.pass_on(received, message, admitted, self.judge.name_of(received.gid))
 
     def _pass_on(self, events: list[GuardEvent]) -> None:
         for event in events:
             self._emit(event)
+
+
+def _held(watches: list[_Watch]) -> dict[tuple[str, str, str], int] | None:
+    """Return what was held back, or None where nothing is."""
+    relays = [watch.relay for watch in watches if watch.relay]
+    return {key: count for relay in relays for key, count in relay.held_back.items()} if relays else None
 
 
 def _counted(plan: Plan) -> str:

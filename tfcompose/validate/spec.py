@@ -71,7 +71,11 @@ class AllowedEdge(Model):
 class GuardSpec(Model):
     """What watches the live tree."""
 
-    mode: str = key(choice("off", "watch"), "watch")
+    mode: str = key(
+        choice("off", "watch", "strict"),
+        "watch",
+        "strict: what a process of the plan sends and does not own is held back",
+    )
     unknown_edges: str = key(choice("ignore", "warn", "error"), "warn", "an edge that nobody declared")
     on_violation: str = key(
         choice("report", "stop-offender", "stop"),

@@ -1,0 +1,116 @@
+"""What a strict guard costs in time: ``python tests/benchmarks/bench_strict.py``, or name the file to pytest.
+
+A process of the plan sends 50 edges at 200 Hz, and a listener takes how long they were under way: without a guard's
+fence, and through it, in turns. The difference of the medians, and of the 99th percentiles, is what strict adds.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from statistics import median, quantiles
+
+import pytest
+
+from tfcompose.ros.message import decode
+from tfcompose.ros.node import open_node
+from tfcompose.ros.stop import Stop
+from tfcompose.ros.tf import TFSubscription, wait
+
+EDGES, HERTZ = 50, 200.0
+ROUNDS, ROUND_S, BEFORE_S = 3, 4.0, 1.0
+MEDIAN_MS, P99_MS = 0.4, 1.0
+DOMAIN = "94"
+OWNER = f"""
+import signal, sys, time
+from tfcompose.ros.message import Template
+from tfcompose.ros.node import open_node
+from tfcompose.ros.tf import TFPublisher
+signal.signal(signal.SIGINT, lambda *_: sys.exit())
+with open_node("owner", "/") as node:
+    publisher = TFPublisher(node, static=False)
+    template = Template([("base", f"frame_{{n}}") for n in range({EDGES})])
+    due = time.monotonic()
+    while True:
+        template.set_stamp(time.time_ns())
+        publisher.publish(template.data)
+        due += 1 / {HERTZ}
+        time.sleep(max(0.0, due - time.monotonic()))
+"""
+
+
+def robot(folder: Path, mode: str) -> Path:
+    """Write the robot's file and return its path."""
+    (folder / "owner.py").write_text(OWNER, encoding="utf-8")
+    frames = "".join(f"  frame_{n}: {{parent: base, owner: owner, rate: {HERTZ:g} Hz}}\n" for n in range(EDGES))
+    file = folder / f"{mode}.yaml"
+    file.write_text(
+        f"tfcompose: 1\nrobot: bench_{mode}\nros: {{discovery: localhost}}\nbase: base\nframes:\n  base: {{}}\n{frames}"
+        f"processes:\n  owner: {{run: [{sys.executable}, {folder / 'owner.py'}], node: /owner}}\n"
+        f"guard: {{mode: {mode}}}\n",
+        encoding="utf-8",
+    )
+    return file
+
+
+def delays_ms(mode: str, folder: Path) -> list[float]:
+    """Return how long messages were under way, in milliseconds, each from its stamp."""
+    with (folder / "said.txt").open("wb") as out:
+        command = [sys.executable, "-m", "tfcompose", "up", str(robot(folder, mode))]
+        up = subprocess.Popen(command, stdout=out, cwd=folder)
+    found: list[float] = []
+    try:
+        with open_node("listener", "/bench") as node:
+            reader, begun, stop = TFSubscription(node, static=False), None, Stop()
+            end = time.monotonic() + 30
+            while time.monotonic() < end:
+                wait(node, [reader], 0.5, stop)
+                now_ns = time.time_ns()
+                for one in reader.take():
+                    transforms = decode(one.data)
+                    if len(transforms) != EDGES:
+                        continue
+                    if begun is None:
+                        begun = time.monotonic()
+                        end = begun + BEFORE_S + ROUND_S
+                    if time.monotonic() > begun + BEFORE_S:
+                        found.append((now_ns - transforms[0].stamp_ns) / 1e6)
+    finally:
+        up.terminate()
+        up.wait(20)
+    return found
+
+
+def measure() -> dict[str, tuple[float, float]]:
+    """Return the median and the 99th percentile for each mode, in milliseconds: the best of some rounds."""
+    rounds: dict[str, list[tuple[float, float]]] = {"watch": [], "strict": []}
+    with tempfile.TemporaryDirectory() as folder:
+        for _ in range(ROUNDS):
+            for mode, found in rounds.items():
+                delays = delays_ms(mode, Path(folder))
+                assert len(delays) > ROUND_S * HERTZ * 0.8, f"{mode}: {len(delays)} messages came"
+                found.append((median(delays), quantiles(delays, n=100)[98]))
+    return {mode: (min(m for m, _ in found), min(p for _, p in found)) for mode, found in rounds.items()}
+
+
+def test_strict_adds_little() -> None:
+    """Strict adds less than 0.4 ms at the median and 1 ms at the 99th percentile."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_DOMAIN_ID", DOMAIN)
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        found = measure()
+    for mode, (middle, late) in found.items():
+        sys.stdout.write(f"{mode}: median {middle:.3f} ms, 99th percentile {late:.3f} ms\n")
+    added = [strict - watch for strict, watch in zip(found["strict"], found["watch"], strict=True)]
+    sys.stdout.write(f"strict adds {added[0]:.3f} ms at the median, {added[1]:.3f} ms at the 99th percentile\n")
+    assert added[0] < MEDIAN_MS
+    assert added[1] < P99_MS
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("ROS_DOMAIN_ID", DOMAIN)
+    test_strict_adds_little()

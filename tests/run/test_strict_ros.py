@@ -1,0 +1,202 @@
+"""A strict guard on the real thing: children that send what is not theirs, late joiners, and a guard that is killed."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING
+
+import psutil
+import pytest
+
+from tests.waiting import until
+from tfcompose.ros.graph import writers
+from tfcompose.ros.message import decode
+from tfcompose.ros.node import open_node
+from tfcompose.ros.stop import Stop
+from tfcompose.ros.tf import TFSubscription, wait
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from tfcompose.ros.tf import Received
+
+pytestmark = pytest.mark.ros
+
+#: A node that latches edges, sends others at 20 Hz with stamps that do not change, and says whom it hears on TF.
+CHILD = """
+import json, signal, sys, time
+from tfcompose.ros.message import Transform, decode, encode
+from tfcompose.ros.node import open_node
+from tfcompose.ros.tf import TFPublisher, TFSubscription
+name, fixed, moving = sys.argv[1], json.loads(sys.argv[2]), json.loads(sys.argv[3])
+signal.signal(signal.SIGINT, lambda *_: sys.exit())
+def message(edges):
+    return encode([Transform(time.time_ns(), *edge.split(), (0.1, 0.2, 0.3), (0.0, 0.0, 0.6, 0.8)) for edge in edges])
+with open_node(name, "/") as node:
+    readers = [TFSubscription(node, static=static) for static in (False, True)]
+    latched, sent, heard = TFPublisher(node, static=True), TFPublisher(node, static=False), set()
+    for edge in fixed:  # one after the other, as some nodes do
+        latched.publish(message([edge]))
+        time.sleep(0.3)
+    while True:
+        data = message(moving)
+        if moving:
+            sent.publish(data)
+            if name == "drive":
+                print("sent", data.hex(), flush=True)
+        time.sleep(0.05)
+        found = {t.child for reader in readers for one in reader.take() for t in decode(one.data)} - heard
+        heard |= found
+        if found:
+            print("hears", *sorted(heard), flush=True)
+"""
+ROBOT = """
+tfcompose: 1
+robot: fenced
+ros: {{discovery: localhost}}
+links: {{base_link: {{}}}}
+frames:
+  map: {{}}
+  odom: {{parent: map, owner: slam, rate: 10 Hz}}
+  base_link: {{parent: odom, owner: drive, rate: 15 Hz}}
+  laser: {{parent: base_link}}
+  arm: {{parent: base_link, owner: arm, static: true}}
+  tool: {{parent: arm, owner: arm, static: true}}
+  hand: {{parent: tool, owner: rogue}}
+processes:
+  slam: {{simulate: {{fixed: {{}}, rate: 10 Hz}}}}
+  drive: {drive}
+  arm: {arm}
+  rogue: {rogue}
+guard: {{mode: strict}}
+"""
+FRAMES = {"odom", "base_link", "laser", "arm", "tool", "hand"}
+FIXED = {"laser", "arm", "tool"}
+
+
+def child(name: str, fixed: list[str], moving: list[str], folder: Path) -> str:
+    argv = [sys.executable, str(folder / "child.py"), name, json.dumps(fixed), json.dumps(moving)]
+    return json.dumps({"run": argv, "node": f"/{name}"})
+
+
+class Fenced:
+    """A robot under a strict guard."""
+
+    def __init__(self, folder: Path) -> None:
+        (folder / "child.py").write_text(CHILD, encoding="utf-8")
+        text = ROBOT.format(
+            drive=child("drive", [], ["odom base_link"], folder),
+            arm=child("arm", ["base_link arm", "arm tool"], [], folder),
+            rogue=child("rogue", ["base_link laser"], ["map odom", "tool hand", "tool cup"], folder),
+        )
+        (folder / "robot.yaml").write_text(text, encoding="utf-8")
+        self.output = folder / "output.txt"
+        with self.output.open("wb") as out:
+            self.popen = subprocess.Popen([sys.executable, "-m", "tfcompose", "up"], cwd=folder, stdout=out, stderr=out)
+
+    @property
+    def text(self) -> str:
+        return self.output.read_text(encoding="utf-8")
+
+    def says(self, *words: str, within: float = 30.0) -> None:
+        there = until(lambda: any(all(word in line for word in words) for line in self.text.splitlines()), within)
+        assert there, (words, self.text)
+
+    def guard(self) -> psutil.Process:
+        return next(p for p in psutil.Process(self.popen.pid).children() if "guard" in p.cmdline()[-1:])
+
+    def end(self) -> int:
+        self.popen.send_signal(signal.SIGINT)
+        try:
+            return self.popen.wait(20)
+        finally:
+            self.popen.kill()
+
+
+@pytest.fixture
+def robot(domain: object, tmp_path: Path) -> Iterator[Fenced]:
+    assert domain
+    running = Fenced(tmp_path)
+    try:
+        running.says("tree complete")
+        yield running
+    finally:
+        running.end()
+
+
+class Ear:
+    """A listener like anybody's."""
+
+    def __init__(self, node: object) -> None:
+        self.node: object = node
+        self.readers = [TFSubscription(node, static=static) for static in (False, True)]  # type: ignore[arg-type]
+
+    def hears(self, seconds: float, enough: Callable[[list[Received]], bool] | None = None) -> list[Received]:
+        """Return what comes in this time, or until it is enough."""
+        received: list[Received] = []
+        end = time.monotonic() + seconds
+        while time.monotonic() < end and not (enough and enough(received)):
+            wait(self.node, self.readers, 0.1, Stop())  # type: ignore[arg-type]
+            received += [one for reader in self.readers for one in reader.take()]
+        return received
+
+
+def children(received: list[Received]) -> set[str]:
+    return {transform.child for one in received for transform in decode(one.data)}
+
+
+def told(robot: Fenced) -> list[str]:
+    return [line for line in robot.text.splitlines() if " published by /rogue" in line and "note" not in line]
+
+
+def test_only_what_each_process_owns_gets_through_unchanged_and_what_is_held_back_is_named(robot: Fenced) -> None:
+    robot.says("error[TF801]", " published by /rogue; the owner")
+    robot.says("warning[TF803]", "tool → cup is published by /rogue")
+    with open_node("late", "/test") as node:
+        ear = Ear(node)
+        received = ear.hears(10, lambda some: children(some) >= FRAMES)
+        received += ear.hears(2)
+        names = {one.gid: one.node for topic in ("/tf", "/tf_static") for one in writers(node, topic)}
+    assert children(received) == FRAMES
+    assert {names[one.gid] for one in received if one.gid} == {"/tfcompose_guard"}
+    poses = {t.xyz for one in received for t in decode(one.data) if t.child in {"odom", "laser"}}
+    assert (0.1, 0.2, 0.3) not in poses, "the rogue's edge got through"
+    fixed = [one for one in received if children([one]) <= FIXED]
+    assert sorted(map(len, map(decode, (one.data for one in fixed)))) == [1, 2], "each sender's edges in one message"
+    sent = {line.split()[-1] for line in robot.text.splitlines() if " sent " in line}
+    got = {one.data.hex() for one in received if children([one]) == {"base_link"}}
+    assert len(got) > 10
+    assert got <= sent
+    hears = [line for line in robot.text.splitlines() if " hears " in line and line.startswith("drive")]
+    assert set(hears[-1].split(" hears ")[1].split()) == FRAMES, "the fence is in a child's ear"
+    assert "held back: no listener gets it" in robot.text
+    robot.end()
+    robot.says("held back: ", " × map → odom from /rogue", " × tool → cup from /rogue")
+    assert "tool → hand from" not in robot.text
+
+
+def test_while_the_guard_is_dead_nothing_passes_and_the_next_one_passes_all_on_again(robot: Fenced) -> None:
+    with open_node("early", "/test") as node, open_node("meanwhile", "/test") as other:
+        ear = Ear(node)
+        assert children(ear.hears(10, lambda some: children(some) >= FRAMES)) == FRAMES
+        robot.says("TF801", " published by /rogue; the owner")
+        ear.hears(2)  # what it has told has been kept by then
+        before = told(robot)
+        robot.guard().kill()
+        ear.hears(0.1)  # what was on its way
+        meanwhile: list[Received] = []
+        while robot.text.count("started guard") < 2:  # it waits a second, and then needs some time to listen
+            meanwhile += ear.hears(0.05)
+        assert children(meanwhile) == set()
+        joined = Ear(other)
+        robot.says("warning[TF808] guard was ended by SIGKILL: nothing of the plan passes to /tf until it is back")
+        robot.says("over", "guard watches again after")
+        assert children(ear.hears(10, lambda some: children(some) >= FRAMES - FIXED)) >= FRAMES - FIXED
+        assert children(joined.hears(10, lambda some: children(some) >= FRAMES)) == FRAMES
+    assert robot.text.count("tree complete") == 1
+    assert told(robot) == before

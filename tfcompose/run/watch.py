@@ -126,7 +126,7 @@ class _Watch:
         now = time.monotonic()
         strangers = {each.gid for each, _ in received} - self._known
         self._known |= strangers
-        if strangers or now >= self._due:  # who sends once and goes is in the graph for a moment only
+        if strangers:  # who sends once and goes is in the graph for a moment only
             self._look_round(now)
         if self._clock:
             self.judge.clock(self._clock.now_ns())
@@ -134,6 +134,8 @@ class _Watch:
             self._hear(each, now, static=static)
         if now >= self._due:
             self._due = now + LOOK_EVERY_S
+            if not strangers:  # after the messages: what a strict guard passes on does not wait for it
+                self._look_round(now)
             self._pass_on(self.judge.tick(now))
             if self._leaks_to:
                 self._pass_on(self.judge.leaks(self._graph.global_writers(), self._leaks_to))

@@ -374,7 +374,8 @@ def test_the_command_lists_all_presets_and_shows_each(capsys: pytest.CaptureFixt
     assert main(["presets"]) == 0
     said = capsys.readouterr().out
     assert all(f"  {name} " in said for name in NAMES)
-    assert "(= realsense/d455)" in said
+    assert "(= orbbec/gemini-335)" in said
+    assert "(from realsense/d455)" in said, "a D456 has no screw that is known"
     assert main(["presets", "--format", "json"]) == 0
     rows = json.loads(capsys.readouterr().out)
     assert [row["name"] for row in rows if row["kind"] != "node"] == NAMES

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
     from tfcompose.resolve import Library
+    from tfcompose.validate.preset import PresetSpec
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -61,7 +62,7 @@ def _list(only: str | None, known: Library, form: str) -> int:
     presets = {name: known.get(name) for name in known.names}
     rows: list[dict[str, str]] = [
         {"name": name, "vendor": preset.vendor, "model": preset.model, "kind": preset.kind, "about": preset.about}
-        | ({"same_as": preset.extends} if preset.extends and "/_" not in preset.extends else {})
+        | _likeness(preset, known)
         for name, preset in presets.items()
     ]
     rows += _nodes.rows()
@@ -78,13 +79,23 @@ def _list(only: str | None, known: Library, form: str) -> int:
     for vendor, group in groupby(rows, lambda row: row["vendor"]):
         lines = [f"  {row['name']:<{width}}  {row['kind']:<10}  {_about(row)}" for row in group]
         blocks.append("\n".join([vendor, *lines]))
-    sys.stdout.write("\n\n".join(blocks) + f"\n\n{len(rows)} presets; tfcompose presets NAME shows one\n")
+    count = f"{len(rows)} preset{'s' if len(rows) != 1 else ''}"
+    sys.stdout.write("\n\n".join(blocks) + f"\n\n{count}; tfcompose presets NAME shows one\n")
     return 0
 
 
+def _likeness(preset: PresetSpec, known: Library) -> dict[str, str]:
+    """Return of which other model it has the very same frames, or which it is made from."""
+    if not preset.extends or "/_" in preset.extends:
+        return {}
+    other = known.get(preset.extends)
+    same = (preset.mount, preset.frames, preset.options) == (other.mount, other.frames, other.options)
+    return {"same_as" if same else "made_from": preset.extends}
+
+
 def _about(row: dict[str, str]) -> str:
-    same = f" (= {row['same_as']})" if "same_as" in row else ""
-    return f"{row['model']}: {row['about']}{same}"
+    like = f" (= {row['same_as']})" if "same_as" in row else f" (from {row['made_from']})" if "made_from" in row else ""
+    return f"{row['model']}: {row['about']}{like}"
 
 
 def _words(row: dict[str, str]) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ import os
 import posixpath
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -79,7 +80,7 @@ def run(arguments: Namespace) -> int:
         return 1
     text, failed = _written(read, arguments, packages)
     if failed and not arguments.keep_going:
-        print_findings(failed, sys.stderr)
+        print_findings([replace(one, span=None) for one in failed], sys.stderr)  # places in what is not written
         complain("nothing was written: the source has what a robot file cannot; --keep-going writes it all the same")
         return 1
     return _write(text, arguments.output) or int(bool(errors or failed))

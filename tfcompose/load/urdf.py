@@ -126,8 +126,10 @@ class _Reader:
         begin, after_attributes = self.begins.pop()
         if len(self.stack) != 1:  # of what stands in the root only
             return
-        at = self._position(self.parser.CurrentByteIndex)
-        element.raw = self.text[begin : self.text.find(">", max(at, after_attributes)) + 1]
+        end = self.text.find(">", after_attributes)
+        if self.text[end - 1] != "/":  # it has an end tag; of the others expat's versions give different places
+            end = self.text.find(">", self._position(self.parser.CurrentByteIndex))
+        element.raw = self.text[begin : end + 1]
 
     def _position(self, byte: int) -> int:
         """Return the character that begins at a byte; places are asked for in the order of the text."""

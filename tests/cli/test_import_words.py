@@ -1,0 +1,250 @@
+"""What ``tfcompose import`` writes, says and refuses."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tests.cli.test_importing import PRESETS, built, imported, urdf_of
+from tfcompose.cli import importing, main
+from tfcompose.load import load
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+HEAD = '<robot name="r"><link name="base_link"/>'
+
+
+@pytest.fixture(autouse=True)
+def _one_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importing, "library", lambda: PRESETS)
+
+
+def data(text: str) -> Any:
+    return load(text, "robot.yaml").data
+
+
+def fixed(child: str, parent: str = "base_link", origin: str = "", name: str = "") -> str:
+    ends = f'<parent link="{parent}"/><child link="{child}"/><origin {origin}/>'
+    return f'<link name="{child}"/><joint name="{name or child + "_joint"}" type="fixed">{ends}</joint>'
+
+
+def moving(more: str, kind: str = "revolute") -> str:
+    ends = '<parent link="base_link"/><child link="arm"/>'
+    return f'{HEAD}<link name="arm"/><joint name="shoulder" type="{kind}">{ends}{more}</joint></robot>'
+
+
+def test_angles_are_written_in_degrees_where_that_is_exact(tmp_path: Path) -> None:
+    said = 'rpy="1.5707963267948966 0 -0.7853981633974483"'
+    limit = '<limit lower="-3.14159265359" upper="1.5708" effort="1" velocity="2"/>'
+    joint = data(imported(moving(f"<origin {said}/>{limit}"), tmp_path))["joints"]["shoulder"]
+    assert joint["rpy"] == ["90 deg", 0, "-45 deg"]
+    assert joint["limit"] == {"lower": "-180 deg", "upper": 1.5708, "effort": 1, "velocity": 2}
+
+
+def test_a_rotation_is_written_with_the_angles_of_the_source(tmp_path: Path) -> None:
+    tool = fixed("tool", origin='rpy="-1.5708 1.5708 0.1"')
+    text = imported(f"{HEAD}{tool}</robot>", tmp_path)
+    assert data(text)["frames"]["tool"] == {"parent": "base_link", "rpy": [-1.5708, 1.5708, 0.1]}
+
+
+def test_what_cannot_be_taken_is_said_at_its_place(tmp_path: Path) -> None:
+    limit = '<limit lower="-1" upper="1" effort="1" velocity="2" jerk="5"/>'
+    text = imported(
+        moving(limit).replace("</robot>", '<material name="grey"><color rgba="1 1 1 1"/></material></robot>'), tmp_path
+    )
+    lines = text.splitlines()
+    assert lines[lines.index("joints:") + 1] == '  # left out: limit jerk="5"'
+    assert "# left out: the material grey, which nothing has" in lines
+
+
+def test_a_frame_keeps_the_name_of_its_joint_in_a_comment(tmp_path: Path) -> None:
+    assert "  # joint mast_fix\n  mast: " in imported(f"{HEAD}{fixed('mast', name='mast_fix')}</robot>", tmp_path)
+
+
+def test_a_joint_that_a_block_names_stays_a_joint(tmp_path: Path) -> None:
+    block = '<gazebo reference="mast_fix"><preserveFixedJoint>true</preserveFixedJoint></gazebo>'
+    said = data(imported(f"{HEAD}{fixed('mast', name='mast_fix')}{block}</robot>", tmp_path))
+    assert said["joints"]["mast_fix"]["type"] == "fixed"
+    assert "frames" not in said
+
+
+def test_a_free_joint_gets_an_owner_to_be_named(tmp_path: Path) -> None:
+    text = imported(moving("", "floating"), tmp_path)
+    assert data(text)["joints"]["shoulder"]["owner"] == "mover"
+    assert "who publishes shoulder: name that process here" in text
+    assert 'type="floating"' in built(tmp_path / "robot.yaml")
+
+
+def test_the_root_is_the_base_where_another_link_would_be(tmp_path: Path) -> None:
+    text = f'<robot name="r"><link name="world"/>{fixed("base_link", "world")}</robot>'
+    assert data(imported(text, tmp_path))["base"] == "world"
+    assert '<link name="world"/>' in built(tmp_path / "robot.yaml")
+
+
+CONTROL = """<ros2_control name="sys" type="system"><hardware><plugin>a/B</plugin><param name="port">0.10</param>
+</hardware><joint name="shoulder"><command_interface name="position"><param name="min">-1</param></command_interface>
+<state_interface name="position"/>{more}</joint></ros2_control>"""
+LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="2"/>'
+
+
+def test_ros2_control_becomes_the_section_and_texts_stay_what_they_are(tmp_path: Path) -> None:
+    text = imported(moving(LIMIT).replace("</robot>", CONTROL.format(more="") + "</robot>"), tmp_path)
+    assert data(text)["ros2_control"] == {
+        "sys": {
+            "plugin": "a/B",
+            "params": {"port": "0.10"},
+            "joints": {"shoulder": {"command": {"position": {"min": -1}}, "state": ["position"]}},
+        }
+    }
+    assert '<param name="port">0.10</param>' in built(tmp_path / "robot.yaml")
+
+
+def test_ros2_control_with_more_in_it_stays_as_it_is_written(tmp_path: Path) -> None:
+    text = imported(moving(LIMIT).replace("</robot>", CONTROL.format(more="<other/>") + "</robot>"), tmp_path)
+    assert "ros2_control" not in data(text)
+    assert "<other/>" in data(text)["xml"]["ros2_control_1"]
+
+
+def test_a_text_that_looks_like_an_expression_is_none(tmp_path: Path) -> None:
+    block = "<gazebo><plugin>${robot_namespace}</plugin></gazebo>"
+    imported(f"{HEAD}{block}</robot>", tmp_path)
+    assert "<plugin>${robot_namespace}</plugin>" in built(tmp_path / "robot.yaml")
+
+
+def test_a_block_keeps_the_namespace_that_the_document_declares(tmp_path: Path) -> None:
+    text = f'{HEAD}<drake:filter a="1"/></robot>'.replace('"r"', '"r" xmlns:drake="http://drake"', 1)
+    imported(text, tmp_path)
+    assert ET.fromstring(built(tmp_path / "robot.yaml")).find("{http://drake}filter") is not None  # noqa: S314
+
+
+@pytest.mark.parametrize("block", ['<gazebo reference="base_link"/>', "<gazebo a='b > c' />", "<gazebo><a/></gazebo>"])
+def test_a_block_ends_where_it_ends(block: str, tmp_path: Path) -> None:
+    assert data(
+        imported(f"{HEAD}{block}<link name='a'/>{fixed('b')}</robot>".replace("<link name='a'/>", ""), tmp_path)
+    )["xml"] == {"gazebo_1": f"{block}\n"}
+
+
+def test_colours_get_names_that_the_language_has(tmp_path: Path) -> None:
+    said = '<material name="{}"><color rgba="{} 0 0 1"/></material>'
+    visual = "<visual><geometry><sphere radius='1'/></geometry>{}</visual>"
+    visuals = "".join(visual.format(said.format(*one)) for one in (("light blue", 1), ("light-blue", 0.5)))
+    text = imported(f'<robot name="r"><link name="base_link">{visuals}</link></robot>', tmp_path)
+    names = [one["material"]["name"] for one in data(text)["links"]["base_link"]["visual"]]
+    assert names == ["light_blue", "light_blue_"]
+    assert "the material light_blue is called 'light blue' there" in text
+
+
+def test_a_relative_mesh_is_addressed_from_where_the_robot_file_is(tmp_path: Path) -> None:
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes/a.stl").write_text("")
+    visual = '<visual><geometry><mesh filename="meshes/a.stl"/></geometry></visual>'
+    (tmp_path / "r.urdf").write_text(f'<robot name="r"><link name="base_link">{visual}</link></robot>')
+    (tmp_path / "sub").mkdir()
+    assert main(["import", str(tmp_path / "r.urdf"), "-o", str(tmp_path / "sub/robot.yaml")]) == 0
+    said = data((tmp_path / "sub/robot.yaml").read_text("utf-8"))
+    assert said["links"]["base_link"]["visual"]["mesh"] == "../meshes/a.stl"
+
+
+#: Sensors that nothing else has the frames of.
+TOLD_APART = ("realsense/d455", "realsense/d405", "oak/oak-d-sr", "realsense/l515", "sick/nanoscan3")
+
+
+@pytest.mark.parametrize("name", TOLD_APART)
+def test_a_sensor_that_is_like_no_other_is_recognised(name: str, tmp_path: Path) -> None:
+    sensor = {"preset": name, "parent": "base_link", "xyz": [0.1, 0, 0.2], "driver": "none"}
+    spec = {"tfcompose": 1, "robot": "r", "links": {"base_link": {}}, "sensors": {"eye": sensor}}
+    assert data(imported(urdf_of(spec, tmp_path), tmp_path))["sensors"] == {"eye": sensor}
+
+
+D435 = {"preset": "realsense/d435i", "parent": "base_link", "driver": "none"}
+
+
+def d435(folder: Path, **more: Any) -> str:
+    name = more.pop("name", "eye")
+    return urdf_of({"tfcompose": 1, "robot": "r", "links": {"base_link": {}}, "sensors": {name: D435 | more}}, folder)
+
+
+def test_options_follow_from_the_frames_that_there_are(tmp_path: Path) -> None:
+    options = {"streams": ["depth", "infra1"], "imu": True, "unite_imu": False}
+    text = imported(d435(tmp_path, name="d435i", options=options), tmp_path)
+    assert data(text)["sensors"]["d435i"] == {**D435, "options": options}
+
+
+def test_sensors_that_only_their_maker_can_tell_apart_stay_frames_and_a_comment_names_them(tmp_path: Path) -> None:
+    text = imported(d435(tmp_path), tmp_path)
+    assert "sensors" not in data(text)
+    assert "a sensor, by its frames: realsense/d435i, realsense/d435 fit equally well" in " ".join(text.split())
+
+
+def test_the_name_of_a_sensor_can_say_which_model_it_is(tmp_path: Path) -> None:
+    text = imported(d435(tmp_path, name="front_d435i"), tmp_path)
+    assert data(text)["sensors"]["front_d435i"] == D435
+
+
+def test_a_value_a_little_off_the_presets_is_kept_and_one_further_off_is_no_match(tmp_path: Path) -> None:
+    urdf = d435(tmp_path, name="d435i")
+    near = urdf.replace('xyz="0 0.015 0"', 'xyz="0 0.0150005 0"')
+    assert near != urdf
+    sensor = data(imported(near, tmp_path))["sensors"]["d435i"]
+    assert sensor["frames"] == {"d435i_color_frame": {"xyz": [0, 0.0150005, 0]}}
+    far = urdf.replace('xyz="0 0.015 0"', 'xyz="0 0.0155 0"')
+    sensor = data(imported(far, tmp_path))["sensors"]["d435i"]
+    assert sensor["preset"] == "generic/rgbd"  # of which nobody knows where the colour imager is
+    assert sensor["frames"] == {"d435i_color_frame": {"xyz": [0, 0.0155, 0]}}
+
+
+def test_no_sensors_leaves_frames_frames(tmp_path: Path) -> None:
+    assert "sensors" not in data(imported(d435(tmp_path, name="d435i"), tmp_path, "--no-sensors"))
+
+
+def test_a_xacro_file_is_expanded_with_arguments(tmp_path: Path) -> None:
+    file = tmp_path / "r.urdf.xacro"
+    arg = '<xacro:arg name="high" default="1"/>'
+    text = f'<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">{arg}<link name="base_link"/>'
+    mast = fixed("mast", origin='xyz="0 0 $(arg high)"')
+    file.write_text(f"{text}{mast}</robot>")
+    out = tmp_path / "robot.yaml"
+    assert main(["import", str(file), "high:=0.5", "-o", str(out)]) == 0
+    assert data(out.read_text("utf-8"))["frames"]["mast"]["xyz"] == [0, 0, 0.5]
+    assert main(["import", str(file), "hgh:=0.5", "-o", str(out), "--force"]) == 1
+
+
+def test_a_source_with_errors_is_refused_whole_unless_that_is_wanted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, out = tmp_path / "r.urdf", tmp_path / "robot.yaml"
+    file.write_text(
+        moving(LIMIT).replace('xyz="', "").replace("<limit", '<origin xyz="1 2"/><axis xyz="0 0 0"/><limit')
+    )
+    assert main(["import", str(file), "-o", str(out)]) == 1
+    assert not out.exists()
+    said = capsys.readouterr().err
+    assert said.count("error[TF721]") == 2
+    assert "--keep-going" in said
+    assert main(["import", str(file), "-o", str(out), "--keep-going"]) == 1
+    assert "# TF721 in the source: the axis of shoulder has no direction" in out.read_text("utf-8")
+
+
+def test_a_file_that_is_there_is_not_written_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file, out = tmp_path / "r.urdf", tmp_path / "robot.yaml"
+    file.write_text(f"{HEAD}</robot>")
+    out.write_text("mine")
+    assert main(["import", str(file), "-o", str(out)]) == 2
+    assert out.read_text("utf-8") == "mine"
+    assert "--force" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["a.yaml"], ["r.urdf", "a:=b"], ["r.urdf", "--robot", "R2"], ["r.urdf", "--package", "a"], ["none.urdf"]],
+    ids=" ".join,
+)
+def test_wrong_use_is_one_sentence(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["import", *words]) == 2
+    said = capsys.readouterr()
+    assert said.err
+    assert not said.out
+    assert "Traceback" not in said.err

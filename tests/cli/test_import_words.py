@@ -167,6 +167,12 @@ def d435(folder: Path, **more: Any) -> str:
     return urdf_of({"tfcompose": 1, "robot": "r", "links": {"base_link": {}}, "sensors": {name: D435 | more}}, folder)
 
 
+def test_frames_turned_as_every_cameras_are_name_no_vendor(tmp_path: Path) -> None:
+    optical = fixed("xtion_depth_optical_frame", "xtion_depth_frame", 'rpy="-1.5707963267948966 0 -1.5707963267948966"')
+    frames = fixed("xtion_link") + fixed("xtion_depth_frame", "xtion_link", 'xyz="0 0.047 0"') + optical
+    assert "sensors" not in data(imported(f"{HEAD}{frames}</robot>", tmp_path))
+
+
 def test_options_follow_from_the_frames_that_there_are(tmp_path: Path) -> None:
     options = {"streams": ["depth", "infra1"], "imu": True, "unite_imu": False}
     text = imported(d435(tmp_path, name="d435i", options=options), tmp_path)

@@ -1,7 +1,8 @@
 """Sensors in somebody else's robot: chains of fixed frames whose names and poses are those of a preset.
 
-A preset is recognised by frames inside of it: by one at least whose pose says something. Where several presets fit
-equally well, a generic one is taken, or the one whose name is in the sensor's; else none is, and a note says so.
+A preset is recognised by frames inside of it: by one at least whose position, which is not 0, is the vendor's. Where
+several presets fit equally well, a generic one is taken, or the one whose name is in the sensor's; else none is, and a
+note says so.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 NEAR = 1e-6
 #: As near as it must be for the preset's to be written in its stead.
 EQUAL = 1e-13
+#: Every camera has frames that are turned as optical ones are: that alone names no vendor.
+GENERIC = "generic"
 _MOST_CHOICES = 256
 
 
@@ -158,7 +161,8 @@ class _Search:
         far, twist = math.dist(nominal.xyz, edge.pose.xyz), angle_between(nominal.quat_xyzw, edge.pose.quat_xyzw)
         if far > NEAR or twist > NEAR:
             return None
-        says = (frame.xyz is not None and any(frame.xyz)) or (turned is not None and turned != Pose().quat_xyzw)
+        turns = turned is not None and turned != Pose().quat_xyzw
+        says = (frame.xyz is not None and any(frame.xyz)) or (preset.vendor == GENERIC and turns)
         return edge, frame.xyz is None or far > EQUAL, unknown or twist > EQUAL, says
 
 
@@ -183,6 +187,6 @@ def _options(preset: PresetSpec, matched: Mapping[str, Any]) -> Iterator[dict[st
 
 
 def _subsets(values: tuple[str, ...]) -> Iterator[list[str]]:
-    for count in range(len(values) + 1):
+    for count in range(1, len(values) + 1):
         for some in itertools.combinations(values, count):
             yield list(some)

@@ -60,10 +60,9 @@ def _in_whole(root: Element, robot: Robot) -> Iterator[str]:
         if name != "name" and not name.startswith("xmlns"):
             yield f'{name}="{root.attributes[name]}"'
     known = {shape.material.name for link in robot.links.values() for shape in link.visuals if shape.material}
-    for element in root.all("material"):
-        name = element.attributes.get("name", "")
-        if name not in known:
-            yield f"the material {name}, which nothing has"
+    unused = [name for one in root.all("material") if (name := one.attributes.get("name", "")) not in known]
+    if unused:
+        yield f"{'materials' if unused[1:] else 'the material'} {', '.join(unused)}, which nothing has"
 
 
 def _in_element(element: Element, colours: frozenset[str]) -> Iterator[str]:
@@ -77,8 +76,6 @@ def _in_element(element: Element, colours: frozenset[str]) -> Iterator[str]:
         yield from (f"<{child.tag}>" for child in one.children if ":" in child.tag)
         if one.tag == "material" and one.attributes.get("name") not in colours and not one.children:
             yield f"the material {one.attributes.get('name', '')}, which nothing describes"
-        if one.tag == "collision" and one.first("material"):
-            yield "the material of a collision"
 
 
 def _in_attributes(element: Element) -> Iterator[str]:

@@ -1,7 +1,8 @@
 """``# tfcompose: allow TF301 because …``: findings that a person has looked at and lets stand.
 
 The comment stands on the line that the finding is about, or alone on the line above. Findings about text and keys (TF0
-and TF1) cannot be allowed: they say that the file was not understood.
+and TF1) cannot be allowed, since they say that the file was not understood; nor can those without whose end there is no
+robot to build.
 """
 
 from __future__ import annotations
@@ -18,9 +19,13 @@ if TYPE_CHECKING:
     from tfcompose.diagnostic import Span
 
 
+#: No tree, edges that nobody publishes, processes that never start.
+NOTHING_TO_BUILD = frozenset({"TF201", "TF202", "TF203", "TF206", "TF302", "TF812", "TF813"})
+
+
 def can_be_allowed(code: str) -> bool:
     """Return whether findings of the code can be let stand."""
-    return code in CODES and code[:3] not in {"TF0", "TF1"}
+    return code in CODES and code[:3] not in {"TF0", "TF1"} and code not in NOTHING_TO_BUILD
 
 
 def apply(found: Iterable[Diagnostic], allows: Sequence[Allow]) -> tuple[list[Diagnostic], set[tuple[Allow, str]]]:

@@ -83,7 +83,8 @@ A file cannot be laid over itself.""",
 PATH has dots between its keys: sensors.camera.tf=driver.""",
     "TF017": """An entry under rules is no code, or one that cannot be set.
 
-Findings about text and keys (TF0 and TF1) always count.""",
+Findings about text and keys (TF0 and TF1) always count, and those without whose end there is no robot to build: two
+parents, cycles, frames and owners that are not there, processes that wait for each other.""",
     "TF018": """A file is not XML, not a robot, or declares entities.
 
 The place is where reading stopped. A URDF is one <robot>; with xacro the message is xacro's own.""",

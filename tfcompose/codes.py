@@ -154,6 +154,7 @@ CODES = {
     "TF816": "path_cannot_be_told",
     "TF817": "process_not_ready",
     "TF818": "required_without_role",
+    "TF819": "unknown_host",
     "TF820": "live_loop",
     "TF821": "self_transform",
     "TF822": "two_writers",

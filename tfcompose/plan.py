@@ -238,7 +238,11 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Everything that ``tfcompose up`` needs, and nothing that it has to compile."""
+    """Everything that ``tfcompose up`` needs, and nothing that it has to compile.
+
+    ``host`` is the machine whose share of the processes this is: it starts those that are not ``external``. None is
+    the whole plan, and empty the share of the machine that the plan does not name.
+    """
 
     robot: str
     spec_digest: str
@@ -250,6 +254,7 @@ class Plan:
     claims: tuple[Claim, ...] = ()
     description: str = DESCRIPTION
     version: int = VERSION
+    host: str | None = None
 
     def process(self, name: str) -> PlanProcess:
         """Return the process of that name.

@@ -40,6 +40,7 @@ def write_plan(plan: Plan) -> str:
         "spec_digest": plan.spec_digest,
         "description": plan.description,
         "base": plan.base,
+        **({} if plan.host is None else {"host": plan.host}),
         "ros": _fields(plan.ros),
     }
     lines = [f"  {_json(key)}: {_json(value)}" for key, value in head.items()]
@@ -296,4 +297,5 @@ def _plan_from_json(data: dict[str, Any]) -> Plan:
         guard=_guard_from_json(get(data, "guard", dict, "plan")),
         claims=tuple(_claim_from_json(claim) for claim in get(data, "claims", list, "plan")),
         description=get(data, "description", str, "plan"),
+        host=get(data, "host", str, "plan") if "host" in data else None,
     )

@@ -277,6 +277,10 @@ somebody else's process takes a path as an argument; and without parameters ther
 
 The finding says what its ``ready`` waits for, what was seen instead, and what the process said last. Processes that
 wait for it wait on.""",
+    "TF819": """The plan does not say what this machine starts.
+
+A process may name a ``host:``. ``up --host NAME`` starts that host's share; without it, the machine's own name decides,
+and a machine that the plan does not name starts what has no host. All others are expected, and the guard sees them.""",
     "TF820": """Somebody publishes an edge that closes a loop.
 
 The frames of the loop are each other's ancestors; tf2 finds no way through them, and every lookup that needs one fails.

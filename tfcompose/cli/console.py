@@ -79,6 +79,7 @@ class Console:
         self._width = max(len(name) for name in [*names, OURS])
         self._colours = {name: COLOURS[index % len(COLOURS)] for index, name in enumerate(names)}
         self._nodes = {process.name: process.nodes for process in plan.processes}
+        self._hosts = {process.name: f"host {process.host}" for process in plan.processes if process.host}
 
     def __call__(self, notice: Notice) -> None:
         """Write what a notice says, at once.
@@ -118,7 +119,8 @@ class Console:
             text = f"started {notice.process} (pid {notice.pid})"
         elif notice.state == "EXPECTED":
             nodes = ", ".join(self._nodes.get(notice.process, ()))
-            text = f"expecting {notice.process} ({nodes}): somebody else starts it"
+            who = self._hosts.get(notice.process, "somebody else")
+            text = f"expecting {notice.process} ({nodes}): {who} starts it"
         elif notice.detail:
             text += f": {notice.detail}"
         self._say(text)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.up import PLAN, as_asked, plan_in
 from tfcompose.planfile import read_plan
 from tfcompose.ros.environment import FASTDDS_PROFILE, child_environment
+from tfcompose.run.hosts import told
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -31,7 +32,10 @@ def dry_run(arguments: Namespace) -> int:
             return compiled
         files = {file.path: file.text for file in import_module("tfcompose.emit").emit(compiled) if file.text}
         plan = read_plan(files[PLAN], PLAN)
-    plan = as_asked(plan, arguments)
+    share = as_asked(plan, arguments)
+    if isinstance(share, int):
+        return share
+    plan = share
     sys.stdout.write("\n".join(_lines(plan, files)) + "\n")
     return 0
 
@@ -51,6 +55,7 @@ def _lines(plan: Plan, files: dict[str, str]) -> Iterator[str]:
     ros = plan.ros
     domain = "the environment's" if ros.domain_id is None else ros.domain_id
     yield f"robot {plan.robot}: {len(plan.processes)} processes, {len(plan.edges)} edges, domain: {domain}"
+    yield from told(plan)
     for process in plan.processes:
         yield ""
         yield from _process(plan, process, files)

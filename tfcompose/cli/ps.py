@@ -10,7 +10,7 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.cli.running import add_robot, running
+from tfcompose.cli.running import add_robot, is_meant, running
 from tfcompose.cli.terminal import UNREADABLE, complain
 from tfcompose.run.control import ask
 from tfcompose.run.place import PlaceError
@@ -50,7 +50,7 @@ def _robots(name: str | None) -> list[dict[str, Any]] | int:
     found = []
     try:
         for place, _ in running():
-            if name is None or name in {place.name, place.name.rpartition("@")[0]}:
+            if is_meant(place, name):
                 found.append({"name": place.name} | ask(place, do="ps"))
     except PlaceError as error:
         complain(str(error))
@@ -69,9 +69,10 @@ def _robots(name: str | None) -> list[dict[str, Any]] | int:
 def _row(process: dict[str, Any]) -> tuple[str, ...]:
     cpu, memory = process["cpu"], process["memory"]
     ready = "" if process["ready"] or process["state"] != "RUNNING" else ", not ready"
+    where = f" of {process['host']}" if process["state"] == "EXPECTED" and process["host"] else ""
     return (
         process["name"],
-        process["state"].lower() + ready,
+        process["state"].lower() + ready + where,
         str(process["pid"] or "–"),
         "–" if process["uptime"] is None else _time(process["uptime"]),
         str(process["restarts"]),

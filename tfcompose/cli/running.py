@@ -37,6 +37,12 @@ def running() -> list[tuple[Place, Holder]]:
     return [(place, holder) for place, holder in found if holder]
 
 
+def is_meant(place: Place, name: str | None) -> bool:
+    """Return whether this name means the robot: its own, one without the domain, or without a host's name too."""
+    share = place.name.rpartition("@")[0]
+    return name is None or name in {place.name, share, share.partition(".")[0]}
+
+
 def chosen(name: str | None, *, among: Callable[[], list[Place]] | None = None) -> Place | int:
     """Return the place of the robot that is meant, or the exit code after saying why there is none."""
     try:
@@ -45,7 +51,7 @@ def chosen(name: str | None, *, among: Callable[[], list[Place]] | None = None) 
         complain(str(error))
         return UNREADABLE
     what = "robot has run here" if among else "robot is running"
-    found = [place for place in known if name is None or name in {place.name, place.name.rpartition("@")[0]}]
+    found = [place for place in known if is_meant(place, name)]
     names = ", ".join(place.name for place in known)
     if not known:
         complain(f"no {what}")

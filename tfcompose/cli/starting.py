@@ -45,6 +45,8 @@ def start(arguments: Namespace) -> int:
     if isinstance(plan, int):
         return plan
     plan = as_asked(plan, arguments)
+    if isinstance(plan, int):
+        return plan
     if plan.guard.mode == "off" and arguments.settle is not None:
         complain("the guard is off, so nobody looks before the start: leave out --settle")
         return UNREADABLE

@@ -7,6 +7,7 @@ node's name. Where the robot runs already, a changed plan is followed: only what
 
 from __future__ import annotations
 
+import os
 import sys
 from dataclasses import replace
 from importlib import import_module
@@ -15,13 +16,13 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.options import DEFAULT_FILE, add_variant, not_negative, positive
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings, read_text, unreadable
 from tfcompose.diagnostic import RejectedError
+from tfcompose.plan import Plan
 from tfcompose.planfile import read_plan
+from tfcompose.run.hosts import share_of
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from pathlib import Path
-
-    from tfcompose.plan import Plan
 
 PLAN = "plan.json"
 
@@ -39,6 +40,10 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--timeout", type=positive, default=60.0, metavar="S",
         help="how long --wait waits; then exit code 1, and the robot goes on; default: 60",
+    )  # fmt: skip
+    parser.add_argument(
+        "--host", metavar="NAME",
+        help="start the share of this host, and expect the others'; default: this machine's name, if the robot has it",
     )  # fmt: skip
     parser.add_argument("--dry-run", action="store_true", help="print what would be started, and start nothing")
     parser.add_argument(
@@ -78,8 +83,13 @@ def plan_in(file: Path) -> Plan | int:
         return UNREADABLE if unreadable(error.diagnostics) else 1
 
 
-def as_asked(plan: Plan, arguments: Namespace) -> Plan:
-    """Return the plan with what the command line says about the guard."""
+def as_asked(plan: Plan, arguments: Namespace) -> Plan | int:
+    """Return this machine's share of the plan, with what the command line says about the guard; or an exit code."""
+    share = share_of(plan, arguments.host, os.uname().nodename)
+    if not isinstance(share, Plan):
+        print_findings([share], sys.stderr)
+        return 1
+    plan = share
     if arguments.guard:
         plan = replace(plan, guard=replace(plan.guard, mode=arguments.guard))
     if arguments.settle is None:

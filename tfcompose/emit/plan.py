@@ -51,6 +51,7 @@ def plan_of(robot: Robot, target: Target = AS_WRITTEN) -> Plan:
             for edge in robot.edges
         ]
     )
+    main = next((process.host for process in robot.processes if process.name == STATIC), None)
     owned: dict[str, list[tuple[str, str]]] = {}
     for edge in edges:
         owned.setdefault(edge.owner, []).append((edge.parent, edge.child))
@@ -61,7 +62,7 @@ def plan_of(robot: Robot, target: Target = AS_WRITTEN) -> Plan:
         ros=robot.ros,
         edges=edges,
         processes=tuple(
-            _at(target, _process(process, robot, owned.get(process.name, []), names)) for process in needed
+            _on(main, _at(target, _process(process, robot, owned.get(process.name, []), names))) for process in needed
         ),
         guard=robot.guard,
         claims=tuple(_claims(robot)),
@@ -203,6 +204,13 @@ def _at(target: Target, process: PlanProcess) -> PlanProcess:
 
     env = {name: placed(value) for name, value in process.env.items()}
     return replace(process, argv=tuple(placed(word) for word in process.argv), env=env)
+
+
+def _on(main: str | None, process: PlanProcess) -> PlanProcess:
+    """Return the process on its host: what names none runs where ``static`` does. The guard runs everywhere."""
+    if process.host or process.kind in ("external", "guard"):
+        return process
+    return replace(process, host=main)
 
 
 def _names(process: Process, robot: Robot) -> list[str]:

@@ -26,6 +26,7 @@ def status(state: State, now: float) -> dict[str, Any]:
     """Return all that is known of a run, as plain data; times are seconds until now."""
     return {
         "robot": state.plan.robot,
+        "host": state.plan.host,
         "launcher": os.getpid(),
         "plan": state.plan.spec_digest,
         "uptime": round(now - (state.begun or now), 3),
@@ -42,6 +43,7 @@ def _process(state: State, one: Tracked, now: float) -> dict[str, Any]:
     return {
         "name": one.process.name,
         "kind": one.process.kind,
+        "host": one.process.host,
         "state": one.state,
         "ready": one.ready,
         "pid": one.pid,

@@ -1,6 +1,7 @@
 """Where a running robot is found: a folder that only the user can open, with a lock, a control socket and the plan.
 
-A robot is one name in one ROS domain. Its folder is in XDG_RUNTIME_DIR, or else in ``tfcompose-UID`` below the folder
+A robot is one name in one ROS domain; a host's share of it has the host in its name.
+Its folder is in XDG_RUNTIME_DIR, or else in ``tfcompose-UID`` below the folder
 for temporary files. Logs outlive the run: they are in ROS's folder for logs (ROS_LOG_DIR, else ROS_HOME/log, else
 ~/.ros/log), in ``tfcompose/ROBOT@DOMAIN``.
 """
@@ -41,7 +42,7 @@ class Holder:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """The folder of a robot in a domain; ``name`` is ROBOT@DOMAIN."""
+    """The folder of a robot in a domain; ``name`` is ROBOT@DOMAIN, or ROBOT.HOST@DOMAIN."""
 
     name: str
     folder: Path
@@ -115,7 +116,8 @@ def place_of(plan: Plan, env: Mapping[str, str]) -> Place:
         PlaceError: if there is no folder that only this user can open.
     """
     domain = str(plan.ros.domain_id) if plan.ros.domain_id is not None else env.get("ROS_DOMAIN_ID") or "0"
-    return _place(f"{plan.robot}@{domain.strip()}".replace("/", "_"), _runtime_folder(env), env)
+    share = f"{plan.robot}.{plan.host}" if plan.host else plan.robot
+    return _place(f"{share}@{domain.strip()}".replace("/", "_"), _runtime_folder(env), env)
 
 
 def places(env: Mapping[str, str]) -> list[Place]:

@@ -40,13 +40,20 @@ def static(own: Own, stop: Stop) -> None:
         if edges:
             publisher.publish(encode(edges))
         say(f"{count(len(edges), 'edge')} on /tf_static")
-        if any(p.kind == "joints" and p.description == own.process.description for p in own.plan.processes):
+        if _joints_of(own) in {
+            process.name for process in own.plan.processes if process.kind in ("joints", "external")
+        }:
             stop.wait(None)
             return
         description = Description(own, node)
         while not stop.requested:
             wait(node, [description.subscription], LOOK_EVERY_S if description.looks else None, stop)
             description.look()
+
+
+def _joints_of(own: Own) -> str:
+    """Return the name of the process that sends the description in this one's place, where there is one."""
+    return f"{own.process.name.removesuffix('static')}joints"
 
 
 def simulate(own: Own, stop: Stop) -> None:

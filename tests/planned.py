@@ -1,0 +1,26 @@
+"""A robot's text as its plan and files, for tests of what is made of plans."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.compiling import library
+from tfcompose.compile import compile_robot
+from tfcompose.emit import emit
+from tfcompose.planfile import read_plan
+
+if TYPE_CHECKING:
+    from tfcompose.plan import Plan
+
+
+def built(text: str, *profiles: str) -> dict[str, str]:
+    """Return the files that a right robot is built to."""
+    compiled = compile_robot(text, "robot.yaml", library(), list(profiles))
+    assert compiled.robot, compiled.found
+    assert not compiled.errors, compiled.found
+    return {file.path: file.text for file in emit(compiled.robot)}
+
+
+def compiled_plan(text: str, *profiles: str) -> Plan:
+    """Return the plan of a right robot."""
+    return read_plan(built(text, *profiles)["plan.json"], "plan.json")

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 COMMANDS = {
     "lint": "find everything that is wrong; starts nothing, needs no ROS",
     "build": "write the URDF and the plan: all of it, or nothing",
+    "export": "the plan for systemd, docker compose or ros2 launch",
     "up": "start the robot, or a built plan, and guard its TF tree",
     "ps": "the processes of running robots: state, pid, time, restarts, use, edges",
     "logs": "what the processes of a robot wrote, also after it has ended",

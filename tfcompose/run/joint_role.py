@@ -13,6 +13,7 @@ from tfcompose.ros.tf import TFPublisher, wait
 from tfcompose.run.clock_watch import CLOCK_AFTER_S, no_clock
 from tfcompose.run.description import Description
 from tfcompose.run.joint_mover import JointMover, Told
+from tfcompose.run.notify import ready
 from tfcompose.run.own import count, say
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ def joints(own: Own, stop: Stop) -> None:
         states = JointStateSubscription(node)
         at_most = f", at most {told.publish_frequency:g} Hz" if told.publish_frequency else ""
         say(f"{count(len(mover), 'edge')} on /tf, from {states.topic}{at_most}")
+        ready()
         missing = _Missing(node, mover, states.topic)
         while not stop.requested:
             looks = missing.looks or clock.looks or description.looks

@@ -15,6 +15,7 @@ from tfcompose.run.clock_watch import CLOCK_AFTER_S, no_clock
 from tfcompose.run.description import Description
 from tfcompose.run.joint_role import LOOK_EVERY_S, joints
 from tfcompose.run.motion import circle, swept
+from tfcompose.run.notify import ready
 from tfcompose.run.own import count, say
 from tfcompose.run.watch import guard
 
@@ -40,6 +41,7 @@ def static(own: Own, stop: Stop) -> None:
         if edges:
             publisher.publish(encode(edges))
         say(f"{count(len(edges), 'edge')} on /tf_static")
+        ready()
         if _joints_of(own) in {
             process.name for process in own.plan.processes if process.kind in ("joints", "external")
         }:
@@ -67,6 +69,7 @@ def simulate(own: Own, stop: Stop) -> None:
         else:
             publish, what = _body(own, node, simulation)
         say(f"{what}, simulated at {simulation.rate:g} Hz")
+        ready()
         if own.plan.ros.clock == "sim":
             ticks = _sim_ticks(node, simulation.rate, stop)
         else:

@@ -17,6 +17,7 @@ from tfcompose.run.heeding import Orders
 from tfcompose.run.judge import FINDING_S, Judge
 from tfcompose.run.memory import Memory, recalled
 from tfcompose.run.neighbours import GLOBAL, Graph
+from tfcompose.run.notify import ready
 from tfcompose.run.orders import JOINS
 from tfcompose.run.own import say
 from tfcompose.run.relay import Relay
@@ -71,6 +72,7 @@ def guard(own: Own, stop: Stop) -> None:
         ]
         say(f"watching {_counted(own.plan)}{'' if judges else ', and judging nobody'}{' again' if left else ''}")
         voice.flush()
+        ready()
         clock = ClockWatch(own, node)
         bulletin = Bulletin(node, own.plan.robot)
         switches = Switches(node, own.plan, emit) if judges else None

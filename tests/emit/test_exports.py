@@ -1,0 +1,276 @@
+"""The plan for other launchers: units, a compose file, a launch file."""
+
+from __future__ import annotations
+
+import configparser
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import pytest
+import yaml
+
+from tests.planned import built, compiled_plan
+from tfcompose.emit.compose import compose
+from tfcompose.emit.launch import launch
+from tfcompose.emit.supervised import Machine
+from tfcompose.emit.systemd import systemd
+from tfcompose.plan import Plan, PlanProcess, StopRule
+from tfcompose.planfile import read_plan
+
+ROBOT = (Path(__file__).parents[2] / "robots" / "autonomous_robot.yaml").read_text("utf-8")
+DRIVEN = """
+tfcompose: 1
+robot: rover
+ros: {discovery: localhost, namespace: r1, domain_id: 7}
+frames:
+  map: {}
+  dock: {parent: map, xyz: [1, -2, 0.5], rpy: [0, 0, 30 deg]}
+  odom: {parent: map, owner: slam, rate: 10 Hz}
+  base_link: {parent: odom, owner: drive, rate: 20 Hz}
+links:
+  lidar: {parent: base_link, xyz: [0, 0, 0.3], visual: {box: [0.1, 0.1, 0.1]}}
+processes:
+  drive:
+    run: {package: base, executable: drive_node, args: [--fast]}
+    node: drive
+    params: {wheel: 0.1}
+    remap: {cmd: cmd_vel}
+    env: {GREETING: "100 % \\"sure\\" $HOME"}
+    restart: always
+    lifecycle: active
+    stop: {signal: SIGTERM, timeout: 2 s}
+  slam: {run: [slam, --now], node: slam, restart: on-failure, max_restarts: 3, after: {drive: started, static: ready}}
+  other: {external: true}
+"""
+
+
+# systemd
+
+
+def unit(text: str) -> dict[str, dict[str, list[str]]]:
+    """Read a unit: sections, and each key's values in order."""
+    parser = configparser.RawConfigParser(strict=False, delimiters=("=",), interpolation=None)
+    parser.optionxform = str  # type: ignore[assignment]
+    lines: dict[str, dict[str, list[str]]] = {}
+    section = ""
+    for line in text.splitlines():
+        if line.startswith("["):
+            section = line.strip("[]")
+            lines[section] = {}
+        elif line:
+            key, _, value = line.partition("=")
+            lines[section].setdefault(key, []).append(value)
+    parser.read_string(text)
+    assert set(parser.sections()) == set(lines)
+    return lines
+
+
+def units(plan: Plan, machine: Machine | None = None) -> dict[str, dict[str, dict[str, list[str]]]]:
+    machine = machine or Machine("/opt/rover", "/usr/bin/python3")
+    return {file.path: unit(file.text) for file in systemd(plan, machine)[0]}
+
+
+def test_each_process_that_is_started_is_a_unit_and_the_target_wants_them_all() -> None:
+    made = units(compiled_plan(DRIVEN))
+    names = {f"rover-{name}.service" for name in ("static", "drive", "slam", "guard")}
+    assert set(made) == {"rover.target", *names}
+    assert set(made["rover.target"]["Unit"]["Wants"]) == {"network-online.target", *names}
+    for name in names:
+        assert made[name]["Unit"]["PartOf"] == made[name]["Install"]["WantedBy"] == ["rover.target"]
+
+
+def test_own_processes_say_when_they_are_ready_and_others_are_executed() -> None:
+    made = units(compiled_plan(DRIVEN))
+    assert {name: one["Service"]["Type"] for name, one in made.items() if "Service" in one} == {
+        "rover-static.service": ["notify"],
+        "rover-guard.service": ["notify"],
+        "rover-drive.service": ["exec"],
+        "rover-slam.service": ["exec"],
+    }
+
+
+def test_a_unit_restarts_stops_and_waits_as_the_plan_says() -> None:
+    made = units(compiled_plan(DRIVEN))
+    slam, drive = made["rover-slam.service"], made["rover-drive.service"]
+    assert slam["Unit"]["After"] == slam["Unit"]["Wants"] == ["rover-drive.service rover-static.service"]
+    assert (slam["Service"]["Restart"], slam["Unit"]["StartLimitBurst"]) == (["on-failure"], ["4"])
+    assert drive["Service"]["Restart"] == ["always"]
+    assert (drive["Service"]["KillSignal"], drive["Service"]["TimeoutStopSec"]) == (["SIGTERM"], ["2"])
+    assert slam["Service"]["ExecStart"] == ["/usr/bin/python3 -m tfcompose.run.process /opt/rover/plan.json slam"]
+
+
+def test_a_process_that_is_waited_for_until_it_is_done_is_oneshot() -> None:
+    plan = compiled_plan(DRIVEN)
+    late = replace(plan.process("slam"), after={"drive": "done"})
+    plan = replace(plan, processes=tuple(late if one.name == "slam" else one for one in plan.processes))
+    assert units(plan)["rover-drive.service"]["Service"]["Type"] == ["oneshot"]
+    assert units(plan)["rover-drive.service"]["Service"]["Restart"] == ["on-failure"]
+
+
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="systemd-analyze is not installed")
+@pytest.mark.parametrize("setup", [(), ("/opt/ros/jazzy/setup.bash", "/opt/ws/setup.bash")])
+@pytest.mark.parametrize(("text", "profiles"), [(DRIVEN, ()), (ROBOT, ()), (ROBOT, ("demo",))])
+def test_systemd_finds_nothing_wrong_with_the_units(
+    text: str, profiles: tuple[str, ...], setup: tuple[str, ...], tmp_path: Path
+) -> None:
+    odd = {"ROS_HOME": "/home/a b/100 %", "QUOTED": 'a "b" \\ $HOME'}
+    machine = Machine(str(tmp_path), sys.executable, setup, odd)
+    files = systemd(compiled_plan(text, *profiles), machine)[0]
+    for file in files:
+        (tmp_path / file.path).write_text(file.text, "utf-8")
+    command = ["systemd-analyze", "verify", "--man=no", *(str(tmp_path / file.path) for file in files)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    said = [line for line in done.stderr.splitlines() if str(tmp_path) in line or "rover" in line or "robot" in line]
+    assert (done.returncode, said) == (0, [])
+
+
+# compose
+
+
+def test_each_process_is_a_service_on_the_hosts_network_that_waits_as_the_plan_says() -> None:
+    plan = compiled_plan(DRIVEN)
+    (file,), said = compose(plan, Machine("..", image="robot:1"))
+    made = yaml.safe_load(file.text)
+    assert set(made) == {"name", "services"}
+    services = made["services"]
+    assert set(services) == {"static", "drive", "slam", "guard"}
+    for name, service in services.items():
+        assert (service["network_mode"], service["ipc"], service["image"]) == ("host", "host", "robot:1")
+        assert service["command"][-2:] == ["/robot/plan.json", name]
+        assert service["environment"] == {"ROS_DOMAIN_ID": "7", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    assert services["slam"]["depends_on"] == {
+        "drive": {"condition": "service_started"},
+        "static": {"condition": "service_healthy"},
+    }
+    assert "healthcheck" in services["static"], "who waits for healthy waits for ever without it"
+    assert (services["slam"]["restart"], services["drive"]["restart"]) == ("on-failure:3", "always")
+    assert (services["drive"]["stop_signal"], services["drive"]["stop_grace_period"]) == ("SIGTERM", "2000ms")
+    assert any("drive: nobody drives its lifecycle" in line for line in said)
+    assert any("other is expected" in line for line in said)
+
+
+@pytest.mark.parametrize("profiles", [(), ("demo",)])
+def test_every_service_that_waits_for_health_has_a_check_of_an_edge_of_the_plan(profiles: tuple[str, ...]) -> None:
+    plan = compiled_plan(ROBOT, *profiles)
+    services = yaml.safe_load(compose(plan, Machine(".."))[0][0].text)["services"]
+    edges = {(edge.parent, edge.child) for edge in plan.edges}
+    for service in services.values():
+        for other, how in service.get("depends_on", {}).items():
+            assert other in services
+            assert how["condition"] != "service_healthy" or "healthcheck" in services[other]
+        if "healthcheck" in service:
+            words = service["healthcheck"]["test"]
+            assert tuple(words[words.index("echo") + 1 :][:2]) in edges
+
+
+# launch
+
+
+class Recorded(SimpleNamespace):
+    """What stands in for an action: its kind, and what it was told."""
+
+
+def load(text: str, file: Path, monkeypatch: pytest.MonkeyPatch) -> list[Recorded]:
+    """Return the actions of a launch file, with stand-ins for what it imports of launch."""
+
+    def kind(name: str) -> Any:
+        return lambda *words, **told: Recorded(kind=name, words=words, **told)
+
+    for module in (
+        "launch", "launch.actions", "launch.event_handlers", "launch.events", "launch_ros", "launch_ros.actions",
+        "launch_ros.event_handlers", "launch_ros.events", "launch_ros.events.lifecycle",
+        "launch_ros.parameter_descriptions",
+    ):  # fmt: skip
+        stand_in = ModuleType(module)
+        stand_in.__getattr__ = kind  # type: ignore[method-assign]
+        monkeypatch.setitem(sys.modules, module, stand_in)
+    messages = ModuleType("lifecycle_msgs.msg")
+    messages.Transition = SimpleNamespace(TRANSITION_CONFIGURE=1, TRANSITION_ACTIVATE=3)  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "lifecycle_msgs.msg", messages)
+    names: dict[str, Any] = {"__file__": str(file), "__name__": "launch_file"}
+    exec(compile(text, str(file), "exec"), names)  # noqa: S102 (the file under test)
+    return list(names["generate_launch_description"]().words[0])
+
+
+def launched(text: str, folder: Path, monkeypatch: pytest.MonkeyPatch, *profiles: str) -> tuple[Plan, list[Recorded]]:
+    files = built(text, *profiles)
+    plan = read_plan(files["plan.json"], "plan.json")
+    (folder / "robot.urdf").write_text(files["robot.urdf"], "utf-8")
+    (folder / "launch").mkdir()
+    (file,), _ = launch(plan, Machine(".."), files["robot.urdf"])
+    return plan, load(file.text, folder / "launch" / file.path, monkeypatch)
+
+
+def sent(actions: list[Recorded]) -> dict[tuple[str, str], list[float] | None]:
+    """Return the edges that stock nodes send, by what these are told; poses of static_transform_publishers alone."""
+    edges: dict[tuple[str, str], list[float] | None] = {}
+    for action in actions:
+        if getattr(action, "executable", "") == "robot_state_publisher":
+            urdf = action.parameters[0]["robot_description"].words[0]
+            for joint in ET.fromstring(urdf).findall("joint"):  # noqa: S314 (our own)
+                if joint.get("type") != "floating":
+                    ends = tuple(str(joint.find(end).get("link")) for end in ("parent", "child"))  # type: ignore[union-attr]
+                    edges[ends] = None  # type: ignore[index]
+        elif getattr(action, "executable", "") == "static_transform_publisher":
+            told = dict(zip(action.arguments[::2], action.arguments[1::2], strict=True))
+            ends = (told["--frame-id"], told["--child-frame-id"])
+            assert ends not in edges
+            edges[ends] = [float(told[key]) for key in ("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw")]
+    return edges
+
+
+@pytest.mark.parametrize(("text", "profiles"), [(DRIVEN, ()), (ROBOT, ()), (ROBOT, ("demo",))])
+def test_stock_nodes_send_the_edges_that_our_publishers_send_and_no_other(
+    text: str, profiles: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, actions = launched(text, tmp_path, monkeypatch, *profiles)
+    own = {(edge.parent, edge.child): edge for edge in plan.edges if edge.owner in ("static", "joints")}
+    edges = sent(actions)
+    assert set(edges) == set(own)
+    for ends, pose in edges.items():
+        if pose is not None:
+            assert pose == pytest.approx([*own[ends].pose.xyz, *own[ends].pose.quat_xyzw], abs=1e-12)
+    names = [action.name for action in actions if action.kind in ("Node", "LifecycleNode")]
+    assert len(names) == len(set(names))
+
+
+def test_a_driver_is_a_node_with_its_name_parameters_and_remappings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, actions = launched(DRIVEN, tmp_path, monkeypatch)
+    (drive,) = (action for action in actions if action.kind == "LifecycleNode")
+    assert (drive.package, drive.executable, drive.name, drive.namespace) == ("base", "drive_node", "drive", "/r1")
+    assert (drive.arguments, drive.ros_arguments) == (["--fast"], [])
+    assert drive.parameters == [str(tmp_path / "params" / "drive.yaml")]
+    assert ("cmd", "cmd_vel") in drive.remappings
+    assert drive.additional_env == {"GREETING": '100 % "sure" $HOME'}
+    assert drive.respawn
+    (slam,) = (action for action in actions if action.kind == "ExecuteProcess")
+    assert slam.cmd[1:] == ["-m", "tfcompose.run.process", str(tmp_path / "plan.json"), "slam"]
+    handlers = [action for action in actions if action.kind == "RegisterEventHandler"]
+    assert len(handlers) == 2, "configured when it was started, and activated when it is inactive"
+    variables = [action.words for action in actions if action.kind == "SetEnvironmentVariable"]
+    assert variables == [("ROS_DOMAIN_ID", "7"), ("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")]
+
+
+def test_where_a_urdf_is_not_all_that_we_send_our_own_publishers_are_started(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = ROBOT.replace("ros: {discovery: localhost}", "ros: {discovery: localhost, state_publisher: stock}")
+    _, actions = launched(text, tmp_path, monkeypatch, "demo")
+    stock = [action for action in actions if getattr(action, "executable", "") == "robot_state_publisher"]
+    assert len(stock) == 1, "the plan's own"
+
+
+def test_a_name_with_a_slash_is_a_name_for_everyone() -> None:
+    plan = compiled_plan(DRIVEN)
+    part = PlanProcess("arm/ekf", "run", argv=("ekf",), stop=StopRule())
+    plan = replace(plan, processes=(*plan.processes, part))
+    assert "rover-arm-ekf.service" in units(plan)
+    assert "arm-ekf" in yaml.safe_load(compose(plan, Machine(".."))[0][0].text)["services"]

@@ -1,0 +1,117 @@
+"""One process of a plan, as other supervisors start it."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.waiting import until
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from tests.conftest import Started
+
+pytestmark = pytest.mark.ros
+
+ROVER = """
+tfcompose: 1
+robot: rover
+ros: {discovery: localhost}
+frames:
+  odom: {}
+  base_link: {parent: odom, owner: drive, rate: 20 Hz}
+  lidar: {parent: base_link, xyz: [0, 0, 0.3]}
+processes:
+  drive: {simulate: {fixed: {xyz: [1, 0, 0]}, rate: 20 Hz}}
+  hello: {run: [sh, -c, 'echo $GREETING; exec sleep 60'], env: {GREETING: good day}}
+"""
+
+
+@pytest.fixture
+def units(domain: object, tmp_path: Path) -> Path:
+    """The robot's units, exported."""
+    assert domain
+    (tmp_path / "robot.yaml").write_text(ROVER, "utf-8")
+    words = [sys.executable, "-m", "tfcompose", "export", "systemd", str(tmp_path / "robot.yaml"), "-o", str(tmp_path)]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    return tmp_path / "systemd"
+
+
+@pytest.fixture
+def manager(tmp_path: Path) -> Iterator[socket.socket]:
+    """What systemd listens at."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listening:
+        listening.bind(str(tmp_path / "notify"))
+        listening.settimeout(20)
+        yield listening
+
+
+def module_of(unit: Path) -> list[str]:
+    """Return what follows ``python -m`` in the unit's command."""
+    (line,) = re.findall(r"^ExecStart=(.*)$", unit.read_text("utf-8"), re.MULTILINE)
+    words = shlex.split(line)
+    assert words[:2] == [sys.executable, "-m"]
+    return words[2:]
+
+
+def test_the_units_commands_start_the_tree_and_say_when_they_are_ready(
+    units: Path, tmp_path: Path, manager: socket.socket, start: Callable[..., Started]
+) -> None:
+    running = []
+    for name in ("static", "drive", "guard"):
+        running.append(start(*module_of(units / f"rover-{name}.service"), NOTIFY_SOCKET=str(tmp_path / "notify")))
+        assert manager.recv(100) == b"READY=1", name
+    words = [
+        sys.executable,
+        "-m",
+        "tfcompose",
+        "echo",
+        "odom",
+        "lidar",
+        "--once",
+        "--timeout",
+        "15",
+        "--format",
+        "json",
+    ]
+    said = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    assert said.returncode == 0, said.stderr
+    assert '"xyz": [1.0, 0.0, 0.3]' in said.stdout
+    guard = running[-1]
+    assert until(lambda: "Complete" in guard.output), "the guard that watches sees the whole tree"
+    assert [one.end(signal.SIGINT)[0] for one in running] == [0, 0, 0]
+
+
+def test_a_foreign_process_is_its_own_supervised_process_with_the_plans_environment(
+    units: Path, start: Callable[..., Started]
+) -> None:
+    hello = start(*module_of(units / "rover-hello.service"))
+    assert until(lambda: "good day" in hello.output)
+    assert until(lambda: Path(f"/proc/{hello.process.pid}/exe").readlink() != Path(sys.executable).resolve()), (
+        "nobody stands between"
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "said", "code"), [("nobody", "has no process nobody", 2), ("missing", "no-such-program of missing", 1)]
+)
+def test_what_cannot_be_started_is_said(
+    name: str, said: str, code: int, units: Path, start: Callable[..., Started]
+) -> None:
+    plan = units.parent / "plan.json"
+    text = plan.read_text("utf-8").replace('"hello"', '"missing"').replace('["sh", ', '["no-such-program", ')
+    plan.write_text(text, "utf-8")
+    one = start("tfcompose.run.process", plan, name)
+    assert one.process.wait(20) == code
+    assert until(lambda: said in "".join(one.errors)), one.errors
+    assert "Traceback" not in "".join(one.errors)

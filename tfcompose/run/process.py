@@ -1,0 +1,75 @@
+"""One process of a plan, started as ``tfcompose up`` starts it: ``python -m tfcompose.run.process PLAN_FILE NAME``.
+
+This program becomes the process, so that whoever supervises it (systemd, a container) supervises that one. Exit codes:
+1 something that it needs is missing, 2 the arguments or the plan are not usable.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import RejectedError
+from tfcompose.planfile import read_plan
+from tfcompose.ros.environment import child_environment
+from tfcompose.run.orders import JOINS
+from tfcompose.run.preflight import Command, commands_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from tfcompose.diagnostic import Diagnostic
+
+_ARGUMENTS = 2
+
+
+def command_of(argv: Sequence[str], base: Mapping[str, str]) -> Command | int:
+    """Return what is executed, or an exit code after saying why nothing is."""
+    if len(argv) != _ARGUMENTS:
+        return _fail("usage: python -m tfcompose.run.process PLAN_FILE NAME", 2)
+    file, name = Path(argv[0]), argv[1]
+    try:
+        plan = read_plan(file.read_text("utf-8"), str(file))
+        process = plan.process(name)
+    except (OSError, UnicodeDecodeError, RejectedError) as error:
+        return _fail(f"cannot read the plan: {error}", 2)
+    except KeyError:
+        return _fail(f"the plan {file} has no process {name}", 2)
+    if process.kind == "external":
+        return _fail(f"{name} is started by somebody else", 2)
+    commands, found = commands_of(plan, [process], file, base, child_environment)
+    if found:
+        return _fail("\n".join(map(_text, found)), 1)
+    # No launcher holds the others back until the guard has looked: it takes every owner as the plan's.
+    joins = {JOINS: "1"} if process.kind == "guard" else {}
+    return replace(commands[name], env=commands[name].env | joins)
+
+
+def main(argv: Sequence[str]) -> int:
+    """Become the process, or return an exit code."""
+    command = command_of(argv, os.environ)
+    if isinstance(command, int):
+        return command
+    try:
+        os.chdir(command.folder)
+        os.execve(command.argv[0], command.argv, command.env)  # noqa: S606 (this is what it is for)
+    except OSError as error:
+        return _fail(f"{argv[1]} cannot be started: {error}", 1)
+
+
+def _text(found: Diagnostic) -> str:
+    return "\n".join(
+        [found.message, *(f"  {note.message}" for note in found.notes), *([found.help] if found.help else [])]
+    )
+
+
+def _fail(what: str, code: int) -> int:
+    sys.stderr.write(f"{what}\n")
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -130,6 +130,18 @@ def test_systemd_finds_nothing_wrong_with_the_units(
     assert (done.returncode, said) == (0, [])
 
 
+def test_a_value_stays_what_it_is_whatever_systemd_makes_of_its_characters() -> None:
+    """A unit's ``%h`` is a folder, and ``$HOME`` in a command a variable; doubled they are themselves."""
+    machine = Machine("/opt/100%h", "/usr/bin/python3", ("/opt/$HOME/setup.bash",), {"A": '%h "b" \\ $C'})
+    static = units(compiled_plan(DRIVEN), machine)["rover-static.service"]["Service"]
+    assert static["Environment"] == [r'"A=%%h \"b\" \\ $C"']
+    assert static["WorkingDirectory"] == ["/opt/100%%h"]
+    (command,) = static["ExecStart"]
+    assert '"/opt/$$HOME/setup.bash" /usr/bin/python3' in command
+    assert "/opt/100%%h/plan.json static" in command
+    assert 'exec \\"$$@\\""' in command
+
+
 # compose
 
 

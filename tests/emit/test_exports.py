@@ -258,7 +258,8 @@ def test_a_driver_is_a_node_with_its_name_parameters_and_remappings(
     _, actions = launched(DRIVEN, tmp_path, monkeypatch)
     (drive,) = (action for action in actions if action.kind == "LifecycleNode")
     assert (drive.package, drive.executable, drive.name, drive.namespace) == ("base", "drive_node", "drive", "/r1")
-    assert (drive.arguments, drive.ros_arguments) == (["--fast"], [])
+    assert drive.arguments == ["--fast"]
+    assert not hasattr(drive, "ros_arguments"), "name, remappings and parameters are told once"
     assert drive.parameters == [str(tmp_path / "params" / "drive.yaml")]
     assert ("cmd", "cmd_vel") in drive.remappings
     assert drive.additional_env == {"GREETING": '100 % "sure" $HOME'}

@@ -143,7 +143,8 @@ def _place(plan: Plan) -> str:
 
 
 def _state_publisher(plan: Plan) -> list[str]:
-    told = {"frame_prefix": plan.ros.frame_prefix, "use_sim_time": plan.ros.clock == "sim"}
+    prefix = {"frame_prefix": plan.ros.frame_prefix} if plan.ros.frame_prefix else {}
+    told = prefix | {"use_sim_time": plan.ros.clock == "sim"}
     description = 'ParameterValue((BUILD / "robot.urdf").read_text(encoding="utf-8"), value_type=str)'
     parameters = f'[{{"robot_description": {description}}}, {told!r}]'
     package = 'package="robot_state_publisher", executable="robot_state_publisher", name="robot_state_publisher"'
@@ -171,7 +172,8 @@ def _started(process: PlanProcess) -> list[str]:
     told = [
         f"package={package[1]!r}, executable={package[2]!r}, name={node!r}, namespace={namespace or '/'!r}",
         f"remappings={list(process.remap.items())!r}",
-        f"arguments=[{', '.join(arguments)}], ros_arguments=[{', '.join(ros_arguments)}]",
+        f"arguments=[{', '.join(arguments)}]",
+        *([f"ros_arguments=[{', '.join(ros_arguments)}]"] if ros_arguments else []),
         *([f"parameters=[str(BUILD / {process.params_file!r})]"] if process.params_file else []),
         *([f"additional_env={{{_environment(process)}}}"] if process.env else []),
         "output='screen'",

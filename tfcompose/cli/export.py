@@ -18,7 +18,7 @@ from tfcompose.cli.output import write_all
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings, read_text
 from tfcompose.cli.up import PLAN, plan_in
 from tfcompose.diagnostic import RejectedError
-from tfcompose.emit.supervised import Machine
+from tfcompose.emit.supervised import Machine, started
 from tfcompose.plan import Plan
 from tfcompose.run.hosts import share_of
 
@@ -45,7 +45,7 @@ def arguments(parser: ArgumentParser) -> None:
         "-o", "--output", metavar="DIR",
         help="where to build FILE; the export is in a folder there; default: build/ROBOT, or PLAN's folder",
     )  # fmt: skip
-    parser.add_argument("--host", metavar="NAME", help="only this host's share; default: all processes")
+    parser.add_argument("--host", metavar="NAME", help="only this host's share; '': what has no host; default: all")
     parser.add_argument(
         "--at", metavar="DIR", help="systemd: where the plan's folder is on the robot; default: where it is here"
     )
@@ -73,7 +73,7 @@ def run(arguments: Namespace) -> int:
         file = built[0] / PLAN
     plan = plan_in(file)
     if isinstance(plan, Plan) and arguments.host is not None:
-        share = share_of(plan, arguments.host, "")
+        share = share_of(plan, arguments.host or None, "")
         if not isinstance(share, Plan):
             print_findings([share], sys.stderr)
             return 1
@@ -93,6 +93,8 @@ def _export(plan: Plan, file: Path, arguments: Namespace) -> int:
         complain(f"nothing was written to {folder}: {error.strerror}")
         return UNREADABLE
     sys.stdout.write(f"wrote {folder}: {', '.join(one.path for one in files)}\n")
+    if plan.host is None:
+        said += [f"{one.name} runs on {one.host}, and is here too: --host" for one in started(plan) if one.host]
     sys.stdout.writelines(f"not as tfcompose up: {line}\n" for line in said)
     return 0
 

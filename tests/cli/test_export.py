@@ -1,0 +1,65 @@
+"""``tfcompose export``: from a robot or a built plan to files for other launchers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.emit.test_exports import DRIVEN
+from tests.run.test_hosts import TWO
+from tfcompose.cli import main
+
+
+@pytest.fixture
+def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "robot.yaml").write_text(DRIVEN, "utf-8")
+    (tmp_path / "two.yaml").write_text(TWO, "utf-8")
+    return tmp_path
+
+
+@pytest.mark.parametrize("kind", ["systemd", "compose", "launch"])
+def test_a_robot_and_its_built_plan_give_the_same_export_and_the_build_stays_whole(robot: Path, kind: str) -> None:
+    assert main(["build"]) == 0
+    build = robot / "build" / "rover"
+    before = {file.relative_to(build): file.read_bytes() for file in build.rglob("*") if file.is_file()}
+    assert main(["export", kind, "build/rover/plan.json"]) == 0
+    from_plan = {file.name: file.read_bytes() for file in (build / kind).iterdir()}
+    assert main(["export", kind]) == 0
+    assert {file.name: file.read_bytes() for file in (build / kind).iterdir()} == from_plan
+    assert {name: (build / name).read_bytes() for name in before} == before
+    assert Path("params/drive.yaml") in before
+
+
+def test_a_hosts_share_is_exported_without_the_others(robot: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def services(*words: str) -> set[str]:
+        assert main(["export", "compose", "two.yaml", *words]) == 0
+        text = (robot / "build" / "rover" / "compose" / "compose.yaml").read_text("utf-8")
+        return set(yaml.safe_load(text)["services"])
+
+    assert services("--host", "jetson") == {"arm_drive", "guard"}
+    assert services("--host", "") == {"static", "drive", "guard"}
+    assert "and is here too" not in capsys.readouterr().out
+    assert services() == {"static", "drive", "arm_drive", "guard"}
+    assert "arm_drive runs on jetson, and is here too: --host" in capsys.readouterr().out
+    assert main(["export", "compose", "two.yaml", "--host", "jetsn"]) == 1
+    assert "did you mean jetson?" in capsys.readouterr().err
+
+
+def test_units_name_where_things_are_on_the_robot(robot: Path) -> None:
+    words = ["--at", "/opt/rover", "--python", "/usr/bin/python3", "--setup", "/opt/ros/jazzy/setup.bash"]
+    assert main(["export", "systemd", *words]) == 0
+    unit = (robot / "build" / "rover" / "systemd" / "rover-static.service").read_text("utf-8")
+    assert "/opt/ros/jazzy/setup.bash /usr/bin/python3 -m tfcompose.run.process /opt/rover/plan.json static\n" in unit
+    assert str(robot) not in unit
+    assert "Environment=" not in unit
+
+
+@pytest.mark.parametrize(
+    ("words", "code"), [(["nothere.yaml"], 2), (["nothere.json"], 2), (["plan.json", "--profile", "demo"], 2)]
+)
+def test_what_cannot_be_exported_writes_nothing(robot: Path, words: list[str], code: int) -> None:
+    assert main(["export", "launch", *words]) == code
+    assert not (robot / "build").exists()

@@ -57,6 +57,14 @@ def test_units_name_where_things_are_on_the_robot(robot: Path) -> None:
     assert "Environment=" not in unit
 
 
+def test_a_strict_plan_is_refused_because_nobody_would_fence_its_processes_off(
+    robot: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["export", "compose", "--set", "guard.mode=strict"]) == 1
+    assert "--set guard.mode=watch" in capsys.readouterr().err
+    assert not (robot / "build" / "rover" / "compose").exists()
+
+
 @pytest.mark.parametrize(
     ("words", "code"), [(["nothere.yaml"], 2), (["nothere.json"], 2), (["plan.json", "--profile", "demo"], 2)]
 )

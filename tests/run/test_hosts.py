@@ -102,6 +102,14 @@ def test_a_host_that_the_plan_does_not_know_is_a_finding(
     assert advice in found.help
 
 
+def test_strict_holds_back_on_one_machine_only_and_says_so() -> None:
+    """Two guards that pass on would each pass on what the other does."""
+    plan = compiled_plan(TWO + "guard: {mode: strict}\n")
+    found = share_of(plan, "jetson", "x")
+    assert isinstance(found, Diagnostic)
+    assert (found.code, found.help) == ("TF819", "watch on each: --guard watch, or guard: {mode: watch}")
+
+
 def test_a_share_is_written_and_read_and_has_a_place_of_its_own(tmp_path: Path) -> None:
     tmp_path.chmod(0o700)
     env = {"XDG_RUNTIME_DIR": str(tmp_path), "ROS_DOMAIN_ID": "7"}

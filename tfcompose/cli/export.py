@@ -78,6 +78,9 @@ def run(arguments: Namespace) -> int:
             print_findings([share], sys.stderr)
             return 1
         plan = share
+    if isinstance(plan, Plan) and plan.guard.mode == "strict":
+        complain("guard: strict needs tfcompose up, which fences its processes off: export with --set guard.mode=watch")
+        return 1
     return plan if isinstance(plan, int) else _export(plan, file, arguments)
 
 

@@ -85,13 +85,13 @@ def plan_in(file: Path) -> Plan | int:
 
 def as_asked(plan: Plan, arguments: Namespace) -> Plan | int:
     """Return this machine's share of the plan, with what the command line says about the guard; or an exit code."""
+    if arguments.guard:
+        plan = replace(plan, guard=replace(plan.guard, mode=arguments.guard))
     share = share_of(plan, arguments.host, os.uname().nodename)
     if not isinstance(share, Plan):
         print_findings([share], sys.stderr)
         return 1
     plan = share
-    if arguments.guard:
-        plan = replace(plan, guard=replace(plan.guard, mode=arguments.guard))
     if arguments.settle is None:
         return plan
     env = {"TFCOMPOSE_SETTLE_S": str(arguments.settle)}

@@ -46,6 +46,9 @@ def share_of(plan: Plan, asked: str | None, machine: str) -> Plan | Diagnostic:
         return finding("TF819", message, None, help=f"{did_you_mean(asked, hosts, known)}")
     if not hosts:
         return plan
+    if plan.guard.mode == "strict":
+        message = f"guard: strict holds back on one machine, and {plan.robot} runs on several: {', '.join(hosts)}"
+        return finding("TF819", message, None, help="watch on each: --guard watch, or guard: {mode: watch}")
     host = asked or next((name for name in (machine, machine.partition(".")[0]) if name in hosts), None)
     if host is None and not without_host(plan):
         message = f"this machine is {machine}, and every process of {plan.robot} runs on another: {', '.join(hosts)}"

@@ -275,3 +275,12 @@ def test_the_angle_between_two_orientations_is_scipys(
     angle = (Rotation.from_quat(expected).inv() * Rotation.from_quat(seen)).magnitude()
     assert offset_of(Pose(a, expected), Pose(b, scaled)).rot_rad == pytest.approx(angle, abs=1e-7)  # type: ignore[arg-type]
     assert offset_of(Pose(a, expected), Pose(b, seen)).xyz_m == pytest.approx(math.dist(a, b))
+
+
+def test_what_a_strict_guard_passes_on_is_its_owners(plan: Plan) -> None:
+    strict = replace(plan, processes=(*plan.processes, PlanProcess("guard", "guard", nodes=("/rover/guard",))))
+    tree = Tree()
+    for sent in tree.sent.values():
+        sent["node"] = "/rover/guard"
+    assert tree.told(strict) == []
+    assert {one.code for one in tree.told(plan)} == {"TF801"}

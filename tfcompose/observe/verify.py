@@ -99,7 +99,7 @@ class _Expectations:
         for one in rightly:
             yield from self._sent_rightly(edge, one)
             yield from self._value(edge, one)
-        owners = [one for one in rightly if not one.nodes or edge.node in one.nodes]
+        owners = [one for one in rightly if not one.nodes or self._is_owners(edge, one)]
         if owners:  # one that was started again is judged by what came last
             yield from self._times(
                 edge, max(owners, key=lambda one: (one.present is not False, one.strand.tally.last_ns))
@@ -118,6 +118,11 @@ class _Expectations:
             message = f"{one.name} was seen{who}, and nobody declared it"
             yield Verdict(one.name, None, (finding("TF803", message, None, help=advice, severity=severity),))
 
+    def _is_owners(self, edge: PlanEdge, one: EdgeSeen) -> bool:
+        """Whether the owner may have sent it: itself, or through a strict guard, which passes on what it owns."""
+        guards = (node for process in self.plan.processes if process.kind == "guard" for node in process.nodes)
+        return edge.node in one.nodes or any(node in one.nodes for node in guards)
+
     def _finding(self, code: str, edge: PlanEdge, message: str, advice: str = "") -> Diagnostic:
         place = self.places.get(edge.child)
         notes = [] if place else [Note(f"declared in {edge.source[0]}:{edge.source[1]}")]
@@ -135,7 +140,7 @@ class _Expectations:
         return self._finding("TF811", edge, message, advice)
 
     def _sent_rightly(self, edge: PlanEdge, one: EdgeSeen) -> Iterator[Diagnostic]:
-        if one.nodes and edge.node not in one.nodes:
+        if one.nodes and not self._is_owners(edge, one):
             message = f"{edge.name} is published by {one.publisher}; the owner is {edge.owner} ({edge.node})"
             ours = any(node in process.nodes for process in self.plan.processes for node in one.nodes)
             advice = f"end {one.publisher}, or switch its TF off"

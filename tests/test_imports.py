@@ -54,6 +54,7 @@ ONLY_IN: dict[str, set[str]] = {
     "tf2_msgs": {"ros"},
     "geometry_msgs": {"ros"},
     "sensor_msgs": {"ros"},
+    "nav_msgs": {"ros"},
     "lifecycle_msgs": {"ros"},
     "rcl_interfaces": {"ros"},
     "launch": {"run"},

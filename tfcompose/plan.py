@@ -203,6 +203,11 @@ class PlanProcess:
     drives: tuple[Driven, ...] = ()
     switches: dict[str, dict[str, str | int | float | bool]] = field(default_factory=dict)
 
+    @property
+    def topics(self) -> tuple[str, str]:
+        """The topics (moving, fixed) on which it publishes TF."""
+        return self.remap.get("/tf", "/tf"), self.remap.get("/tf_static", "/tf_static")
+
 
 @dataclass(frozen=True, slots=True)
 class RosSettings:

@@ -179,7 +179,7 @@ def test_a_node_of_an_isolated_plan_that_writes_the_global_topic_is_named(up: Ca
     robot = up(ISOLATED)
     robot.joins("/other_robot/drive", "odom base_link")
     robot.joins("/rover/drive", "odom base_link")
-    robot.says("error[TF827]", "/rover/drive writes the global /tf, and the plan keeps its own on /rover/tf")
+    robot.says("error[TF827]", "/rover/drive writes the global /tf, and its robot keeps its own on /rover/tf")
     said = robot.output.read_text(encoding="utf-8")
     assert ("/other_robot" in said, said.count("TF827")) == (False, 1)
 

@@ -717,8 +717,8 @@ def test_only_the_plans_own_nodes_leak_to_the_global_topic() -> None:
     events = [event for _ in range(3) for event in judge.leaks(writers, ("/rover/tf", "/rover/tf_static"))]
     said = [event.found.message for event in events if isinstance(event, Found)]
     assert said == [
-        "/rover/ekf writes the global /tf, and the plan keeps its own on /rover/tf",
-        "/rover/static writes the global /tf_static, and the plan keeps its own on /rover/tf_static",
+        "/rover/ekf writes the global /tf, and its robot keeps its own on /rover/tf",
+        "/rover/static writes the global /tf_static, and its robot keeps its own on /rover/tf_static",
     ]
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import inspect
 
 from tfcompose.check.check import RULES
+from tfcompose.check.live_pages import LIVE_PAGES
 
 
 def page(code: str) -> str:
@@ -332,6 +333,7 @@ frame is not there for any listener.""",
 
 verify compares what is fixed: millimetres and degrees beyond --tolerance are told. A build that is older than the file,
 another calibration, or a driver with values of its own are the usual reasons.""",
+    **LIVE_PAGES,
     "TF901": """ROS 2 is missing, or cannot be used.""",
     "TF902": """A plan cannot be used: it is not one, not whole, or of another version.
 

@@ -34,6 +34,7 @@ COMMANDS = {
     "wait": "wait until a running robot has ended, or is ready",
     "down": "stop a running robot",
     "echo": "the live pose of B in A",
+    "doctor": "what is wrong with the running tree, and what to do",
     "monitor": "who publishes each live edge, how often, how evenly and how late",
     "graph": "the tree as a picture: SVG, PDF, PNG, DOT or Mermaid",
     "verify": "what a robot file says, against what is published, live or in a bag",

@@ -26,16 +26,20 @@ LOOK_AGAIN_S = 0.02
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """One message: its transforms, whether it came on /tf_static, its publisher's id, and when it came."""
+    """One message: its transforms, whether it came on /tf_static, its publisher's id, and when it came.
+
+    ``sent_ns`` is when it was sent by the clock of its publisher's machine, 0 where that is not known.
+    """
 
     rows: tuple[Row, ...]
     static: bool
     gid: bytes | None
     received_ns: int
+    sent_ns: int = 0
 
 
 class Live:
-    """Listens to /tf and /tf_static, or those below a namespace, as long as its node lives.
+    """Listens to the topics of moving and of fixed edges, as long as its node lives.
 
     ``topics`` (moving, fixed) may be given instead. Where a simulator publishes /clock, stamps that are
     nearer to it than to the system's time are compared with it.
@@ -76,7 +80,8 @@ class Live:
                     self.census.take_malformed(received.gid)
                     continue
                 # Fast DDS tells when a message came; what waited here for its turn is not late.
-                heard.append(Heard(rows, static, received.gid, received.received_ns or now_ns))
+                came_ns = received.received_ns or now_ns
+                heard.append(Heard(rows, static, received.gid, came_ns, received.source_ns))
         for each in heard:
             clock_ns = _clock_of(each, sim_ns)
             self.census.take(

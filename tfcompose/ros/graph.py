@@ -82,3 +82,27 @@ def _full_name(namespace: str, name: str) -> str:
 def services(node: Node) -> list[str]:
     """Return the full names of the services that ``node`` has discovered until now, sorted."""
     return sorted(name for name, _ in node.get_service_names_and_types())
+
+
+def topics(node: Node) -> list[tuple[str, tuple[str, ...]]]:
+    """Return the full names of the topics that ``node`` has discovered until now, each with its types, sorted."""
+    return sorted((name, tuple(types)) for name, types in node.get_topic_names_and_types())
+
+
+def ends(node: Node, topic: str) -> list[tuple[str, str, bool]]:
+    """Return who publishes on a topic, and who listens: node, type, and whether it publishes; unnamed ones left out.
+
+    ``topic`` is a full name; the node's own ends are left out.
+    """
+    own = _full_name(node.get_namespace(), node.get_name())
+    infos = [(info, True) for info in node.get_publishers_info_by_topic(topic)]
+    infos += [(info, False) for info in node.get_subscriptions_info_by_topic(topic)]
+    named = [(_full_name(info.node_namespace, info.node_name), info.topic_type, sends) for info, sends in infos]
+    return sorted({one for one in named if one[0] not in {own, UNKNOWN_NODE}})
+
+
+def nodes(node: Node) -> list[str]:
+    """Return the full names of the other nodes that ``node`` has discovered until now, sorted."""
+    own = _full_name(node.get_namespace(), node.get_name())
+    names = {_full_name(namespace, name) for name, namespace in node.get_node_names_and_namespaces()}
+    return sorted(names - {own, UNKNOWN_NODE})

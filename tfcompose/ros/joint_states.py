@@ -16,13 +16,14 @@ if TYPE_CHECKING:
     from rclpy.node import Node
 
 TOPIC = "joint_states"
+JOINT_STATE_TYPE = "sensor_msgs/msg/JointState"
 
 
 class JointStateSubscription(Subscription):
-    """A subscription to ``joint_states``."""
+    """A subscription to ``joint_states``, or to another topic of its type."""
 
-    def __init__(self, node: Node) -> None:
-        super().__init__(node, JointState, TOPIC, JOINT_STATES)
+    def __init__(self, node: Node, topic: str = TOPIC) -> None:
+        super().__init__(node, JointState, topic, JOINT_STATES)
 
 
 class JointStatePublisher:

@@ -12,12 +12,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.ros.misfits import best_effort_writer, leak, volatile_writer
 from tfcompose.run.cases import Case, Cases, Start
 from tfcompose.run.events import Clear, Found, GuardEvent
 from tfcompose.run.health import EdgeHealth
 from tfcompose.run.law import Law, Sight
 from tfcompose.run.liveness import Liveness
-from tfcompose.run.offences import Offence, best_effort_writer, leak, violation, volatile_writer
+from tfcompose.run.offences import Offence, violation
 from tfcompose.run.senders import Message, Senders, Writer
 from tfcompose.run.sent_poses import SentPoses
 from tfcompose.run.stamps import Clocks, Stamps
@@ -123,7 +124,8 @@ class Judge:
             if writer.node is None:
                 continue
             if writer.static and writer.volatile:
-                events += self._once("TF806", writer, volatile_writer(writer.node, self.plan))
+                owned = [e.name for e in self.plan.edges if e.node == writer.node and e.kind == "static"]
+                events += self._once("TF806", writer, volatile_writer(writer.node, "/tf_static", owned))
             if writer.best_effort:
                 topic = "/tf_static" if writer.static else "/tf"
                 events += self._once("TF826", writer, best_effort_writer(writer.node, topic))

@@ -106,27 +106,6 @@ def taken(offences: Sequence[Offence], where: str = "") -> Diagnostic:
     return finding("TF807", message, None, help=advice, notes=notes)
 
 
-def best_effort_writer(node: str, topic: str) -> Diagnostic:
-    """Return the finding for a publisher that sends best effort, which no TF listener accepts."""
-    message = f"{node} writes {topic} best effort, so no listener receives it: they ask for reliable"
-    return finding("TF826", message, None, help="publish it reliable")
-
-
-def leak(node: str, topic: str, own: str) -> Diagnostic:
-    """Return the finding for a node of an isolated plan that writes a global TF topic."""
-    message = f"{node} writes the global {topic}, and the plan keeps its own on {own}"
-    advice = f"start it with the remapping {topic}:={own}, as tfcompose does with the processes that it starts"
-    return finding("TF827", message, None, help=advice)
-
-
-def volatile_writer(node: str, plan: Plan) -> Diagnostic:
-    """Return the finding for a publisher on /tf_static that no TF listener accepts."""
-    owned = [edge.name for edge in plan.edges if edge.node == node and edge.kind == "static"]
-    notes = [Note(f"it owns {', '.join(owned[:LISTED_AT_MOST])}")] if owned else []
-    message = f"{node} writes /tf_static with durability volatile, so no listener receives it"
-    return finding("TF806", message, None, notes=notes, help="publish it with durability transient_local, reliable")
-
-
 def _message(offences: Sequence[Offence]) -> str:
     first = offences[0]
     more = _more(offences)

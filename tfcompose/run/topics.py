@@ -8,12 +8,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from tfcompose.ros.topics import parts_of
 from tfcompose.run.events import Clear, Complete
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from tfcompose.plan import Plan, PlanEdge, PlanProcess
+    from tfcompose.plan import Plan, PlanProcess
     from tfcompose.run.events import GuardEvent
 
     Topics = tuple[str, str]
@@ -24,15 +25,9 @@ def plans_by_topics(plan: Plan, guard: PlanProcess) -> dict[Topics, Plan]:
 
     The guard's own topics are always among them.
     """
-    topics = {process.name: _topics(process) for process in plan.processes}
-    edges: dict[Topics, list[PlanEdge]] = {_topics(guard): []}
-    for edge in plan.edges:
-        edges.setdefault(topics[edge.owner], []).append(edge)
-    return {pair: replace(plan, edges=tuple(some)) for pair, some in edges.items()}
-
-
-def _topics(process: PlanProcess) -> Topics:
-    return (process.remap.get("/tf", "/tf"), process.remap.get("/tf_static", "/tf_static"))
+    parts = parts_of(plan)
+    own = parts.pop(guard.topics, None) or replace(plan, edges=())
+    return {guard.topics: own, **parts}
 
 
 def together(emit: Callable[[GuardEvent], None], plans: Sequence[Plan]) -> Callable[[GuardEvent], None]:

@@ -1,0 +1,248 @@
+"""The doctor's diagnoses over histories: what they say, and when they say nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tfcompose.observe.census import Census, Publisher
+from tfcompose.observe.diagnose import diagnose
+from tfcompose.observe.diagnose.surroundings import differences
+from tfcompose.observe.joint_list import joints_of
+from tfcompose.observe.seen import Seen, Stamped, Topic, seconds
+from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.pose import Pose
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+SECOND_NS = 1_000_000_000
+BEGUN_NS = 1_800_000_000 * SECOND_NS
+SECONDS = 5.0
+END_NS = BEGUN_NS + int(SECONDS * SECOND_NS)
+SENDERS = {b"d": "/drive", b"e": "/drive", b"s": "/static", b"x": "/ekf"}
+
+
+class History:
+    """What came in five seconds, from publishers that are named after their ids."""
+
+    def __init__(self) -> None:
+        self.census = Census()
+        self.census.graph([Publisher(gid, node, static=gid == b"s") for gid, node in SENDERS.items()])
+
+    def fixed(self, edge: str, gid: bytes = b"s", x: float = 0.0) -> History:
+        self.census.take([row(edge, 0, x)], static=True, gid=gid, received_ns=BEGUN_NS)
+        return self
+
+    def moving(
+        self,
+        edge: str,
+        gid: bytes = b"d",
+        hz: float = 50.0,
+        until_s: float = SECONDS,
+        stamp: Callable[[int], int] = lambda now: now,
+    ) -> History:
+        for tick in range(int(until_s * hz)):
+            now = BEGUN_NS + int(tick * SECOND_NS / hz)
+            self.census.take([row(edge, stamp(now))], static=False, gid=gid, received_ns=now)
+        return self
+
+    def seen(self, **more: Any) -> Seen:
+        publishers = tuple(self.census.publishers.values())
+        return Seen(SECONDS, edges=tuple(self.census.edges(END_NS)), publishers=publishers, **more)
+
+
+def row(edge: str, stamp_ns: int, x: float = 0.0) -> Any:
+    parent, child = edge.split()
+    return (parent, child, *divmod(stamp_ns, SECOND_NS), x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def robot() -> History:
+    return History().moving("odom base_link").fixed("base_link laser")
+
+
+def plan(*edges: PlanEdge, **more: Any) -> Plan:
+    owners = {"drive": "/drive", "static": "/static"}
+    processes = tuple(PlanProcess(name, "external", nodes=(node,)) for name, node in owners.items())
+    return Plan("rover", "0", "base_link", RosSettings(), edges or planned(), processes, **more)
+
+
+def planned() -> tuple[PlanEdge, ...]:
+    moving = PlanEdge("odom", "base_link", "dynamic", "drive", "/drive", Pose(), 50.0, ("rover.yaml", 7))
+    return moving, PlanEdge("base_link", "laser", "static", "static", "/static", Pose(), None, ("rover.yaml", 9))
+
+
+def messages(seen: Seen) -> dict[str, str]:
+    return {one.code: one.message for one in diagnose(seen)}
+
+
+def test_a_sound_robot_gives_no_finding_with_a_plan_or_without() -> None:
+    assert messages(robot().seen()) == {}
+    assert messages(robot().seen(plan=plan())) == {}
+
+
+def test_an_edge_that_comes_late_is_said_with_the_time_that_lookups_lack() -> None:
+    history = History().moving("odom base_link", stamp=lambda now: now - 7 * SECOND_NS // 10)
+    assert messages(history.seen()) == {
+        "TF833": "odom → base_link from /drive is stamped 700 ms ago when it comes",
+    }
+
+
+def test_a_machine_whose_clock_is_ahead_is_known_by_messages_that_come_before_they_were_sent() -> None:
+    seen = robot().seen(skews_s={b"d": 3.2})
+    assert messages(seen) == {"TF834": "the clock of /drive is 3.2 s ahead of this machine's"}
+    assert messages(replace(seen, skews_s={b"d": -0.4})) == {
+        "TF834": "what /drive sends arrives 400 ms after it was sent"
+    }
+    assert messages(replace(seen, skews_s={b"d": -0.2})) == {}
+
+
+def test_a_loop_is_told_once_and_not_as_two_parents_too() -> None:
+    history = robot().moving("map odom").moving("laser odom", b"x")
+    assert messages(history.seen()) == {
+        "TF820": "the frames base_link → laser → odom → base_link are a loop: tf2 finds no way through them"
+    }
+
+
+def test_edges_of_a_publisher_that_replaced_another_have_one_publisher() -> None:
+    """It was started anew: the first one had left."""
+    history = History().moving("odom base_link", until_s=2.0)
+    history.census.graph([Publisher(b"e", "/drive", static=False)])
+    for tick in range(100):
+        now = BEGUN_NS + 3 * SECOND_NS + tick * SECOND_NS // 50
+        history.census.take([row("odom base_link", now)], static=False, gid=b"e", received_ns=now)
+    assert messages(history.seen()) == {}
+
+
+def test_a_tree_whose_names_have_a_prefix_is_told_so() -> None:
+    found = diagnose(robot().fixed("robot1/base_link camera").seen())
+    assert [one.code for one in found] == ["TF830"]
+    assert "frame_prefix" in found[0].help
+
+
+def test_where_simulated_time_rules_the_one_with_system_time_is_named() -> None:
+    sim = robot().moving("map odom", b"x").seen(clock_ns=100 * SECOND_NS, clock_moves=True)
+    assert messages(sim) == {}, "a clock that nobody stamps with rules nothing"
+    history = History().fixed("base_link laser").moving("map odom", b"x", stamp=lambda now: now - BEGUN_NS)
+    history.moving("odom base_link").moving("base_link arm", b"x", stamp=lambda now: now - BEGUN_NS)
+    found = messages(history.seen(clock_ns=5 * SECOND_NS, clock_moves=True))
+    assert found == {"TF825": "/drive stamps odom → base_link with the system's time, and /clock says 5.0 s"}
+
+
+def test_data_that_no_edge_reaches_are_in_the_future_or_in_the_past_and_else_nothing_is_said() -> None:
+    def of(late_s: float, delay_s: float) -> dict[str, str]:
+        history = History().moving("odom base_link", stamp=lambda now: now - int(late_s * SECOND_NS))
+        data = Stamped("/scan", "base_link", ("/lidar",), (delay_s,) * 5)
+        return messages(history.seen(stamped=(data,)))
+
+    assert of(0.0, 0.1) == of(0.2, 0.0) == {}
+    assert of(0.4, 0.0) == {
+        "TF841": "/scan from /lidar is stamped 400 ms after the newest odom → base_link from /drive: "
+        "extrapolation into the future"
+    }
+    assert of(0.0, 11.0)["TF841"].endswith("extrapolation into the past")
+
+
+def test_a_scan_whose_clock_is_ahead_is_told_apart_from_an_edge_that_is_late() -> None:
+    data = Stamped("/scan", "base_link", ("/lidar",), (-1.0,) * 5)
+    found = diagnose(robot().seen(stamped=(data,)))
+    assert [one.code for one in found] == ["TF841"]
+    assert found[0].help.startswith("the clock behind /scan is 1 s ahead")
+
+
+@pytest.mark.parametrize(
+    ("history", "code", "text"),
+    [
+        (History().moving("odom base_link"), "TF811", "base_link → laser of static (/static) was not published"),
+        (
+            History().moving("odom base_link", b"x").fixed("base_link laser"),
+            "TF801",
+            "odom → base_link is published by /ekf; the owner is drive (/drive)",
+        ),
+        (
+            robot().moving("map base_link", b"x"),
+            "TF802",
+            "base_link has a second parent: /ekf publishes map → base_link, drive (/drive) odom → base_link",
+        ),
+        (
+            robot().moving("base_link arm", b"x"),
+            "TF803",
+            "base_link → arm is published by /ekf, and nobody declared it",
+        ),
+        (
+            History().moving("odom base_link", until_s=3.0).fixed("base_link laser"),
+            "TF804",
+            "odom → base_link: nothing for 2.02 s from drive (/drive)",
+        ),
+        (
+            History().moving("odom base_link", hz=20.0).fixed("base_link laser"),
+            "TF805",
+            "odom → base_link comes with 20 Hz from drive (/drive), declared are 50 Hz",
+        ),
+        (
+            History().moving("odom base_link").moving("base_link laser", b"s"),
+            "TF809",
+            "base_link → laser is published by its owner /static on /tf, declared for /tf_static",
+        ),
+        (
+            robot().moving("odom base_link", b"e"),
+            "TF801",
+            "odom → base_link is published by /drive and by another /drive",
+        ),
+    ],
+    ids=["missing", "foreign", "parent", "undeclared", "silent", "slow", "topic", "twice"],
+)
+def test_with_a_plan_what_differs_from_it_is_found(history: History, code: str, text: str) -> None:
+    assert messages(history.seen(plan=plan()))[code] == text
+
+
+def test_edges_that_a_plan_allows_or_that_are_another_robots_are_no_finding() -> None:
+    seen = robot().moving("base_link tag_1", b"x").seen(plan=plan(guard=GuardPolicy(allow=(("*", "tag_*"),))))
+    assert messages(seen) == {}
+
+
+def test_processes_with_other_settings_cannot_be_heard_and_why_is_said() -> None:
+    ours = {"ROS_DOMAIN_ID": "7"}
+    assert differences({"ROS_DOMAIN_ID": "7", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, ours) == ""
+    assert differences({}, ours) == "ROS_DOMAIN_ID=0, and here it is 7"
+    assert "OFF" in differences({**ours, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, ours)
+    assert differences({**ours, "RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}, ours) == "", "the default may be the same"
+    apart = differences({**ours, "RMW_IMPLEMENTATION": "a"}, {**ours, "RMW_IMPLEMENTATION": "b"})
+    assert apart == "RMW_IMPLEMENTATION=a, and here it is b"
+
+
+@pytest.mark.parametrize(
+    ("settings", "word"),
+    [
+        ({"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, "other machines are not heard"),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LAN"}, "is none of SUBNET"),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, "nobody is discovered"),
+    ],
+)
+def test_settings_that_cannot_be_meant_are_found(settings: dict[str, str], word: str) -> None:
+    assert word in messages(robot().seen(settings=settings))["TF909"]
+
+
+def test_a_leak_is_one_where_the_robot_has_topics_of_its_own() -> None:
+    tf = "tf2_msgs/msg/TFMessage"
+    both = (Topic("/robot1/tf", tf, ("/robot1/drive",)), Topic("/tf", tf, ("/robot1/ekf", "/drive")))
+    assert messages(robot().seen(graph=both)) == {
+        "TF827": "/robot1/ekf writes the global /tf, and its robot keeps its own on /robot1/tf"
+    }
+    assert messages(robot().seen(graph=both[1:])) == {}, "a namespace without topics of its own"
+
+
+def test_a_description_gives_its_moving_joints_and_nothing_where_it_is_none() -> None:
+    text = "<robot name='r'><link name='a'/><link name='b'/>"
+    text += "<joint name='j' type='revolute'><parent link='a'/><child link='b'/><mimic joint='k'/></joint>"
+    text += "<joint name='f' type='fixed'><parent link='a'/><child link='c'/></joint></robot>"
+    links, joints = joints_of(text)
+    assert links == {"a", "b"}
+    assert [(j.name, j.parent, j.child, j.mimic) for j in joints] == [("j", "a", "b", True)]
+    assert joints_of("<robot") == joints_of("<!DOCTYPE a [<!ENTITY b 'c'>]><robot/>") == (frozenset(), ())
+
+
+def test_times_are_said_as_people_say_them() -> None:
+    assert [seconds(value) for value in (0.12, 3.21, 7200, 864000)] == ["120 ms", "3.21 s", "2 h", "10 days"]

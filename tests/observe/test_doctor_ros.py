@@ -1,0 +1,542 @@
+"""``tfcompose doctor`` on the real thing: real nodes do what is wrong, and it says so."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from nav_msgs.msg import Odometry
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState, LaserScan
+from std_msgs.msg import String
+
+from tfcompose.ros.environment import FASTDDS_PROFILE
+from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.node import LATCHED, open_node, qos
+from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.typesupport import tf_message_type
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from typing import Protocol
+
+    class Started(Protocol):
+        """A process under test, as conftest starts it."""
+
+        output: str
+
+        def until_says(self, text: str) -> None: ...
+        def end(self, number: int = ...) -> tuple[int, float]: ...
+
+
+pytestmark = pytest.mark.ros
+
+GCC = shutil.which("gcc") or ""
+ROBOT = str(Path(__file__).parents[2] / "robots" / "autonomous_robot.yaml")
+
+SECOND_NS = 1_000_000_000
+IDENTITY = (0.0, 0.0, 0.0, 1.0)
+VOLATILE, RELIABLE = DurabilityPolicy.VOLATILE, ReliabilityPolicy.RELIABLE
+BEST_EFFORT = ReliabilityPolicy.BEST_EFFORT
+ARM = """<robot name="arm"><link name="base_link"/><link name="upper_arm"/><link name="hand"/>
+<joint name="shoulder" type="revolute"><parent link="base_link"/><child link="upper_arm"/></joint>
+<joint name="wrist" type="fixed"><parent link="upper_arm"/><child link="hand"/></joint></robot>"""
+
+
+class Stage:
+    """Nodes that publish, until the test is over."""
+
+    def __init__(self) -> None:
+        self._stack = ExitStack()
+        self._jobs: list[tuple[float, Callable[[int], None]]] = []
+        self._over = threading.Event()
+        self._threads: list[threading.Thread] = []
+
+    def node(self, name: str, namespace: str = "") -> Any:
+        return self._stack.enter_context(open_node(name, namespace))
+
+    def fixed(self, node: Any, *edges: str, topic: str = "/tf_static", x: float = 0.0) -> None:
+        self.keep(TFPublisher(node, static=True, topic=topic)).publish(message(0, edges, x))
+
+    def moving(
+        self,
+        node: Any,
+        *edges: str,
+        hz: float = 30.0,
+        stamp: Callable[[int], int] = lambda now: now,
+        topic: str = "/tf",
+        quat: tuple[float, float, float, float] = IDENTITY,
+    ) -> None:
+        publisher = self.keep(TFPublisher(node, static=False, topic=topic))
+        self.every(hz, lambda now: publisher.publish(message(stamp(now), edges, quat=quat)))
+
+    def odd(self, node: Any, *edges: str, topic: str, profile: Any) -> None:
+        """Publish with other settings than TF has."""
+        publisher = self.keep(node.create_publisher(tf_message_type(), topic, profile))
+        self.every(10, lambda now: publisher.publish(message(now, edges)))
+
+    def typed(self, node: Any, kind: Any, topic: str, make: Callable[[int], Any], hz: float = 20.0) -> None:
+        publisher = self.keep(node.create_publisher(kind, topic, 10))
+        self.every(hz, lambda now: publisher.publish(make(now)))
+
+    def every(self, hz: float, job: Callable[[int], None]) -> None:
+        def run() -> None:
+            while not self._over.wait(1 / hz):
+                job(time.time_ns())
+
+        self._threads.append(threading.Thread(target=run))
+        self._threads[-1].start()
+
+    def keep(self, thing: Any) -> Any:
+        self._stack.callback(lambda: thing)
+        return thing
+
+    def close(self) -> None:
+        self._over.set()
+        for thread in self._threads:
+            thread.join()
+        self._stack.close()
+
+
+def message(stamp_ns: int, edges: tuple[str, ...], x: float = 0.0, quat: Any = IDENTITY) -> bytes:
+    pairs = [edge.split() for edge in edges]
+    return encode([Transform(stamp_ns, parent, child, (x, 0.0, 0.0), quat) for parent, child in pairs])
+
+
+@pytest.fixture
+def stage(domain: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stage]:
+    assert domain.id
+    monkeypatch.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", str(FASTDDS_PROFILE))
+    stage = Stage()
+    yield stage
+    stage.close()
+
+
+def doctor(*words: str, seconds: float = 3.0) -> tuple[int, list[dict[str, Any]]]:
+    """Run it, and return the exit code and the findings."""
+    command = [sys.executable, "-m", "tfcompose", "doctor", "--for", str(seconds), "--format", "json", *words]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=40, check=False)
+    assert "Traceback" not in done.stderr, done.stderr
+    return done.returncode, json.loads(done.stdout)
+
+
+def said(found: list[dict[str, Any]], code: str) -> str:
+    """Return all that was said of that code."""
+    assert code in {one["code"] for one in found}, found
+    parts = [one for one in found if one["code"] == code]
+    return "\n".join(
+        "\n".join([one["message"], *(note["message"] for note in one["notes"]), one["help"]]) for one in parts
+    )
+
+
+def sound(stage: Stage) -> Any:
+    """A robot with nothing wrong."""
+    node = stage.node("drive")
+    stage.moving(node, "odom base_link")
+    stage.fixed(node, "base_link laser")
+    return node
+
+
+def scan(frame: str, late_s: float = 0.0) -> Callable[[int], LaserScan]:
+    def make(now: int) -> LaserScan:
+        scan = LaserScan()
+        scan.header.frame_id = frame
+        scan.header.stamp.sec, scan.header.stamp.nanosec = divmod(now - int(late_s * SECOND_NS), SECOND_NS)
+        return scan
+
+    return make
+
+
+def two_trees(stage: Stage) -> None:
+    sound(stage)
+    stage.fixed(stage.node("cam"), "base_lnk camera")
+
+
+def future_stamps(stage: Stage) -> None:
+    """The scan is stamped as it is measured, and odometry a second late."""
+    node = stage.node("drive")
+    stage.moving(node, "odom base_link", stamp=lambda now: now - SECOND_NS)
+    stage.fixed(node, "base_link laser")
+    stage.typed(stage.node("lidar"), LaserScan, "/scan", scan("laser"))
+
+
+def past_stamps(stage: Stage) -> None:
+    sound(stage)
+    stage.typed(stage.node("lidar"), LaserScan, "/scan", scan("laser", 12.0))
+
+
+def late(stage: Stage) -> None:
+    stage.moving(stage.node("drive"), "odom base_link", stamp=lambda now: now - 2 * SECOND_NS)
+
+
+def loop(stage: Stage) -> None:
+    sound(stage)
+    stage.moving(stage.node("wrong"), "base_link odom")
+
+
+def two_writers(stage: Stage) -> None:
+    sound(stage)
+    stage.moving(stage.node("ekf"), "odom base_link")
+
+
+def second_parent(stage: Stage) -> None:
+    sound(stage)
+    stage.moving(stage.node("slam"), "map base_link")
+
+
+def low_rate(stage: Stage) -> None:
+    node = stage.node("drive")
+    stage.moving(node, "odom base_link", hz=4)
+    stage.fixed(node, "base_link laser")
+
+
+def repeated(stage: Stage) -> None:
+    began = time.time_ns()
+    node = stage.node("drive")
+    stage.moving(node, "odom base_link", stamp=lambda _: began)
+
+
+def back(stage: Stage) -> None:
+    turns = iter(range(1_000_000))
+    stage.moving(stage.node("drive"), "odom base_link", stamp=lambda now: now - next(turns) % 2 * SECOND_NS // 4)
+
+
+def without_stamp(stage: Stage) -> None:
+    stage.moving(stage.node("drive"), "odom base_link", stamp=lambda _: 0)
+
+
+def other_clock(stage: Stage) -> None:
+    """One node stamps with simulated time, the other with the system's."""
+    sound(stage)
+    began = time.time_ns()
+    stage.moving(stage.node("gazebo"), "base_link wheel", stamp=lambda now: now - began)
+
+
+def ahead(stage: Stage) -> None:
+    stage.moving(stage.node("amcl"), "map odom", stamp=lambda now: now + 3 * SECOND_NS)
+
+
+def volatile(stage: Stage) -> None:
+    sound(stage)
+    stage.odd(stage.node("cam"), "base_link camera", topic="/tf_static", profile=qos(1, VOLATILE, RELIABLE))
+
+
+def best_effort(stage: Stage) -> None:
+    stage.fixed(stage.node("static"), "base_link laser")
+    stage.odd(stage.node("drive"), "odom base_link", topic="/tf", profile=qos(10, VOLATILE, BEST_EFFORT))
+
+
+def wrong_type(stage: Stage) -> None:
+    sound(stage)
+    stage.typed(stage.node("old"), String, "/tf", lambda _: String(data="a b"))
+
+
+def both_topics(stage: Stage) -> None:
+    sound(stage)
+    stage.fixed(stage.node("old"), "odom base_link")
+
+
+def leak(stage: Stage) -> None:
+    stage.moving(stage.node("drive", "robot1"), "odom base_link", topic="/robot1/tf")
+    stage.moving(stage.node("ekf", "robot1"), "map odom")
+
+
+def refused(stage: Stage) -> None:
+    sound(stage)
+    stage.moving(stage.node("arm"), "base_link arm", quat=(0.0, 0.0, 0.0, 0.9))
+
+
+def in_itself(stage: Stage) -> None:
+    sound(stage)
+    stage.moving(stage.node("arm"), "base_link base_link")
+
+
+def no_clock(stage: Stage) -> None:
+    sound(stage)
+    node = stage.node("nav")
+    stage.keep(node.create_subscription(Clock, "/clock", lambda _: None, 1))
+
+
+def clock_stands(stage: Stage) -> None:
+    no_clock(stage)
+    stage.typed(stage.node("sim"), Clock, "/clock", lambda _: Clock())
+
+
+def clocks(stage: Stage) -> None:
+    sound(stage)
+    for name in ("sim", "bag"):
+        stage.typed(stage.node(name), Clock, "/clock", clock)
+
+
+def clock(now: int) -> Clock:
+    made = Clock()
+    made.clock.sec, made.clock.nanosec = divmod(now, SECOND_NS)
+    return made
+
+
+def unknown_frame(stage: Stage) -> None:
+    sound(stage)
+    stage.typed(stage.node("lidar"), LaserScan, "/scan", scan("lasr"))
+
+
+def slash(stage: Stage) -> None:
+    sound(stage)
+    stage.typed(stage.node("lidar"), LaserScan, "/scan", scan("/laser"))
+
+
+def states_unheard(stage: Stage) -> None:
+    sound(stage)
+    stage.typed(
+        stage.node("broadcaster"), JointState, "/joint_states", lambda _: JointState(name=["a"], position=[0.0])
+    )
+
+
+def publisher_of_states(stage: Stage) -> Any:
+    """A robot state publisher, as it is seen from outside."""
+    node = sound(stage)
+    stage.keep(node.create_publisher(String, "/robot_description", LATCHED)).publish(String(data=ARM))
+    stage.keep(node.create_subscription(JointState, "/joint_states", lambda _: None, 1))
+    return node
+
+
+def misspelt_joint(stage: Stage) -> None:
+    publisher_of_states(stage)
+    stage.typed(
+        stage.node("broadcaster"), JointState, "/joint_states", lambda _: JointState(name=["sholder"], position=[0.0])
+    )
+
+
+def many_static(stage: Stage) -> None:
+    node = stage.node("many")
+    for number in range(101):
+        stage.fixed(node, f"base_link part_{number}")
+
+
+def gaps(stage: Stage) -> None:
+    node = stage.node("drive")
+    publisher = stage.keep(TFPublisher(node, static=False))
+    ticks = iter(range(1_000_000))
+
+    def tick(now: int) -> None:
+        if next(ticks) % 100 < 50:
+            publisher.publish(message(now, ("odom base_link",)))
+
+    stage.every(40, tick)
+
+
+SCENES: dict[Callable[[Stage], Any], tuple[str, list[str]]] = {
+    two_trees: ("TF830", ["base_lnk", "camera", "/cam", "base_link?"]),
+    future_stamps: ("TF841", ["/scan from /lidar is stamped", "odom → base_link from /drive", "into the future"]),
+    past_stamps: ("TF841", ["/scan from /lidar is stamped 12 s before odom → base_link", "into the past"]),
+    late: ("TF833", ["odom → base_link from /drive is stamped 2 s ago", "extrapolation into the future"]),
+    loop: ("TF820", ["base_link → odom → base_link", "/drive", "/wrong"]),
+    two_writers: ("TF822", ["odom → base_link is published by /drive and by /ekf", "same value", "Hz", "pid"]),
+    second_parent: ("TF802", ["base_link has 2 parents: map and odom", "/drive", "/slam"]),
+    low_rate: ("TF838", ["odom → base_link comes with", "/drive", "20 Hz"]),
+    repeated: ("TF823", ["/drive sends odom → base_link with the same stamp"]),
+    back: ("TF824", ["/drive stamps odom → base_link back in time"]),
+    without_stamp: ("TF825", ["/drive stamps odom → base_link without a stamp", "use_sim_time"]),
+    other_clock: ("TF825", ["/gazebo stamps base_link → wheel with", "simulated time"]),
+    ahead: ("TF835", ["/amcl stamps map → odom ", " s ahead of time"]),
+    volatile: ("TF806", ["/cam writes /tf_static with durability volatile"]),
+    best_effort: ("TF826", ["/drive writes /tf best effort"]),
+    wrong_type: ("TF832", ["/old publishes std_msgs/msg/String on /tf"]),
+    both_topics: ("TF809", ["base_link comes on /tf from /drive and on /tf_static from /old"]),
+    leak: ("TF827", ["/robot1/ekf writes the global /tf", "/robot1/tf"]),
+    refused: ("TF831", ["/arm publishes base_link → arm", "length 0.900"]),
+    in_itself: ("TF821", ["/arm publishes base_link → base_link"]),
+    no_clock: ("TF836", ["/nav uses simulated time, and nobody publishes /clock"]),
+    clock_stands: ("TF836", ["/clock from /sim stands at 0.000 s"]),
+    clocks: ("TF837", ["/bag and by /sim"]),
+    unknown_frame: ("TF840", ["/scan from /lidar is in the frame lasr", "did you mean laser?"]),
+    slash: ("TF840", ["begin with /", "frame_id to laser"]),
+    states_unheard: ("TF842", ["/broadcaster publishes /joint_states"]),
+    publisher_of_states: ("TF843", ["/drive waits for /joint_states", "base_link → upper_arm"]),
+    misspelt_joint: ("TF844", ["shoulder", "base_link → upper_arm", "/broadcaster"]),
+    many_static: ("TF309", ["101 publishers on /tf_static"]),
+    gaps: ("TF839", ["odom → base_link from /drive stayed away for 1."]),
+}
+
+
+@pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.__name__)
+def test_what_is_wrong_is_found_with_the_node_and_the_numbers(stage: Stage, scene: Callable[[Stage], Any]) -> None:
+    scene(stage)
+    expected, words = SCENES[scene]
+    code, found = doctor()
+    text = said(found, expected)
+    assert code == 1
+    for word in words:
+        assert word in text
+    assert {one["code"] for one in found} <= {expected, *ALSO.get(scene, set())}, found
+
+
+#: What else is found there, since it follows.
+ALSO: dict[Callable[[Stage], Any], set[str]] = {
+    future_stamps: {"TF833"},
+    both_topics: {"TF822"},
+    clocks: {"TF825"},
+    two_writers: {"TF824"},
+}
+
+
+def test_a_sound_robot_gives_no_finding_and_exit_code_0(stage: Stage) -> None:
+    sound(stage)
+    stage.typed(stage.node("lidar"), LaserScan, "/scan", scan("laser", 0.05))
+    stage.typed(stage.node("wheels"), Odometry, "/odometry", odometry)
+    assert doctor() == (0, [])
+
+
+def odometry(now: int) -> Odometry:
+    made = Odometry()
+    made.header.frame_id = "odom"
+    made.header.stamp.sec, made.header.stamp.nanosec = divmod(now, SECOND_NS)
+    return made
+
+
+def test_one_that_leaves_is_missed(stage: Stage, until: Callable[..., bool]) -> None:
+    sound(stage)
+    with ExitStack() as leave:
+        publisher = TFPublisher(leave.enter_context(open_node("arm", "")), static=False)
+        command = [sys.executable, "-m", "tfcompose", "doctor", "--for", "5", "--format", "json"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            assert until(publisher.publisher.get_subscription_count)
+            for _ in range(40):
+                publisher.publish(message(time.time_ns(), ("base_link arm",)))
+                time.sleep(0.02)
+            leave.close()
+            output, _ = process.communicate(timeout=30)
+    text = said(json.loads(output), "TF804")
+    assert "base_link → arm: nothing for" in text
+    assert "/arm, which has left" in text
+
+
+@pytest.mark.usefixtures("stage")
+def test_where_nothing_runs_it_says_with_which_settings_it_looked(domain: Any) -> None:
+    code, found = doctor(seconds=1.0)
+    text = said(found, "TF845")
+    assert code == 1
+    assert "no other node was seen" in text
+    assert f"ROS_DOMAIN_ID={domain.id}, ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST" in text
+
+
+def test_a_robot_below_a_namespace_is_pointed_at_and_then_looked_at(stage: Stage) -> None:
+    node = stage.node("drive", "robot1")
+    stage.moving(node, "odom base_link", topic="/robot1/tf")
+    stage.fixed(node, "base_link laser", topic="/robot1/tf_static")
+    _, found = doctor()
+    assert "tfcompose doctor --namespace /robot1" in said(found, "TF845")
+    assert doctor("--namespace", "robot1") == (0, [])
+
+
+FAR = """
+import time
+from tfcompose.ros.node import open_node
+with open_node("far", ""):
+    print("up", flush=True)
+    time.sleep(60)
+"""
+
+
+def test_a_robot_in_another_domain_is_seen_by_its_process(domain: Any) -> None:
+    """It runs on this machine, and it cannot be heard: the process says in which domain it was started."""
+    environment = {**domain.environment, "ROS_DOMAIN_ID": "101"}
+    command = [sys.executable, "-c", FAR]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        try:
+            assert process.stdout
+            assert process.stdout.readline() == "up\n"
+            _, found = doctor(seconds=1.0)
+        finally:
+            process.kill()
+    text = said(found, "TF908")
+    assert "ROS_DOMAIN_ID=101" in text
+    assert f"pid {process.pid}: " in text
+
+
+def test_discovery_that_is_switched_off_is_named(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    sound(stage)
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
+    _, found = doctor(seconds=1.0)
+    assert "ROS_AUTOMATIC_DISCOVERY_RANGE=OFF" in said(found, "TF909")
+    assert "TF845" in {one["code"] for one in found}
+
+
+SHIM = """
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <time.h>
+int clock_gettime(clockid_t id, struct timespec *now) {
+    static int (*real)(clockid_t, struct timespec *);
+    if (!real) real = (int (*)(clockid_t, struct timespec *))dlsym(RTLD_NEXT, "clock_gettime");
+    int code = real(id, now);
+    if (id == CLOCK_REALTIME) now->tv_sec += 3;
+    return code;
+}
+"""
+TALKER = """
+import time
+from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.node import open_node
+from tfcompose.ros.tf import TFPublisher
+with open_node("far", "") as node:
+    publisher = TFPublisher(node, static=False)
+    while True:
+        publisher.publish(encode([Transform(time.time_ns(), "odom", "base_link", (0.0,) * 3, (0.0, 0.0, 0.0, 1.0))]))
+        time.sleep(0.03)
+"""
+
+
+@pytest.mark.skipif(not GCC, reason="the clock of a process is set by a library that gcc makes")
+@pytest.mark.usefixtures("stage")
+def test_the_clock_of_another_machine_is_named_with_how_far_it_is_off(tmp_path: Path) -> None:
+    (tmp_path / "shim.c").write_text(SHIM, encoding="utf-8")
+    library = str(tmp_path / "shim.so")
+    subprocess.run([GCC, "-shared", "-fPIC", "-o", library, str(tmp_path / "shim.c"), "-ldl"], check=True)
+    environment = {**os.environ, "LD_PRELOAD": library}
+    with subprocess.Popen([sys.executable, "-c", TALKER], env=environment) as talker:
+        try:
+            _, found = doctor(seconds=5.0)
+        finally:
+            talker.kill()
+    text = said(found, "TF834")
+    assert "the clock of /far" in text
+    assert re.search(r"is (3|2\.9\d) s ahead of this machine's", text), text
+    assert {one["code"] for one in found} == {"TF834"}
+
+
+def test_a_robot_that_runs_as_planned_gives_no_finding_and_one_beside_its_plan_is_told_what_differs(
+    start: Callable[..., Started], stage: Stage
+) -> None:
+    """The example's stand-ins; without the profile the plan expects a camera's driver."""
+    up = start("tfcompose", "up", ROBOT, "--profile", "demo")
+    up.until_says("all ready")
+    assert doctor(ROBOT, "--profile", "demo", seconds=4.0) == (0, [])
+    assert doctor(seconds=4.0) == (0, [])
+    stage.fixed(stage.node("rogue"), "base_link laser_link", x=0.1)
+    code, found = doctor(ROBOT, seconds=4.0)
+    text = said(found, "TF801")
+    assert code == 1
+    assert "base_link → laser_link is published by /rogue; the owner is static (/tfcompose_static)" in text
+    assert "9 more edges are published by /tfcompose_static; the owner is camera (/camera/camera)" in text
+    up.end()
+
+
+@pytest.mark.usefixtures("stage")
+def test_ctrl_c_ends_the_look_and_says_what_was_found(start: Callable[..., Started]) -> None:
+    process = start("tfcompose", "doctor", "--for", "60")
+    time.sleep(2.0)
+    code, seconds = process.end(signal.SIGINT)
+    assert (code, seconds < 3.0) == (1, True)
+    assert "TF845" in process.output

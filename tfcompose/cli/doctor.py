@@ -1,0 +1,117 @@
+"""``tfcompose doctor``: what is wrong with the running tree, and what to do.
+
+Listen to the running system for some seconds and say what is wrong: trees that nothing connects, loops, two publishers
+of one edge, stamps that no lookup can bring together, low rates, frames that no listener can receive, a silent /clock,
+missing joint states, settings by which nothing is heard. Each finding names the node and the numbers. It needs no robot
+file; with one, or with a built plan, it knows also what is expected. Ctrl-C ends the look, and what was found is said.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.options import add_variant, positive
+from tfcompose.cli.terminal import UNREADABLE, complain, print_findings
+from tfcompose.diagnostic import finding
+from tfcompose.plan import RosSettings
+from tfcompose.ros.environment import RosError, child_environment, missing_ros
+from tfcompose.ros.stop import Stop
+from tfcompose.ros.topics import parts_of
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+
+    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.plan import Plan
+
+#: Publishers that were there before are found within this time, or almost always.
+SURE_S = 2.0
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("file", nargs="?", metavar="FILE|PLAN", help="what is expected; default: nothing is")
+    add_variant(parser)
+    parser.add_argument(
+        "--for", dest="duration", type=positive, default=5.0, metavar="S", help="look for S seconds; default: 5"
+    )
+    parser.add_argument("--namespace", metavar="NS", help="look at /NS/tf and /NS/tf_static")
+    parser.add_argument("--format", choices=("text", "json"), default="text", help="default: text")
+
+
+def run(arguments: Namespace) -> int:
+    """Look and print the findings; exit code 0 where nothing is wrong, 1 with findings, 2 for wrong use."""
+    missing = missing_ros()
+    if missing:
+        return _say([finding("TF901", missing, None)], arguments, "")
+    plan = _plan(arguments)
+    if isinstance(plan, int):
+        return plan
+    gc.enable()  # it may be asked to look for hours
+    os.environ.update(child_environment(os.environ, plan.ros if plan else RosSettings(), own=True))
+    with Stop() as stop:
+        module = import_module("tfcompose.observe.doctor")
+        try:
+            found = module.examine(_expected(plan, arguments.namespace), arguments.duration, stop)
+        except RosError as error:
+            return _say([finding("TF901", str(error), None)], arguments, "")
+    seen = f"{_counted(found.edges, 'edge')} from {_counted(found.nodes, 'node')}"
+    looked = f"looked for {found.seconds:.1f} s at {seen}"
+    code = _say(found.findings, arguments, looked)
+    if found.seconds < min(SURE_S, arguments.duration):
+        complain(f"looked for {found.seconds:.1f} s only, in which not every publisher is found")
+    return code
+
+
+def _say(found: list[Diagnostic], arguments: Namespace, looked: str) -> int:
+    """Print the findings and return the exit code."""
+    if arguments.format == "json":
+        sys.stdout.write(import_module("tfcompose.render.json").render_json(found))
+        return int(bool(found))
+    print_findings(found, sys.stdout)
+    if looked:
+        sys.stdout.write(f"{looked}: {_summary(found)}\n")
+    return int(bool(found))
+
+
+def _summary(found: list[Diagnostic]) -> str:
+    errors = sum(one.severity == "error" for one in found)
+    counts = ((errors, "error"), (len(found) - errors, "warning"))
+    return " and ".join(_counted(n, word) for n, word in counts if n) or "nothing is wrong"
+
+
+def _counted(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"
+
+
+def _plan(arguments: Namespace) -> Plan | int | None:
+    """Return the plan of the robot or the plan's file that was given, or the exit code after saying what is wrong."""
+    file = arguments.file
+    if file is None:
+        if arguments.profiles or arguments.overlays or arguments.settings:
+            complain("--profile, --overlay and --set are laid over a robot file: name one")
+            return UNREADABLE
+        return None
+    if file.endswith(".json"):
+        read: Plan | int = import_module("tfcompose.cli.up").plan_in(Path(file))
+        return read
+    robot = import_module("tfcompose.cli.compiling").robot_or_code(file, arguments)
+    if isinstance(robot, int):
+        return robot
+    plan: Plan = import_module("tfcompose.emit.plan").plan_of(robot)
+    return plan
+
+
+def _expected(plan: Plan | None, namespace: str | None) -> dict[tuple[str, str], Plan | None]:
+    """Return the topics to look at, each pair with the part of the plan that is expected there."""
+    prefix = f"/{namespace.strip('/')}" if namespace and namespace.strip("/") else ""
+    asked = (f"{prefix}/tf", f"{prefix}/tf_static")
+    if plan is None:
+        return {asked: None}
+    parts = parts_of(plan)
+    return {asked: parts.get(asked, plan)} if namespace is not None else dict(parts) or {asked: plan}

@@ -1,0 +1,98 @@
+"""Whether the tree serves the data that come with a frame and a stamp: scans, points, camera images."""
+
+from __future__ import annotations
+
+from statistics import median
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.observe.seen import listed, seconds, who
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.observe.census import EdgeSeen
+    from tfcompose.observe.seen import Seen, Stamped
+
+#: tf2's buffers keep 10 s.
+KEPT_S = 10.0
+#: Who waits for a transform rarely waits longer.
+LACK_S = 0.3
+#: A clock, or a driver, that is ahead by more.
+AHEAD_S = 0.05
+FEWEST = 3
+
+
+def data_frame_unknown(seen: Seen) -> Iterator[Diagnostic]:
+    """Data come in a frame that is not in the tree."""
+    frames = {frame for edge in seen.taken for frame in (edge.strand.parent, edge.strand.child)}
+    for each in seen.stamped:
+        if each.frame in frames or not frames:
+            continue
+        who_sends = listed(each.nodes) or "somebody"
+        if not each.frame:
+            message = f"{each.topic} from {who_sends} has no frame_id, so nobody can say where it was measured"
+            yield finding("TF840", message, None, help="set the driver's frame_id")
+            continue
+        message = f"{each.topic} from {who_sends} is in the frame {each.frame}, which nobody publishes"
+        plain = each.frame.removeprefix("/")
+        otherwise = f"set the driver's frame_id to a frame of the tree, or publish the edge that leads to {each.frame}"
+        advice = did_you_mean(each.frame, frames, otherwise)
+        if plain in frames:
+            message = f"{each.topic} from {who_sends} is in the frame {each.frame}: tf2 refuses names that begin with /"
+            advice = f"set the driver's frame_id to {plain}"
+        yield finding("TF840", message, None, help=advice)
+
+
+def data_beyond_tf(seen: Seen) -> Iterator[Diagnostic]:
+    """The stamps of data and of the tree do not meet: every lookup for them extrapolates."""
+    for each in seen.stamped:
+        if len(each.delays_s) < FEWEST:
+            continue
+        age_s = median(each.delays_s)
+        ways = [(_delay_s(edge), edge) for edge in _moving_above(seen, each.frame)]
+        sender = listed(each.nodes) or "somebody"
+        for late_s, edge in sorted(ways, key=lambda way: -way[0])[:1]:
+            lack_s = late_s - age_s
+            if lack_s > LACK_S:
+                message = f"{each.topic} from {sender} is stamped {seconds(lack_s)} after the newest {edge.name}"
+                message += f" from {who(edge)}"
+                yield finding("TF841", f"{message}: extrapolation into the future", None, help=_ahead_help(each, age_s))
+            elif -lack_s > KEPT_S:
+                message = (
+                    f"{each.topic} from {sender} is stamped {seconds(lack_s)} before {edge.name}, and tf2 keeps 10 s"
+                )
+                advice = (
+                    "stamp with the time of the measurement, by the same clock; or give listeners a longer cache_time"
+                )
+                yield finding("TF841", f"{message}: extrapolation into the past", None, help=advice)
+
+
+def _ahead_help(each: Stamped, age_s: float) -> str:
+    if age_s < -AHEAD_S:
+        return (
+            f"the clock behind {each.topic} is {seconds(age_s)} ahead: sync it, or let the driver stamp with ROS time"
+        )
+    advice = "the edge is late: stamp it with the time of the measurement and send at once"
+    return f"{advice}; listeners may wait, with a timeout"
+
+
+def _delay_s(edge: EdgeSeen) -> float:
+    return edge.timing.delay_s or 0.0
+
+
+def _moving_above(seen: Seen, frame: str) -> list[EdgeSeen]:
+    """Return the moving edges from a frame up to its root, of each frame the one that came last."""
+    newest: dict[str, EdgeSeen] = {}
+    for edge in seen.taken:
+        known = newest.get(edge.strand.child)
+        if known is None or known.age_s > edge.age_s:
+            newest[edge.strand.child] = edge
+    found: list[EdgeSeen] = []
+    passed: set[str] = set()
+    while frame in newest and frame not in passed:
+        passed.add(frame)
+        edge = newest[frame]
+        found += [] if edge.strand.static else [edge]
+        frame = edge.strand.parent
+    return found

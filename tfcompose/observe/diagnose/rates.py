@@ -1,0 +1,89 @@
+"""What is wrong with how often edges come."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.observe.seen import seconds, who
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.observe.census import EdgeSeen
+    from tfcompose.observe.seen import Seen
+
+#: Least rates in Hz of what navigation looks up for every scan and every control step (as for TF307), by frame names.
+LEAST = {("odom", "base_link"): 20.0, ("odom", "base_footprint"): 20.0, ("map", "odom"): 5.0}
+#: Any edge that others hang on.
+LEAST_INSIDE = 5.0
+#: So many messages say how often something comes.
+FEWEST = 3
+#: A gap that is longer by this factor than the others, and than so many seconds.
+GAP, GAP_S = 10.0, 1.0
+#: Of a low rate one is sure after so long.
+SURE_S = 1.0
+#: Somebody is silent after four of his periods, and this time at least.
+PERIODS, SILENT_S = 4.0, 0.6
+#: An edge comes slower than declared below this part of the declared rate.
+SLOW = 0.8
+
+
+def low_rate(seen: Seen) -> Iterator[Diagnostic]:
+    """An edge comes so seldom that lookups fail between two messages, and frames jump."""
+    inside = {edge.strand.parent for edge in seen.taken}
+    for edge in seen.moving:
+        rate, least = edge.timing.rate, least_of(edge, inside)
+        if edge.strand.child in seen.planned or rate is None or rate >= least or is_silent(edge):
+            continue
+        if edge.strand.tally.count < FEWEST and seen.seconds < 2 * SURE_S:
+            continue
+        often = f"{rate:.2g} Hz" if rate < least / 2 else f"{rate:.3g} Hz"
+        message = f"{edge.name} comes with {often} from {who(edge)}, and should with {least:g} Hz or more"
+        notes = [Note(f"between two messages, {seconds(1 / rate)}, lookups of now are extrapolation into the future")]
+        advice = "raise its rate: publish_rate, publish_frequency, frequency, transform_publish_period"
+        yield finding("TF838", message, None, severity="warning", notes=notes, help=advice)
+
+
+def gap(seen: Seen) -> Iterator[Diagnostic]:
+    """An edge comes often, and then not at all for a while."""
+    for edge in seen.moving:
+        rate, longest = edge.timing.rate, edge.timing.longest_gap_s
+        if (
+            rate is None
+            or longest is None
+            or longest < GAP_S
+            or longest * rate < GAP
+            or edge.strand.tally.count < FEWEST
+        ):
+            continue
+        message = f"{edge.name} from {who(edge)} stayed away for {seconds(longest)}, and comes with {rate:.3g} Hz else"
+        advice = "is its computer, or the network, overloaded? A node that blocks in a callback sends nothing meanwhile"
+        yield finding("TF839", message, None, severity="warning", help=advice)
+
+
+def fell_silent(seen: Seen) -> Iterator[Diagnostic]:
+    """An edge came, and does not come any more."""
+    alive = {(edge.strand.parent, edge.strand.child) for edge in seen.moving if not is_silent(edge)}
+    for edge in seen.moving:
+        if not is_silent(edge) or edge.strand.child in seen.planned or (edge.strand.parent, edge.strand.child) in alive:
+            continue
+        gone = ", which has left" if edge.present is False else ", which is still there"
+        message = f"{edge.name}: nothing for {seconds(edge.age_s)} from {who(edge)}{gone}"
+        advice = "start it again, and look why it ended" if edge.present is False else "what does it wait for?"
+        yield finding("TF804", message, None, help=advice)
+
+
+def least_of(edge: EdgeSeen, inside: set[str]) -> float:
+    """Return the least rate of an edge in hertz; 0 where any will do."""
+    strand = edge.strand
+    named = LEAST.get((strand.parent.rpartition("/")[2], strand.child.rpartition("/")[2]))
+    return named or (LEAST_INSIDE if strand.child in inside else 0.0)
+
+
+def is_silent(edge: EdgeSeen, rate: float | None = None) -> bool:
+    """Whether a moving edge that came often does not come any more."""
+    count, tally = edge.strand.tally.count, edge.strand.tally
+    span_s = (tally.last_ns - edge.strand.first_ns) / 1e9
+    period_s = 1 / rate if rate else span_s / (count - 1) if count >= FEWEST else float("inf")
+    return edge.age_s > max(SILENT_S, PERIODS * period_s)

@@ -1,0 +1,171 @@
+"""What is wrong with the tree's shape."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import Diagnostic, Note, finding, slip_of
+from tfcompose.observe.seen import listed, who
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.observe.census import EdgeSeen
+    from tfcompose.observe.seen import Seen
+
+
+def self_transform(seen: Seen) -> Iterator[Diagnostic]:
+    """A frame is published in itself."""
+    for edge in seen.edges:
+        if edge.strand.parent == edge.strand.child:
+            message = f"{who(edge)} publishes {edge.name}, a frame in itself, which tf2 drops"
+            advice = "give the node's child frame another name, or switch its TF off"
+            yield finding("TF821", message, None, severity="warning", help=advice)
+
+
+def refused_transform(seen: Seen) -> Iterator[Diagnostic]:
+    """Transforms come that no listener takes: a quaternion that is none, a NaN, an empty name."""
+    for edge in seen.edges:
+        strand = edge.strand
+        if strand.refused is None or strand.parent == strand.child:
+            continue
+        length = sum(part * part for part in strand.pose.quat_xyzw) ** 0.5
+        why = (
+            f"its quaternion has length {length:.3f}" if strand.refused.name == "DENORMALISED" else strand.refused.text
+        )
+        name = f"{strand.parent or '(no frame)'} → {strand.child or '(no frame)'}"
+        often = "" if strand.static else f" ({strand.refusals} of {strand.tally.count})"
+        message = f"{who(edge)} publishes {name}, which tf2 drops: {why}{often}"
+        yield finding(
+            "TF831", message, None, help="mend what the node computes it from; until then the frame is not there"
+        )
+
+
+def loop(seen: Seen) -> Iterator[Diagnostic]:
+    """Frames are each other's ancestors, so that tf2 finds no way through them."""
+    above = _above(seen)
+    for frames in _loops(above):
+        on_it = [edge for edge in seen.taken if _is_on(edge, frames)]
+        way = " → ".join((*frames, frames[0]))
+        message = f"the frames {way} are a loop: tf2 finds no way through them"
+        notes = [Note(f"{edge.name} is published by {who(edge)}") for edge in on_it]
+        elsewhere = [edge for edge in seen.taken if edge.strand.child in frames and edge.strand.parent not in frames]
+        notes += [Note(f"{edge.name}, which leads out of the loop, is published by {who(edge)}") for edge in elsewhere]
+        yield finding("TF820", message, None, notes=notes, help="end one of these nodes, or turn its edge round")
+
+
+def second_parent(seen: Seen) -> Iterator[Diagnostic]:
+    """A frame hangs on two parents; tf2 takes whichever came last."""
+    above, planned = _above(seen), seen.planned
+    in_loops = {frame for frames in _loops(above) for frame in frames}
+    for child, edges in above.items():
+        parents = sorted({edge.strand.parent for edge in edges})
+        if len(parents) < 2 or child in in_loops or child in planned:  # noqa: PLR2004 (two parents)
+            continue
+        message = f"{child} has {len(parents)} parents: {' and '.join(parents)}; tf2 takes whichever came last"
+        notes = [Note(_said(seen, edge)) for edge in edges]
+        advice = f"let one node publish {child}: end the other, or switch its TF off"
+        yield finding("TF802", message, None, notes=notes, help=advice)
+
+
+def two_trees(seen: Seen) -> Iterator[Diagnostic]:
+    """Frames are in trees that nothing connects."""
+    trees = trees_of(seen)
+    expected = {edge.parent for edge in seen.plan.edges} - seen.planned if seen.plan else frozenset()
+    if len(trees) < 2 or set(trees) <= expected:  # noqa: PLR2004 (one tree is right)
+        return
+    first, *others = trees
+    for root in others:
+        if trees[root] & trees[first]:
+            continue  # a frame with two parents connects them, and is a finding of its own
+        message = f"nothing connects {_tree(root, trees[root])} with {_tree(first, trees[first])}"
+        publishers = {who(edge): None for edge in seen.taken if edge.strand.child in trees[root]}
+        notes = [Note(f"{root} and what is below it is published by {listed(list(publishers))}")]
+        yield finding("TF830", message, None, notes=notes, help=_bridge(seen, root, trees[first], trees[root]))
+
+
+def trees_of(seen: Seen) -> dict[str, set[str]]:
+    """Return the frames of each tree by its root, the largest tree first; frames on loops have no root."""
+    below: dict[str, set[str]] = {}
+    for edge in seen.taken:
+        below.setdefault(edge.strand.parent, set()).add(edge.strand.child)
+    children = {edge.strand.child for edge in seen.taken}
+    trees = {}
+    for root in sorted(set(below) - children):
+        frames, waiting = {root}, [root]
+        while waiting:
+            new = below.get(waiting.pop(), set()) - frames
+            frames |= new
+            waiting += new
+        trees[root] = frames
+    return dict(sorted(trees.items(), key=lambda item: -len(item[1])))
+
+
+def _bridge(seen: Seen, root: str, main: set[str], own: set[str]) -> str:
+    """Return what would connect the tree below ``root`` with the main one."""
+    for edge in seen.plan.edges if seen.plan else ():
+        if (edge.parent in main) != (edge.child in main) and (edge.parent in own) != (edge.child in own):
+            return f"{edge.name} is missing: {edge.owner} ({edge.node}) should publish it"
+    for joint in seen.movable:
+        if {joint.parent, joint.child} & own and {joint.parent, joint.child} & main:
+            return f"{joint.parent} → {joint.child} is missing: the joint {joint.name} of robot_description moves it"
+    slip = slip_of(root, main)
+    if slip:
+        return f"is {root} meant to be {slip}? One of the two names is misspelt"
+    for name in sorted(main):
+        if root.rpartition("/")[2] == name.rpartition("/")[2]:
+            return f"is {root} meant to be {name}? One of the two has a frame_prefix too much or too little"
+    return f"publish the edge that leads to {root}; is the node that should do it running?"
+
+
+def _tree(root: str, frames: set[str]) -> str:
+    some = sorted(frames - {root})
+    return f"the tree below {root} ({listed(some)})"
+
+
+def _said(seen: Seen, edge: EdgeSeen) -> str:
+    where = seen.where(edge)
+    rate = f" at {edge.timing.rate:.3g} Hz" if edge.timing.rate and not edge.strand.static else ""
+    return f"{edge.name} is published by {who(edge)}{rate}{', ' if where else ''}{where}"
+
+
+def _above(seen: Seen) -> dict[str, list[EdgeSeen]]:
+    above: dict[str, list[EdgeSeen]] = {}
+    for edge in seen.taken:
+        if edge.strand.parent != edge.strand.child:
+            above.setdefault(edge.strand.child, []).append(edge)
+    return above
+
+
+def _is_on(edge: EdgeSeen, frames: tuple[str, ...]) -> bool:
+    pairs = zip(frames, (*frames[1:], frames[0]), strict=True)
+    return (edge.strand.parent, edge.strand.child) in set(pairs)
+
+
+def _loops(above: dict[str, list[EdgeSeen]]) -> list[tuple[str, ...]]:
+    """Return each loop once, from its first frame by name downwards; at most one for each edge that closes it."""
+    found: dict[frozenset[str], tuple[str, ...]] = {}
+    for start in sorted(above):
+        way = _way_up(above, start)
+        if way and frozenset(way) not in found:
+            first = way.index(min(way))
+            found[frozenset(way)] = (*way[first:], *way[:first])
+    return list(found.values())
+
+
+def _way_up(above: dict[str, list[EdgeSeen]], start: str) -> tuple[str, ...]:
+    """Return the frames from ``start`` down to it again, by the shortest way, or nothing."""
+    came_from: dict[str, str] = {}
+    waiting = [start]
+    for frame in waiting:
+        for edge in above.get(frame, ()):
+            parent = edge.strand.parent
+            if parent == start:
+                way = [frame]
+                while way[-1] != start:
+                    way.append(came_from[way[-1]])
+                return (start, *way[:-1])
+            if parent not in came_from:
+                came_from[parent] = frame
+                waiting.append(parent)
+    return ()

@@ -1,0 +1,158 @@
+"""Looks at the running system for a while, and says what is wrong with it."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from tfcompose.observe.census import SETTLE_S, Census
+from tfcompose.observe.diagnose import diagnose
+from tfcompose.observe.live import Live
+from tfcompose.observe.seen import GLOBAL, RosProcess, Seen, Topic
+from tfcompose.observe.sideline import Sideline
+from tfcompose.ros.clock import wall_ns
+from tfcompose.ros.graph import ends, nodes, topics
+from tfcompose.ros.node import open_node
+from tfcompose.ros.processes import ros_processes, settings_in
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.observe.live import Heard
+    from tfcompose.plan import Plan
+    from tfcompose.ros.stop import Stop
+
+    Topics = tuple[str, str]
+
+WAIT_S = 0.05
+LOOK_EVERY_S = 0.5
+#: Nodes of tools that look, as this one does, say nothing about the robot.
+TOOLS = ("/tfcompose_", "/_ros2cli_")
+#: What is looked at besides TF itself.
+INTERESTING = ("tf2_msgs/msg/TFMessage", "rosgraph_msgs/msg/Clock", "sensor_msgs/msg/JointState")
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What was found: the findings, and what was looked at: edges, publishing nodes, seconds."""
+
+    findings: list[Diagnostic]
+    edges: int
+    nodes: int
+    seconds: float
+
+
+def examine(expected: dict[Topics, Plan | None], seconds: float, stop: Stop) -> Found:
+    """Look at the topics (moving, fixed) for so many seconds, or until ``stop`` is requested, and judge.
+
+    Each pair of topics may have a plan that says what is expected on it.
+
+    Raises:
+        RosError: if ROS cannot start a node, or take messages.
+    """
+    begun = time.monotonic()
+    with open_node("tfcompose_doctor", "") as node:
+        ears = [_Ear(node, pair) for pair in expected]
+        graph: dict[str, Topic] = {}
+        due = begun
+        while not stop.requested and (now := time.monotonic()) < begun + seconds:
+            for ear in ears:
+                ear.hear(min(WAIT_S, begun + seconds - now), stop)
+            if now >= due:
+                due = now + LOOK_EVERY_S
+                graph |= graph_of(node)
+                for ear in ears:
+                    ear.sideline.look(graph.values(), _beside(ear, graph))
+        graph |= graph_of(node)  # the last word counts, but what was seen before is not forgotten
+        looked = time.monotonic() - begun
+        common = Seen(
+            looked,
+            nodes=tuple(name for name in nodes(node) if not name.startswith(TOOLS)),
+            graph=tuple(graph.values()),
+            settings=own_settings(),
+            processes=tuple(RosProcess(*one) for one in ros_processes()),
+        )
+        pictures = [replace(ear.picture(common), plan=plan) for ear, plan in zip(ears, expected.values(), strict=True)]
+    return _judged(pictures, looked)
+
+
+def _judged(pictures: list[Seen], seconds: float) -> Found:
+    findings = list(dict.fromkeys(one for seen in pictures for one in diagnose(seen)))
+    edges = {(edge.strand.parent, edge.strand.child) for seen in pictures for edge in seen.taken}
+    names = {name for seen in pictures for edge in seen.taken for name in edge.nodes}
+    return Found(sorted(findings, key=lambda one: one.severity), len(edges), len(names), seconds)
+
+
+@dataclass(slots=True)
+class _Ear:
+    """What is heard on one pair of topics."""
+
+    node: Node
+    topics: Topics
+    census: Census = field(default_factory=lambda: Census(0.0, SETTLE_S))
+    skews_s: dict[bytes, float] = field(default_factory=dict)
+    clocks: set[int] = field(default_factory=set)
+    live: Live = field(init=False)
+    sideline: Sideline = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.live = Live(self.node, self.census, topics=self.topics)
+        self.sideline = Sideline(self.node, self.topics[0].removesuffix("/tf"))
+
+    def hear(self, timeout_s: float, stop: Stop) -> None:
+        for heard in self.live.look(timeout_s, stop):
+            self._compare_clocks(heard)
+        clock_ns = self.live.clock_ns
+        if clock_ns is not None and len(self.clocks) < 2:  # noqa: PLR2004 (two times say that it moves)
+            self.clocks.add(clock_ns)
+        self.sideline.take(clock_ns)
+
+    def _compare_clocks(self, heard: Heard) -> None:
+        """Note by how much the sender's clock is ahead at least: a latched message may be old."""
+        if heard.gid is None or heard.static or not heard.sent_ns:
+            return
+        ahead_s = (heard.sent_ns - heard.received_ns) / 1e9
+        self.skews_s[heard.gid] = max(ahead_s, self.skews_s.get(heard.gid, ahead_s))
+
+    def picture(self, common: Seen) -> Seen:
+        return replace(
+            common,
+            topics=self.topics,
+            edges=tuple(self.census.edges(wall_ns())),
+            publishers=tuple(self.live.publishers()),
+            clock_ns=self.live.clock_ns,
+            clock_moves=len(self.clocks) > 1,
+            skews_s=self.skews_s,
+            **self.sideline.picture(),
+        )
+
+
+def graph_of(node: Node) -> dict[str, Topic]:
+    """Return the topics that say something about TF, with the nodes at their ends, by name."""
+    found = {}
+    for name, types in topics(node):
+        if name not in GLOBAL and not set(types) & {*INTERESTING, *Sideline.TYPES}:
+            continue
+        both = [end for end in ends(node, name) if not end[0].startswith(TOOLS)]
+        for kind in types:
+            senders = tuple(dict.fromkeys(who for who, type_, sends in both if sends and type_ == kind))
+            readers = tuple(dict.fromkeys(who for who, type_, sends in both if not sends and type_ == kind))
+            if senders or readers:
+                found[f"{name} {kind}"] = Topic(name, kind, senders, readers)
+    return found
+
+
+def _beside(ear: _Ear, graph: dict[str, Topic]) -> tuple[str, ...]:
+    """Return the namespaces, below this one, of robots that have TF topics of their own."""
+    names = {
+        topic.name.removesuffix("/tf") for topic in graph.values() if topic.name.endswith("/tf") and topic.publishers
+    }
+    return tuple(name for name in names if name and name != ear.topics[0].removesuffix("/tf"))
+
+
+def own_settings() -> dict[str, str]:
+    """Return ROS's variables in this process's environment."""
+    return settings_in(b"\0".join(f"{name}={value}".encode() for name, value in os.environ.items()))

@@ -165,8 +165,6 @@ CODES = {
     "TF827": "isolation_leak",
     "TF828": "driver_pose_differs",
     "TF829": "switch_not_taken",
-    "TF831": "refused_transform",
-    "TF846": "wrong_live_pose",
     "TF830": "two_trees",
     "TF831": "refused_transform",
     "TF832": "wrong_type_on_tf",
@@ -183,6 +181,7 @@ CODES = {
     "TF843": "no_joint_states",
     "TF844": "joint_without_state",
     "TF845": "no_tf",
+    "TF846": "wrong_live_pose",
     # the environment
     "TF901": "no_ros",
     "TF902": "bad_plan",

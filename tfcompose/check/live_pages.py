@@ -8,10 +8,6 @@ LIVE_PAGES = {
 Every lookup between the two fails with "could not find a connection between", or "two or more unconnected trees". An
 edge is missing: its publisher does not run, its name is misspelt, or one of the trees has a frame_prefix that the other
 does not have. tfcompose tree --live shows both.""",
-    "TF831": """A transform comes that every listener drops.
-
-A quaternion is not of length 1 (within 0.5 %), a value is not finite, or a frame's name is empty. The frame is not in
-the tree, and tf2 writes an error for each message. Normalise the quaternion; (0, 0, 0, 0) is one that nobody set.""",
     "TF832": """Something else than transforms is published on a topic of TF.
 
 ROS does not connect publishers and listeners of different types: nobody receives it. Often it is a bag of ROS 1 that

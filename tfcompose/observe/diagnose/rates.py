@@ -34,7 +34,7 @@ def low_rate(seen: Seen) -> Iterator[Diagnostic]:
     inside = {edge.strand.parent for edge in seen.taken}
     for edge in seen.moving:
         rate, least = edge.timing.rate, least_of(edge, inside)
-        if edge.strand.child in seen.planned or rate is None or rate >= least or is_silent(edge):
+        if edge.strand.child in seen.planned or rate is None or rate >= least or is_silent(edge) or _has_gap(edge):
             continue
         if edge.strand.tally.count < FEWEST and seen.seconds < 2 * SURE_S:
             continue
@@ -48,15 +48,9 @@ def low_rate(seen: Seen) -> Iterator[Diagnostic]:
 def gap(seen: Seen) -> Iterator[Diagnostic]:
     """An edge comes often, and then not at all for a while."""
     for edge in seen.moving:
-        rate, longest = edge.timing.rate, edge.timing.longest_gap_s
-        if (
-            rate is None
-            or longest is None
-            or longest < GAP_S
-            or longest * rate < GAP
-            or edge.strand.tally.count < FEWEST
-        ):
+        if not _has_gap(edge):
             continue
+        rate, longest = edge.timing.rate or 0.0, edge.timing.longest_gap_s or 0.0
         message = f"{edge.name} from {who(edge)} stayed away for {seconds(longest)}, and comes with {rate:.3g} Hz else"
         advice = "is its computer, or the network, overloaded? A node that blocks in a callback sends nothing meanwhile"
         yield finding("TF839", message, None, severity="warning", help=advice)
@@ -87,3 +81,10 @@ def is_silent(edge: EdgeSeen, rate: float | None = None) -> bool:
     span_s = (tally.last_ns - edge.strand.first_ns) / 1e9
     period_s = 1 / rate if rate else span_s / (count - 1) if count >= FEWEST else float("inf")
     return edge.age_s > max(SILENT_S, PERIODS * period_s)
+
+
+def _has_gap(edge: EdgeSeen) -> bool:
+    rate, longest = edge.timing.rate, edge.timing.longest_gap_s
+    if rate is None or longest is None or edge.strand.tally.count < FEWEST:
+        return False
+    return longest >= GAP_S and longest * rate >= GAP

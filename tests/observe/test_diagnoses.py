@@ -107,12 +107,16 @@ def test_a_loop_is_told_once_and_not_as_two_parents_too() -> None:
 
 
 def test_edges_of_a_publisher_that_replaced_another_have_one_publisher() -> None:
-    """It was started anew: the first one had left."""
-    history = History().moving("odom base_link", until_s=2.0)
-    history.census.graph([Publisher(b"e", "/drive", static=False)])
+    """It was started anew, and the graph shows the killed one for some seconds still; fixed edges hold on."""
+    history = History().moving("odom base_link", until_s=2.0).fixed("base_link laser")
     for tick in range(100):
         now = BEGUN_NS + 3 * SECOND_NS + tick * SECOND_NS // 50
         history.census.take([row("odom base_link", now)], static=False, gid=b"e", received_ns=now)
+    assert messages(history.seen()) == {}
+    history.fixed("base_link laser", b"t")
+    history.census.graph([Publisher(gid, "/static", static=True) for gid in (b"s", b"t")])
+    assert set(messages(history.seen())) == {"TF822"}
+    history.census.graph([Publisher(b"e", "/drive", static=False), Publisher(b"t", "/static", static=True)])
     assert messages(history.seen()) == {}
 
 

@@ -1,7 +1,8 @@
 """``tfcompose graph``: the tree as a picture.
 
 Draw the tree: frames coloured by owner, fixed and moving edges, sensors in frames of their own. The ending of the file
-says how: .svg, .pdf, .png, .dot (Graphviz) or .mmd (Mermaid).
+says how: .svg, .pdf, .png, .dot (Graphviz) or .mmd (Mermaid). With --live or --bag it is the published tree, coloured
+by publisher; second parents and loops are drawn as they are.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.compiling import robot_or_code
+from tfcompose.cli.looking import add_for
 from tfcompose.cli.options import add_file, add_variant
 from tfcompose.cli.terminal import UNREADABLE, complain
 from tfcompose.emit.final import with_final_names
@@ -38,6 +40,10 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "-o", "--output", default="tree.svg", metavar="PICTURE", help=f"a file that ends in {NAMED}; default: tree.svg"
     )
+    parser.add_argument("--live", action="store_true", help="the tree that is published now, not FILE")
+    parser.add_argument("--bag", metavar="BAG", help="the tree of a recording: a rosbag2 folder, .mcap or .db3")
+    add_for(parser, "with --live: look so long; default: 3", 3.0)
+    parser.add_argument("--namespace", default="", metavar="NS", help="/NS/tf and /NS/tf_static instead")
     parser.add_argument("--poses", action="store_true", help="write each frame's pose in its parent, in m and degrees")
 
 
@@ -48,16 +54,25 @@ def run(arguments: Namespace) -> int:
     if refused:
         complain(refused)
         return UNREADABLE
-    robot = robot_or_code(arguments.file, arguments)
-    if isinstance(robot, int):
-        return robot
+    graph = _graph(arguments)
+    if isinstance(graph, int):
+        return graph
     try:
-        _write(path, picture(graph_of(with_final_names(robot), poses=arguments.poses), path.suffix.lower()))
+        _write(path, picture(graph, path.suffix.lower()))
     except OSError as error:
         complain(f"{path} was not written: {error.strerror}")
         return UNREADABLE
     sys.stdout.write(f"wrote {path}\n")
     return 0
+
+
+def _graph(arguments: Namespace) -> Graph | int:
+    """Return what is to be drawn, or the exit code after saying what is wrong."""
+    if arguments.live or arguments.bag:
+        published: Graph | int = import_module("tfcompose.cli.live_graph").seen(arguments)
+        return published
+    robot = robot_or_code(arguments.file, arguments)
+    return robot if isinstance(robot, int) else graph_of(with_final_names(robot), poses=arguments.poses)
 
 
 def _refused(path: Path) -> str:

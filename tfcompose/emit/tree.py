@@ -9,6 +9,7 @@ from tfcompose.emit.numbers import clean_rpy, clean_xyz, number
 
 if TYPE_CHECKING:
     from tfcompose.model import Edge, Robot
+    from tfcompose.pose import Pose
 
 
 def tree(robot: Robot) -> str:
@@ -50,11 +51,16 @@ def _switched(edge: Edge) -> str:
 
 def pose_text(edge: Edge) -> str:
     """Return position and rotation of an edge, as far as they are not zero."""
+    return pose_words(edge.pose)
+
+
+def pose_words(pose: Pose) -> str:
+    """Return position in metres and rotation (rpy) in degrees, as far as they are not zero."""
     parts = []
-    xyz = clean_xyz(edge.pose.xyz)
+    xyz = clean_xyz(pose.xyz)
     if any(xyz):
         parts.append(f"xyz {' '.join(number(round(value, 6)) for value in xyz)}")
-    rpy = clean_rpy(edge.pose.quat_xyzw)
+    rpy = clean_rpy(pose.quat_xyzw)
     if any(rpy):
         parts.append(f"rpy {' '.join(number(round(math.degrees(value), 4)) for value in rpy)} deg")
     return "  ".join(parts)

@@ -53,10 +53,10 @@ PYTHON = ("${python}", "-I", "-S", "-c")
 SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); print('up', flush=True); time.sleep(60)"
 FLOOD = """
 import os, time
-data, end, count = b"a line of sixty-three characters, which says nothing worth a word\\n" * 1000, time.time() + 3, 0
-while time.time() < end:
+data, count = b"a line of sixty-three characters, which says nothing worth a word\\n" * 1000, 0
+while count < 200_000_000:
     count += os.write(1, data)
-open("flooded", "w").write(str(count / 3))
+open("flooded", "w").write(str(count))
 time.sleep(60)
 """
 #: A daemon: its child leaves the group and the session, heeds no signal, and goes on when it has ended.
@@ -135,16 +135,14 @@ def test_a_flood_blocks_neither_its_writer_nor_anybody_else_and_takes_little_mem
 ) -> None:
     run = launch(program("flood", FLOOD), program("calm", SLEEPER))
     until(run.is_up)
-    slowest = 0.0
+    slowest, end = 0.0, time.monotonic() + 100
     while not (tmp_path / "flooded").exists():
+        assert time.monotonic() < end
         began = time.monotonic()
         run.ps()
         slowest = max(slowest, time.monotonic() - began)
         time.sleep(0.05)
-    until((tmp_path / "flooded").read_text)
-    assert (
-        float((tmp_path / "flooded").read_text()) > 30e6
-    )  # a log takes 1 MB a second; on a free machine it is far more
+    # A log takes 1 MB a second: who waited for it would have needed minutes.
     assert psutil.Process(run.popen.pid).memory_info().rss < 80e6
     assert slowest < 5  # it answers; how fast depends on who else uses the machine
     assert sum(file.stat().st_size for file in (tmp_path / "log").iterdir()) < 30e6

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.terminal import UNREADABLE, complain
 from tfcompose.planfile import write_plan
+from tfcompose.run.addresses import with_whole_addresses
 from tfcompose.run.leftovers import leftovers
 
 if TYPE_CHECKING:
@@ -22,13 +23,17 @@ PLAN = "plan.json"
 def kept(plan: Plan, file: Path, place: Place, *, alone: bool) -> Path | int:
     """Copy the plan, and what stands beside it, to where the run is; return the copy, or an exit code with a complaint.
 
-    A build then does not reach into a run. ``alone`` removes the copies of earlier runs.
+    A build then does not reach into a run. Meshes stay where they are: descriptions address them from the copy too.
+    ``alone`` removes the copies of earlier runs.
     """
     parts = {PLAN: write_plan(plan).encode()}
+    descriptions = {plan.description, *(one.description for one in plan.processes if one.description is not None)}
     try:
-        for name in (plan.description, *(process.params_file for process in plan.processes)):
+        for name in (*descriptions, *(process.params_file for process in plan.processes)):
             if name is not None and (file.parent / name).is_file():
                 parts[name] = (file.parent / name).read_bytes()
+        for name in descriptions & parts.keys():
+            parts[name] = _addressed(parts[name], (file.parent / name).parent)
         digest = hashlib.sha256(repr(sorted(parts.items())).encode()).hexdigest()[:16]
         folder = place.folder / f"plan-{digest}"
         if alone:
@@ -41,6 +46,14 @@ def kept(plan: Plan, file: Path, place: Place, *, alone: bool) -> Path | int:
         complain(f"the plan cannot be copied to {place.folder}: {error.strerror}")
         return UNREADABLE
     return folder / PLAN
+
+
+def _addressed(urdf: bytes, folder: Path) -> bytes:
+    """Return a description with whole addresses; bytes that are no text stay, for their reader to refuse."""
+    try:
+        return with_whole_addresses(urdf.decode("utf-8"), folder).encode()
+    except UnicodeDecodeError:
+        return urdf
 
 
 def left_behind(place: Place, run_id: str) -> list[str]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.check import apply, check, levelled, unknown_rules, with_edits, with_replaced
-from tfcompose.diagnostic import Allow, Diagnostic, Note, RejectedError
+from tfcompose.diagnostic import Allow, Diagnostic, RejectedError
 from tfcompose.frozen import dataclass
 from tfcompose.load import Source, composed, load, with_includes
 from tfcompose.resolve import Disk, Library, resolve
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from tfcompose.model import Robot
+    from tfcompose.resolve.whole import Whole
     from tfcompose.validate import Validated
 
 #: Findings that follow from a pose. In an entry whose pose was refused they say nothing new.
@@ -82,7 +83,7 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     except RejectedError as error:
         return Compiled(None, error.diagnostics)
     resolved = resolve(validated, library, read, disk)
-    later = [*resolved.found, *_about_parts(check(resolved.robot), resolved.whole.foreign)]
+    later = [*resolved.found, *_about_parts(check(resolved.robot), resolved.whole)]
     source = validated.source
     plain = not (profiles or overlays)
     found = [*validated.found, *(one for one in later if _stands(one, validated) and (plain or one.code not in _IDLE))]
@@ -94,20 +95,20 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     return Compiled(resolved.robot, tuple(ordered), source.allows, frozenset(used), source)
 
 
-def _about_parts(found: list[Diagnostic], files: dict[str, Note]) -> list[Diagnostic]:
-    """Return the findings; those about files of parts that somebody else wrote with a note that says which part it is.
+def _about_parts(found: list[Diagnostic], whole: Whole) -> list[Diagnostic]:
+    """Return the findings; those about the files of parts with a note that says which part it is.
 
-    Warnings about such files are left out: who holds the part cannot mend them, and ``lint`` of the file says them.
+    Warnings about files that somebody else wrote are left out: who holds the part cannot mend them, and ``lint`` of
+    the file says them.
     """
-    if not files:
+    if not (whole.foreign or whole.own):
         return found
     said = []
     for one in found:
-        note = files.get(one.span.file) if one.span else None
-        if note is None:
-            said.append(one)
-        elif one.severity == "error":
-            said.append(replace(one, notes=(*one.notes, note)))
+        file = one.span.file if one.span else ""
+        notes = [whole.foreign[file]] if file in whole.foreign else whole.own.get(file, [])
+        if file not in whole.foreign or one.severity == "error":
+            said.append(replace(one, notes=(*one.notes, *notes)))
     return said
 
 

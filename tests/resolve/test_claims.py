@@ -222,3 +222,27 @@ FACTS: dict[str, dict[str, Any]] = {
 def test_the_frames_parameters_and_their_defaults_are_the_vendors(name: str) -> None:
     roles = node_preset(name).frames.values()
     assert {role.parameter: role.default for role in roles if role.parameter} == FACTS[name]
+
+
+def test_a_switch_that_the_user_sets_otherwise_is_not_written_over_in_silence() -> None:
+    text = (
+        "tfcompose: 1\nrobot: r\nframes: {odom: {}, base_link: {parent: odom, owner: ekf}}\nprocesses:\n"
+        "  ekf: {external: true}\n  drive:\n    run: RUN\n    params: {tf: true}\n"
+        "    publishes: [{parent: odom, child: base_link, off: {tf: false}}]\n"
+    )
+    found = compile_robot(text.replace("RUN", "{package: p, executable: e}"), "r.yaml", library()).found
+    assert [(one.code, one.message) for one in found] == [
+        ("TF333", "tf of drive is True, and ekf owns odom → base_link"),
+    ]
+
+
+def test_a_switch_is_a_parameter_for_a_command_that_takes_the_file() -> None:
+    text = (
+        "tfcompose: 1\nrobot: r\nframes: {odom: {}, base_link: {parent: odom, owner: ekf}}\nprocesses:\n"
+        "  ekf: {external: true}\n  drive: {run: [mine, '${params_file}'], "
+        "publishes: [{parent: odom, child: base_link, off: {tf: false}}]}\n"
+    )
+    compiled = compile_robot(text, "r.yaml", library())
+    assert not compiled.found
+    assert compiled.robot
+    assert {file.path: file.text for file in emit(compiled.robot)}["params/drive.yaml"].endswith('"tf": false\n')

@@ -306,6 +306,22 @@ def test_a_fault_in_the_parts_file_is_said_there_and_names_the_part() -> None:
     assert [note.message for note in found.notes][-1] == "as the part one"
 
 
+def test_a_finding_of_a_rule_about_the_parts_file_names_the_parts() -> None:
+    rover = ROVER.replace("wheel_link: {}", "wheel_lnk: {}")
+    found = next(one for one in compiled(FLEET, **{"robots/rover_yaml": rover}).found if one.code == "TF203")
+    assert [note.message for note in found.notes if note.message.startswith("as the part")] == [
+        "as the part one",
+        "as the part two",
+    ]
+
+
+def test_the_owner_of_a_part_that_is_carried_about_owns_its_mount() -> None:
+    text = CELL.replace("parent: table, EXTRA", "parent: [table, rack], owner: robot")
+    text += "frames: {rack: {parent: table, xyz: [1, 0, 0]}}\nprocesses: {robot: {external: true}}\n"
+    edge = sound(text).parent_edge("left_foot")
+    assert (edge.parent, edge.switched, edge.owner) == ("table", ("rack",), "robot")
+
+
 def test_a_comment_in_the_parts_file_allows_its_finding() -> None:
     rover = ROVER.replace(
         "  slam: {run", "  idle: {external: true} # tfcompose: allow TF815 because it logs\n  slam: {run"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, RejectedError, Span, did_you_mean, finding
 from tfcompose.frozen import dataclass
-from tfcompose.model import BUILT_IN, Claim, Edge, Node, Process
+from tfcompose.model import BUILT_IN, AsInFile, Claim, Edge, Node, Process
 from tfcompose.plan import switch_text
 from tfcompose.resolve.node_presets import node_preset, node_preset_names
 from tfcompose.resolve.roles import Roles
@@ -35,8 +35,17 @@ def flat(params: dict[str, Any], above: str = "") -> dict[str, Any]:
     """Return nested parameters by their full names, with dots."""
     found: dict[str, Any] = {}
     for key, value in params.items():
-        found |= flat(value, f"{above}{key}.") if isinstance(value, dict) else {f"{above}{key}": value}
+        found |= flat(value, f"{above}{key}.") if isinstance(value, dict) else {f"{above}{key}": _meant(value)}
     return found
+
+
+def _meant(value: Any) -> Any:
+    """Return a word of a parameter file as ROS reads it, as far as switches and names need it: true, false, or text."""
+    if not isinstance(value, AsInFile):
+        return value
+    return {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}.get(
+        value.lower(), str(value)
+    )
 
 
 @dataclass(slots=True)
@@ -219,6 +228,14 @@ class _Work:
 
     def _foreign(self, told: _Told, claim: ClaimSpec, name: str, other: Edge) -> None:
         """Write the switch, or say that it cannot be written."""
+        against = next((key for key, off in claim.off.items() if told.given.get(key, off) != off), None)
+        if against is not None and told.can_be_told and not told.has(claim.on):
+            message = (
+                f"{against} of {told.process.name} is {told.given[against]!r}, and {other.owner} owns {other.name}"
+            )
+            advice = "remove it: tfcompose writes the switch"
+            self.found.append(finding("TF333", message, self._at(told, against), help=advice))
+            return
         needed = any(self._is_own(told, own) and set(own.off) & set(claim.off) for own in told.claims)
         if claim.off and told.can_be_told and not needed and not told.has(claim.on):
             told.computed |= claim.off

@@ -75,7 +75,9 @@ class Drafts:
         for name, link in robot.links.items():
             self.links.setdefault(name, link)
         if part.said.parent is not None and part.root is not None:
-            self.add(at, part.said.parent, part.root, part.said, owner=STATIC, part=part.name)
+            switched = len(part.said.parent) > 1  # then the part's owner is who carries it about
+            owner = part.said.owner if switched else STATIC
+            self.add(at, part.said.parent, part.root, part.said, owner=owner, part=part.name)
         self.edges += [Draft(edge, part=part.name) for edge in robot.edges]
         self.sensors += robot.sensors
         return True

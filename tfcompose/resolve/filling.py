@@ -47,10 +47,16 @@ class Filler:
         )
         for node in done.nodes:
             self._check_paths(done, node)
-        if not any(node.params for node in done.nodes) and any("${params_file}" in word for word in done.argv):
-            message = f"{process.name} is given ${{params_file}}, and has no parameters"
-            self.found.append(finding("TF816", message, self.source.at((*section, "run")), help="params: {…}"))
         return done
+
+    def needless(self, process: Process) -> list[Diagnostic]:
+        """Return a finding if the process is given the file of its parameters, and has none."""
+        at: Path = ("processes", process.name, "run")
+        asked = any("${params_file}" in word for word in process.argv)
+        if not asked or any(node.params for node in process.nodes) or not self.source.has(at):
+            return []
+        message = f"{process.name} is given ${{params_file}}, and has no parameters"
+        return [finding("TF816", message, self.source.at(at), help="params: {…}")]
 
     def _fill(self, value: Any, path: Path) -> Any:
         if isinstance(value, str):

@@ -87,6 +87,7 @@ class Parts:
             raise RejectedError([finding("TF015", f"robots are parts of each other: {circle}", at)])
         inside = replace(self, files=(*self.files, file), found=[], missing=[])
         loaded = with_includes(load(read(file), file), read)
+        self.whole.own.setdefault(file, []).append(_note(part))
         validated = validate(part.laid_over(composed(loaded, part.said.profiles)))
         resolved = self.resolve(validated, self.library, self.read, self.disk, inside)
         self.found += [_noted(one, part) for one in (*validated.found, *resolved.found)]

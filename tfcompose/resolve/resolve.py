@@ -14,6 +14,7 @@ from tfcompose.plan import GuardPolicy
 from tfcompose.resolve.bodies import Bodies, with_colours
 from tfcompose.resolve.built_in import built_in
 from tfcompose.resolve.edges import Drafts
+from tfcompose.resolve.filling import Filler
 from tfcompose.resolve.isolation import isolate, settings_of
 from tfcompose.resolve.nodes import has_claims
 from tfcompose.resolve.packages import Packages
@@ -150,6 +151,8 @@ def _completed(robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None,
     if has_claims(spec):  # what knows them is loaded only then
         robot, refused = import_module("tfcompose.resolve.claims").settled(robot, spec, source)
         found += refused
+    filler = Filler(robot, source, disk)
+    found += [one for process in robot.processes for one in filler.needless(process)]
     return robot
 
 

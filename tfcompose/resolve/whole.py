@@ -16,9 +16,10 @@ class Whole:
     """What is known of all parts of a robot, and of theirs, together.
 
     ``allows`` are the comments that let findings in their files stand, ``foreign`` the files that somebody else wrote,
-    with a note that says as which part.
+    with a note that says as which part. ``own`` are the robot files that are parts, with such notes, one for each use.
     """
 
     count: int = 0
     allows: list[Allow] = field(default_factory=list)
     foreign: dict[str, Note] = field(default_factory=dict)
+    own: dict[str, list[Note]] = field(default_factory=dict)

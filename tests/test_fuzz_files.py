@@ -30,7 +30,10 @@ calibrations: [lidar.yaml]
 packages: {arm: .}
 ros: {shared_frames: [map], isolate: topics, namespace: site}
 links: {table: {parent: map, visual: {mesh: a.stl}, inertial: {mass: 3, inertia: {ixx: 1, iyy: 1, izz: 1}}}}
-frames: {map: {}, spot: {parent: table, look: {down: 20 deg}}, tip: {parent: spot, relative_to: left_base, xyz: [0, 0, 1]}}
+frames:
+  map: {}
+  spot: {parent: table, look: {down: 20 deg}}
+  tip: {parent: spot, relative_to: left_base, xyz: [0, 0, 1]}
 sensors:
   eye: {preset: generic/lidar3d, parent: table, xyz: [0, 0, "${high}"]}
   cam: {preset: realsense/d435i, parent: spot, tf: tfcompose, driver: none, calibration: {file: kit.yaml}}
@@ -59,15 +62,19 @@ files = {
     "kit.yaml": "spot:\n  cam_color_optical_frame: {x: 0.1, y: 0, z: 1, roll: 0, pitch: !degrees 5, yaw: 0}\n",
     "nav.yaml": "/**: {ros__parameters: {a: 012}}\nslam:\n  ros__parameters: {alpha: [1, 2], deep: {b: on}}\n",
 }
-pieces = ["{", "}", "[", "]", ": ", "\n", "  ", "- ", "&a ", "*a", "<<: *a", "${", "}", "null", "~", "1e999", "-0.0", "!x ", '"', "'",
-          "\x00", "\ufeff", "é", "<", ">", "/>", "<!--", "&amp;", "&x;", "9" * 400, "nan", "inf", "map", "table", "a: " * 200, "\t", "|", ">"]
+pieces = ["{", "}", "[", "]", ": ", "\n", "  ", "- ", "&a ", "*a", "<<: *a", "${", "}", "null", "~", "1e999",
+          "-0.0", "!x ",
+          '"', "'",
+          "\x00", "\ufeff", "é", "<", ">", "/>", "<!--", "&amp;", "&x;",
+          "9" * 400, "nan", "inf", "map", "table", "a: " * 200, "\t", "|", ">"]
 rng = random.Random(seed)
 
 def damaged(text):
     for _ in range(rng.randint(1, 4)):
         at = rng.randrange(len(text) + 1)
         end = min(len(text), at + rng.choice([0, 0, 1, 3, 10, 40]))
-        what = rng.choice(pieces) if rng.random() < 0.7 else text[(b := rng.randrange(len(text) + 1)):b + rng.randint(0, 60)]
+        begin = rng.randrange(len(text) + 1)
+        what = rng.choice(pieces) if rng.random() < 0.7 else text[begin : begin + rng.randint(0, 60)]
         text = text[:at] + what + text[end:]
     return text
 

@@ -35,7 +35,7 @@ def two_writers(seen: Seen) -> Iterator[Diagnostic]:
         if len(distinct) > 1 and child not in seen.planned and _together(rivals):
             groups.setdefault(tuple(sorted(distinct, key=str)), []).append(rivals)
     for found in groups.values():
-        rivals = found[0]
+        rivals = sorted(found[0], key=who)
         names = list(dict.fromkeys(who(edge) for edge in rivals))
         by = f"twice by {names[0]}" if len(names) == 1 else f"by {' and by '.join(names)}"
         more = f" and {counted(len(found) - 1, 'more edge')}" if len(found) > 1 else ""

@@ -136,7 +136,7 @@ def two_clocks(seen: Seen) -> Iterator[Diagnostic]:
     """Two nodes publish the time."""
     for topic in seen.graph:
         if topic.name == "/clock" and len(topic.publishers) > 1:
-            message = f"/clock is published by {' and by '.join(topic.publishers)}: time jumps to and fro"
+            message = f"/clock is published by {' and by '.join(sorted(topic.publishers))}: time jumps to and fro"
             yield finding(
                 "TF837", message, None, help="end one: a second simulator, or a bag played with --clock beside it"
             )

@@ -9,14 +9,13 @@ from tfcompose.check import apply, check, levelled, unknown_rules, with_edits, w
 from tfcompose.diagnostic import Allow, Diagnostic, RejectedError
 from tfcompose.frozen import dataclass
 from tfcompose.load import Source, composed, load, with_includes
-from tfcompose.resolve import Disk, Library, resolve
+from tfcompose.resolve import Disk, Library, Whole, resolve
 from tfcompose.validate import validate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from tfcompose.model import Robot
-    from tfcompose.resolve.whole import Whole
     from tfcompose.validate import Validated
 
 #: Findings that follow from a pose. In an entry whose pose was refused they say nothing new.

@@ -241,8 +241,11 @@ def test_an_edge_that_turns_out_to_be_published_while_processes_start_is_refused
     up: Callable[..., Up], rogue: Callable[[], object]
 ) -> None:
     rogue()
-    robot = up(ROVER, "--settle", "0.1")
-    assert robot.ends(40) == 1
+    for _ in range(3):  # on a busy machine it may be heard too late to be taken for one that was there first
+        robot = up(ROVER, "--settle", "0.1", "--for", "8")
+        assert robot.ends(40) == 1
+        if "TF807" in robot.text:
+            break
     assert "error[TF807] odom → base_link: published by /strange/rogue before the start" in robot.text
     assert "Traceback" not in robot.text
 

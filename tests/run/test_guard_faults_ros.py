@@ -248,6 +248,7 @@ def test_the_policy_stop_offender_stops_the_plans_own_offender_and_no_stranger(
     )
     robot = up(text.replace("guard: {", "guard: {on_violation: stop-offender, "))
     robot.joins("/drive", "odom base_link")
+    robot.says("live", "map → odom")
     robot.joins("/stranger", "map odom")
     robot.says("error[TF801]", "map → odom is published by /stranger")
     robot.says("error[TF801]", "map → odom is published by /traitor; the owner is slam (/slam)")

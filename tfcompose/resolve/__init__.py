@@ -6,5 +6,6 @@
 from tfcompose.resolve.library import Library
 from tfcompose.resolve.packages import Disk
 from tfcompose.resolve.resolve import Resolved, resolve
+from tfcompose.resolve.whole import Whole
 
-__all__ = ["Disk", "Library", "Resolved", "resolve"]
+__all__ = ["Disk", "Library", "Resolved", "Whole", "resolve"]

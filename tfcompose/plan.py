@@ -24,6 +24,7 @@ DESCRIPTION = "robot.full.urdf"
 EdgeKind = Literal["static", "joint", "dynamic"]
 ProcessKind = Literal["static", "joints", "guard", "simulate", "external", "run"]
 GuardMode = Literal["off", "watch", "strict"]
+UnknownEdges = Literal["ignore", "warn", "error"]
 OnViolation = Literal["report", "stop-offender", "stop"]
 
 ReadyKind = Literal["edges", "topic", "service", "lifecycle", "log", "exit", "time"]
@@ -226,7 +227,7 @@ class GuardPolicy:
     """What the guard does. ``allow`` holds (parent, child) patterns of edges that need no declaration."""
 
     mode: GuardMode = "watch"
-    unknown_edges: Literal["ignore", "warn", "error"] = "warn"
+    unknown_edges: UnknownEdges = "warn"
     on_violation: OnViolation = "report"
     allow: tuple[tuple[str, str], ...] = ()
 

@@ -13,7 +13,7 @@ from tfcompose.run.place import PlaceError, places
 from tfcompose.run.told import notice_of
 
 if TYPE_CHECKING:
-    from argparse import ArgumentParser
+    from argparse import ArgumentParser, Namespace
     from collections.abc import Callable, Iterator
 
     from tfcompose.run.notice import Notice
@@ -76,6 +76,18 @@ def asked(place: Place, **request: Any) -> dict[str, Any] | int:
         complain(str(answer["error"]))
         return 1
     return answer
+
+
+def ask_of_each(arguments: Namespace, do: str, doing: str) -> int:
+    """Have the launcher do it with each of the named processes; return the exit code."""
+    place = chosen(arguments.robot)
+    if isinstance(place, int):
+        return place
+    codes = []
+    for name in arguments.name:
+        answer = asked(place, do=do, name=name)
+        codes.append(answer if isinstance(answer, int) else told(f"{name}: {doing}"))
+    return max(codes)
 
 
 def events(place: Place, timeout_s: float | None = None) -> Iterator[tuple[Notice, float]]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.running import add_robot, asked, chosen, told
+from tfcompose.cli.running import add_robot, ask_of_each
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -22,11 +22,4 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Ask the launcher; exit code 0, 1 where it refuses or none runs, 2 where several robots run and none is named."""
-    place = chosen(arguments.robot)
-    if isinstance(place, int):
-        return place
-    codes = []
-    for name in arguments.name:
-        answer = asked(place, do="stop", name=name)
-        codes.append(answer if isinstance(answer, int) else told(f"{name}: stopping"))
-    return max(codes)
+    return ask_of_each(arguments, "stop", "stopping")

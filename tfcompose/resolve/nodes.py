@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, finding
 from tfcompose.model import Node
@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from tfcompose.load import Path, Source
     from tfcompose.validate.process import ProcessSpec
     from tfcompose.validate.spec import RobotSpec
+
+#: The key among a process's parameters that names files with more of them.
+FILE_KEY = "file"
 
 
 def full_name(namespace: str, name: str) -> str:
@@ -24,6 +27,11 @@ def full_name(namespace: str, name: str) -> str:
 def has_claims(spec: RobotSpec) -> bool:
     """Return whether anything is said of what nodes publish, or a process has several nodes."""
     return any(said.nodes or said.publishes or (said.node and said.node.preset) for said in spec.processes.values())
+
+
+def names_files(params: dict[str, Any]) -> bool:
+    """Return whether parameters name files."""
+    return isinstance(params.get(FILE_KEY), (str, list))
 
 
 def _usual(said: ProcessSpec) -> str | None:

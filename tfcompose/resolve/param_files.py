@@ -10,7 +10,7 @@ from tfcompose.diagnostic import Diagnostic, Note, RejectedError, finding, neare
 from tfcompose.load.params import NodeParams, ParamsFile, Word, load_params
 from tfcompose.model import AsInFile
 from tfcompose.resolve.beside import beside
-from tfcompose.resolve.nodes import full_name
+from tfcompose.resolve.nodes import FILE_KEY, full_name, names_files
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from tfcompose.load import Source
     from tfcompose.model import Node, Process, Robot
 
-KEY = "file"
-
 
 def with_param_files(robot: Robot, source: Source, read: Callable[[str], str] | None) -> tuple[Robot, list[Diagnostic]]:
     """Return the robot whose nodes have the parameters of the files that they name, and what is wrong with these."""
@@ -28,11 +26,6 @@ def with_param_files(robot: Robot, source: Source, read: Callable[[str], str] | 
     processes = tuple(work.process(process) for process in robot.processes)
     written = robot.written | ({"parameter files": work.digests} if work.digests else {})
     return replace(robot, processes=processes, written=written), work.found
-
-
-def names_files(params: dict[str, Any]) -> bool:
-    """Return whether parameters name files."""
-    return isinstance(params.get(KEY), (str, list))
 
 
 @dataclass(slots=True)
@@ -49,8 +42,8 @@ class _Work:
         return replace(process, nodes=nodes)
 
     def _node(self, node: Node, process: Process) -> Node:
-        named = node.params[KEY]
-        at = (*node.path, "params", KEY)
+        named = node.params[FILE_KEY]
+        at = (*node.path, "params", FILE_KEY)
         files = [(named, at)] if isinstance(named, str) else [(one, (*at, i)) for i, one in enumerate(named)]
         params: dict[str, Any] = {}
         for file, path in files:
@@ -59,7 +52,7 @@ class _Work:
                 params = _laid_over(params, self._said(file, place, node, process))
             else:
                 self.found.append(finding("TF103", "params: file takes the names of files", place))
-        inline = {key: value for key, value in node.params.items() if key != KEY}
+        inline = {key: value for key, value in node.params.items() if key != FILE_KEY}
         return replace(node, params=_laid_over(params, inline))
 
     def _said(self, file: str, at: Span, node: Node, process: Process) -> dict[str, Any]:

@@ -133,11 +133,7 @@ class PartEntry:
         if root not in robot.frames:
             at, advice = self.source.at((*self.at, "root")), did_you_mean(root, robot.frames)
             raise RejectedError([finding("TF203", f"the part {self.name} has no frame {root}", at, help=advice)])
-        children, below, waiting = robot.children(), {root}, [root]
-        while waiting:
-            new = [edge.child for edge in children.get(waiting.pop(), []) if edge.child not in below]
-            below.update(new)
-            waiting += new
+        below = robot.below(root)
         return replace(
             robot,
             frames={name: at for name, at in robot.frames.items() if name in below},

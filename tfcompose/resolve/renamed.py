@@ -131,9 +131,7 @@ def _calibration(calibration: Calibration, names: Names) -> Calibration:
 
 def _process(process: Process, names: Names) -> Process:
     simulate = process.simulate
-    if simulate and not (
-        names.alone or process.part
-    ):  # joint states are sent under the names that joints have in the whole
+    if simulate and not (names.alone or process.part):  # joint states have the names that joints have in the whole
         joints = {names.joint(name): q for name, q in simulate.joints.items()}
         sweep = {names.joint(name): how for name, how in simulate.sweep.items()}
         simulate = replace(simulate, joints=joints, sweep=sweep)

@@ -29,7 +29,8 @@ def with_stock(robot: Robot) -> tuple[Robot, list[Diagnostic]]:
     """
     if robot.base is None:
         return robot, []
-    below = _below(robot, robot.base)
+    described = robot.below(robot.base)
+    below = described - {robot.base}
     found = [
         finding(
             "TF315",
@@ -40,8 +41,8 @@ def with_stock(robot: Robot) -> tuple[Robot, list[Diagnostic]]:
         for edge in robot.edges
         if edge.joint and edge.owner == JOINTS and edge.child not in below
     ]
-    for frame in sorted(below & set(robot.ros.shared_frames)) if robot.ros.frame_prefix else ():
-        message = f"{frame} is shared and below {robot.base}: a stock {NAME} prefixes every frame"
+    for frame in sorted(described & set(robot.ros.shared_frames)) if robot.ros.frame_prefix else ():
+        message = f"{frame} is shared and in the tree of {robot.base}: a stock {NAME} prefixes every frame"
         found.append(finding("TF316", message, robot.frames.get(frame), help="state_publisher: tfcompose"))
     edges = tuple(
         replace(edge, owner=JOINTS) if edge.owner == STATIC and edge.kind == "static" and edge.child in below else edge
@@ -50,15 +51,6 @@ def with_stock(robot: Robot) -> tuple[Robot, list[Diagnostic]]:
     has_work = any(edge.owner == JOINTS for edge in edges)
     processes = tuple(_stock(one, robot) if one.name == JOINTS and has_work else one for one in robot.processes)
     return replace(robot, edges=edges, processes=processes), found
-
-
-def _below(robot: Robot, base: str) -> set[str]:
-    children, below, waiting = robot.children(), set[str](), [base]
-    while waiting:
-        new = [edge.child for edge in children.get(waiting.pop(), ()) if edge.child not in below]
-        below.update(new)
-        waiting += new
-    return below
 
 
 def _stock(joints: Process, robot: Robot) -> Process:

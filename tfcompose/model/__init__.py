@@ -1,0 +1,46 @@
+"""The robot: frames, edges, bodies, joints and processes, with every name, pose and owner decided.
+
+A ``Robot`` can hold a wrong robot: two parents, a cycle, two owners can all be said, and a rule says so with both
+places. Lengths are metres, angles radians, rates hertz; an edge's pose is the pose of its child in its parent.
+"""
+
+from tfcompose.model.body import Asset, Inertial, Link, Material, Shape
+from tfcompose.model.edge import Calibration, Edge
+from tfcompose.model.hardware import Block, Component, Hardware, Interface
+from tfcompose.model.joint import Dynamics, Joint, Limit, ReferencePositions, SafetyController
+from tfcompose.model.process import BUILT_IN, GUARD, JOINTS, STATIC, AsInFile, Claim, Node, Process
+from tfcompose.model.robot import AsWritten, Part, Robot
+from tfcompose.model.sensor import OPTICAL_ENDINGS, MountedSensor, is_optical
+
+__all__ = [
+    "BUILT_IN",
+    "GUARD",
+    "JOINTS",
+    "OPTICAL_ENDINGS",
+    "STATIC",
+    "AsInFile",
+    "AsWritten",
+    "Asset",
+    "Block",
+    "Calibration",
+    "Claim",
+    "Component",
+    "Dynamics",
+    "Edge",
+    "Hardware",
+    "Inertial",
+    "Interface",
+    "Joint",
+    "Limit",
+    "Link",
+    "Material",
+    "MountedSensor",
+    "Node",
+    "Part",
+    "Process",
+    "ReferencePositions",
+    "Robot",
+    "SafetyController",
+    "Shape",
+    "is_optical",
+]

@@ -1,0 +1,124 @@
+"""A robot, its parts, and the numbers as they were written."""
+
+from __future__ import annotations
+
+from dataclasses import field
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.frozen import dataclass
+from tfcompose.plan import GuardPolicy, RosSettings
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tfcompose.diagnostic import Span
+    from tfcompose.model.body import Link
+    from tfcompose.model.edge import Edge
+    from tfcompose.model.hardware import Block, Hardware
+    from tfcompose.model.process import Claim, Process
+    from tfcompose.model.sensor import MountedSensor
+
+
+@dataclass(frozen=True, slots=True)
+class AsWritten:
+    """The numbers of one value of a pose or joint limit as the file has them, in SI, each with its place.
+
+    ``path`` leads to the value (``sensors``, ``camera``, ``rpy``); ``with_unit`` says of each number whether it stands
+    there with a unit, and ``place`` where the number of an index stands.
+    """
+
+    path: tuple[str | int, ...]
+    numbers: tuple[float, ...]
+    with_unit: tuple[bool, ...]
+    place: Callable[[int], Span] = field(compare=False, repr=False)
+
+    @property
+    def key(self) -> str:
+        """The value's key: ``xyz``, ``rpy``, ``look``, …."""
+        return str(self.path[-1])
+
+    @property
+    def entry(self) -> str:
+        """The name of the frame, link, joint, sensor or process that the value belongs to."""
+        return str(self.path[1])
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part that is a robot of its own beside others, with its own ``static``, ``joints`` and description.
+
+    ``robot`` has the names of the part's own file; in the robot that holds it, frames and joints have ``prefix`` too.
+    """
+
+    name: str
+    prefix: str
+    robot: Robot
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """One robot, resolved.
+
+    ``frames`` holds every frame that was declared, with its place; ``base`` is where the URDF begins, or None where the
+    tree has no single root; ``sensors`` are those with a known preset, ``as_written`` the numbers of poses and limits
+    before they became poses, ``unused`` the variables that nothing uses; ``written`` is the plain data that the robot
+    was made from, profiles laid over it; ``broken`` holds the entries (section, name) that were refused
+    already, of a part how its names begin. ``parts`` are those that are robots of their own.
+    """
+
+    name: str
+    file: str
+    frames: dict[str, Span]
+    edges: tuple[Edge, ...]
+    links: dict[str, Link]
+    processes: tuple[Process, ...]
+    base: str | None
+    ros: RosSettings = field(default_factory=RosSettings)
+    guard: GuardPolicy = field(default_factory=GuardPolicy)
+    sensors: tuple[MountedSensor, ...] = ()
+    as_written: tuple[AsWritten, ...] = field(default=(), compare=False, repr=False)
+    unused: dict[str, Span] = field(default_factory=dict, compare=False)
+    written: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
+    broken: frozenset[tuple[str, str]] = frozenset()
+    claims: tuple[Claim, ...] = ()
+    parts: tuple[Part, ...] = ()
+    hardware: tuple[Hardware, ...] = ()
+    blocks: tuple[Block, ...] = ()
+
+    def final(self, frame: str) -> str:
+        """Return the frame's name on the live tree: with the prefix, unless it is shared."""
+        return frame if frame in self.ros.shared_frames else f"{self.ros.frame_prefix}{frame}"
+
+    def excuses(self, name: str) -> bool:
+        """Return whether a frame, process or joint may be missing only because an entry was refused already."""
+        return any(
+            name == entry
+            or (section == "sensors" and name.startswith(f"{entry}_"))
+            or (section == "parts" and name.startswith(entry))
+            for section, entry in self.broken
+        )
+
+    def parent_edge(self, child: str) -> Edge | None:
+        """Return the first edge whose child is the frame, or None for a root."""
+        return next((edge for edge in self.edges if edge.child == child), None)
+
+    def roots(self) -> list[str]:
+        """Return the declared frames that no edge has as its child, in the order of declaration."""
+        children = {edge.child for edge in self.edges}
+        return [frame for frame in self.frames if frame not in children]
+
+    def children(self) -> dict[str, list[Edge]]:
+        """Return the edges of each parent, in the order of declaration."""
+        table: dict[str, list[Edge]] = {}
+        for edge in self.edges:
+            table.setdefault(edge.parent, []).append(edge)
+        return table
+
+    def below(self, frame: str) -> set[str]:
+        """Return the frame and every frame that hangs below it, over edges of any owner."""
+        children, found, waiting = self.children(), {frame}, [frame]
+        while waiting:
+            new = [edge.child for edge in children.get(waiting.pop(), ()) if edge.child not in found]
+            found.update(new)
+            waiting += new
+        return found

@@ -1,0 +1,68 @@
+"""What comes after the tree is known: raw blocks, the base, processes' topics and publishers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.resolve.filling import Filler
+from tfcompose.resolve.isolation import isolate
+from tfcompose.resolve.nodes import has_claims
+
+if TYPE_CHECKING:
+    from tfcompose.load import Source
+    from tfcompose.model import Robot
+    from tfcompose.resolve.packages import Disk
+    from tfcompose.validate.spec import RobotSpec
+
+
+def completed(robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None) -> tuple[Robot, list[Diagnostic]]:
+    """Return the robot with what stands beside links and joints, its base, and its processes' topics and publishers."""
+    found: list[Diagnostic] = []
+    if spec.ros2_control or spec.xml:
+        robot, refused = _with_blocks(robot, spec, source)
+        found += refused
+    robot = replace(robot, base=_base(robot, spec, source, found))
+    if spec.ros.state_publisher == "stock":
+        robot, refused = import_module("tfcompose.resolve.stock").with_stock(robot)
+        found += refused
+    robot, refused = isolate(robot, spec.ros, source, disk)
+    found += refused
+    if has_claims(spec):  # what knows them is loaded only then
+        robot, refused = import_module("tfcompose.resolve.claims").settled(robot, spec, source)
+        found += refused
+    filler = Filler(robot, source, disk)
+    found += [one for process in robot.processes for one in filler.needless(process)]
+    return robot, found
+
+
+def _with_blocks(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Diagnostic]]:
+    """Return the robot with its hardware and raw blocks; what reads XML is loaded only here."""
+    work = import_module("tfcompose.resolve.blocks")
+    moving = [edge.joint.name for edge in robot.edges if edge.joint]
+    hardware = work.hardware_of(spec.ros2_control, source)
+    frames = [frame for frame in robot.frames if frame in robot.links or robot.parent_edge(frame)]
+    joints = [edge.joint_name for edge in robot.edges if edge.joint_name]
+    blocks, found = work.blocks_of(spec.xml, source, frames, joints)
+    known = {*moving, *(name for section, name in robot.broken if section == "joints")}
+    found += work.unknown_joints(hardware, known)
+    return replace(robot, hardware=(*hardware, *robot.hardware), blocks=(*blocks, *robot.blocks)), found
+
+
+def _base(robot: Robot, spec: RobotSpec, source: Source, found: list[Diagnostic]) -> str | None:
+    """Return where the URDF begins: as said; base_link, or a fixed base_footprint above it; else the only root."""
+    if spec.base is not None:
+        if spec.base in robot.frames:
+            return spec.base
+        advice = did_you_mean(spec.base, robot.frames)
+        found.append(finding("TF203", f"no frame {spec.base}", source.at(("base",)), help=advice))
+        return None
+    if "base_link" in robot.frames:
+        above = robot.parent_edge("base_link")
+        if above and above.kind == "static" and above.parent == "base_footprint":
+            return "base_footprint"
+        return "base_link"
+    roots = robot.roots()
+    return roots[0] if len(roots) == 1 else None

@@ -1,8 +1,8 @@
 """Slotted dataclasses that are made in a quarter of the time, frozen or not.
 
 ``dataclasses`` writes and compiles six methods for each class, and that was a third of what ``lint`` cost. Here only
-``__init__`` is written for each class, and the other methods are the same functions for all. The classes are
-dataclasses to ``fields`` and ``replace``, to type checkers, and to those who use them.
+``__init__`` is written, for each class of which there are objects; the other methods are the same functions for all.
+The classes are dataclasses to ``fields`` and ``replace``, to type checkers, and to those who use them.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def _frozen(cls: type) -> Any:
         if name not in vars(cls):
             setattr(cls, name, method)
     made: Any = _dataclass(init=False, repr=False, eq=False, slots=True)(cls)
-    made.__init__ = _init_of(made)
+    made.__init__ = _init_at_first_use(made)
     return made
 
 
@@ -39,6 +39,16 @@ def _slotted(cls: type) -> Any:
     cls.__repr__ = _shown  # type: ignore[assignment,method-assign]
     cls.__hash__ = None  # type: ignore[assignment] # it changes
     return _dataclass(repr=False, eq=False, slots=True)(cls)
+
+
+def _init_at_first_use(cls: type) -> Callable[..., None]:
+    """Return the method that is written when the first object is made: a run makes objects of half the classes."""
+
+    def init(self: Any, *values: Any, **named: Any) -> None:
+        cls.__init__ = _init_of(cls)  # type: ignore[misc]
+        cls.__init__(self, *values, **named)  # type: ignore[misc]
+
+    return init
 
 
 def _init_of(cls: type) -> Callable[..., None]:

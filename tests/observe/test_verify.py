@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from tfcompose.observe.census import Census, Publisher
-from tfcompose.observe.offset import Offset, offset_of
 from tfcompose.observe.verify import edges_by_topics, verify
 from tfcompose.plan import Driven, GuardPolicy, Joint, Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.pose import Pose, quat_from_rpy
+from tfcompose.verdict.offset import Offset, offset_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -192,8 +192,9 @@ def test_a_driver_with_another_stream_than_its_preset_has_is_named_with_what_was
 def test_a_driver_whose_frame_is_far_from_nominal_is_told_with_both_poses(up: Callable[..., Up]) -> None:
     """An infra2 that is 4.5 cm further to the right is that of a D455."""
     robot = up(ROVER % (EVERYTHING, "tf: driver"), STAND_IN_OFF="infra2_frame:-0.045")
-    robot.says("warning[TF828] preset realsense/d435i expects front_link → front_infra2_frame at xyz 0 -0.05 0")
-    assert "the driver /front/front sent xyz 0.0004 -0.0962 0.0003" in robot.text
+    robot.says("warning[TF828] the pose of front_infra2_frame in front_link from the driver /front/front is 46.")
+    assert "off preset realsense/d435i: seen xyz 0.0004 -0.0962 0.0003 m" in robot.text
+    assert "expected xyz 0 -0.05 0 m" in robot.text
     assert "sensors: {front: {frames: {front_infra2_frame: {xyz: [0.0004, -0.0962, 0.0003]" in robot.text
     time.sleep(CLEAR_S)
     assert len(codes(robot.text)) == 1
@@ -201,8 +202,10 @@ def test_a_driver_whose_frame_is_far_from_nominal_is_told_with_both_poses(up: Ca
 
 def test_a_frame_that_the_preset_calls_exact_may_not_be_off_by_two_millimetres(up: Callable[..., Up]) -> None:
     robot = up(ROVER % ("streams: [depth]", "tf: driver"), STAND_IN_OFF="depth_optical_frame:0.002")
-    robot.says("TF828", "expects front_depth_frame → front_depth_optical_frame at xyz 0 0 0 rpy -90 0 -90 deg")
-    assert "sent xyz 0 0.002 0 rpy -90 0 -90 deg" in robot.text
+    robot.says(
+        "TF828", "the pose of front_depth_optical_frame in front_depth_frame from the driver /front/front is 2 mm"
+    )
+    assert "seen xyz 0 0.002 0 m, rpy -90 0 -90 deg; expected xyz 0 0 0 m, rpy -90 0 -90 deg" in robot.text
 
 
 def test_a_switch_that_the_driver_has_otherwise_is_read_back_and_named(up: Callable[..., Up]) -> None:

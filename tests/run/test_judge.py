@@ -325,7 +325,7 @@ def test_a_second_parent_is_reported_also_when_the_owner_itself_sends_it(running
     drive = running.joins("/drive")
     running.repeat(drive, "odom base, map base", 10)
     assert [found.code for found in running.found()] == ["TF802"]
-    assert "/drive publishes map → base" in running.found()[0].message
+    assert "base hangs on map: its owner drive (/drive) publishes map → base, " in running.found()[0].message
 
 
 @pytest.mark.parametrize(("policy", "severities"), [("ignore", []), ("warn", ["warning"]), ("error", ["error"])])
@@ -598,7 +598,7 @@ def test_the_owner_may_hang_a_switched_edge_on_each_of_its_parents_and_on_no_oth
         history.repeat(changer, f"{parent} tool", 5)
     assert history.said() == []
     history.repeat(changer, "table tool", 10)
-    message = "tool has a second parent: /changer publishes table → tool, changer (/changer) arm → tool"
+    message = "tool hangs on table: its owner changer (/changer) publishes table → tool, declared is arm → tool"
     assert history.said() == [f"TF802 {message}"]
 
 

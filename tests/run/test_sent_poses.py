@@ -83,12 +83,12 @@ def test_all_frames_of_one_driver_are_one_finding_that_is_told_once() -> None:
         guard.hears(("link", "lens", moved(LENS, 0.1)), ("lens", "optical", moved(OPTICAL, 0.1)))
     (one,) = guard.says()
     assert one.found.message == (
-        "preset realsense/d435i expects link → lens at xyz 0 -0.05 0, the driver /front/front sent xyz 0 -0.05 0.1, "
-        "and 1 more frame elsewhere"
+        "the pose of lens in link from the driver /front/front is 100 mm off preset realsense/d435i, and 1 more frame "
+        "elsewhere: seen xyz 0 -0.05 0.1 m, rpy 0 0 0 deg; expected xyz 0 -0.05 0 m, rpy 0 0 0 deg"
     )
     assert one.found.severity == "warning"
     assert [note.message for note in one.found.notes] == [
-        "lens → optical: xyz 0 0 0 rpy -90 0 -90 deg, and sent xyz 0 0 0.1 rpy -90 0 -90 deg"
+        "optical in lens: seen xyz 0 0 0.1 m, rpy -90 0 -90 deg; expected xyz 0 0 0 m, rpy -90 0 -90 deg"
     ]
     guard.hears(("link", "lens", moved(LENS, 0.2)))
     assert guard.says() == []

@@ -21,8 +21,8 @@ from tfcompose.cli.looking import add_bag, add_for, from_bag, from_live, nothing
 from tfcompose.cli.options import add_file, add_variant
 from tfcompose.cli.terminal import complain, print_findings
 from tfcompose.observe.census import SETTLE_S, Census
-from tfcompose.observe.offset import Offset
 from tfcompose.observe.verify import edges_by_topics, summary, verify
+from tfcompose.verdict.offset import Offset
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace

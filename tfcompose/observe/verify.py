@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, Span, did_you_mean, finding
-from tfcompose.observe.offset import Offset, offset_of, shown
 from tfcompose.plan import SLOW_BELOW
 from tfcompose.pose import Pose
+from tfcompose.verdict.offset import Offset, offset_of, shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Note
-from tfcompose.run.driven import drives_of, sensor_of
 from tfcompose.run.events import Found, GuardEvent, Recovered, Taken
-from tfcompose.run.offences import NAMELESS, Offence, taken, violation
 from tfcompose.run.senders import FEWEST_GAPS
+from tfcompose.verdict.driven import drives_of, sensor_of
+from tfcompose.verdict.offence import NAMELESS, Offence
+from tfcompose.verdict.violation import taken, violation
 
 if TYPE_CHECKING:
     from tfcompose.plan import Plan, PlanEdge

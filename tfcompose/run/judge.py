@@ -18,10 +18,11 @@ from tfcompose.run.events import Clear, Found, GuardEvent
 from tfcompose.run.health import EdgeHealth
 from tfcompose.run.law import Law, Sight
 from tfcompose.run.liveness import Liveness
-from tfcompose.run.offences import Offence, violation
 from tfcompose.run.senders import Message, Senders, Writer
 from tfcompose.run.sent_poses import SentPoses
 from tfcompose.run.stamps import Clocks, Stamps
+from tfcompose.verdict.offence import Offence
+from tfcompose.verdict.violation import violation
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

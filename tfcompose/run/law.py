@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from tfcompose.run.offences import LOOP, SELF, TWO_WRITERS, Offence
 from tfcompose.run.shape import Shape
 from tfcompose.run.turns import Turns
+from tfcompose.verdict.offence import LOOP, SELF, TWO_WRITERS, Offence, code_of
 
 if TYPE_CHECKING:
     from tfcompose.plan import Plan, PlanEdge
@@ -51,17 +51,10 @@ class Law:
             return Offence(SELF, parent, child, nodes, static, edge)
         if edge is None:
             return self._stranger(sight, nodes, now)
-        code, namesake = "", False
-        loop: tuple[str, ...] = ()
-        if not edge.may_hang_on(parent):
-            loop = self._shape.loop(parent, child, now)
-            code = LOOP if loop else "TF802"
-        elif edge.node not in nodes:
-            code = "TF801"
-        elif self._is_namesake(edge, sight):
-            code, namesake = "TF801", True
-        elif static != (edge.kind == "static") and len(nodes) == 1:
-            code = "TF809"
+        code = code_of(edge, parent, static=static, owner=edge.node in nodes, sure=len(nodes) == 1)
+        loop = self._shape.loop(parent, child, now) if code == "TF802" else ()
+        namesake = code in {"", "TF809"} and self._is_namesake(edge, sight)
+        code = LOOP if loop else "TF801" if namesake else code
         return Offence(code, parent, child, nodes, static, edge, namesake, loop) if code else None
 
     def _stranger(self, sight: Sight, nodes: tuple[str, ...], now: float) -> Offence | None:

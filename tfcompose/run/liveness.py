@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.plan import SLOW_BELOW
 from tfcompose.run.events import Complete, Found, GuardEvent, Live, OwnerReady, Recovered
-from tfcompose.run.silence import change_event, left
+from tfcompose.run.silence import change_event
+from tfcompose.verdict.timing import left
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -256,7 +257,7 @@ class Liveness:
             edge = tracks[0].edge
             if edge.node not in nodes and owner not in self._gone:
                 self._gone.add(owner)
-                events.append(Found(left(edge, tracks)))
+                events.append(Found(left([edge for track in tracks for edge in track.edges])))
             elif edge.node in nodes and owner in self._gone:
                 self._gone.discard(owner)
                 events.append(Recovered(f"{owner} ({edge.node}) is back"))

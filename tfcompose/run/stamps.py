@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tfcompose.verdict.offence import BACK, REPEATED, WRONG_CLOCK
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -21,8 +23,6 @@ REPEAT_COUNTS, REPEATS = 2, 10
 STEP_COUNTS, BACK_STEPS = 4, 12
 #: One step back by so much is enough.
 LARGE_STEP_NS = _SECOND_NS
-
-REPEATED, BACK, WRONG_CLOCK = "TF823", "TF824", "TF825"
 
 
 @dataclass(slots=True)

@@ -21,10 +21,10 @@ from tfcompose.run.notify import ready
 from tfcompose.run.orders import JOINS
 from tfcompose.run.own import say
 from tfcompose.run.relay import Relay
-from tfcompose.run.sent_poses import expected_of
 from tfcompose.run.switches import Switches
 from tfcompose.run.topics import plans_by_topics, together
 from tfcompose.run.voice import Voice
+from tfcompose.verdict.driver_pose import expected_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

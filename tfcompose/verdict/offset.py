@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from tfcompose.pose import Pose, multiply, normalised
-
-if TYPE_CHECKING:
-    from tfcompose.pose import Quaternion
+from tfcompose.pose import Pose, angle_between, normalised
 
 
 class Offset(NamedTuple):
@@ -24,17 +21,17 @@ class Offset(NamedTuple):
         parts += [f"{math.degrees(self.rot_rad):.3g} deg"] if self.rot_rad >= _NO_RAD else []
         return " and ".join(parts) or "nothing"
 
+    def beyond(self, limit: Offset) -> bool:
+        """Whether the distance or the angle is larger than that of ``limit``."""
+        return self.xyz_m > limit.xyz_m or self.rot_rad > limit.rot_rad
+
 
 _NO_MM, _NO_RAD = 1e-6, 1e-6
 
 
 def offset_of(expected: Pose, seen: Pose) -> Offset:
     """Return how far ``seen`` is from ``expected``; quaternions need not be of length 1."""
-    x, y, z, w = normalised(expected.quat_xyzw)
-    back: Quaternion = (-x, -y, -z, w)
-    dx, dy, dz, dw = multiply(back, normalised(seen.quat_xyzw))
-    # Exact for small angles, as acos is not.
-    angle = 2 * math.atan2(math.sqrt(dx * dx + dy * dy + dz * dz), abs(dw))
+    angle = angle_between(normalised(expected.quat_xyzw), normalised(seen.quat_xyzw))
     return Offset(math.dist(expected.xyz, seen.xyz), angle)
 
 
@@ -44,3 +41,8 @@ def shown(pose: Pose) -> str:
     angles = Pose(pose.xyz, normalised(pose.quat_xyzw)).rpy
     rpy = " ".join(f"{round(math.degrees(angle), 3) + 0.0:g}" for angle in angles)
     return f"xyz {xyz} m, rpy {rpy} deg"
+
+
+def compared(expected: Pose, seen: Pose) -> str:
+    """Return both poses as people read them."""
+    return f"seen {shown(seen)}; expected {shown(expected)}"

@@ -1,4 +1,4 @@
-"""What the guard says of a sensor's driver: what its preset expects of it, and the switch that it ignores."""
+"""What there is to say of a sensor's driver: what its preset expects of it, and the switch that it ignores."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from tfcompose.plan import Driven, Plan
-    from tfcompose.run.offences import Offence
+    from tfcompose.verdict.offence import Offence
 
 #: Frames that were sent otherwise than expected, or were not expected.
 _OTHERWISE = frozenset({"TF802", "TF803"})

@@ -1,22 +1,21 @@
-"""What the guard reports, in words: the edge, who sent it, who owns it, and what to do."""
+"""Offences in words: the edge, who sent it, who owns it, and what to do."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, Severity, finding
-from tfcompose.run.driven import advice_of, message_of
-from tfcompose.run.stamps import BACK, REPEATED, WRONG_CLOCK
+from tfcompose.verdict.driven import advice_of, message_of
+from tfcompose.verdict.offence import BACK, REPEATED, SELF, TWO_WRITERS, WRONG_CLOCK
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from tfcompose.diagnostic import Span
     from tfcompose.plan import Driven, Plan, PlanEdge
+    from tfcompose.verdict.offence import Offence
 
 LISTED_AT_MOST = 12
-NAMELESS = "a publisher without a node name"
-LOOP, SELF, TWO_WRITERS = "TF820", "TF821", "TF822"
 _WARNINGS = frozenset({SELF, TWO_WRITERS, REPEATED, BACK})
 _ADVICE = {
     SELF: "no listener gets it; give the node's child frame another name, or switch its TF off",
@@ -27,65 +26,20 @@ _ADVICE = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Offence:
-    """One edge that was published by somebody who may not, or in a way that it may not.
+def violation(
+    offences: Sequence[Offence], plan: Plan, where: str = "", driven: Driven | None = None, place: Span | None = None
+) -> Diagnostic:
+    """Return the finding for offences of one kind by one node, that runs ``where`` and may drive a sensor.
 
-    ``nodes`` are those of which one did it: a single one where the rmw says who sent a message, none where the sender
-    has no name. A ``namesake`` has the owner's name and is not the owner. ``loop`` holds the frames of a loop that the
-    edge closes, ``detail`` what was seen of stamps, or who the other writer is.
+    ``place`` is where the edge stands in the robot's file, if that is at hand.
     """
-
-    code: str
-    parent: str
-    child: str
-    nodes: tuple[str, ...]
-    static: bool
-    edge: PlanEdge | None
-    namesake: bool = False
-    loop: tuple[str, ...] = ()
-    detail: str = ""
-
-    @property
-    def who(self) -> str:
-        """The offender, as people read it."""
-        if len(self.nodes) > 1:
-            return f"one of {', '.join(self.nodes)}"
-        name = self.nodes[0] if self.nodes else NAMELESS
-        return f"another {name}" if self.namesake else name
-
-    @property
-    def whom(self) -> str:
-        """The offender, as the one to do something about."""
-        return f"the other {self.nodes[0]}" if self.namesake and len(self.nodes) == 1 else self.who
-
-    @property
-    def name(self) -> str:
-        """The edge that was seen."""
-        return f"{self.parent} → {self.child}"
-
-    @property
-    def of_stamps(self) -> bool:
-        """Whether it is about stamps, and over as soon as these are right."""
-        return self.code in {REPEATED, BACK, WRONG_CLOCK}
-
-    @property
-    def over(self) -> str:
-        """The sentence that says that it has ended."""
-        if self.of_stamps:
-            return f"{self.who} stamps {self.name} as it should again"
-        return f"{self.name} is no longer published by {self.who}"
-
-
-def violation(offences: Sequence[Offence], plan: Plan, where: str = "", driven: Driven | None = None) -> Diagnostic:
-    """Return the finding for offences of one kind by one node, that runs ``where`` and may drive a sensor."""
     first = offences[0]
     mild = first.code in _WARNINGS or (first.code == "TF803" and plan.guard.unknown_edges == "warn")
     severity: Severity = "warning" if mild else "error"
-    notes = [*_others(offences), *_declared(first), *_runs(first, where)]
-    message = message_of(first, _more(offences), driven) or _message(offences)
+    notes = [*_others(offences), *([] if place else _declared(first)), *_runs(first, where)]
+    message = message_of(first, _more(offences), driven) or _message(offences, plan)
     advice = advice_of(first, driven) or _switch(first, plan) or _help(first)
-    return finding(first.code, message, None, help=advice, notes=notes, severity=severity)
+    return finding(first.code, message, place, help=advice, notes=notes, severity=severity)
 
 
 def taken(offences: Sequence[Offence], where: str = "") -> Diagnostic:
@@ -106,7 +60,7 @@ def taken(offences: Sequence[Offence], where: str = "") -> Diagnostic:
     return finding("TF807", message, None, help=advice, notes=notes)
 
 
-def _message(offences: Sequence[Offence]) -> str:
+def _message(offences: Sequence[Offence], plan: Plan) -> str:
     first = offences[0]
     more = _more(offences)
     verb = "are" if more else "is"
@@ -122,14 +76,27 @@ def _message(offences: Sequence[Offence]) -> str:
     if edge is None:
         return f"{first.name}{more} {verb} published by {first.who}, and nobody declared {'them' if more else 'it'}"
     if first.code == "TF802":
-        owner = f"{edge.owner} ({edge.node})"
-        return f"{first.child} has a second parent: {first.who} publishes {first.name}{more}, {owner} {edge.name}"
+        return _of_parents(first, edge, more)
     if first.code == "TF809":
-        topics = ("/tf_static", "/tf") if first.static else ("/tf", "/tf_static")
-        return f"{first.name}{more} {verb} published by its owner {first.who} on {topics[0]}, declared for {topics[1]}"
+        fixed, moving = "/tf_static", "/tf"
+        if edge.owner in {process.name for process in plan.processes}:
+            moving, fixed = plan.process(edge.owner).topics
+        topics = (fixed, moving) if first.static else (moving, fixed)
+        by = "" if first.recorded else f" by its owner {first.who}"
+        return f"{first.name}{more} {verb} published{by} on {topics[0]}, declared for {topics[1]}"
     owners = list(dict.fromkeys(f"{o.edge.owner} ({o.edge.node})" for o in offences if o.edge))
     owner = f"the owner is {owners[0]}" if len(owners) == 1 else f"the owners are {', '.join(owners)}"
     return f"{first.name}{more} {verb} published by {first.who}; {owner}"
+
+
+def _of_parents(first: Offence, edge: PlanEdge, more: str) -> str:
+    if first.recorded:
+        return f"{first.child} hangs on {first.parent}{more}, and belongs on {edge.parent}"
+    owner = f"{edge.owner} ({edge.node})"
+    if first.is_owners:
+        publishes = f"its owner {owner} publishes {first.name}{more}"
+        return f"{first.child} hangs on {first.parent}: {publishes}, declared is {edge.name}"
+    return f"{first.child} has a second parent: {first.who} publishes {first.name}{more}, {owner} {edge.name}"
 
 
 def _loop(first: Offence) -> str:
@@ -163,6 +130,10 @@ def _help(first: Offence) -> str:
         return f"end {first.whom}, or turn the edge round; while it is there, tf2 finds no way through these frames"
     if first.code == "TF809":
         return "static: true says that the owner sends it on /tf_static"
+    if first.recorded:
+        return "tf2 takes whatever came last"
+    if first.code == "TF802" and first.is_owners:
+        return f"correct what {first.who} publishes, or the parent in the robot's file"
     return f"end {first.whom}, or switch its TF off; tf2 takes whatever came last"
 
 

@@ -1,0 +1,76 @@
+"""What there is to say of owners that send nothing, nothing any more, or too seldom."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import Diagnostic, Note, finding
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tfcompose.diagnostic import Severity, Span
+    from tfcompose.plan import PlanEdge
+
+NAMED_AT_MOST = 6
+
+
+def named(edges: Sequence[PlanEdge]) -> str:
+    """Return the edges by name, the first few of them if they are many."""
+    names = [edge.name for edge in edges[:NAMED_AT_MOST]]
+    more = len(edges) - len(names)
+    return ", ".join(names) + (f" and {more} more" if more else "")
+
+
+def never_seen(edges: Sequence[PlanEdge], advice: str, place: Span | None = None) -> Diagnostic:
+    """Return the finding for edges of one owner that did not come; ``place`` is where the first stands."""
+    first = edges[0]
+    was, whose = ("was", "its") if len(edges) == 1 else ("were", "their")
+    message = f"{named(edges)} {was} never seen; {whose} owner is {_owner(first)}"
+    return finding("TF811", message, place, notes=[] if place else _declared(edges), help=advice)
+
+
+def silent(edges: Sequence[PlanEdge], quiet_s: float, place: Span | None = None, *, over: bool = False) -> Diagnostic:
+    """Return the finding for edges of one owner that did not come for so long; ``over``: and then came again."""
+    first = edges[0]
+    what = "was silent" if over else "fell silent"
+    message = f"{_owner(first)} {what}: nothing on {named(edges)} for {quiet_s:.3g} s"
+    advice = f"is {first.node} still running, and does it get its data?"
+    if over:
+        advice = f"what held {first.node} up? An overloaded machine or network does, or a callback that blocks"
+    return finding("TF804", message, place, notes=_rated(first, place), help=advice)
+
+
+def left(edges: Sequence[PlanEdge]) -> Diagnostic:
+    """Return the finding for fixed edges whose owner has left."""
+    message = f"{_owner(edges[0])} is gone: nobody latches {named(edges)} any more"
+    advice = "listeners that are there keep these frames; those that join later do not get them"
+    return finding("TF804", message, None, help=advice)
+
+
+def slow(
+    edges: Sequence[PlanEdge], rate: float, place: Span | None = None, severity: Severity = "warning"
+) -> Diagnostic:
+    """Return the finding for edges of one owner that come with ``rate`` hertz."""
+    first = edges[0]
+    come = "comes" if len(edges) == 1 else "come"
+    message = f"{named(edges)} {come} at {rate:.3g} Hz from {_owner(first)}, declared are {first.rate or 0.0:g} Hz"
+    notes = [] if place else _declared(edges[:1])
+    return finding(
+        "TF805", message, place, severity=severity, notes=notes, help="raise its rate, or declare the rate that it has"
+    )
+
+
+def _owner(edge: PlanEdge) -> str:
+    return f"{edge.owner} ({edge.node})"
+
+
+def _rated(edge: PlanEdge, place: Span | None) -> list[Note]:
+    said = f"declared at {edge.rate:g} Hz" if edge.rate else "declared"
+    if place:
+        return [Note(said)] if edge.rate else []
+    return [Note(f"{said} in {edge.source[0]}:{edge.source[1]}")] if edge.rate else []
+
+
+def _declared(edges: Sequence[PlanEdge]) -> list[Note]:
+    return [Note(f"{edge.name} is declared in {edge.source[0]}:{edge.source[1]}") for edge in edges[:NAMED_AT_MOST]]

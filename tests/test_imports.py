@@ -126,6 +126,16 @@ def test_a_stage_is_imported_by_its_own_name_from_outside(file: Path) -> None:
         assert not (len(steps) > 2 and steps[0] == "tfcompose" and steps[1] in STAGES), name
 
 
+def test_launcher_guard_and_publishers_do_not_know_each_other() -> None:
+    """They are processes of their own: what they share stands in ``run`` itself."""
+    groups = {folder.name for folder in (PACKAGE / "run").iterdir() if (folder / "__init__.py").exists()}
+    assert groups == {"guard", "launcher", "publishing"}
+    for group in groups:
+        for file in (PACKAGE / "run" / group).rglob("*.py"):
+            others = {name.split(".")[2] for name in imports_of(file) if name.startswith("tfcompose.run.")}
+            assert not others & (groups - {group}), file
+
+
 def test_nothing_is_imported_inside_a_function() -> None:
     """A circle would be broken that way; what is loaded late is named, through ``import_module``."""
     inside = [
@@ -187,7 +197,7 @@ def test_commands_before_the_plan_load_yaml_and_nothing_else_from_elsewhere(
 
 
 def test_reading_and_supervising_a_plan_loads_nothing_from_elsewhere_and_no_compiler(bare: set[str]) -> None:
-    loaded = loaded_by("import tfcompose.planfile, tfcompose.run.supervisor")
+    loaded = loaded_by("import tfcompose.planfile, tfcompose.run.launcher.supervisor")
     assert not foreign(loaded, bare)
     assert not {name for name in loaded for stage in (*STAGES, "emit") if name.startswith(f"tfcompose.{stage}")}
 

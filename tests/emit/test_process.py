@@ -16,7 +16,7 @@ from tfcompose.diagnostic import RejectedError
 from tfcompose.emit import Target, emit
 from tfcompose.plan import PlanProcess, Ready, StopRule
 from tfcompose.planfile import read_plan, write_plan
-from tfcompose.run.executable import filled_in, own_env
+from tfcompose.run.launcher.executable import filled_in, own_env
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -26,7 +26,7 @@ from tfcompose.planfile import read_plan
 from tfcompose.pose import Pose
 from tfcompose.ros.joint_message import encode_names, fill
 from tfcompose.ros.message import decode
-from tfcompose.run.joint_mover import JointMover, Told
+from tfcompose.run.publishing.joint_mover import JointMover, Told
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

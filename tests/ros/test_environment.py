@@ -63,5 +63,5 @@ def test_without_rclpy_one_sentence_says_what_to_install(monkeypatch: pytest.Mon
 def test_the_parts_that_need_no_ros_import_none() -> None:
     names = ["environment", "message", "stop"]
     code = "import sys; " + "; ".join(f"import tfcompose.ros.{name}" for name in names)
-    code += "; import tfcompose.run.begin, tfcompose.run.motion; sys.exit('rclpy' in sys.modules)"
+    code += "; import tfcompose.run.begin, tfcompose.run.publishing.motion; sys.exit('rclpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False, timeout=20).returncode == 0

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tfcompose.emit.markup import quoted
-from tfcompose.run.addresses import with_whole_addresses
+from tfcompose.run.publishing.addresses import with_whole_addresses
 
 FOLDER = Path("/builds/a b & <c>/rover")
 

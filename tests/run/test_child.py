@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tfcompose.run.child import Lines, spawn
-from tfcompose.run.preflight import Command
-from tfcompose.run.signals import Signals
+from tfcompose.run.launcher.child import Lines, spawn
+from tfcompose.run.launcher.preflight import Command
+from tfcompose.run.launcher.signals import Signals
 
 if TYPE_CHECKING:
     from pathlib import Path

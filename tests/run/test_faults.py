@@ -15,8 +15,8 @@ import pytest
 
 from tfcompose.plan import Plan, PlanProcess, RosSettings
 from tfcompose.planfile import write_plan
-from tfcompose.run.control import ask, connect
-from tfcompose.run.leftovers import end, leftovers
+from tfcompose.run.launcher.control import ask, connect
+from tfcompose.run.launcher.leftovers import end, leftovers
 from tfcompose.run.place import Place
 
 if TYPE_CHECKING:
@@ -29,12 +29,12 @@ import resource, sys
 from pathlib import Path
 from tfcompose.cli.console import Console
 from tfcompose.planfile import read_plan
-from tfcompose.run.control import listen
-from tfcompose.run.logs import Logs
-from tfcompose.run.outlet import Outlet
+from tfcompose.run.launcher.control import listen
+from tfcompose.run.launcher.logs import Logs
+from tfcompose.run.launcher.outlet import Outlet
 from tfcompose.run.place import Lock, Place
-from tfcompose.run.session import Session
-from tfcompose.run.supervisor import supervise
+from tfcompose.run.launcher.session import Session
+from tfcompose.run.launcher.supervisor import supervise
 file = Path(sys.argv[1])
 if len(sys.argv) > 3:
     resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]), int(sys.argv[3])))

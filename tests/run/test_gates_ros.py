@@ -10,8 +10,8 @@ import pytest
 
 from tfcompose.plan import Plan, PlanProcess, Ready, RosSettings
 from tfcompose.planfile import write_plan
-from tfcompose.run.notice import AllReady, FindingShown, Notice, ProcessReady
-from tfcompose.run.supervisor import supervise
+from tfcompose.run.launcher.notice import AllReady, FindingShown, Notice, ProcessReady
+from tfcompose.run.launcher.supervisor import supervise
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tfcompose.ros.message import Transform, decode, encode
 from tfcompose.ros.tf import Received
-from tfcompose.run.hearing import Hearing
+from tfcompose.run.guard.hearing import Hearing
 
 NAMES = st.sampled_from(["a", "b", "odom", "base_link", "käse", "", "x" * 9])
 TRANSFORMS = st.lists(

@@ -16,7 +16,7 @@ from tfcompose.plan import Joint, PlanEdge
 from tfcompose.pose import Pose, angle_between, normalised
 from tfcompose.ros.joint_message import encode_names, fill
 from tfcompose.ros.message import Transform, decode
-from tfcompose.run.joint_mover import JointMover, Told
+from tfcompose.run.publishing.joint_mover import JointMover, Told
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from tfcompose.plan import Claim, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.pose import Pose
 from tfcompose.run.events import Clear, Complete, Found, GuardEvent, Live, OwnerReady, Recovered, Taken
-from tfcompose.run.health import statuses
-from tfcompose.run.judge import Judge, Message, Writer
+from tfcompose.run.guard.health import statuses
+from tfcompose.run.guard.judge import Judge, Message, Writer
 
 if TYPE_CHECKING:
     from tfcompose.diagnostic import Diagnostic

@@ -11,15 +11,15 @@ import pytest
 
 from tfcompose.plan import Plan, PlanProcess, RosSettings
 from tfcompose.ros.environment import child_environment
-from tfcompose.run.notice import LogLine, Notice
-from tfcompose.run.preflight import commands_of
-from tfcompose.run.supervisor import supervise
+from tfcompose.run.launcher.notice import LogLine, Notice
+from tfcompose.run.launcher.preflight import commands_of
+from tfcompose.run.launcher.supervisor import supervise
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from tfcompose.diagnostic import Diagnostic
-    from tfcompose.run.preflight import Command
+    from tfcompose.run.launcher.preflight import Command
 
 NAV2 = PlanProcess(
     "nav2", "run", ("${launch:nav2_bringup/navigation_launch.py}", "use_composition:=False"), remap={"/tf": "/r/tf"}

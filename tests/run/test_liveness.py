@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.pose import Pose
 from tfcompose.run.events import Complete, Found, GuardEvent, Live, OwnerReady, Recovered
-from tfcompose.run.liveness import Liveness
+from tfcompose.run.guard.liveness import Liveness
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

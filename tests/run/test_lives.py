@@ -11,9 +11,9 @@ import pytest
 from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, Ready, RosSettings, StopRule
 from tfcompose.pose import Pose
 from tfcompose.run.events import Clear, Complete, GateOpen, GateShut, Live, OwnerReady, Remember
-from tfcompose.run.lives import refusal
-from tfcompose.run.machine import step
-from tfcompose.run.notice import (
+from tfcompose.run.launcher.lives import refusal
+from tfcompose.run.launcher.machine import step
+from tfcompose.run.launcher.notice import (
     AllReady,
     AllStarted,
     FindingShown,
@@ -23,8 +23,7 @@ from tfcompose.run.notice import (
     RecoveredShown,
     Replanned,
 )
-from tfcompose.run.orders import Absent, Gate, GuardOrder, Present
-from tfcompose.run.state import (
+from tfcompose.run.launcher.state import (
     Action,
     Asked,
     Begin,
@@ -45,7 +44,8 @@ from tfcompose.run.state import (
     Tick,
     initial,
 )
-from tfcompose.run.timing import wake_time
+from tfcompose.run.launcher.timing import wake_time
+from tfcompose.run.orders import Absent, Gate, GuardOrder, Present
 
 if TYPE_CHECKING:
     from tfcompose.diagnostic import Diagnostic

@@ -7,7 +7,7 @@ import os
 import time
 from typing import TYPE_CHECKING
 
-from tfcompose.run.logs import KEPT, Follower, Logs, logged, read_logs
+from tfcompose.run.launcher.logs import KEPT, Follower, Logs, logged, read_logs
 
 if TYPE_CHECKING:
     from pathlib import Path

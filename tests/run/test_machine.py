@@ -12,8 +12,8 @@ from tfcompose.diagnostic import Diagnostic, finding
 from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.pose import Pose
 from tfcompose.run.events import Clear, Complete, Found, Live, OwnerReady, Recovered, Taken
-from tfcompose.run.machine import step
-from tfcompose.run.notice import (
+from tfcompose.run.launcher.machine import step
+from tfcompose.run.launcher.notice import (
     Ended,
     FindingShown,
     Missing,
@@ -25,7 +25,7 @@ from tfcompose.run.notice import (
     TreeComplete,
     Waiting,
 )
-from tfcompose.run.state import (
+from tfcompose.run.launcher.state import (
     Action,
     Begin,
     Event,
@@ -43,7 +43,7 @@ from tfcompose.run.state import (
     TimeUp,
     initial,
 )
-from tfcompose.run.timing import wake_time
+from tfcompose.run.launcher.timing import wake_time
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tfcompose.run.outlet import KEPT, Outlet
+from tfcompose.run.launcher.outlet import KEPT, Outlet
 
 
 def test_a_reader_that_does_not_read_costs_no_time_and_bounded_memory_and_learns_how_much_is_left_out() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from tfcompose.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.ros.environment import child_environment
-from tfcompose.run.preflight import Command, commands_of
+from tfcompose.run.launcher.preflight import Command, commands_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

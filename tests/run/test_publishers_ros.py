@@ -371,7 +371,7 @@ def test_an_interrupt_during_the_start_ends_quietly_too(start: Callable[..., Any
     process = start("tfcompose.run.static", file, "static", PYTHONVERBOSE="1")
     end = time.monotonic() + UNTIL_S
     while time.monotonic() < end and not any(
-        "import 'tfcompose.run.roles'" in e or "import 'rclpy'" in e for e in process.errors
+        "import 'tfcompose.run.publishing.static_role'" in e or "import 'rclpy'" in e for e in process.errors
     ):
         time.sleep(0.001)
     code, _ = process.end(signal.SIGINT)

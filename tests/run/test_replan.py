@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.pose import Pose
-from tfcompose.run.replan import Change, change
+from tfcompose.run.launcher.replan import Change, change
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -9,8 +9,8 @@ import pytest
 from tfcompose.plan import Driven, Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.pose import OPTICAL_XYZW, Pose, multiply, quat_from_rpy
 from tfcompose.run.events import Found
-from tfcompose.run.senders import Message, Senders, Writer
-from tfcompose.run.sent_poses import SentPoses
+from tfcompose.run.guard.senders import Message, Senders, Writer
+from tfcompose.run.guard.sent_poses import SentPoses
 
 LENS, OPTICAL = Pose((0.0, -0.05, 0.0)), Pose((0.0, 0.0, 0.0), OPTICAL_XYZW)
 DRIVEN = Driven("front", "realsense/d435i", publishes=True, frames={"lens": "nominal", "optical": "exact"})

@@ -19,9 +19,9 @@ from tests.waiting import until
 from tfcompose.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.planfile import write_plan
 from tfcompose.run.events import Clear, Complete, Live, OwnerReady, Remember, to_line
-from tfcompose.run.notice import Ended, FindingShown, LogLine, Notice, ProcessState
-from tfcompose.run.state import Times
-from tfcompose.run.supervisor import supervise
+from tfcompose.run.launcher.notice import Ended, FindingShown, LogLine, Notice, ProcessState
+from tfcompose.run.launcher.state import Times
+from tfcompose.run.launcher.supervisor import supervise
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -52,7 +52,7 @@ LAUNCHER = """
 import signal, sys
 from pathlib import Path
 from tfcompose.planfile import read_plan
-from tfcompose.run.supervisor import supervise
+from tfcompose.run.launcher.supervisor import supervise
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # the tests may run below nohup
 file = Path(sys.argv[1])
 plan = read_plan(file.read_text(), str(file))

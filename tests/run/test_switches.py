@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tfcompose.plan import Driven
-from tfcompose.run.switches import not_taken
+from tfcompose.run.guard.switches import not_taken
 
 if TYPE_CHECKING:
     from tfcompose.ros.parameters import Value

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.plan import Plan, PlanProcess, RosSettings
 from tfcompose.run.events import Clear, Complete, GuardEvent, OwnerReady
-from tfcompose.run.topics import plans_by_topics, together
+from tfcompose.run.guard.topics import plans_by_topics, together
 
 if TYPE_CHECKING:
     from collections.abc import Callable

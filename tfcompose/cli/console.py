@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 from tfcompose.cli.start_table import table_of
 from tfcompose.cli.terminal import line_of
 from tfcompose.render.text import BOLD, GREEN, PLAIN, RED, YELLOW, render_text
-from tfcompose.run.notice import (
+from tfcompose.run.launcher.notice import (
     AllReady,
     AllStarted,
     Ended,
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from tfcompose.cli.status import Status
     from tfcompose.plan import Plan
-    from tfcompose.run.notice import Notice
+    from tfcompose.run.launcher.notice import Notice
 
 #: Colours that are told apart on dark and light terminals; a process keeps its own by its place in the plan.
 COLOURS = tuple(f"\033[{code}m" for code in (36, 35, 34, 32, 33, 96, 95, 94))

@@ -12,16 +12,16 @@ from tfcompose.cli.keeping import left_behind
 from tfcompose.cli.missing import say_missing
 from tfcompose.cli.running import events
 from tfcompose.cli.terminal import coloured, complain
-from tfcompose.run.logs import Logs
-from tfcompose.run.notice import AllReady, AllStarted, Ended
-from tfcompose.run.supervisor import supervise
+from tfcompose.run.launcher.logs import Logs
+from tfcompose.run.launcher.notice import AllReady, AllStarted, Ended
+from tfcompose.run.launcher.supervisor import supervise
 
 if TYPE_CHECKING:
     from argparse import Namespace
 
     from tfcompose.plan import Plan
+    from tfcompose.run.launcher.session import Session
     from tfcompose.run.place import Lock, Place
-    from tfcompose.run.session import Session
 
 
 def detach(plan: Plan, place: Place, lock: Lock, session: Session, arguments: Namespace) -> int:

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.options import positive
 from tfcompose.cli.running import add_robot, asked, chosen, events, running, told
 from tfcompose.cli.terminal import complain
-from tfcompose.run.leftovers import end, leftovers
-from tfcompose.run.notice import Ended
+from tfcompose.run.launcher.leftovers import end, leftovers
+from tfcompose.run.launcher.notice import Ended
 from tfcompose.run.place import places
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.run.leftovers import Leftover
+    from tfcompose.run.launcher.leftovers import Leftover
     from tfcompose.run.place import Place
 
 

@@ -13,7 +13,7 @@ from tfcompose.cli.console import Console
 from tfcompose.cli.running import add_robot, chosen, events
 from tfcompose.cli.terminal import coloured, complain
 from tfcompose.plan import Plan, RosSettings
-from tfcompose.run.told import told_line
+from tfcompose.run.launcher.told import told_line
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace

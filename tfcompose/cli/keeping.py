@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.terminal import UNREADABLE, complain
 from tfcompose.planfile import write_plan
-from tfcompose.run.addresses import with_whole_addresses
-from tfcompose.run.leftovers import leftovers
+from tfcompose.run.launcher.leftovers import leftovers
+from tfcompose.run.publishing.addresses import with_whole_addresses
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -18,7 +18,7 @@ from tfcompose.cli.running import add_robot, chosen, running
 from tfcompose.cli.terminal import coloured, complain
 from tfcompose.diagnostic import did_you_mean
 from tfcompose.render.text import PLAIN
-from tfcompose.run.logs import Follower, logged, read_logs
+from tfcompose.run.launcher.logs import Follower, logged, read_logs
 from tfcompose.run.place import places
 
 if TYPE_CHECKING:

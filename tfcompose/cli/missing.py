@@ -6,7 +6,7 @@ import time
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.terminal import complain
-from tfcompose.run.control import ask
+from tfcompose.run.launcher.control import ask
 
 if TYPE_CHECKING:
     from tfcompose.run.place import Place

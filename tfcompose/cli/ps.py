@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.running import add_robot, is_meant, running
 from tfcompose.cli.terminal import UNREADABLE, complain
-from tfcompose.run.control import ask
+from tfcompose.run.launcher.control import ask
+from tfcompose.run.launcher.usage import usage_of
 from tfcompose.run.place import PlaceError
-from tfcompose.run.usage import usage_of
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace

@@ -8,15 +8,15 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.terminal import UNREADABLE, complain
-from tfcompose.run.control import ask, connect
+from tfcompose.run.launcher.control import ask, connect
+from tfcompose.run.launcher.told import notice_of
 from tfcompose.run.place import PlaceError, places
-from tfcompose.run.told import notice_of
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from collections.abc import Callable, Iterator
 
-    from tfcompose.run.notice import Notice
+    from tfcompose.run.launcher.notice import Notice
     from tfcompose.run.place import Holder, Place
 
 

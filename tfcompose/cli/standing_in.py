@@ -13,7 +13,7 @@ from tfcompose.diagnostic import RejectedError
 from tfcompose.emit.plan import plan_of
 from tfcompose.load import load, with_includes
 from tfcompose.ros.environment import child_environment
-from tfcompose.run.preflight import commands_of, started_by_us
+from tfcompose.run.launcher.preflight import commands_of, started_by_us
 
 if TYPE_CHECKING:
     from argparse import Namespace

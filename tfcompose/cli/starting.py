@@ -16,13 +16,13 @@ from tfcompose.cli.terminal import UNREADABLE, coloured, complain, print_finding
 from tfcompose.cli.up import PLAN, as_asked, plan_in
 from tfcompose.diagnostic import finding
 from tfcompose.ros.environment import child_environment, missing_ros
-from tfcompose.run.control import listen
-from tfcompose.run.logs import Logs
-from tfcompose.run.outlet import Outlet
+from tfcompose.run.launcher.control import listen
+from tfcompose.run.launcher.logs import Logs
+from tfcompose.run.launcher.outlet import Outlet
+from tfcompose.run.launcher.preflight import commands_of, started_by_us
+from tfcompose.run.launcher.session import Session
+from tfcompose.run.launcher.supervisor import supervise
 from tfcompose.run.place import Lock, PlaceError, place_of
-from tfcompose.run.preflight import commands_of, started_by_us
-from tfcompose.run.session import Session
-from tfcompose.run.supervisor import supervise
 
 if TYPE_CHECKING:
     from argparse import Namespace

@@ -18,8 +18,13 @@ from tfcompose.run.own import read_own
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-#: The module that imports ROS, which is loaded when signals are handled.
-ROLES = "tfcompose.run.roles"
+#: What each kind of process does: a function, and its module, which imports ROS and is loaded when signals are handled.
+ROLES = {
+    "static": ("tfcompose.run.publishing.static_role", "static"),
+    "joints": ("tfcompose.run.publishing.joint_role", "joints"),
+    "simulate": ("tfcompose.run.publishing.simulate_role", "simulate"),
+    "guard": ("tfcompose.run.guard.watch", "guard"),
+}
 
 
 def start(argv: Sequence[str], kind: str) -> int:
@@ -40,7 +45,8 @@ def start(argv: Sequence[str], kind: str) -> int:
         if stop.requested:
             return 0
         try:
-            role = import_module(ROLES).ROLES[kind]
+            module, name = ROLES[kind]
+            role = getattr(import_module(module), name)
             if not stop.requested:
                 role(own, stop)
         except RosError as error:

@@ -13,6 +13,8 @@ from typing import Any
 from tfcompose.diagnostic import Diagnostic, Note
 
 EVENTS_FD = "TFCOMPOSE_EVENTS_FD"
+#: The descriptor of what the guard before this one left, in JSON; see ``tfcompose.run.guard.memory``.
+MEMORY_FD = "TFCOMPOSE_MEMORY_FD"
 
 
 @dataclass(frozen=True, slots=True)

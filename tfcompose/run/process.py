@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 from tfcompose.diagnostic import RejectedError
 from tfcompose.planfile import read_plan
 from tfcompose.ros.environment import child_environment
+from tfcompose.run.launcher.preflight import Command, commands_of
 from tfcompose.run.orders import JOINS
-from tfcompose.run.preflight import Command, commands_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

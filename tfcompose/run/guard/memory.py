@@ -1,0 +1,61 @@
+"""What a guard leaves to the one that follows it, should it die: by the launcher, which does not look into it.
+
+``events.MEMORY_FD`` names the environment variable that holds the descriptor of a file with the memory: one JSON
+object, by the TF topics that a judge watches.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.run.events import MEMORY_FD, Remember
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from tfcompose.run.events import GuardEvent
+    from tfcompose.run.guard.judge import Judge
+    from tfcompose.run.guard.relay import Relay
+
+#: A longer part is not handed on: the launcher takes no longer lines; characters.
+LONGEST = 900_000
+
+
+def recalled(env: Mapping[str, str]) -> dict[str, Any]:
+    """Return what the guard before this one left, by topics; nothing where there was none."""
+    if MEMORY_FD not in env:
+        return {}
+    with os.fdopen(int(env[MEMORY_FD]), "rb") as file:
+        left: dict[str, Any] = json.loads(file.read())
+    by_topics: dict[str, Any] = {}
+    for key, value in left.items():
+        topics, _, part = key.rpartition(" ")
+        by_topics.setdefault(topics, {})[part] = value
+    return by_topics
+
+
+class Memory:
+    """Hands on what a judge knows, and a relay latches, part by part, whenever a part has changed."""
+
+    def __init__(self, topics: str, judge: Judge, relay: Relay | None, emit: Callable[[GuardEvent], None]) -> None:
+        self._topics = topics
+        self._judge = judge
+        self._relay = relay
+        self._emit = emit
+        self._mark: object = None
+        self._left: dict[str, Any] = {}
+
+    def look(self) -> None:
+        """Hand on what has changed."""
+        mark = (self._judge.mark, self._relay and self._relay.changes)
+        if mark == self._mark:
+            return
+        self._mark = mark
+        known = self._judge.memory() | (self._relay.memory() if self._relay else {})
+        gone = dict.fromkeys(self._left.keys() - known.keys())
+        for part, value in (known | gone).items():
+            if self._left.get(part) != value and len(json.dumps(value)) < LONGEST:
+                self._emit(Remember({f"{self._topics} {part}": value}))
+        self._left = known

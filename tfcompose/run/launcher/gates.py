@@ -1,0 +1,145 @@
+"""When a process is ready: what its gate waits for, and what is said of one that stays shut."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tfcompose.diagnostic import Note, finding
+from tfcompose.run.launcher.notice import AllReady, AllStarted, ProcessReady, StartRow
+from tfcompose.run.launcher.state import Order, TellLate
+from tfcompose.run.orders import Gate
+
+if TYPE_CHECKING:
+    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.plan import PlanProcess
+    from tfcompose.run.launcher.state import State, Tracked
+    from tfcompose.run.launcher.turn import Turn
+
+#: Gates at which the guard looks.
+_GUARDED = ("edges", "topic", "service", "lifecycle")
+
+
+def kind_of(process: PlanProcess) -> str:
+    """Return what the process's readiness hangs on: its gate's kind, or "started"."""
+    if process.ready:
+        return process.ready.kind
+    if process.lifecycle:
+        return "lifecycle"
+    return "edges" if process.owns else "started"
+
+
+def has_own_gate(process: PlanProcess) -> bool:
+    """Return whether the plan says by what this process is ready."""
+    return process.ready is not None or bool(process.lifecycle)
+
+
+def order_gate(turn: Turn, one: Tracked) -> None:
+    """Tell the guard what to look for, and which nodes to bring into their states."""
+    process, kind = one.process, kind_of(one.process)
+    ready = process.ready
+    if turn.state.guard is None or not (process.lifecycle or kind in ("topic", "service", "lifecycle")):
+        return
+    nodes, text = process.lifecycle, ready.text if ready else ""
+    if kind == "lifecycle" and not nodes:
+        nodes = dict.fromkeys(process.nodes, text)
+    topic, service = (text if kind == name else "" for name in ("topic", "service"))
+    turn.actions.append(Order(Gate(process.name, topic, service, dict(nodes), drive=bool(process.lifecycle))))
+
+
+def opened(turn: Turn, name: str, seen: str = "") -> None:
+    """Note that the process is ready."""
+    one = turn.state.tracked[name]
+    if one.ready:
+        return
+    turn.track(name, replace(one, ready=True, ready_since=turn.now, seen=seen, late=False))
+    if has_own_gate(one.process):
+        turn.tell(ProcessReady(name, seen, turn.now - (turn.state.begun or 0.0)))
+
+
+def look(turn: Turn) -> None:
+    """Open the gates that need nobody to look, and say which are late."""
+    for name, one in turn.state.tracked.items():
+        if one.ready or one.state not in ("RUNNING", "EXPECTED"):
+            continue
+        kind, ready = kind_of(one.process), one.process.ready
+        if kind == "started" or (kind in _GUARDED and turn.state.guard is None):
+            opened(turn, name, "started")
+        elif kind == "time" and ready and turn.now >= one.began + ready.number:
+            opened(turn, name, f"{ready.number:g} s have passed")
+        elif not one.late and (due := late_at(turn.state, one)) is not None and turn.now >= due:
+            turn.track(name, replace(one, late=True))
+            found = _late(turn.state, one, due - one.began)
+            turn.know(shown=turn.state.shown | {found.code})
+            turn.actions.append(TellLate(name, found))
+
+
+def say_progress(turn: Turn) -> None:
+    """Say, once, that all that can be was started, and that all are ready."""
+    _say_started(turn)
+    _say_ready(turn)
+
+
+def late_at(state: State, one: Tracked) -> float | None:
+    """Return when the process is late; None if it may take its time."""
+    if one.ready or one.late or not has_own_gate(one.process) or one.state not in ("RUNNING", "EXPECTED"):
+        return None
+    ready = one.process.ready
+    if ready and ready.kind == "time":
+        return None
+    timeout_s = ready.timeout_s if ready else None
+    return one.began + (state.times.ready_s if timeout_s is None else timeout_s)
+
+
+def opens_at(one: Tracked) -> float | None:
+    """Return when a gate opens by itself."""
+    ready = one.process.ready
+    waits = not one.ready and one.state in ("RUNNING", "EXPECTED") and ready and ready.kind == "time"
+    return one.began + ready.number if waits and ready else None
+
+
+def _late(state: State, one: Tracked, seconds: float) -> Diagnostic:
+    process, kind = one.process, kind_of(one.process)
+    text = process.ready.text if process.ready else ""
+    missing = [edge.name for edge in state.plan.edges_of(process.name) if edge.child not in state.live]
+    waits = {
+        "topic": f"nobody publishes {text}",
+        "service": f"there is no service {text}",
+        "lifecycle": "its nodes are not in their lifecycle states",
+        "log": f"no line of its output holds {text}",
+        "exit": "it still runs",
+        "edges": f"nobody published {', '.join(missing[:4])}",
+    }[kind]
+    notes = [Note(f"seen instead: {one.seen}")] if one.seen else []
+    return finding("TF817", f"{process.name} is not ready after {seconds:g} s: {waits}", None, notes=notes)
+
+
+def _say_started(turn: Turn) -> None:
+    state = turn.state
+    if state.all_started or state.clear is None or any(one.state == "STARTING" for one in state.tracked.values()):
+        return
+    turn.know(all_started=True)
+    waiting = tuple(name for name, one in state.tracked.items() if one.state == "STOPPED" and one.wanted)
+    started = sum(one.order > 0 for one in state.tracked.values())
+    turn.tell(AllStarted(started, waiting, turn.now - (state.begun or 0.0)))
+
+
+def is_ready(state: State) -> bool:
+    """Return whether every process that is wanted is ready, or done, and every edge live."""
+    if state.clear is None or state.stop or not (state.complete or state.guard is None):
+        return False
+    return all((one.ready and not one.leaving) or one.state == "EXITED" for one in state.tracked.values() if one.wanted)
+
+
+def _say_ready(turn: Turn) -> None:
+    state = turn.state
+    begun = max(state.begun or 0.0, state.begun_anew)
+    if state.all_ready or not is_ready(state):
+        return
+    turn.know(all_ready=True)
+    rows = []
+    for name, one in state.tracked.items():
+        if one.wanted and (one.began >= begun or state.begun_anew == 0.0):
+            started = None if one.state == "EXPECTED" else one.began - begun
+            rows.append(StartRow(name, started, (one.ready_since or one.since) - begun))
+    turn.tell(AllReady(tuple(rows), turn.now - begun))

@@ -1,0 +1,156 @@
+"""Before anything is started: everything about the plan that cannot work on this machine, all at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Protocol
+
+from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.ros.environment import PROFILE_VARIABLES, RosError
+from tfcompose.ros.fence import can_fence, profile
+from tfcompose.run.launcher.executable import NotFound, executable_of, filled_in, folder_of, not_found, own_env
+from tfcompose.run.launcher.launch_file import is_launch, launch_command
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from tfcompose.plan import Plan, PlanProcess, RosSettings
+
+
+class Environment(Protocol):
+    """What makes a process's environment; ``own`` says that the process is one of tfcompose's."""
+
+    def __call__(self, base: Mapping[str, str], ros: RosSettings, *, own: bool) -> dict[str, str]:
+        """Return the environment.
+
+        Raises:
+            RosError: if the plan's settings cannot be followed.
+        """
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """What is executed: program and arguments, environment, and folder.
+
+    ``own`` says that it is one of tfcompose's. ``fence`` is a file that must be there first, and what it holds.
+    """
+
+    argv: tuple[str, ...]
+    env: dict[str, str]
+    folder: Path
+    own: bool = False
+    fence: tuple[Path, str] | None = None
+
+
+def started_by_us(plan: Plan) -> list[PlanProcess]:
+    """Return the processes that the launcher starts, in the plan's order."""
+    return [process for process in plan.processes if process.kind != "external"]
+
+
+def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
+    plan: Plan,
+    processes: list[PlanProcess],
+    plan_file: Path,
+    base: Mapping[str, str],
+    environment: Environment,
+    built_in: Path | None = None,
+) -> tuple[dict[str, Command], list[Diagnostic]]:
+    """Return each process's command, and what is wrong; with anything wrong, nothing should be started.
+
+    ``built_in`` is the folder that the plan was built in, where ``plan_file`` is a copy of it.
+    """
+    folder = built_in or plan_file.absolute().parent
+    found = _never_started(plan)
+    commands: dict[str, Command] = {}
+    missing = []
+    for process in processes:
+        command = _command_of(process, plan.ros, (plan_file.absolute(), folder), base, environment)
+        if isinstance(command, Diagnostic):
+            found.append(command)
+        elif isinstance(command, NotFound):
+            missing.append(command)
+        else:
+            commands[process.name] = command
+    if plan.guard.mode == "strict":
+        found += _fence(plan, commands, plan_file.absolute().parent)
+    if missing:
+        found.append(not_found(missing))
+    return commands, list(dict.fromkeys(found))
+
+
+def _command_of(
+    process: PlanProcess,
+    ros: RosSettings,
+    files: tuple[Path, Path],
+    base: Mapping[str, str],
+    environment: Environment,
+) -> Command | NotFound | Diagnostic:
+    own = process.kind != "run"
+    try:
+        env = environment(base, ros, own=own) | own_env(process, *files)
+    except RosError as error:
+        return finding("TF902", str(error), None)
+    argv = filled_in(process, *files)
+    if not argv:
+        return finding("TF902", f"the plan does not say how {process.name} is started", None)
+    folder = folder_of(process, files[1])
+    if is_launch(argv[0]):
+        launched = launch_command(process, ros, argv, env)
+        return Command(launched[0], env | launched[1], folder) if isinstance(launched, tuple) else launched
+    program = executable_of(process, argv[0], folder, env)
+    return program if isinstance(program, NotFound) else Command((program, *argv[1:]), env, folder, own)
+
+
+def _fence(plan: Plan, commands: dict[str, Command], folder: Path) -> list[Diagnostic]:
+    """Fence off what the commands send on TF, and return why that cannot be done."""
+    found = []
+    for name, command in commands.items():
+        process = plan.process(name)
+        reads = process.kind == "guard"
+        processes = plan.processes if reads else (process,)
+        topics = [one.remap.get(topic, topic) for one in processes for topic in ("/tf", "/tf_static")]
+        moved = [topic for topic in topics if not topic.startswith("/")]
+        if moved:
+            message = f"guard: strict needs full names of TF's topics, and {name} has {', '.join(moved)}"
+            found.append(finding("TF902", message, None, help="write the remapping with a leading slash"))
+            continue
+        if not can_fence(command.env):
+            rmw = command.env["RMW_IMPLEMENTATION"]
+            message = f"guard: strict needs rmw_fastrtps_cpp, and {name} is started with {rmw}"
+            found.append(
+                finding("TF902", message, None, help="unset RMW_IMPLEMENTATION, or watch: guard: {mode: watch}")
+            )
+            continue
+        try:
+            text = profile(command.env, topics, f"tfc_{plan.robot}", reads=reads)
+        except RosError as error:
+            found.append(finding("TF902", f"{name}: {error}", None))
+            continue
+        file = folder / "fence" / f"{name.replace('/', '.')}.xml"
+        env = command.env | dict.fromkeys(PROFILE_VARIABLES, str(file))
+        commands[name] = replace(command, env=env, fence=(file, text))
+    return found
+
+
+def _never_started(plan: Plan) -> list[Diagnostic]:
+    """Return a finding for each process that waits for what cannot come."""
+    known = {process.name: process for process in plan.processes}
+    found = []
+    for process in plan.processes:
+        for name, what in process.after.items():
+            if name not in known:
+                found.append(finding("TF902", f"{process.name} waits for {name}, which is not in the plan", None))
+            elif what not in _promises(known[name]):
+                found.append(finding("TF902", f"{process.name} waits until {name} is {what}: that never comes", None))
+    waiting = {process.name: set(process.after) & set(known) for process in plan.processes if process.kind != "guard"}
+    while free := [name for name, others in waiting.items() if not others & set(waiting)]:
+        for name in free:
+            del waiting[name]
+    if waiting:
+        found.append(finding("TF812", f"{', '.join(waiting)} wait for each other", None))
+    return found
+
+
+def _promises(process: PlanProcess) -> tuple[str, ...]:
+    return ("started", "ready", "done") if process.kind == "run" else ("started", "ready")

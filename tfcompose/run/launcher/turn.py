@@ -1,0 +1,81 @@
+"""One step of the process machine, while it is being taken: what is known so far, and what is to be done so far."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tfcompose.run.launcher.failures import in_short
+from tfcompose.run.launcher.notice import Ended, FindingShown, Notice, ProcessState, StateName, Stopping
+from tfcompose.run.launcher.state import Action, Finish, Order, Start, State, Stop, Tell, Tracked
+from tfcompose.run.orders import Present
+
+if TYPE_CHECKING:
+    from tfcompose.diagnostic import Diagnostic
+
+
+class Turn:
+    """The step's state and actions. It lives no longer than the step, and its state is replaced, never changed."""
+
+    def __init__(self, state: State, now: float) -> None:
+        self.state = state
+        self.now = now
+        self.actions: list[Action] = []
+
+    def know(self, **changes: object) -> None:
+        """Write down what is known from now on."""
+        self.state = replace(self.state, **changes)  # type: ignore[arg-type]
+
+    def track(self, name: str, tracked: Tracked) -> None:
+        """Write down what is known of one process."""
+        self.know(tracked=self.state.tracked | {name: tracked})
+
+    def tell(self, notice: Notice) -> None:
+        """Tell the person."""
+        self.actions.append(Tell(notice))
+
+    def enter(self, name: str, state: StateName, detail: str = "", **changes: float | None) -> None:
+        """Put the process into the state, since now, and tell."""
+        pid = changes.pop("pid", None)
+        one = replace(self.state.tracked[name], state=state, since=self.now, pid=pid, **changes)  # type: ignore[arg-type]
+        self.track(name, one)
+        self.tell(ProcessState(name, state, one.pid, detail))
+
+    def start(self, name: str) -> None:
+        """Have the process started."""
+        order = 1 + max(one.order for one in self.state.tracked.values())
+        before = self.state.tracked[name]
+        again = before.order > 0
+        self.enter(name, "STARTING", order=order, level=0, restarts=before.restarts + again)
+        if again and before.process.owns and self.state.guard not in (None, name):
+            self.actions.append(Order(Present(name)))
+        self.actions.append(Start(name))
+
+    def show(self, found: Diagnostic) -> None:
+        """Show the finding, and remember an error."""
+        if found.severity == "error":
+            self.know(shown=self.state.shown | {found.code})
+        self.tell(FindingShown(found))
+
+    def fail(self, found: Diagnostic) -> None:
+        """Show the finding and stop everything; once that is under way, further failures follow from it."""
+        if self.state.stop is None:
+            self.show(found)
+            self.know(because=(found.message, *(note.message for note in found.notes)))
+            self.stop(Stop("failure", 1), in_short(found))
+
+    def stop(self, stop: Stop, reason: str) -> None:
+        """Begin to stop everything, unless that is under way."""
+        if self.state.stop:
+            return
+        self.know(stop=stop)
+        self.tell(Stopping(reason))
+        for name, one in self.state.tracked.items():
+            if one.state == "BACKOFF":
+                self.enter(name, "STOPPED")
+
+    def finish(self, exit_code: int) -> None:
+        """End: nothing runs any more."""
+        self.know(finished=True)
+        self.tell(Ended(exit_code, self.state.because))
+        self.actions.append(Finish(exit_code))

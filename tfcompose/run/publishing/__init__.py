@@ -1,0 +1,1 @@
+"""tfcompose's own publishers: fixed edges, moving joints, stand-ins, and the robot's description."""

@@ -1,0 +1,146 @@
+"""From joint states to TF messages, bytes to bytes; what cannot be believed is said and left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tfcompose.ros.joint_message import read_names
+from tfcompose.run.publishing.follow import SLIDING, TURNING, Joints
+from tfcompose.run.publishing.moving import Moving
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from tfcompose.plan import PlanEdge
+    from tfcompose.ros.joint_message import Names
+
+_SECOND_NS = 1_000_000_000
+# Joint states come with one list of names from each driver; one that never repeats itself must not fill the memory.
+_MOST_SOURCES = 64
+# Faults are said by their sentence, which may hold a name; so many are said.
+_MOST_LINES = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """How joint states are published; the words are robot_state_publisher's.
+
+    ``publish_frequency`` in Hz is the most of those with the same names, or 0 for all. ``ignore_timestamp`` says that
+    they are published whatever their time is: also when it is the last one's, or their frequency too high.
+    """
+
+    publish_frequency: float = 0.0
+    ignore_timestamp: bool = False
+
+
+@dataclass(slots=True)
+class _Source:
+    """Joint states with the same names, and when the last of them was published, in nanoseconds of their own time."""
+
+    names: Names
+    moving: Moving | None
+    last_ns: int | None = None
+    due_ns: int = 0
+
+
+class JointMover:
+    """The moving edges of a plan.
+
+    ``say`` is given lines for people. ``now_ns`` gives the time for a message without a stamp, from its arrival in
+    nanoseconds, or None as long as there is none: messages that are sent by hand often have no stamp.
+    """
+
+    def __init__(
+        self,
+        edges: Sequence[PlanEdge],
+        say: Callable[[str], None],
+        now_ns: Callable[[int], int | None],
+        told: Told | None = None,
+    ) -> None:
+        pairs = [(edge, edge.joint) for edge in edges if edge.joint]
+        movable = [(edge, joint) for edge, joint in pairs if joint.type in TURNING + SLIDING]
+        self._edges = [edge for edge, _ in movable]
+        self._all_joints = [joint for _, joint in movable]
+        self._joints = Joints(self._all_joints)
+        self._say = say
+        self._now_ns = now_ns
+        told = told or Told()
+        self._ignores_time = told.ignore_timestamp
+        self._period_ns = round(_SECOND_NS / told.publish_frequency) if told.publish_frequency else 0
+        self._sources: list[_Source] = []
+        self._said: set[str] = set()
+        self._moved: set[int] = set()
+        for edge, joint in pairs:
+            if joint.type not in TURNING + SLIDING:
+                say(f"{edge.name} is not published: a {joint.type} joint has no single position in joint states")
+
+    def __len__(self) -> int:
+        return len(self._edges)
+
+    @property
+    def missing(self) -> list[str]:
+        """The joints that no joint state has moved yet; not those that follow one of them."""
+        names = {joint.name for index, joint in enumerate(self._all_joints) if index not in self._moved}
+        return [joint.name for joint in self._all_joints if joint.name in names and joint.mimic not in names]
+
+    def answer(self, data: bytes, received_ns: int) -> bytes | None:
+        """Return what a joint state says as a TFMessage, or None where it says nothing or is left out."""
+        try:
+            source = self._source(data)
+            if source.moving is None:
+                return None
+            positions = source.names.positions(data)
+            stamp_ns = source.names.stamp_ns(data) or self._now_ns(received_ns)
+            if stamp_ns is None or not self._is_due(source, stamp_ns):
+                return None
+            return source.moving.message(positions, stamp_ns)
+        except ValueError as error:
+            self._once(f"dropped a joint state: {error} (said once)")
+            return None
+
+    def _source(self, data: bytes) -> _Source:
+        for source in self._sources:
+            if source.names.fit(data):
+                return source
+        names = read_names(data)
+        names.positions(data)
+        for source in self._sources:
+            if source.names.names == names.names:  # with another frame, or other bytes between the names
+                source.names = names
+                return source
+        if len(self._sources) >= _MOST_SOURCES:
+            self._sources.clear()
+        followed = self._joints.followed(names.names)
+        moving = Moving(self._edges, self._all_joints, followed, names.names) if followed else None
+        self._moved |= {one.joint for one in followed}
+        self._sources.append(_Source(names, moving))
+        return self._sources[-1]
+
+    def _is_due(self, source: _Source, stamp_ns: int) -> bool:
+        """Whether a joint state of this time is published, and note that it is.
+
+        tf2 takes the first transform of one time only, and every listener warns of the others. A time before the last
+        one is a recording that starts anew, or a second source, and is published: tf2 sorts.
+        """
+        if self._ignores_time:
+            return True
+        if stamp_ns == source.last_ns:
+            self._once("left out a joint state with the same time as the one before (said once)")
+            return False
+        # Half a period early is in time: the next one is due a period after this one was, so that a source's jitter
+        # leaves nothing out and the mean stays.
+        early_ns = source.due_ns - self._period_ns // 2
+        if self._period_ns and source.last_ns is not None and source.last_ns < stamp_ns < early_ns:
+            hertz = _SECOND_NS / self._period_ns
+            self._once(f"joint states come with more than {hertz:g} Hz: some are left out, as publish_frequency says")
+            return False
+        behind = source.last_ns is None or stamp_ns < source.last_ns or stamp_ns - source.due_ns > self._period_ns
+        source.due_ns = (stamp_ns if behind else source.due_ns) + self._period_ns
+        source.last_ns = stamp_ns
+        return True
+
+    def _once(self, line: str) -> None:
+        if line not in self._said and len(self._said) < _MOST_LINES:
+            self._said.add(line)
+            self._say(line)

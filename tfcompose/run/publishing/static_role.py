@@ -1,0 +1,44 @@
+"""What the static process does: the fixed edges are latched, and the description where nobody else sends it."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.node import open_node
+from tfcompose.ros.tf import TFPublisher, wait
+from tfcompose.run.notify import ready
+from tfcompose.run.own import count, say
+from tfcompose.run.publishing.description import LOOK_EVERY_S, Description
+
+if TYPE_CHECKING:
+    from tfcompose.ros.stop import Stop
+    from tfcompose.run.own import Own
+
+
+def static(own: Own, stop: Stop) -> None:
+    """Latch all fixed edges in one message on /tf_static, and the description where no joints process does."""
+    # A fixed edge holds at every time and tf2 does not look at its stamp; simulated time may not have begun.
+    stamp_ns = 0 if own.plan.ros.clock == "sim" else time.time_ns()
+    edges = [Transform(stamp_ns, e.parent, e.child, e.pose.xyz, e.pose.quat_xyzw) for e in own.edges]
+    with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
+        publisher = TFPublisher(node, static=True)
+        if edges:
+            publisher.publish(encode(edges))
+        say(f"{count(len(edges), 'edge')} on /tf_static")
+        ready()
+        if _joints_of(own) in {
+            process.name for process in own.plan.processes if process.kind in ("joints", "external")
+        }:
+            stop.wait(None)
+            return
+        description = Description(own, node)
+        while not stop.requested:
+            wait(node, [description.subscription], LOOK_EVERY_S if description.looks else None, stop)
+            description.look()
+
+
+def _joints_of(own: Own) -> str:
+    """Return the name of the process that sends the description in this one's place, where there is one."""
+    return f"{own.process.name.removesuffix('static')}joints"

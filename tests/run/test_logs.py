@@ -73,7 +73,7 @@ def test_a_full_disk_is_said_once_costs_lines_and_stops_nobody(tmp_path: Path, m
     said = [logs.write("a", "lost") for _ in range(100)]
     assert said == [f"logs are not written to {tmp_path}: No space left on device", *[None] * 99]
     monkeypatch.setattr(os, "write", write)
-    monkeypatch.setattr("tfcompose.run.logs.LEFT_ALONE_S", 0.0)
+    monkeypatch.setattr("tfcompose.run.launcher.logs.LEFT_ALONE_S", 0.0)
     logs.write("a", "after")
     logs.close()
     assert texts(tmp_path, "a") == ["before", "after"]

@@ -182,6 +182,7 @@ CODES = {
     "TF844": "joint_without_state",
     "TF845": "no_tf",
     "TF846": "wrong_live_pose",
+    "TF847": "needed_but_optional",
     # the environment
     "TF901": "no_ros",
     "TF902": "bad_plan",

@@ -174,8 +174,9 @@ class PlanProcess:
     """What is started, or, with kind ``external``, expected to run.
 
     ``nodes`` are full names; ``lifecycle`` says of some of them into which state they are brought after the start.
-    ``required`` says that the plan ends when the process does. ``max_restarts`` None is the launcher's default, as is
-    ``ready`` None: the edges that the process owns, or that it was started.
+    ``required`` says what ends the plan: True, this process's end; None, its failure; False, neither.
+    ``max_restarts`` None is the launcher's default, as is ``ready`` None: the edges that the process owns, or that it
+    was started.
     ``drives`` are the sensors that it is the driver of, by their presets. ``switches`` holds, by the full names of its
     nodes, the parameters that were written for them and decide what they publish.
     ``description`` is the file beside the plan that a publisher sends as ``robot_description``; None: the plan's.
@@ -191,7 +192,7 @@ class PlanProcess:
     nodes: tuple[str, ...] = ()
     restart: str = "no"
     max_restarts: int | None = None
-    required: bool = False
+    required: bool | None = None
     stop: StopRule = field(default_factory=StopRule)
     log_level: str | None = None
     lifecycle: dict[str, str] = field(default_factory=dict)

@@ -226,7 +226,7 @@ def _process_from_json(data: dict[str, Any], where: str) -> PlanProcess:
         nodes=tuple(str(node) for node in get(data, "nodes", list, where)),
         restart=one_of(data, "restart", ("no", "on-failure", "always"), where),
         max_restarts=optional(data, "max_restarts", int, where),
-        required=get(data, "required", bool, where),
+        required=optional(data, "required", bool, where),
         stop=_stop_from_json(get(data, "stop", dict, where), where),
         log_level=one_of(data, "log_level", (None, *LOG_LEVELS), where),
         lifecycle=_states(data, where),

@@ -42,8 +42,9 @@ def process_of(keys: str, head: str = HEAD) -> PlanProcess:
 
 
 REACH: dict[str, dict[str, Any]] = {
-    "": {"required": False, "max_restarts": None, "stop": StopRule(), "log_level": None, "ready": None, "host": None},
+    "": {"required": None, "max_restarts": None, "stop": StopRule(), "log_level": None, "ready": None, "host": None},
     "required: true": {"required": True},
+    "required: false": {"required": False},
     "host: jetson": {"host": "jetson"},
     "restart: always, max_restarts: 3": {"restart": "always", "max_restarts": 3},
     "stop: {signal: SIGTERM, timeout: 200 ms}": {"stop": StopRule("SIGTERM", 0.2)},
@@ -130,7 +131,7 @@ def test_a_stand_in_takes_the_place_of_a_shells_command() -> None:
 @pytest.mark.parametrize(
     ("old", "new"),
     [
-        ('"required": false', '"required": 1'),
+        ('"required": null', '"required": 1'),
         ('"signal": "SIGINT"', '"signal": "SIGFOO"'),
         ('"timeout_s": null', '"timeout_s": "3"'),
         ('"lifecycle": {}', '"lifecycle": {"/a": "on"}'),

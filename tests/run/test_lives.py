@@ -4,127 +4,23 @@ from __future__ import annotations
 
 from dataclasses import replace
 from signal import SIGINT, SIGKILL, SIGQUIT, SIGTERM
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any
 
 import pytest
 
-from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, Ready, RosSettings, StopRule
-from tfcompose.pose import Pose
+from tests.run.history import GUARD, SLAM, STATIC, begin, plan_of, run_process
+from tfcompose.plan import GuardPolicy, Plan, PlanProcess, Ready, StopRule
 from tfcompose.run.events import Clear, Complete, GateOpen, GateShut, Live, OwnerReady, Remember
+from tfcompose.run.launcher.happening import Asked, Down, Exited, LogSeen, NewPlan, Signalled
 from tfcompose.run.launcher.lives import refusal
-from tfcompose.run.launcher.machine import step
 from tfcompose.run.launcher.notice import (
     AllReady,
     AllStarted,
-    FindingShown,
-    Notice,
     ProcessReady,
-    ProcessState,
     RecoveredShown,
     Replanned,
 )
-from tfcompose.run.launcher.state import (
-    Action,
-    Asked,
-    Begin,
-    Down,
-    Event,
-    Exited,
-    Finish,
-    Kill,
-    LogSeen,
-    NewPlan,
-    Order,
-    Signalled,
-    Start,
-    Started,
-    State,
-    Tell,
-    TellLate,
-    Tick,
-    initial,
-)
-from tfcompose.run.launcher.timing import wake_time
-from tfcompose.run.orders import Absent, Gate, GuardOrder, Present
-
-if TYPE_CHECKING:
-    from tfcompose.diagnostic import Diagnostic
-
-GUARD = PlanProcess("guard", "guard")
-STATIC = PlanProcess("static", "static", owns=(("base_link", "laser"),))
-SLAM = PlanProcess("slam", "run", owns=(("map", "odom"),))
-N = TypeVar("N", bound=Notice)
-
-
-def plan_of(*processes: PlanProcess) -> Plan:
-    edges = tuple(
-        PlanEdge(parent, child, "static", one.name, f"/{one.name}", Pose(), None, ("robot.yaml", 1))
-        for one in processes
-        for parent, child in one.owns
-    )
-    return Plan("rover", "", "base_link", RosSettings(), edges, processes)
-
-
-def run_process(name: str, restart: str = "no", after: dict[str, str] | None = None) -> PlanProcess:
-    return PlanProcess(name, "run", restart=restart, after=after or {})
-
-
-class Life:
-    """A machine that is fed events; what it does is written down, and starts succeed by themselves."""
-
-    def __init__(self, *processes: PlanProcess) -> None:
-        self.now = 100.0
-        self.started: list[str] = []
-        self.killed: list[tuple[str, int]] = []
-        self.told: list[Notice] = []
-        self.orders: list[GuardOrder] = []
-        self.late: list[Diagnostic] = []
-        self.exit_code: int | None = None
-        self.state: State = initial(plan_of(*processes))
-        self.feed(Begin())
-
-    def feed(self, *events: Event) -> Life:
-        for event in events:
-            self.state, actions = step(self.state, event, self.now)
-            for action in actions:
-                self.do(action)
-        return self
-
-    def do(self, action: Action) -> None:
-        match action:
-            case Start(name):
-                self.started.append(name)
-                self.feed(Started(name, 1000 + len(self.started)))
-            case Kill(name, number):
-                self.killed.append((name, number))
-            case Tell(notice):
-                self.told.append(notice)
-            case Order(order):
-                self.orders.append(order)
-            case TellLate(_, found):
-                self.late.append(found)
-            case Finish(code):
-                self.exit_code = code
-
-    def wait(self, seconds: float) -> Life:
-        self.now += seconds
-        return self.feed(Tick())
-
-    def sleep_until_due(self) -> float:
-        due = wake_time(self.state)
-        assert due is not None
-        slept = due - self.now
-        self.wait(slept)
-        return slept
-
-    def all(self, kind: type[N]) -> list[N]:
-        return [notice for notice in self.told if isinstance(notice, kind)]
-
-    def found(self) -> list[Diagnostic]:
-        return [notice.found for notice in self.all(FindingShown)]
-
-    def states(self, name: str) -> list[str]:
-        return [notice.state for notice in self.all(ProcessState) if notice.process == name]
+from tfcompose.run.orders import Absent, Gate, Present
 
 
 def gated(name: str = "lidar", *, kind: Any = "topic", text: str = "/scan", **more: Any) -> PlanProcess:
@@ -147,7 +43,7 @@ AFTER = run_process("b", after={"lidar": "ready"})
     ],
 )
 def test_the_guard_looks_at_a_gate_and_what_waits_is_started_when_it_opens(kind: str, gate: Gate) -> None:
-    history = Life(GUARD, gated(kind=kind), AFTER).feed(Clear())
+    history = begin(GUARD, gated(kind=kind), AFTER).feed(Clear())
     assert history.orders == [gate]
     assert history.started == ["guard", "lidar"]
     history.wait(2).feed(GateOpen("lidar", "/scan is published by /lidar"))
@@ -156,7 +52,7 @@ def test_the_guard_looks_at_a_gate_and_what_waits_is_started_when_it_opens(kind:
 
 
 def test_a_gate_that_stays_shut_is_told_once_with_what_was_seen_instead_and_may_still_open() -> None:
-    history = Life(GUARD, gated(timeout_s=3.0), AFTER).feed(Clear(), GateShut("lidar", "topics /tf, /scan_raw"))
+    history = begin(GUARD, gated(timeout_s=3.0), AFTER).feed(Clear(), GateShut("lidar", "topics /tf, /scan_raw"))
     assert history.sleep_until_due() == pytest.approx(3)
     (found,) = history.late
     assert found.code == "TF817"
@@ -169,7 +65,7 @@ def test_a_gate_that_stays_shut_is_told_once_with_what_was_seen_instead_and_may_
 
 
 def test_a_gate_without_a_time_of_its_own_is_late_after_30_s_and_edges_never_are() -> None:
-    history = Life(GUARD, gated(), SLAM).feed(Clear()).wait(29.9)
+    history = begin(GUARD, gated(), SLAM).feed(Clear()).wait(29.9)
     assert history.late == []
     assert len(history.wait(0.2).late) == 1
 
@@ -177,7 +73,9 @@ def test_a_gate_without_a_time_of_its_own_is_late_after_30_s_and_edges_never_are
 def test_a_line_a_time_and_an_exit_code_open_their_gates() -> None:
     line, time = gated("line", kind="log", text="up"), gated("time", kind="time", number=2.0)
     code = gated("code", kind="exit", number=3.0)
-    history = Life(line, time, code, *(run_process(f"after_{n}", after={n: "ready"}) for n in ("line", "time", "code")))
+    history = begin(
+        line, time, code, *(run_process(f"after_{n}", after={n: "ready"}) for n in ("line", "time", "code"))
+    )
     assert history.started == ["line", "time", "code"]
     assert history.sleep_until_due() == pytest.approx(2)
     assert history.started[3:] == ["after_time"]
@@ -187,20 +85,20 @@ def test_a_line_a_time_and_an_exit_code_open_their_gates() -> None:
 
 
 def test_an_exit_code_that_is_not_the_one_is_a_failure() -> None:
-    history = Life(gated("code", kind="exit", number=3.0), STATIC).feed(Exited("code", 0))
+    history = begin(gated("code", kind="exit", number=3.0), STATIC).feed(Exited("code", 0))
     assert [found.message for found in history.found()] == ["code ended with exit code 0"]
 
 
 def test_lifecycle_nodes_are_driven_and_ready_means_that_they_are_there() -> None:
     slam = PlanProcess("lidar", "run", lifecycle={"/slam": "active"}, owns=(("map", "odom"),))
-    history = Life(GUARD, slam, AFTER).feed(Clear(), OwnerReady("lidar"))
+    history = begin(GUARD, slam, AFTER).feed(Clear(), OwnerReady("lidar"))
     assert history.orders == [Gate("lidar", nodes={"/slam": "active"}, drive=True)]
     assert history.started == ["guard", "lidar"]
     assert history.feed(GateOpen("lidar", "/slam is active")).started[-1] == "b"
 
 
 def test_all_ready_is_told_once_with_when_each_was_started_and_ready() -> None:
-    history = Life(GUARD, STATIC, gated()).wait(1).feed(Clear()).wait(1)
+    history = begin(GUARD, STATIC, gated()).wait(1).feed(Clear()).wait(1)
     assert [notice.waiting for notice in history.all(AllStarted)] == [()]
     history.feed(Live("base_link", "laser", "static", "/static"), OwnerReady("static"), Complete(1)).wait(1)
     assert history.all(AllReady) == []
@@ -218,7 +116,7 @@ def test_all_ready_is_told_once_with_when_each_was_started_and_ready() -> None:
 
 
 def test_max_restarts_is_the_plans() -> None:
-    history = Life(replace(run_process("a", restart="on-failure"), max_restarts=2))
+    history = begin(replace(run_process("a", restart="on-failure"), max_restarts=2))
     for _ in range(2):
         history.feed(Exited("a", 1)).sleep_until_due()
     assert history.feed(Exited("a", 1)).states("a")[-1] == "FATAL"
@@ -226,7 +124,7 @@ def test_max_restarts_is_the_plans() -> None:
 
 
 def test_a_required_process_that_ends_ends_everything_even_when_it_is_done() -> None:
-    history = Life(replace(run_process("a"), required=True), STATIC).feed(Exited("a", 0))
+    history = begin(replace(run_process("a"), required=True), STATIC).feed(Exited("a", 0))
     assert history.found()[0].message == "a ended with exit code 0, and the plan requires it"
     assert history.killed == [("static", SIGINT)]
 
@@ -241,13 +139,13 @@ def test_a_required_process_that_ends_ends_everything_even_when_it_is_done() -> 
     ],
 )
 def test_the_signals_and_times_are_the_plans(rule: StopRule, signals: list[int], times: list[float]) -> None:
-    history = Life(replace(run_process("a"), stop=rule)).feed(Signalled(SIGINT))
+    history = begin(replace(run_process("a"), stop=rule)).feed(Signalled(SIGINT))
     assert [history.sleep_until_due() for _ in times] == pytest.approx(times)
     assert [number for _, number in history.wait(60).killed] == signals
 
 
 def test_everything_is_stopped_on_request_with_exit_code_0() -> None:
-    history = Life(STATIC, run_process("a")).feed(Down())
+    history = begin(STATIC, run_process("a")).feed(Down())
     assert history.killed == [("a", SIGINT), ("static", SIGINT)]
     assert history.feed(Exited("a", 0), Exited("static", 0)).exit_code == 0
 
@@ -256,7 +154,7 @@ def test_everything_is_stopped_on_request_with_exit_code_0() -> None:
 
 
 def test_a_process_is_restarted_and_the_guard_is_told_before_and_after() -> None:
-    history = Life(GUARD, STATIC, SLAM).feed(Clear(), Live("map", "odom", "slam", "/slam"), OwnerReady("slam"))
+    history = begin(GUARD, STATIC, SLAM).feed(Clear(), Live("map", "odom", "slam", "/slam"), OwnerReady("slam"))
     history.feed(Asked("slam", "restart"))
     assert history.killed == [("slam", SIGINT)]
     assert history.orders == [Absent("slam")]
@@ -269,7 +167,7 @@ def test_a_process_is_restarted_and_the_guard_is_told_before_and_after() -> None
 
 
 def test_a_process_that_was_stopped_stays_so_until_it_is_started() -> None:
-    history = Life(STATIC, run_process("a", restart="always")).feed(Asked("a", "stop"), Exited("a", 1)).wait(60)
+    history = begin(STATIC, run_process("a", restart="always")).feed(Asked("a", "stop"), Exited("a", 1)).wait(60)
     assert (history.states("a")[-1], history.exit_code) == ("STOPPED", None)
     assert history.started == ["static", "a"]
     assert history.feed(Asked("a", "start")).started == ["static", "a", "a"]
@@ -277,13 +175,13 @@ def test_a_process_that_was_stopped_stays_so_until_it_is_started() -> None:
 
 
 def test_a_process_that_ignores_a_request_to_stop_is_told_more_firmly() -> None:
-    history = Life(STATIC, run_process("a")).feed(Asked("a", "stop"))
+    history = begin(STATIC, run_process("a")).feed(Asked("a", "stop"))
     assert [history.sleep_until_due(), history.sleep_until_due()] == pytest.approx([5, 5])
     assert history.killed == [("a", SIGINT), ("a", SIGTERM), ("a", SIGKILL)]
 
 
 def test_a_process_that_waits_for_its_restart_can_be_started_at_once_or_stopped() -> None:
-    history = Life(STATIC, run_process("a", restart="always")).feed(Exited("a", 1))
+    history = begin(STATIC, run_process("a", restart="always")).feed(Exited("a", 1))
     assert history.feed(Asked("a", "start")).started == ["static", "a", "a"]
     history.feed(Exited("a", 1), Asked("a", "stop")).wait(60)
     assert len(history.started) == 3
@@ -299,13 +197,13 @@ def test_a_process_that_waits_for_its_restart_can_be_started_at_once_or_stopped(
     ],
 )
 def test_what_cannot_be_done_is_refused_with_the_reason(name: str, verb: str, why: str) -> None:
-    history = Life(GUARD, STATIC, PlanProcess("drive", "external")).feed(Clear())
+    history = begin(GUARD, STATIC, PlanProcess("drive", "external")).feed(Clear())
     assert (refusal(history.state, name, verb) or "").startswith(why)
     assert refusal(history.state, "guard", "restart") is None
 
 
 def test_a_guard_that_is_restarted_is_told_who_is_absent_and_which_gates_are_shut() -> None:
-    history = Life(GUARD, STATIC, SLAM, gated()).feed(Clear(), Asked("slam", "stop"), Exited("slam", 0))
+    history = begin(GUARD, STATIC, SLAM, gated()).feed(Clear(), Asked("slam", "stop"), Exited("slam", 0))
     history.orders.clear()
     history.feed(Asked("guard", "restart"), Exited("guard", 0))
     assert history.started[-1] == "guard"
@@ -314,7 +212,7 @@ def test_a_guard_that_is_restarted_is_told_who_is_absent_and_which_gates_are_shu
 
 
 def test_a_guard_that_dies_is_told_and_started_again_with_what_it_said_and_what_is_live_stays_so() -> None:
-    history = Life(GUARD, STATIC, SLAM).feed(Clear(), Live("map", "odom", "slam", "/slam"), OwnerReady("slam"))
+    history = begin(GUARD, STATIC, SLAM).feed(Clear(), Live("map", "odom", "slam", "/slam"), OwnerReady("slam"))
     history.feed(Remember({"a": 1, "b": 1}), Remember({"b": 2}))
     history.told.clear()
     history.feed(Exited("guard", -SIGKILL, ("last words",)))
@@ -335,7 +233,7 @@ def test_a_guard_that_dies_is_told_and_started_again_with_what_it_said_and_what_
 
 
 def test_a_strict_guard_that_dies_lets_nothing_pass_and_says_so() -> None:
-    history = Life(GUARD, STATIC)
+    history = begin(GUARD, STATIC)
     history.state = replace(history.state, plan=replace(history.state.plan, guard=GuardPolicy("strict")))
     (found,) = history.feed(Clear(), Exited("guard", 1)).found()
     assert found.message == "guard ended with exit code 1: nothing of the plan passes to /tf until it is back"
@@ -343,7 +241,7 @@ def test_a_strict_guard_that_dies_lets_nothing_pass_and_says_so() -> None:
 
 def test_an_owner_that_ended_while_nobody_watched_is_to_be_seen_anew() -> None:
     slam = replace(SLAM, restart="always")
-    history = Life(GUARD, slam).feed(Clear(), Live("map", "odom", "slam", "/slam"), Remember({"a": 1}))
+    history = begin(GUARD, slam).feed(Clear(), Live("map", "odom", "slam", "/slam"), Remember({"a": 1}))
     history.feed(Exited("guard", 1), Exited("slam", 1))
     history.orders.clear()
     history.wait(1)
@@ -353,7 +251,7 @@ def test_an_owner_that_ended_while_nobody_watched_is_to_be_seen_anew() -> None:
 
 
 def test_a_guard_that_dies_again_and_again_ends_everything_with_1() -> None:
-    history = Life(GUARD, STATIC).feed(Clear(), Remember({"a": 1}))
+    history = begin(GUARD, STATIC).feed(Clear(), Remember({"a": 1}))
     for _ in range(5):
         history.feed(Exited("guard", 1)).sleep_until_due()
     history.feed(Exited("guard", 1))
@@ -363,7 +261,7 @@ def test_a_guard_that_dies_again_and_again_ends_everything_with_1() -> None:
 
 
 def test_a_guard_that_is_asked_for_anew_or_follows_another_plan_begins_without_memory() -> None:
-    history = Life(GUARD, STATIC).feed(Clear(), Remember({"a": 1}), Live("base_link", "laser", "static", "/static"))
+    history = begin(GUARD, STATIC).feed(Clear(), Remember({"a": 1}), Live("base_link", "laser", "static", "/static"))
     history.feed(Asked("guard", "restart"), Exited("guard", 0))
     assert (history.state.memory, history.state.live, history.found()) == ({}, frozenset(), [])
     history.feed(Clear(), Remember({"a": 1}), Exited("guard", 1))
@@ -376,7 +274,7 @@ def test_a_guard_that_is_asked_for_anew_or_follows_another_plan_begins_without_m
 
 def test_another_plan_restarts_what_changed_starts_what_is_new_and_stops_what_is_gone() -> None:
     a, b, new = run_process("a"), run_process("b"), run_process("new")
-    history = Life(STATIC, a, b)
+    history = begin(STATIC, a, b)
     plan: Plan = plan_of(STATIC, replace(a, argv=("other",)), new)
     history.feed(NewPlan(plan, frozenset({"a"}), ("base_link → x",)))
     assert sorted(history.killed) == [("a", SIGINT), ("b", SIGINT)]

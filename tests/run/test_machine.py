@@ -2,133 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from signal import SIGHUP, SIGINT, SIGKILL, SIGSEGV, SIGTERM
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import Literal
 
 import pytest
 
-from tfcompose.diagnostic import Diagnostic, finding
-from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
-from tfcompose.pose import Pose
+from tests.run.history import GUARD, SLAM, STATIC, begin, plan_of, run_process
+from tfcompose.diagnostic import finding
+from tfcompose.plan import GuardPolicy, PlanProcess
 from tfcompose.run.events import Clear, Complete, Found, Live, OwnerReady, Recovered, Taken
+from tfcompose.run.launcher.action import Finish, Kill, Start
+from tfcompose.run.launcher.happening import Begin, Exited, OutputLost, Signalled, Started, StartFailed, TimeUp
 from tfcompose.run.launcher.machine import step
 from tfcompose.run.launcher.notice import (
     Ended,
-    FindingShown,
     Missing,
-    Notice,
     OwnerLive,
-    ProcessState,
     RecoveredShown,
     Stopping,
     TreeComplete,
     Waiting,
 )
-from tfcompose.run.launcher.state import (
-    Action,
-    Begin,
-    Event,
-    Exited,
-    Finish,
-    Kill,
-    OutputLost,
-    Signalled,
-    Start,
-    Started,
-    StartFailed,
-    State,
-    Tell,
-    Tick,
-    TimeUp,
-    initial,
-)
+from tfcompose.run.launcher.state import initial
 from tfcompose.run.launcher.timing import wake_time
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-N = TypeVar("N", bound=Notice)
-
-GUARD = PlanProcess("guard", "guard")
-STATIC = PlanProcess("static", "static", owns=(("base_link", "laser"),))
-SLAM = PlanProcess("slam", "run", owns=(("map", "odom"),))
 DRIVE = PlanProcess("drive", "external", owns=(("odom", "base_link"),))
 ERROR = finding("TF801", "rogue publishes base_link → laser, which is static's", None)
 WARNING = finding("TF803", "nobody declared base_link → thing", None, severity="warning")
-
-
-def edge(parent: str, child: str, owner: str) -> PlanEdge:
-    return PlanEdge(parent, child, "static", owner, f"/{owner}", Pose(), None, ("robot.yaml", 1))
-
-
-def plan_of(*processes: PlanProcess, guard: GuardPolicy | None = None) -> Plan:
-    edges = tuple(edge(parent, child, one.name) for one in processes for parent, child in one.owns)
-    return Plan("rover", "", "base_link", RosSettings(), edges, processes, guard or GuardPolicy())
-
-
-def run_process(name: str, restart: str = "no", after: Mapping[str, str] | None = None) -> PlanProcess:
-    return PlanProcess(name, "run", restart=restart, after=dict(after or {}))
-
-
-@dataclass
-class History:
-    """A machine that is fed events; starting and killing are written down, and starts succeed by themselves."""
-
-    plan: Plan
-    now: float = 100.0
-    started: list[str] = field(default_factory=list)
-    killed: list[tuple[str, int]] = field(default_factory=list)
-    told: list[Any] = field(default_factory=list)
-    exit_code: int | None = None
-    state: State = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.state = initial(self.plan)
-
-    def feed(self, *events: Event) -> History:
-        for event in events:
-            self.state, actions = step(self.state, event, self.now)
-            for action in actions:
-                self.do(action)
-        return self
-
-    def do(self, action: Action) -> None:
-        match action:
-            case Start(name):
-                self.started.append(name)
-                self.feed(Started(name, 1000 + len(self.started)))
-            case Kill(name, number):
-                self.killed.append((name, number))
-            case Tell(notice):
-                self.told.append(notice)
-            case Finish(code):
-                self.exit_code = code
-
-    def wait(self, seconds: float) -> History:
-        self.now += seconds
-        return self.feed(Tick())
-
-    def sleep_until_due(self) -> float:
-        """Sleep as the launcher does, and return for how long."""
-        due = wake_time(self.state)
-        assert due is not None
-        slept = due - self.now
-        self.wait(slept)
-        return slept
-
-    def all(self, kind: type[N]) -> list[N]:
-        return [notice for notice in self.told if isinstance(notice, kind)]
-
-    def found(self) -> list[Diagnostic]:
-        return [notice.found for notice in self.all(FindingShown)]
-
-    def states(self, name: str) -> list[str]:
-        return [notice.state for notice in self.all(ProcessState) if notice.process == name]
-
-
-def begin(*processes: PlanProcess, guard: GuardPolicy | None = None) -> History:
-    return History(plan_of(*processes, guard=guard)).feed(Begin())
 
 
 # The start.

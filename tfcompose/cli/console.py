@@ -145,6 +145,8 @@ class Console:
         if len(notice.rows) > 1:
             for line in table_of(notice):
                 self._say(line)
+        if notice.without:
+            self._say(self._paint(f"without {', '.join(notice.without)}: failed, and not required", YELLOW))
 
     @_write.register
     def _(self, notice: Replanned) -> None:

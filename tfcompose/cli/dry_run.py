@@ -11,6 +11,7 @@ from tfcompose.cli.up import PLAN, as_asked, plan_in
 from tfcompose.planfile import read_plan
 from tfcompose.ros.environment import FASTDDS_PROFILE, child_environment
 from tfcompose.run.hosts import told
+from tfcompose.run.launcher.state import MAX_RESTARTS
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -94,10 +95,10 @@ def _times(process: PlanProcess) -> Iterator[str]:
         late = f", late after {ready.timeout_s:g} s" if ready.timeout_s is not None else ""
         yield f"  ready    {ready.kind} {what}{late}".rstrip()
     if process.restart != "no":
-        most = "" if process.max_restarts is None else f", {process.max_restarts} times in a row"
-        yield f"  restart  {process.restart}{most}"
-    if process.required:
-        yield "  required"
+        most = MAX_RESTARTS if process.max_restarts is None else process.max_restarts
+        yield f"  restart  {process.restart}, {most} time{'' if most == 1 else 's'} in a row"
+    if process.required is not None:
+        yield "  required its end ends everything" if process.required else "  optional the rest goes on when it fails"
     if process.stop.signal != "SIGINT" or process.stop.timeout_s is not None:
         patience = "" if process.stop.timeout_s is None else f", {process.stop.timeout_s:g} s"
         yield f"  stop     {process.stop.signal}{patience}"

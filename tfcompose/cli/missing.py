@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.terminal import complain
 from tfcompose.run.launcher.control import ask
@@ -42,9 +42,22 @@ def say_missing(place: Place, timeout_s: float) -> None:
     missing = status["missing"]
     complain(f"{place.name} is not ready after {timeout_s:g} s; it goes on: tfcompose logs, tfcompose down")
     for process in status["processes"]:
-        if not process["ready"] and process["state"] != "EXITED":
-            live = f", {process['live']} of {process['edges']} edges live" if process["edges"] else ""
-            complain(f"  not ready: {process['name']} ({process['state'].lower()}{live})")
+        if process["failed"]:
+            complain(f"  failed: {process['name']} ({process['state'].lower()}, {process['detail']})")
+        elif not process["ready"] and process["state"] != "EXITED":
+            complain(f"  not ready: {process['name']} ({_why(process)})")
     if missing:
         more = f" and {len(missing) - NAMED_AT_MOST} more" if len(missing) > NAMED_AT_MOST else ""
         complain(f"  not live: {', '.join(missing[:NAMED_AT_MOST])}{more}")
+
+
+def _why(process: dict[str, Any]) -> str:
+    """Return the process's state, what it is without, and what is seen there instead."""
+    parts = [process["state"].lower()]
+    if process["edges"]:
+        parts.append(f"{process['live']} of {process['edges']} edges live")
+    elif process["waits"]:
+        parts.append(process["waits"])
+    if process["seen"]:
+        parts.append(f"seen instead: {process['seen']}")
+    return ", ".join(parts)

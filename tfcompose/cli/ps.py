@@ -19,6 +19,8 @@ from tfcompose.run.place import PlaceError
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
+#: So much of why a process is in its state fits into the table, in characters; JSON has all of it.
+LONGEST_WHY = 40
 HEAD = ("PROCESS", "STATE", "PID", "UPTIME", "RESTARTS", "CPU", "MEMORY", "EDGES")
 
 
@@ -41,6 +43,8 @@ def run(arguments: Namespace) -> int:
         return 1
     for robot in robots:
         state = "stopping" if robot["stopping"] else "tree complete" if robot["complete"] else "tree not complete"
+        failed = [process["name"] for process in robot["processes"] if process["failed"]]
+        state += f", without {', '.join(failed)}" if failed else ""
         sys.stdout.write(f"{robot['name']}: {state}, launcher {robot['launcher']}, since {_time(robot['uptime'])}\n")
         _table([_row(process) for process in robot["processes"]])
     return 0
@@ -68,11 +72,9 @@ def _robots(name: str | None) -> list[dict[str, Any]] | int:
 
 def _row(process: dict[str, Any]) -> tuple[str, ...]:
     cpu, memory = process["cpu"], process["memory"]
-    ready = "" if process["ready"] or process["state"] != "RUNNING" else ", not ready"
-    where = f" of {process['host']}" if process["state"] == "EXPECTED" and process["host"] else ""
     return (
         process["name"],
-        process["state"].lower() + ready + where,
+        _state(process),
         str(process["pid"] or "–"),
         "–" if process["uptime"] is None else _time(process["uptime"]),
         str(process["restarts"]),
@@ -80,6 +82,18 @@ def _row(process: dict[str, Any]) -> tuple[str, ...]:
         "–" if memory is None else f"{memory / 1e6:.0f} MB",
         f"{process['live']}/{process['edges']}" if process["edges"] else "–",
     )
+
+
+def _state(process: dict[str, Any]) -> str:
+    """Return the state in words, with why it is in it where that is not plain."""
+    state = process["state"].lower()
+    if process["state"] == "EXPECTED":
+        return f"{state} of {process['host']}" if process["host"] else state
+    if process["state"] == "RUNNING":
+        return state if process["ready"] else f"{state}, not ready"
+    detail = process["detail"]
+    why = f" ({detail[:LONGEST_WHY]}{'…' * (len(detail) > LONGEST_WHY)})" if detail else ""
+    return f"{state}{why}{', failed' if process['failed'] and state != 'fatal' else ''}"
 
 
 def _table(rows: list[tuple[str, ...]]) -> None:

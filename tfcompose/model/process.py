@@ -57,7 +57,7 @@ class Process:
     cwd: str | None = None
     log_level: str | None = None
     host: str | None = None
-    required: bool = False
+    required: bool | None = None
     restart: str = "no"
     max_restarts: int | None = None
     stop: StopRule = field(default_factory=StopRule)

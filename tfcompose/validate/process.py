@@ -241,7 +241,11 @@ class Started(Model):
     cwd: str | None = key(TEXT, None)
     rate: float | None = key(RATE_, None, "for joints: how often joint states come")
     host: str | None = key(TEXT, None, "the machine that it runs on", ("jetson",))
-    required: bool = key(BOOLEAN, default=False, about="when it ends, everything is stopped")
+    required: bool | None = key(
+        BOOLEAN,
+        None,
+        "true: its end stops everything; false: the rest goes on when it fails; left out: its failure stops everything",
+    )
     restart: str = key(choice("no", "on-failure", "always"), "no")
     max_restarts: int | None = key(integer(0, 1_000_000), None, "how often in a row, before it is given up")
     stop: StopSpec | None = key(record(StopSpec), None, "how it is ended")

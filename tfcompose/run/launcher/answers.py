@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import RejectedError
 from tfcompose.planfile import read_plan
-from tfcompose.run.launcher.gates import is_ready
+from tfcompose.run.launcher.gates import is_ready, waits_for
+from tfcompose.run.launcher.happening import Asked, Down, NewPlan
 from tfcompose.run.launcher.lives import refusal
 from tfcompose.run.launcher.preflight import commands_of, started_by_us
 from tfcompose.run.launcher.replan import change
-from tfcompose.run.launcher.state import Asked, Down, NewPlan
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from tfcompose.run.launcher.happening import Event
     from tfcompose.run.launcher.preflight import Command, Environment
-    from tfcompose.run.launcher.state import Event, State, Tracked
+    from tfcompose.run.launcher.state import State, Tracked
 
 
 def status(state: State, now: float) -> dict[str, Any]:
@@ -45,7 +46,12 @@ def _process(state: State, one: Tracked, now: float) -> dict[str, Any]:
         "kind": one.process.kind,
         "host": one.process.host,
         "state": one.state,
+        "detail": one.detail,
+        "required": one.process.required,
+        "failed": bool(one.failed) or one.state == "FATAL",
         "ready": one.ready,
+        "waits": waits_for(state, one),
+        "seen": one.seen,
         "pid": one.pid,
         "uptime": round(now - one.began, 3) if one.state in ("RUNNING", "STOPPING") else None,
         "restarts": one.restarts,

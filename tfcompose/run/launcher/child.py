@@ -150,6 +150,7 @@ class Child:
     last_out: deque[str] = field(default_factory=lambda: deque(maxlen=LAST_LINES))
     last_err: deque[str] = field(default_factory=lambda: deque(maxlen=LAST_LINES))
     bucket: Bucket = field(default_factory=Bucket)
+    gate_seen: bool = False
 
     @property
     def last_lines(self) -> tuple[str, ...]:

@@ -9,7 +9,8 @@ from tfcompose.diagnostic import Diagnostic, Note, finding
 
 if TYPE_CHECKING:
     from tfcompose.plan import PlanEdge
-    from tfcompose.run.launcher.state import Exited, Tracked
+    from tfcompose.run.launcher.happening import Exited
+    from tfcompose.run.launcher.state import Tracked
 
 
 #: How many of an owner's edges a finding names.
@@ -54,6 +55,11 @@ def guard_lost(name: str, event: Exited, *, strict: bool) -> Diagnostic:
 def not_started(name: str, why: str) -> Diagnostic:
     """Return the finding for a process that the operating system would not start."""
     return finding("TF808", f"{name} could not be started: {why}", None)
+
+
+def waits_in_vain(name: str, other: str, what: str) -> Diagnostic:
+    """Return the finding for a process that is not started, because it waits for one that has failed."""
+    return finding("TF808", f"{name} is not started: it waits for {other} to be {what}, and {other} has failed", None)
 
 
 def never_clear(name: str, seconds: float) -> Diagnostic:

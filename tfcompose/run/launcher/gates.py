@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Note, finding
+from tfcompose.run.launcher.action import Order, TellLate
 from tfcompose.run.launcher.notice import AllReady, AllStarted, ProcessReady, StartRow
-from tfcompose.run.launcher.state import Order, TellLate
 from tfcompose.run.orders import Gate
 
 if TYPE_CHECKING:
@@ -98,20 +98,29 @@ def opens_at(one: Tracked) -> float | None:
     return one.began + ready.number if waits and ready else None
 
 
-def _late(state: State, one: Tracked, seconds: float) -> Diagnostic:
-    process, kind = one.process, kind_of(one.process)
-    text = process.ready.text if process.ready else ""
-    missing = [edge.name for edge in state.plan.edges_of(process.name) if edge.child not in state.live]
-    waits = {
+def waits_for(state: State, one: Tracked) -> str:
+    """Return what a process that runs is still without, in words; "" if it is ready, or does not run."""
+    if one.ready or one.state not in ("RUNNING", "EXPECTED"):
+        return ""
+    ready = one.process.ready
+    text = ready.text if ready else ""
+    missing = [edge.name for edge in state.plan.edges_of(one.process.name) if edge.child not in state.live]
+    named = ", ".join(missing[:4]) + (f" and {len(missing) - 4} more" if len(missing) > 4 else "")  # noqa: PLR2004
+    return {
         "topic": f"nobody publishes {text}",
         "service": f"there is no service {text}",
         "lifecycle": "its nodes are not in their lifecycle states",
         "log": f"no line of its output holds {text}",
         "exit": "it still runs",
-        "edges": f"nobody published {', '.join(missing[:4])}",
-    }[kind]
+        "time": f"{ready.number if ready else 0:g} s have not passed",
+        "edges": f"nobody published {named}",
+    }.get(kind_of(one.process), "")
+
+
+def _late(state: State, one: Tracked, seconds: float) -> Diagnostic:
     notes = [Note(f"seen instead: {one.seen}")] if one.seen else []
-    return finding("TF817", f"{process.name} is not ready after {seconds:g} s: {waits}", None, notes=notes)
+    message = f"{one.process.name} is not ready after {seconds:g} s: {waits_for(state, one)}"
+    return finding("TF817", message, None, notes=notes)
 
 
 def _say_started(turn: Turn) -> None:
@@ -119,16 +128,19 @@ def _say_started(turn: Turn) -> None:
     if state.all_started or state.clear is None or any(one.state == "STARTING" for one in state.tracked.values()):
         return
     turn.know(all_started=True)
-    waiting = tuple(name for name, one in state.tracked.items() if one.state == "STOPPED" and one.wanted)
+    waiting = tuple(
+        name for name, one in state.tracked.items() if one.state == "STOPPED" and one.wanted and not one.failed
+    )
     started = sum(one.order > 0 for one in state.tracked.values())
     turn.tell(AllStarted(started, waiting, turn.now - (state.begun or 0.0)))
 
 
 def is_ready(state: State) -> bool:
     """Return whether every process that is wanted is ready, or done, and every edge live."""
-    if state.clear is None or state.stop or not (state.complete or state.guard is None):
+    if state.clear is None or state.stop or state.awaited:
         return False
-    return all((one.ready and not one.leaving) or one.state == "EXITED" for one in state.tracked.values() if one.wanted)
+    wanted = [one for one in state.tracked.values() if one.wanted and not one.failed]
+    return all((one.ready and not one.leaving) or one.state == "EXITED" for one in wanted)
 
 
 def _say_ready(turn: Turn) -> None:
@@ -139,7 +151,7 @@ def _say_ready(turn: Turn) -> None:
     turn.know(all_ready=True)
     rows = []
     for name, one in state.tracked.items():
-        if one.wanted and (one.began >= begun or state.begun_anew == 0.0):
+        if one.wanted and not one.failed and (one.began >= begun or state.begun_anew == 0.0):
             started = None if one.state == "EXPECTED" else one.began - begun
             rows.append(StartRow(name, started, (one.ready_since or one.since) - begun))
-    turn.tell(AllReady(tuple(rows), turn.now - begun))
+    turn.tell(AllReady(tuple(rows), turn.now - begun, state.given_up))

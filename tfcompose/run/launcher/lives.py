@@ -6,14 +6,16 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import did_you_mean
+from tfcompose.run.launcher.action import Order
 from tfcompose.run.launcher.failures import ended_by_itself, guard_lost, how_ended
 from tfcompose.run.launcher.notice import Replanned
-from tfcompose.run.launcher.state import MAX_RESTARTS, Order, Tracked
+from tfcompose.run.launcher.state import MAX_RESTARTS, Tracked
 from tfcompose.run.launcher.timing import backoff_s
 from tfcompose.run.orders import Absent
 
 if TYPE_CHECKING:
-    from tfcompose.run.launcher.state import Asked, Exited, NewPlan, State
+    from tfcompose.run.launcher.happening import Asked, Exited, NewPlan
+    from tfcompose.run.launcher.state import State
     from tfcompose.run.launcher.turn import Turn
 
 
@@ -45,7 +47,7 @@ def exited(turn: Turn, event: Exited) -> None:
     when = " before it said whether somebody publishes the plan's edges already" if early else ""
     if not done or process.required:
         when = ", and the plan requires it" if done else when
-        turn.fail(ended_by_itself(name, event.returncode, when, event.last_lines))
+        turn.failed(name, ended_by_itself(name, event.returncode, when, event.last_lines))
 
 
 def _guard_ended(turn: Turn, one: Tracked, event: Exited) -> None:
@@ -91,7 +93,7 @@ def _restart_later(turn: Turn, one: Tracked, event: Exited) -> None:
     if failures > most:
         turn.enter(name, "FATAL", how)
         when = f", after {most} restart{'' if most == 1 else 's'}"
-        turn.fail(ended_by_itself(name, event.returncode, when, event.last_lines))
+        turn.failed(name, ended_by_itself(name, event.returncode, when, event.last_lines))
         return
     delay = backoff_s(times, failures)
     turn.enter(name, "BACKOFF", f"{how}; restart {failures} of {most} in {delay:g} s", failures=failures)

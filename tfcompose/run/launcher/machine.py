@@ -13,50 +13,34 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.run.events import (
-    Clear,
-    Complete,
-    Found,
     GateOpen,
     GateShut,
-    Live,
     OwnerReady,
-    Recovered,
-    Remember,
     Taken,
 )
-from tfcompose.run.launcher.failures import in_short, never_clear, never_seen, not_started, signal_name
+from tfcompose.run.launcher.ending import asked_to_end, stop_on, taken
+from tfcompose.run.launcher.failures import never_clear, not_started, waits_in_vain
 from tfcompose.run.launcher.gates import kind_of, look, opened, order_gate, say_progress
-from tfcompose.run.launcher.lives import asked, exited, follow, lose
-from tfcompose.run.launcher.notice import Missing, OwnerLive, RecoveredShown, TreeComplete, Waiting
-from tfcompose.run.launcher.offender import judged
-from tfcompose.run.launcher.state import (
-    UNREAD,
-    Action,
+from tfcompose.run.launcher.guard_said import guard_said, owner_ready, say_of
+from tfcompose.run.launcher.happening import (
     Asked,
     Begin,
-    Down,
     Event,
     Exited,
-    Kill,
     LogSeen,
     NewPlan,
-    Order,
-    OutputLost,
-    Signalled,
     Started,
     StartFailed,
-    State,
-    Stop,
-    TimeUp,
-    Tracked,
 )
-from tfcompose.run.launcher.timing import backoff_s, by_owner, stop_level, stop_signals, waiting_due
+from tfcompose.run.launcher.lives import asked, exited, follow
+from tfcompose.run.launcher.notice import Missing, Waiting
+from tfcompose.run.launcher.timing import backoff_s, by_owner, waiting_due
 from tfcompose.run.launcher.turn import Turn
-from tfcompose.run.orders import Absent, Present
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Diagnostic
     from tfcompose.plan import Plan, PlanEdge
+    from tfcompose.run.launcher.action import Action
+    from tfcompose.run.launcher.state import State, Tracked
 
 
 def step(state: State, event: Event, now: float) -> tuple[State, tuple[Action, ...]]:
@@ -79,30 +63,15 @@ def _react(turn: Turn, event: Event) -> None:
         case Started(name, pid):
             _started(turn, name, pid)
         case StartFailed(name, why):
-            turn.enter(name, "FATAL", why)
-            turn.fail(not_started(name, why))
+            _not_started(turn, name, why)
         case Exited():
             exited(turn, event)
         case Taken(found):
-            _taken(turn, found)
+            taken(turn, found)
         case _:
-            _asked_to_end(turn, event)
+            asked_to_end(turn, event)
             if turn.state.stop is None:
                 _asked_or_seen(turn, event)
-
-
-def _asked_to_end(turn: Turn, event: Event) -> None:
-    match event:
-        case Down():
-            turn.stop(Stop("signal", 0, 1, turn.now), "tfcompose down")
-        case Signalled(number):
-            _signalled(turn, signal_name(number))
-        case OutputLost():
-            turn.stop(Stop("failure", UNREAD), "nobody reads the output any more")
-        case TimeUp():
-            _time_up(turn)
-        case _:
-            pass
 
 
 def _asked_or_seen(turn: Turn, event: Event) -> None:
@@ -117,20 +86,15 @@ def _asked_or_seen(turn: Turn, event: Event) -> None:
         case GateShut(process, seen) if process in turn.state.tracked:
             turn.track(process, replace(turn.state.tracked[process], seen=seen))
         case OwnerReady(process) if process in turn.state.tracked:
-            _owner_ready(turn, process)
+            owner_ready(turn, process)
         case _:  # the guard's other events, and Tick
-            _guard_said(turn, event)
+            guard_said(turn, event)
 
 
-def _owner_ready(turn: Turn, process: str) -> None:
-    if kind_of(turn.state.tracked[process].process) == "edges":
-        opened(turn, process, "its edges are live")
-    edges = turn.state.plan.edges_of(process)
-    if edges:
-        names = tuple(edge.name for edge in edges)
-        turn.tell(OwnerLive(process, edges[0].node, names, turn.now - (turn.state.begun or 0.0)))
-        if not turn.state.missing:
-            _complete(turn, len(turn.state.plan.edges))
+def _not_started(turn: Turn, name: str, why: str) -> None:
+    one = turn.state.tracked[name]
+    turn.enter(name, "FATAL", why, order=one.order if one.began else 0)
+    turn.failed(name, not_started(name, why))
 
 
 def _begin(turn: Turn) -> None:
@@ -151,80 +115,9 @@ def _started(turn: Turn, name: str, pid: int) -> None:
         order_gate(turn, turn.state.tracked[name])
     elif turn.state.clear is not None:  # it joins the others
         for other in turn.state.tracked.values():
-            _say_of(turn, other)
+            say_of(turn, other)
             if not other.ready and other.state in ("RUNNING", "EXPECTED"):
                 order_gate(turn, other)
-
-
-def _say_of(turn: Turn, owner: Tracked) -> None:
-    """Tell a guard that joins what became of an owner meanwhile, whatever the one before it knew."""
-    name = owner.process.name
-    runs = owner.state in ("STARTING", "RUNNING", "EXPECTED")
-    missing = any(child not in turn.state.live for _, child in owner.process.owns)
-    if owner.process.owns and not runs:
-        turn.actions.append(Order(Absent(name)))
-    elif missing and turn.state.memory:
-        turn.actions += [Order(Absent(name)), Order(Present(name))]
-
-
-def _signalled(turn: Turn, name: str) -> None:
-    stop = turn.state.stop
-    if stop is None:
-        turn.stop(Stop("signal", 0, 1, turn.now), name)
-    elif stop.signals == 0 or turn.now - stop.signalled >= turn.state.times.same_signal_s:
-        turn.know(stop=replace(stop, signals=stop.signals + 1, signalled=turn.now))
-
-
-def _time_up(turn: Turn) -> None:
-    if turn.state.stop:
-        return
-    complete = turn.state.complete or turn.state.guard is None
-    if not complete and "TF811" not in turn.state.shown:
-        for owner, edges in by_owner(turn.state.missing):
-            turn.show(never_seen(turn.state.tracked[owner], edges))
-    failed = not complete or bool(turn.state.shown)
-    turn.stop(Stop("time", 1 if failed else 0), "the time is up")
-
-
-def _taken(turn: Turn, found: Diagnostic) -> None:
-    stop = turn.state.stop
-    if stop is None or stop.cause == "taken":
-        turn.show(found)
-        turn.stop(Stop("taken", 1), in_short(found))
-
-
-def _guard_said(turn: Turn, event: Event) -> None:
-    seconds = turn.now - (turn.state.begun or 0.0)
-    match event:
-        case Clear():
-            _cleared(turn, seconds)
-        case Live(child=child):
-            turn.know(live=turn.state.live | {child})
-        case Complete(edges):
-            _complete(turn, edges)
-        case Found(found, process):
-            judged(turn, found, process)
-        case Recovered(message):
-            turn.tell(RecoveredShown(message, seconds))
-        case Remember(changed):
-            turn.know(memory=turn.state.memory | changed)
-        case _:
-            pass
-
-
-def _cleared(turn: Turn, seconds: float) -> None:
-    state = turn.state
-    if state.clear is None:
-        turn.know(clear=turn.now)
-    if state.unwatched is not None:
-        turn.know(unwatched=None)
-        turn.tell(RecoveredShown(f"{state.guard} watches again after {turn.now - state.unwatched:.1f} s", seconds))
-
-
-def _complete(turn: Turn, edges: int) -> None:
-    if not turn.state.complete:
-        turn.know(complete=True)
-        turn.tell(TreeComplete(edges, turn.now - (turn.state.begun or 0.0)))
 
 
 # What follows.
@@ -239,15 +132,15 @@ def _settle(turn: Turn) -> None:
         turn.fail(never_clear(state.guard or "guard", state.times.clear_s))
     if turn.state.stop is None:
         _go_on(turn)
-    _stop_on(turn)
+    stop_on(turn)
     if turn.state.stop and not any(one.alive for one in turn.state.tracked.values()):
         turn.finish(turn.state.stop.exit_code)
 
 
 def _go_on(turn: Turn) -> None:
     look(turn)
-    tracked = turn.state.tracked
-    for name, one in tracked.items():
+    _give_up_waiting(turn)
+    for name, one in turn.state.tracked.items():
         if one.state not in ("STOPPED", "BACKOFF"):
             continue
         fresh = one.state == "STOPPED" and one.wanted and turn.state.clear is not None and _may_start(turn, one)
@@ -257,11 +150,23 @@ def _go_on(turn: Turn) -> None:
     say_progress(turn)
     due = waiting_due(turn.state)
     if due is not None and turn.now >= due:
-        missing = turn.state.missing
+        missing = turn.state.awaited
         turn.know(waiting=frozenset(edge.child for edge in missing), waiting_said=turn.now)
         turn.tell(Waiting(tuple(_missing(turn.state.plan, owner, edges) for owner, edges in by_owner(missing))))
-    if all(one.state in ("EXITED", "EXPECTED") for one in turn.state.tracked.values()):
-        turn.finish(0)
+    tracked = turn.state.tracked.values()
+    if turn.state.stop is None and all(one.failed or one.state in ("EXITED", "EXPECTED") for one in tracked):
+        turn.finish(1 if turn.state.given_up else 0)
+
+
+def _give_up_waiting(turn: Turn) -> None:
+    """Have those fail that wait for what has failed."""
+    for name, one in turn.state.tracked.items():
+        if one.state != "STOPPED" or not one.wanted or one.failed:
+            continue
+        for other, what in one.process.after.items():
+            if turn.state.tracked[other].failed and not _is_there(turn, other, what):
+                turn.failed(name, waits_in_vain(name, other, what))
+                break
 
 
 def _missing(plan: Plan, owner: str, edges: tuple[PlanEdge, ...]) -> Missing:
@@ -276,19 +181,6 @@ def _is_there(turn: Turn, name: str, what: str) -> bool:
     other = turn.state.tracked[name]
     if what == "ready":
         return other.ready
-    return other.state == "EXITED" if what == "done" else other.was_started or other.state == "EXPECTED"
-
-
-def _stop_on(turn: Turn) -> None:
-    """Tell processes that are to end, in reverse order of their start, and more firmly where that did not help."""
-    alive = [one for one in turn.state.tracked.values() if one.alive]
-    for one in sorted(alive, key=lambda one: -one.order):
-        level = stop_level(turn.state, one, turn.now)
-        if one.state == "STARTING" or level <= one.level:
-            continue
-        name, signals = one.process.name, stop_signals(one.process)
-        if one.level == 0 and one.leaving:
-            lose(turn, one)
-        turn.actions.append(Kill(name, signals[level - 1]))
-        before = f"still there after {signals[one.level - 1].name}: " if one.level else ""
-        turn.enter(name, "STOPPING", before + signals[level - 1].name, pid=one.pid, level=level)
+    if what == "done":
+        return other.state == "EXITED" and not other.failed
+    return other.was_started or other.state == "EXPECTED"

@@ -71,10 +71,11 @@ class StartRow:
 
 @dataclass(frozen=True, slots=True)
 class AllReady:
-    """Every process is ready and every edge live, ``seconds`` after the start."""
+    """Every process is ready and every edge live, ``seconds`` after the start; but for those that were given up."""
 
     rows: tuple[StartRow, ...]
     seconds: float
+    without: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

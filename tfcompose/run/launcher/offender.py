@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Note
 from tfcompose.run.launcher.failures import in_short
+from tfcompose.run.launcher.happening import Asked
 from tfcompose.run.launcher.lives import asked, refusal
-from tfcompose.run.launcher.state import Asked, Stop
+from tfcompose.run.launcher.state import Stop
 
 if TYPE_CHECKING:
     from tfcompose.diagnostic import Diagnostic

@@ -34,6 +34,7 @@ class Command:
     """What is executed: program and arguments, environment, and folder.
 
     ``own`` says that it is one of tfcompose's. ``fence`` is a file that must be there first, and what it holds.
+    ``missing`` says, of a process that the run goes on without, why it cannot be started.
     """
 
     argv: tuple[str, ...]
@@ -41,6 +42,7 @@ class Command:
     folder: Path
     own: bool = False
     fence: tuple[Path, str] | None = None
+    missing: str = ""
 
 
 def started_by_us(plan: Plan) -> list[PlanProcess]:
@@ -95,11 +97,16 @@ def _command_of(
     if not argv:
         return finding("TF902", f"the plan does not say how {process.name} is started", None)
     folder = folder_of(process, files[1])
+    command: Command | NotFound | Diagnostic
     if is_launch(argv[0]):
         launched = launch_command(process, ros, argv, env)
-        return Command(launched[0], env | launched[1], folder) if isinstance(launched, tuple) else launched
-    program = executable_of(process, argv[0], folder, env)
-    return program if isinstance(program, NotFound) else Command((program, *argv[1:]), env, folder, own)
+        command = Command(launched[0], env | launched[1], folder) if isinstance(launched, tuple) else launched
+    else:
+        program = executable_of(process, argv[0], folder, env)
+        command = program if isinstance(program, NotFound) else Command((program, *argv[1:]), env, folder, own)
+    if isinstance(command, NotFound) and process.required is False:
+        return Command(argv, env, folder, missing=not_found([command]).message)
+    return command
 
 
 def _fence(plan: Plan, commands: dict[str, Command], folder: Path) -> list[Diagnostic]:

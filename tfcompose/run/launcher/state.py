@@ -1,4 +1,4 @@
-"""What the process machine knows, what can happen to it, and what it wants done: values only.
+"""What the process machine knows: values only.
 
 Times are seconds of one monotonic clock.
 """
@@ -8,13 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from tfcompose.run.events import GuardEvent
-
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Diagnostic
     from tfcompose.plan import Plan, PlanEdge, PlanProcess
-    from tfcompose.run.launcher.notice import Notice, StateName
-    from tfcompose.run.orders import GuardOrder
+    from tfcompose.run.launcher.notice import StateName
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,166 +37,9 @@ class Times:
     """two signals closer than this are one: ``timeout`` and closing terminals send theirs twice"""
 
 
-Verb = Literal["stop", "start", "restart"]
-
 MAX_RESTARTS = 5
 #: The exit code when nobody reads the output any more: what a shell says of a program that SIGPIPE ended.
 UNREAD = 141
-
-
-# What happens.
-
-
-@dataclass(frozen=True, slots=True)
-class Begin:
-    """The launcher is ready to start processes."""
-
-
-@dataclass(frozen=True, slots=True)
-class Started:
-    """A process was started."""
-
-    name: str
-    pid: int
-
-
-@dataclass(frozen=True, slots=True)
-class StartFailed:
-    """A process could not be started."""
-
-    name: str
-    why: str
-
-
-@dataclass(frozen=True, slots=True)
-class Exited:
-    """A process ended: exit code, or minus the signal's number. ``last_lines`` is the end of its log."""
-
-    name: str
-    returncode: int
-    last_lines: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Signalled:
-    """The launcher was sent a signal."""
-
-    signal: int
-
-
-@dataclass(frozen=True, slots=True)
-class OutputLost:
-    """Nobody reads the launcher's output any more."""
-
-
-@dataclass(frozen=True, slots=True)
-class Tick:
-    """Nothing but time has passed."""
-
-
-@dataclass(frozen=True, slots=True)
-class TimeUp:
-    """The time that was asked for is over."""
-
-
-@dataclass(frozen=True, slots=True)
-class LogSeen:
-    """A process wrote the line that its gate waits for."""
-
-    process: str
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """Somebody asks for one process to be stopped, started or restarted; ``refusal`` says when not to ask."""
-
-    name: str
-    verb: Verb
-
-
-@dataclass(frozen=True, slots=True)
-class Down:
-    """Somebody asks for everything to be stopped."""
-
-
-@dataclass(frozen=True, slots=True)
-class NewPlan:
-    """From now on another plan holds; ``changed`` are the processes that must be started anew for it."""
-
-    plan: Plan
-    changed: frozenset[str]
-    held: tuple[str, ...] = ()
-
-
-Event = (
-    Begin
-    | Started
-    | StartFailed
-    | Exited
-    | Signalled
-    | OutputLost
-    | Tick
-    | TimeUp
-    | LogSeen
-    | Asked
-    | Down
-    | NewPlan
-    | GuardEvent
-)
-
-
-# What is to be done.
-
-
-@dataclass(frozen=True, slots=True)
-class Start:
-    """Start the process; the answer is ``Started`` or ``StartFailed``."""
-
-    name: str
-
-
-@dataclass(frozen=True, slots=True)
-class Kill:
-    """Send the signal to the process and all of its group."""
-
-    name: str
-    signal: int
-
-
-@dataclass(frozen=True, slots=True)
-class Tell:
-    """Tell the person."""
-
-    notice: Notice
-
-
-@dataclass(frozen=True, slots=True)
-class Finish:
-    """Nothing runs any more: leave with this exit code."""
-
-    exit_code: int
-
-
-@dataclass(frozen=True, slots=True)
-class Order:
-    """Tell the guard."""
-
-    order: GuardOrder
-
-
-@dataclass(frozen=True, slots=True)
-class TellLate:
-    """Tell the person that a process is not ready in time, with what it said last."""
-
-    name: str
-    found: Diagnostic
-
-
-Action = Start | Kill | Tell | TellLate | Order | Finish
-
-
-# What is known.
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,7 +49,8 @@ class Tracked:
     ``order`` counts the starts of all processes, 0 for one that was never started; ``failures`` the short runs in a
     row; ``restarts`` all starts but the first; ``level`` how often it was told to stop, each time more firmly.
     ``leaving`` says what follows once it has stopped: "stop" and it stays so, "again" and it is started, "drop" and it
-    is forgotten. ``seen`` is what its gate saw last, ``late`` whether it was said to be late.
+    is forgotten. ``seen`` is what its gate saw last, ``late`` whether it was said to be late. ``detail`` says why it is
+    in its state. ``failed`` is what was said when the run went on without it: the finding and the end of its log.
     """
 
     process: PlanProcess
@@ -228,6 +68,8 @@ class Tracked:
     ready_since: float | None = None
     seen: str = ""
     late: bool = False
+    detail: str = ""
+    failed: tuple[str, ...] = ()
 
     @property
     def alive(self) -> bool:
@@ -282,6 +124,16 @@ class State:
     def missing(self) -> tuple[PlanEdge, ...]:
         """The edges that were not seen yet; none where no guard looks."""
         return () if self.guard is None else tuple(edge for edge in self.plan.edges if edge.child not in self.live)
+
+    @property
+    def awaited(self) -> tuple[PlanEdge, ...]:
+        """The missing edges that may still come: their owners have not failed."""
+        return tuple(edge for edge in self.missing if not self.tracked[edge.owner].failed)
+
+    @property
+    def given_up(self) -> tuple[str, ...]:
+        """The processes that have failed, and without which the run goes on."""
+        return tuple(name for name, one in self.tracked.items() if one.failed)
 
 
 def initial(plan: Plan, times: Times | None = None) -> State:

@@ -9,10 +9,7 @@ from __future__ import annotations
 import contextlib
 import math
 import os
-import re
 import selectors
-import signal
-import subprocess
 import time
 from collections import deque
 from dataclasses import replace
@@ -21,64 +18,35 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Note
 from tfcompose.ros.environment import child_environment
-from tfcompose.run.events import from_line
+from tfcompose.run.launcher.action import Finish, Kill, Order, Start, Tell, TellLate
 from tfcompose.run.launcher.answers import answer
-from tfcompose.run.launcher.child import (
-    LAST_LINE_LENGTH,
-    Child,
-    Pipe,
-    bury_adopted,
-    has_ended,
-    kill_group,
-    spawn,
-    subreaper,
-)
+from tfcompose.run.launcher.child import subreaper
+from tfcompose.run.launcher.children import Children
 from tfcompose.run.launcher.guard_pipes import GuardPipes
-from tfcompose.run.launcher.keeper import Keeper
-from tfcompose.run.launcher.leftovers import end as end_leftovers
-from tfcompose.run.launcher.leftovers import leftovers
+from tfcompose.run.launcher.happening import Begin, OutputLost, Signalled, StartFailed, Tick, TimeUp
 from tfcompose.run.launcher.machine import step
-from tfcompose.run.launcher.notice import Ended, FindingShown, LogLine
+from tfcompose.run.launcher.notice import Ended, FindingShown
 from tfcompose.run.launcher.preflight import commands_of
 from tfcompose.run.launcher.session import Session
 from tfcompose.run.launcher.signals import Signals
-from tfcompose.run.launcher.state import (
-    Begin,
-    Exited,
-    Finish,
-    Kill,
-    LogSeen,
-    Order,
-    OutputLost,
-    Signalled,
-    Start,
-    Started,
-    StartFailed,
-    Tell,
-    TellLate,
-    Tick,
-    TimeUp,
-    initial,
-)
+from tfcompose.run.launcher.state import initial
 from tfcompose.run.launcher.teller import Teller
 from tfcompose.run.launcher.timing import wake_time
-from tfcompose.run.place import RUN_ID
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
+    from tfcompose.diagnostic import Diagnostic
     from tfcompose.plan import Plan
-    from tfcompose.run.launcher.notice import Notice, Stream
+    from tfcompose.run.launcher.action import Action
+    from tfcompose.run.launcher.happening import Event
+    from tfcompose.run.launcher.notice import Notice
     from tfcompose.run.launcher.preflight import Command, Environment
-    from tfcompose.run.launcher.state import Action, Event, State, Times
+    from tfcompose.run.launcher.state import State, Times
 
 #: The loop looks at its children at least this often, whatever signals say; seconds.
 LONGEST_SLEEP_S = 1.0
-#: So much of a line is compared with what a gate waits for, in characters.
-LONGEST_MATCHED = 4000
-#: The guard's lines hold findings with notes, so they may be longer than a log's; bytes.
-EVENT_LIMIT = 1024 * 1024
 
 #: The answer, what it means for the machine, and another plan's file and commands.
 Answer = tuple[dict[str, Any], "Event | None", "tuple[Path, dict[str, Command]] | None"]
@@ -130,26 +98,24 @@ class _Supervisor:
     ) -> None:
         self._state = state
         self._commands = commands
-        self._children: dict[str, Child] = {}
         self._events: deque[Event] = deque()
         self._exit_code: int | None = None
         self._due: float | None = None
         self._look_at = 0.0
-        self._selector = stack.enter_context(selectors.DefaultSelector())
+        selector = stack.enter_context(selectors.DefaultSelector())
+        self._selector = selector
         self._signals = stack.enter_context(Signals())
-        self._selector.register(self._signals.fd, selectors.EVENT_READ, self._signals.woken)
+        selector.register(self._signals.fd, selectors.EVENT_READ, self._signals.woken)
         self._session = session
         self._ask = ask
-        self._guard_pipes: GuardPipes | None = None
-        self._teller = Teller(self._selector, session, report, lambda: self._events.append(OutputLost()))
+        self._teller = Teller(selector, session, report, lambda: self._events.append(OutputLost()))
         self._teller.listen(session, self._answer)
         self._tell = self._teller.tell
         stack.callback(self._teller.close)
         if session.run_id:
             stack.enter_context(subreaper())
-        self._keeper = Keeper(session.run_id)
-        stack.callback(self._keeper.close)
-        stack.callback(self._abandon)
+        self._children = Children(selector, session.run_id, self._handle, self._tell)
+        stack.callback(self._children.close)
 
     def run(self, duration_s: float | None) -> int:
         self._handle(Begin())
@@ -162,10 +128,7 @@ class _Supervisor:
                 self._handle(Signalled(number))
             if self._signals.children_changed() or time.monotonic() >= self._look_at:
                 self._look_at = time.monotonic() + LONGEST_SLEEP_S
-                for child in [child for child in self._children.values() if has_ended(child.popen.pid)]:
-                    self._ended(child)
-                if self._session.run_id:
-                    bury_adopted({child.popen.pid for child in self._children.values()} | {self._keeper.pid})
+                self._children.bury()
             if end is not None and time.monotonic() >= end:
                 self._handle(TimeUp())
             elif self._events or (self._due or math.inf) <= time.monotonic():
@@ -203,133 +166,30 @@ class _Supervisor:
         match action:
             case Start(name):
                 self._start(name)
-            case Kill(name, number) if name in self._children:
-                kill_group(self._children[name].popen.pid, number)
+            case Kill(name, number):
+                self._children.kill(name, number)
             case Tell(notice):
                 self._tell(notice)
-            case Order(order) if self._guard_pipes:
-                self._guard_pipes.order(order)
-            case TellLate(name, found) if name in self._children:
-                notes = [Note(f"{name}: {line}") for line in self._children[name].last_lines]
-                self._tell(FindingShown(replace(found, notes=(*found.notes, *notes))))
-            case TellLate(_, found):
-                self._tell(FindingShown(found))
+            case Order(order):
+                self._children.order(order)
+            case TellLate(name, found):
+                self._tell_late(name, found)
             case Finish(exit_code):
                 self._exit_code = exit_code
             case _:
                 pass
 
-    # A process's life.
-
     def _start(self, name: str) -> None:
+        state = self._state
+        guard = None
         try:
-            if name == self._state.guard:
-                self._spawn_guard(name)
-            else:
-                self._spawn(name, self._commands[name])
-        except (OSError, subprocess.SubprocessError, ValueError) as error:
-            self._events.append(StartFailed(name, _reason(error)))
+            if name == state.guard:
+                guard = GuardPipes(joins=state.clear is not None, memory=state.memory)
+        except OSError as error:
+            self._events.append(StartFailed(name, str(error)))
+            return
+        self._events.append(self._children.start(state.tracked[name].process, self._commands[name], guard))
 
-    def _spawn_guard(self, name: str) -> None:
-        pipes = GuardPipes(joins=self._state.clear is not None, memory=self._state.memory)
-        command = self._commands[name]
-        try:
-            child = self._spawn(name, replace(command, env=command.env | pipes.env), pipes.theirs)
-        except BaseException:
-            pipes.events.close()
-            pipes.close()
-            raise
-        finally:
-            pipes.handed_over()
-        self._guard_pipes = pipes
-        self._watch(child, Pipe(pipes.events, self._guard_said, EVENT_LIMIT))
-
-    def _close_guard_pipes(self) -> None:
-        if self._guard_pipes:
-            self._guard_pipes.close()
-            self._guard_pipes = None
-
-    def _spawn(self, name: str, command: Command, pass_fds: tuple[int, ...] = ()) -> Child:
-        run_id = self._session.run_id
-        if run_id:
-            command = replace(command, env=command.env | {RUN_ID: run_id})
-        if command.fence:
-            command.fence[0].parent.mkdir(exist_ok=True)
-            command.fence[0].write_text(command.fence[1], encoding="utf-8")
-        child = Child(name, spawn(command, pass_fds))
-        self._children[name] = child
-        self._keep()
-        out, err = child.popen.stdout, child.popen.stderr
-        if out and err:
-            self._watch(child, Pipe(out, self._logger(child, "stdout"), bucket=child.bucket))
-            self._watch(child, Pipe(err, self._logger(child, "stderr"), bucket=child.bucket))
-        self._events.append(Started(name, child.popen.pid))
-        return child
-
-    def _watch(self, child: Child, pipe: Pipe) -> None:
-        child.pipes.append(pipe)
-        self._selector.register(pipe.file, selectors.EVENT_READ, lambda: self._read(child, pipe))
-
-    def _read(self, child: Child, pipe: Pipe) -> None:
-        if pipe.read() == 0:
-            self._drain(child, pipe)
-
-    def _drain(self, child: Child, pipe: Pipe) -> None:
-        child.pipes.remove(pipe)
-        self._selector.unregister(pipe.file)
-        pipe.drain()
-
-    def _logger(self, child: Child, stream: Stream) -> Callable[[str], None]:
-        last = child.last_err if stream == "stderr" else child.last_out
-        ready = self._state.tracked[child.name].process.ready
-        gate = re.compile(ready.text) if ready and ready.kind == "log" else None
-
-        def log(text: str) -> None:
-            last.append(text[:LAST_LINE_LENGTH])
-            self._tell(LogLine(child.name, stream, text))
-            if gate and not self._state.tracked[child.name].ready and gate.search(text[:LONGEST_MATCHED]):
-                self._handle(LogSeen(child.name, text[:LAST_LINE_LENGTH]))
-
-        return log
-
-    def _guard_said(self, line: str) -> None:
-        try:
-            event = from_line(line)
-        except (ValueError, TypeError, KeyError, AttributeError):
-            self._tell(LogLine(self._state.guard or "guard", "stderr", f"not an event: {line}"))
-        else:
-            self._handle(event)
-
-    def _ended(self, child: Child) -> None:
-        """Take what the process leaves behind: the rest of its group, its last words, and its exit code."""
-        kill_group(child.popen.pid, signal.SIGKILL)
-        for pipe in list(child.pipes):
-            self._drain(child, pipe)
-        returncode = child.popen.wait()
-        del self._children[child.name]
-        if child.name == self._state.guard:
-            self._close_guard_pipes()
-        self._keep()
-        self._handle(Exited(child.name, returncode, child.last_lines))
-
-    def _keep(self) -> None:
-        self._keeper.keep(child.popen.pid for child in self._children.values())
-
-    def _abandon(self) -> None:
-        """Kill what is left: something, only if an error in the launcher itself ends it."""
-        for child in self._children.values():
-            kill_group(child.popen.pid, signal.SIGKILL)
-            child.popen.wait()
-            for pipe in child.pipes:
-                pipe.file.close()
-        self._children.clear()
-        self._close_guard_pipes()
-        self._keep()
-        if self._session.run_id:
-            end_leftovers(leftovers(self._session.run_id), 1.0)
-
-
-def _reason(error: Exception) -> str:
-    if isinstance(error, OSError) and error.strerror:
-        return f"{error.strerror}: {error.filename}" if error.filename else error.strerror
-    return str(error)
+    def _tell_late(self, name: str, found: Diagnostic) -> None:
+        notes = [Note(f"{name}: {line}") for line in self._children.last_lines(name)]
+        self._tell(FindingShown(replace(found, notes=(*found.notes, *notes))))

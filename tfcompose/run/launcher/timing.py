@@ -32,11 +32,11 @@ def by_owner(edges: tuple[PlanEdge, ...]) -> tuple[tuple[str, tuple[PlanEdge, ..
 
 def waiting_due(state: State) -> float | None:
     """Return when missing edges are to be named; None if there is nothing new to name."""
-    if state.clear is None or state.complete or not state.missing:
+    if state.clear is None or state.complete or not state.awaited:
         return None
     if state.waiting_said is None:
         return state.clear + state.times.waiting_s
-    missing = {edge.child for edge in state.missing}
+    missing = {edge.child for edge in state.awaited}
     return None if missing == state.waiting else state.waiting_said + state.times.waiting_s
 
 

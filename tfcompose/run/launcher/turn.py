@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from tfcompose.run.launcher.action import Action, Finish, Order, Start, Tell
 from tfcompose.run.launcher.failures import in_short
 from tfcompose.run.launcher.notice import Ended, FindingShown, Notice, ProcessState, StateName, Stopping
-from tfcompose.run.launcher.state import Action, Finish, Order, Start, State, Stop, Tell, Tracked
+from tfcompose.run.launcher.state import State, Stop, Tracked
 from tfcompose.run.orders import Present
 
 if TYPE_CHECKING:
@@ -37,7 +38,8 @@ class Turn:
     def enter(self, name: str, state: StateName, detail: str = "", **changes: float | None) -> None:
         """Put the process into the state, since now, and tell."""
         pid = changes.pop("pid", None)
-        one = replace(self.state.tracked[name], state=state, since=self.now, pid=pid, **changes)  # type: ignore[arg-type]
+        before = self.state.tracked[name]
+        one = replace(before, state=state, since=self.now, pid=pid, detail=detail, failed=(), **changes)  # type: ignore[arg-type]
         self.track(name, one)
         self.tell(ProcessState(name, state, one.pid, detail))
 
@@ -56,6 +58,16 @@ class Turn:
         if found.severity == "error":
             self.know(shown=self.state.shown | {found.code})
         self.tell(FindingShown(found))
+
+    def failed(self, name: str, found: Diagnostic) -> None:
+        """Show that the process has failed for good, and stop everything, unless the run goes on without it."""
+        one = self.state.tracked[name]
+        if one.process.required is not False:
+            self.fail(found)
+        elif self.state.stop is None:
+            advice = f"the rest goes on without it: required is false; tfcompose start {name} tries again"
+            self.show(replace(found, severity="warning", help=advice))
+            self.track(name, replace(one, failed=(found.message, *(note.message for note in found.notes))))
 
     def fail(self, found: Diagnostic) -> None:
         """Show the finding and stop everything; once that is under way, further failures follow from it."""
@@ -77,5 +89,6 @@ class Turn:
     def finish(self, exit_code: int) -> None:
         """End: nothing runs any more."""
         self.know(finished=True)
-        self.tell(Ended(exit_code, self.state.because))
+        failed = sorted((one for one in self.state.tracked.values() if one.failed), key=lambda one: one.since)
+        self.tell(Ended(exit_code, self.state.because or (failed[0].failed if failed else ())))
         self.actions.append(Finish(exit_code))

@@ -1,0 +1,185 @@
+"""The launcher's children: started, heard, and taken leave of, with all that belongs to them."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+from dataclasses import replace
+from selectors import EVENT_READ
+from typing import TYPE_CHECKING
+
+from tfcompose.run.events import from_line
+from tfcompose.run.launcher.child import LAST_LINE_LENGTH, Child, Pipe, bury_adopted, has_ended, kill_group, spawn
+from tfcompose.run.launcher.happening import Exited, LogSeen, Started, StartFailed
+from tfcompose.run.launcher.keeper import Keeper
+from tfcompose.run.launcher.leftovers import end as end_leftovers
+from tfcompose.run.launcher.leftovers import leftovers
+from tfcompose.run.launcher.notice import LogLine
+from tfcompose.run.place import RUN_ID
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from selectors import BaseSelector
+
+    from tfcompose.plan import PlanProcess
+    from tfcompose.run.launcher.guard_pipes import GuardPipes
+    from tfcompose.run.launcher.happening import Event
+    from tfcompose.run.launcher.notice import Notice, Stream
+    from tfcompose.run.launcher.preflight import Command
+    from tfcompose.run.orders import GuardOrder
+
+#: So much of a line is compared with what a gate waits for, in characters.
+LONGEST_MATCHED = 4000
+#: The guard's lines hold findings with notes, so they may be longer than a log's; bytes.
+EVENT_LIMIT = 1024 * 1024
+
+
+class Children:
+    """The processes that run. ``happened`` is given what becomes of them, ``tell`` what they say.
+
+    With a run's id, what they leave behind is this process's to bury and to end.
+    """
+
+    def __init__(
+        self, selector: BaseSelector, run_id: str, happened: Callable[[Event], None], tell: Callable[[Notice], None]
+    ) -> None:
+        self._selector = selector
+        self._run_id = run_id
+        self._happened = happened
+        self._tell = tell
+        self._children: dict[str, Child] = {}
+        self._guard = ""
+        self._guard_pipes: GuardPipes | None = None
+        self._keeper = Keeper(run_id)
+
+    def start(self, process: PlanProcess, command: Command, guard: GuardPipes | None = None) -> Event:
+        """Start the process, with the pipes of a guard if it is one, and return what came of it."""
+        try:
+            if command.missing:
+                return StartFailed(process.name, command.missing)
+            child = self._spawn(process, command, guard)
+        except (OSError, subprocess.SubprocessError, ValueError) as error:
+            if guard:
+                guard.events.close()
+                guard.close()
+            return StartFailed(process.name, _reason(error))
+        finally:
+            if guard:
+                guard.handed_over()
+        if guard:
+            self._guard, self._guard_pipes = process.name, guard
+            self._watch(child, Pipe(guard.events, lambda line: self._guard_said(process.name, line), EVENT_LIMIT))
+        return Started(process.name, child.popen.pid)
+
+    def kill(self, name: str, number: int) -> None:
+        """Send the signal to the child's group, if it runs."""
+        if name in self._children:
+            kill_group(self._children[name].popen.pid, number)
+
+    def order(self, order: GuardOrder) -> None:
+        """Tell the guard, if it runs."""
+        if self._guard_pipes:
+            self._guard_pipes.order(order)
+
+    def last_lines(self, name: str) -> tuple[str, ...]:
+        """Return what the process said last; nothing if it does not run."""
+        return self._children[name].last_lines if name in self._children else ()
+
+    def bury(self) -> None:
+        """Take leave of those that have ended."""
+        for child in [child for child in self._children.values() if has_ended(child.popen.pid)]:
+            self._ended(child)
+        if self._run_id:
+            bury_adopted({child.popen.pid for child in self._children.values()} | {self._keeper.pid})
+
+    def close(self) -> None:
+        """Kill what is left: something, only if an error in the launcher itself ends it."""
+        for child in self._children.values():
+            kill_group(child.popen.pid, signal.SIGKILL)
+            child.popen.wait()
+            for pipe in child.pipes:
+                pipe.file.close()
+        self._children.clear()
+        self._close_guard_pipes()
+        self._keep()
+        if self._run_id:
+            end_leftovers(leftovers(self._run_id), 1.0)
+        self._keeper.close()
+
+    # A process's life.
+
+    def _spawn(self, process: PlanProcess, command: Command, guard: GuardPipes | None) -> Child:
+        more = (guard.env if guard else {}) | ({RUN_ID: self._run_id} if self._run_id else {})
+        if command.fence:
+            command.fence[0].parent.mkdir(exist_ok=True)
+            command.fence[0].write_text(command.fence[1], encoding="utf-8")
+        popen = spawn(replace(command, env=command.env | more), guard.theirs if guard else ())
+        child = Child(process.name, popen)
+        self._children[process.name] = child
+        self._keep()
+        gate = process.ready.text if process.ready and process.ready.kind == "log" else None
+        if popen.stdout and popen.stderr:
+            self._watch(child, Pipe(popen.stdout, self._logger(child, "stdout", gate), bucket=child.bucket))
+            self._watch(child, Pipe(popen.stderr, self._logger(child, "stderr", gate), bucket=child.bucket))
+        return child
+
+    def _watch(self, child: Child, pipe: Pipe) -> None:
+        child.pipes.append(pipe)
+        self._selector.register(pipe.file, EVENT_READ, lambda: self._read(child, pipe))
+
+    def _read(self, child: Child, pipe: Pipe) -> None:
+        if pipe.read() == 0:
+            self._drain(child, pipe)
+
+    def _drain(self, child: Child, pipe: Pipe) -> None:
+        child.pipes.remove(pipe)
+        self._selector.unregister(pipe.file)
+        pipe.drain()
+
+    def _logger(self, child: Child, stream: Stream, gate: str | None) -> Callable[[str], None]:
+        last = child.last_err if stream == "stderr" else child.last_out
+        waited_for = re.compile(gate) if gate is not None else None
+
+        def log(text: str) -> None:
+            last.append(text[:LAST_LINE_LENGTH])
+            self._tell(LogLine(child.name, stream, text))
+            if waited_for and not child.gate_seen and waited_for.search(text[:LONGEST_MATCHED]):
+                child.gate_seen = True
+                self._happened(LogSeen(child.name, text[:LAST_LINE_LENGTH]))
+
+        return log
+
+    def _guard_said(self, name: str, line: str) -> None:
+        try:
+            event = from_line(line)
+        except (ValueError, TypeError, KeyError, AttributeError):
+            self._tell(LogLine(name, "stderr", f"not an event: {line}"))
+        else:
+            self._happened(event)
+
+    def _ended(self, child: Child) -> None:
+        """Take what the process leaves behind: the rest of its group, its last words, and its exit code."""
+        kill_group(child.popen.pid, signal.SIGKILL)
+        for pipe in list(child.pipes):
+            self._drain(child, pipe)
+        returncode = child.popen.wait()
+        del self._children[child.name]
+        if child.name == self._guard:
+            self._close_guard_pipes()
+        self._keep()
+        self._happened(Exited(child.name, returncode, child.last_lines))
+
+    def _close_guard_pipes(self) -> None:
+        if self._guard_pipes:
+            self._guard_pipes.close()
+            self._guard_pipes = None
+
+    def _keep(self) -> None:
+        self._keeper.keep(child.popen.pid for child in self._children.values())
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.strerror}: {error.filename}" if error.filename else error.strerror
+    return str(error)

@@ -113,10 +113,10 @@ def finding(  # noqa: PLR0913 (a finding has that many parts; all but three are 
     return Diagnostic(code, CODES[code], severity, message, span, tuple(notes), help, tuple(edits))
 
 
-def nearest(word: str, known: Iterable[str]) -> str | None:
-    """Return the known word that a person most likely meant by ``word``, or None."""
+def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:
+    """Return the known word that a person most likely meant by ``word``, or None; 1 is as near as the word itself."""
     find = import_module("difflib").get_close_matches  # loaded when a word is wrong
-    found = find(word.lower(), {name.lower(): name for name in known}, n=1, cutoff=0.6)
+    found = find(word.lower(), {name.lower(): name for name in known}, n=1, cutoff=cutoff)
     return next((name for name in known if name.lower() == found[0]), None) if found else None
 
 

@@ -40,8 +40,8 @@ class Imported:
     """A robot on its way into a robot file.
 
     ``notes`` says of each entry what of it is left out, and why. ``rpy`` has the angles (rad) by which rotations are
-    written in the source; ``packages`` are folders of packages, as the robot file is to name them. ``source`` is what
-    people call the file.
+    written in the source; ``packages`` are folders of packages, as the robot file is to name them; ``rules`` are the
+    levels of findings that the source gives reason for. ``source`` is what people call the file.
     """
 
     robot: Robot
@@ -50,3 +50,4 @@ class Imported:
     notes: dict[Entry, tuple[str, ...]] = field(default_factory=dict)
     rpy: dict[Quaternion, Vector] = field(default_factory=dict)
     packages: dict[str, str] = field(default_factory=dict)
+    rules: dict[str, str] = field(default_factory=dict)

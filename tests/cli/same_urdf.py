@@ -110,7 +110,7 @@ def _shapes(link: Any, tag: str, colours: dict[str, Any]) -> list[Any]:
     shapes = []
     for one in link.findall(tag):
         for form in one.find("geometry"):
-            if form.tag not in FORMS:
+            if form.tag not in FORMS or 0 in _sizes(form):
                 continue
             said = {
                 key: value if key == "filename" else [float(word) for word in value.split()]
@@ -119,6 +119,11 @@ def _shapes(link: Any, tag: str, colours: dict[str, Any]) -> list[Any]:
             said["scale"] = said.get("scale", [1.0, 1.0, 1.0])
             shapes.append({"form": form.tag, "pose": _pose(one), "colour": _colour(one, tag, colours), **said})
     return shapes
+
+
+def _sizes(form: Any) -> list[float]:
+    """Return the lengths of a shape; one without any is no body."""
+    return [float(word) for key in ("size", "radius", "length") for word in form.get(key, "").split()]
 
 
 def _colour(shape: Any, tag: str, colours: dict[str, Any]) -> Any:
@@ -156,8 +161,9 @@ def _joint(joint: Any) -> dict[str, Any]:
 
 def _motion(kind: str, limited: bool) -> dict[str, dict[str, float | None]]:  # noqa: FBT001 (here only)
     """Return what may stand in a joint, each with what it is where nothing is said."""
-    ends: dict[str, float | None] = {"lower": None, "upper": None, "effort": 0.0, "velocity": 0.0}
-    has_limit = limited or kind in {"revolute", "prismatic"}  # URDF requires one of these
+    end = 0.0 if kind in {"revolute", "prismatic"} else None  # of these URDF takes 0 for what is not said
+    ends: dict[str, float | None] = {"lower": end, "upper": end, "effort": 0.0, "velocity": 0.0}
+    has_limit = limited or end is not None  # URDF requires one of these
     return {
         "limit": ends if has_limit else {},
         "dynamics": {"damping": 0.0, "friction": 0.0},
@@ -172,9 +178,16 @@ def _motion(kind: str, limited: bool) -> dict[str, dict[str, float | None]]:  # 
 
 
 def _blocks(root: Any) -> list[Any]:
-    return sorted(
-        _tree(one) for one in root if one.tag not in {"link", "joint", "material"} and isinstance(one.tag, str)
-    )
+    """Return what stands beside links and joints, but for what is about a link or joint that is not there."""
+    joints = {one.get("name") for one in root.findall("joint")}
+    there = {one.get("name") for one in root.findall("link")} | joints
+    blocks = []
+    for one in root:
+        idle = one.tag == "gazebo" and one.get("reference", next(iter(there))) not in there
+        idle |= one.tag == "transmission" and any(inner.get("name") not in joints for inner in one.findall("joint"))
+        if isinstance(one.tag, str) and one.tag not in {"link", "joint", "material"} and not idle:
+            blocks.append(_tree(one))
+    return sorted(blocks)
 
 
 def _tree(element: Any) -> str:

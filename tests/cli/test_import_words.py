@@ -64,6 +64,27 @@ def test_a_frame_keeps_the_name_of_its_joint_in_a_comment(tmp_path: Path) -> Non
     assert "  # joint mast_fix\n  mast: " in imported(f"{HEAD}{fixed('mast', name='mast_fix')}</robot>", tmp_path)
 
 
+def test_names_beyond_letters_are_taken_and_lint_no_longer_refuses_them(tmp_path: Path) -> None:
+    text = imported(f"{HEAD}{fixed('the tool', name='a-b.c')}</robot>", tmp_path)
+    assert data(text)["rules"] == {"TF501": "warning"}
+    assert '<link name="the tool"/>' in built(tmp_path / "robot.yaml")
+    assert "rules" not in data(imported(f"{HEAD}{fixed('tool', name='a-b.c')}</robot>", tmp_path))
+
+
+def test_a_block_about_nothing_is_left_out_and_a_comment_says_so(tmp_path: Path) -> None:
+    blocks = '<gazebo reference="gone"><a/></gazebo><transmission name="t"><joint name="gone"/></transmission>'
+    text = imported(f"{HEAD}{blocks}</robot>", tmp_path)
+    assert "xml" not in data(text)
+    assert '# left out: <gazebo reference="gone">: no link or joint gone' in text
+    assert '# left out: <transmission name="t">: no moving joint gone' in text
+
+
+def test_a_limit_without_ends_is_what_readers_take_it_for(tmp_path: Path) -> None:
+    text = imported(moving('<limit effort="1" velocity="2"/>'), tmp_path)
+    assert data(text)["joints"]["shoulder"]["limit"] == {"lower": 0, "upper": 0, "effort": 1, "velocity": 2}
+    assert "# the source says no lower and upper limit, and readers take 0" in text
+
+
 def test_a_joint_that_a_block_names_stays_a_joint(tmp_path: Path) -> None:
     block = '<gazebo reference="mast_fix"><preserveFixedJoint>true</preserveFixedJoint></gazebo>'
     said = data(imported(f"{HEAD}{fixed('mast', name='mast_fix')}{block}</robot>", tmp_path))

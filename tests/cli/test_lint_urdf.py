@@ -7,7 +7,6 @@ import re
 import subprocess
 import sys
 import time
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -165,7 +164,6 @@ XACRO = """<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">
 """
 
 
-@pytest.mark.skipif(not find_spec("xacro"), reason="needs xacro")
 def test_a_xacro_file_is_expanded_and_places_are_those_of_the_expanded_text(tmp_path: Path) -> None:
     file = tmp_path / "r.urdf.xacro"
     file.write_text(XACRO)
@@ -196,13 +194,46 @@ ALLOWED = """<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">
 """
 
 
-@pytest.mark.skipif(not find_spec("xacro"), reason="needs xacro")
 def test_a_comment_in_a_xacro_file_counts_for_its_line_in_every_expansion(tmp_path: Path) -> None:
     file = tmp_path / "r.urdf.xacro"
     file.write_text(ALLOWED)
     assert [(one.code, one.message) for one in lint_urdf(str(file))] == [
         ("TF012", "allow TF205: there is no edge_given_twice here")
     ] * 2
+
+
+RATES = 'effort="1" velocity="1"'
+LIMIT = f'<limit {RATES} {{}} {{}}="1"/>'
+#: What is wrong with somebody's URDF, and how severe that is: an error only where a reader refuses the robot, or takes
+#: it for another one.
+JOINT = '<joint name="{}" type="{}"><parent link="base_link"/><child link="a"/>{}</joint>'
+LEVELS = {
+    "hyphens, as every UR has them": (f'<link name="a"/>{JOINT.format("base_link-a_joint", "fixed", "")}', "warning"),
+    "a space": (f'<link name="a"/>{JOINT.format("my joint", "fixed", "")}', "warning"),
+    "a slash that no lookup takes": (f'<link name="a"/>{JOINT.format("/j", "fixed", "")}', "error"),
+    "an extension": ('<material name="m" gloss="1"><color rgba="1 1 1 1"/></material>', "warning"),
+    "an extension that is like a word": (
+        f'<link name="a"/>{JOINT.format("j", "continuous", LIMIT.format("", "command_effort"))}',
+        "warning",
+    ),
+    "a slip": (f'<link name="a"/>{JOINT.format("j", "continuous", LIMIT.format("", "uper"))}', "error"),
+    "a limit without ends": (f'<link name="a"/>{JOINT.format("j", "revolute", f"<limit {RATES}/>")}', "warning"),
+    "no limit": (f'<link name="a"/>{JOINT.format("j", "revolute", "")}', "error"),
+    "a body of no size": ('<link name="a"><collision><geometry><sphere radius="0"/></geometry></collision></link>'
+        + JOINT.format("j", "fixed", ""), "warning"),
+    "a body of less": ('<link name="a"><collision><geometry><sphere radius="-1"/></geometry></collision></link>'
+        + JOINT.format("j", "fixed", ""), "error"),
+    "a block about nothing": ('<gazebo reference="gone"/>', "warning"),
+    "a transmission of nothing": ('<transmission name="t"><joint name="gone"/></transmission>', "warning"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", LEVELS)
+def test_what_readers_take_is_a_warning_and_no_error(what: str, tmp_path: Path) -> None:
+    inside, severity = LEVELS[what]
+    (tmp_path / "r.urdf").write_text(f'<robot name="r"><link name="base_link"/>{inside}</robot>')
+    found = [one for one in lint_urdf(str(tmp_path / "r.urdf")) if one.code != "TF706"]
+    assert [one.severity for one in found] == [severity], [one.message for one in found]
 
 
 def test_without_xacro_that_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -43,6 +43,7 @@ xml:
     <!-- $(find here) stays -->
     <gazebo reference="hand"><plugin name="p" filename='q'><frame> base_link </frame><joint>joint</joint>
       <text>base_link of joint $(eval 1)</text><cost>$5 $$(x)</cost></plugin></gazebo>
+    <transmission name="drive"><joint name="joint"/><actuator name="motor"/></transmission>
 """
 
 
@@ -131,6 +132,8 @@ def test_names_in_hardware_and_blocks_get_the_prefix_and_words_do_not(tmp_path: 
     assert [str(gazebo.findtext(f"plugin/{tag}")).strip() for tag in ("frame", "joint", "text", "cost")] == [
         "left_base_link", "left_joint", "base_link of joint $(eval 1)", "$5 $$(x)"
     ]  # fmt: skip
+    (drive,) = found.findall("transmission")
+    assert [one.get("name") for one in drive.iter()] == ["left_drive", "left_joint", "left_motor"]
     assert [mesh.get("filename") for mesh in found.iter("mesh")] == ["meshes/a.stl", "package://x/$(y)/$$(z).stl"]
     assert [one.get("name") for one in found.iter("material")] == ["paint"]
 

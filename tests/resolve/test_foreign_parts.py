@@ -125,6 +125,32 @@ def test_an_urdf_is_taken_twice_with_everything_in_it_renamed(cell: Any) -> None
     assert {one.get("name") for one in root.iter("material")} == {"left_grey", "right_grey"}
 
 
+def test_what_is_about_links_and_joints_that_are_cut_off_is_cut_off_too(cell: Any, tmp_path: Path) -> None:
+    control = """<ros2_control name="{}" type="system"><hardware><plugin>a/B</plugin></hardware>{}</ros2_control>"""
+    joint = '<joint name="{}"><command_interface name="position"/></joint>'
+    both = control.format("both", joint.format("shoulder") + joint.format("roll"))
+    cart = """<link name="cart"/><joint name="roll" type="continuous"><parent link="world"/><child link="cart"/></joint>
+    <gazebo reference="cart"><a/></gazebo><gazebo reference="roll"><a/></gazebo><gazebo reference="nobody"><a/></gazebo>
+    <transmission name="wheel"><joint name="roll"/><actuator name="w"/></transmission>"""
+    text = ARM.replace("</robot>", f"{cart}{both}{control.format('one', joint.format('roll'))}</robot>")
+    (tmp_path / "third/arm/arm.urdf").write_text(text, encoding="utf-8")
+    root = ET.fromstring(files(cell(LEFT))["robot.full.urdf"])  # noqa: S314 (our own text)
+    assert [one.get("reference") for one in root.findall("gazebo")] == ["left_upper", None, "nobody"]
+    assert [one.get("name") for one in root.findall("transmission")] == ["left_drive"]
+    assert [one.get("name") for one in root.findall("ros2_control")] == ["left_both"]
+    assert [one.get("name") for one in root.findall("ros2_control/joint")] == ["left_shoulder"]
+
+
+def test_names_that_are_beyond_letters_are_taken_from_others_and_renamed_everywhere(cell: Any, tmp_path: Path) -> None:
+    text = ARM.replace('"upper"', '"upper &amp; &lt;arm&gt;"').replace('"shoulder"', '"shoulder-joint 1.0"')
+    (tmp_path / "third/arm/arm.urdf").write_text(text, encoding="utf-8")
+    root = ET.fromstring(files(cell(LEFT))["robot.full.urdf"])  # noqa: S314 (our own text)
+    assert root.find("link[@name='left_upper & <arm>']") is not None
+    assert [one.get("reference") for one in root.findall("gazebo")] == ["left_upper & <arm>", None]
+    (joint,) = (one.get("name") for one in root.findall("transmission/joint"))
+    assert joint == root.find("joint/mimic").get("joint") == "left_shoulder-joint 1.0"  # type: ignore[union-attr]
+
+
 def test_each_number_of_the_urdf_is_still_there(cell: Any) -> None:
     root = ET.fromstring(files(cell(LEFT))["robot.full.urdf"])  # noqa: S314 (our own text)
     joint = next(one for one in root.findall("joint") if one.get("name") == "left_shoulder")

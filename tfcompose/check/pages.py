@@ -209,7 +209,7 @@ joints are written under links: and joints:, so that they are checked and have a
     "TF720": """An element or an attribute is not one of URDF's.
 
 Readers pass over it without a word: with <orign> a joint is at its parent's origin. An error where a known name is
-near; else it may be somebody's extension.""",
+misspelt; else it may be somebody's extension, and is a warning.""",
     "TF721": """A value of a URDF is missing, or is none.
 
 Numbers are SI: m, rad, kg. Readers refuse the robot, take a default without a word, or compute with what is there.""",

@@ -26,6 +26,7 @@ from tfcompose.imported import Imported
 from tfcompose.resolve.packages import Packages
 from tfcompose.resolve.recognise import recognised
 from tfcompose.resolve.urdf_control import with_hardware
+from tfcompose.resolve.urdf_idle import without_idle_blocks
 from tfcompose.resolve.urdf_lost import angles, lost
 from tfcompose.resolve.urdf_names import with_material_names
 
@@ -108,14 +109,15 @@ def _refusal(arguments: Namespace) -> str:
 
 def _written(read: Read, arguments: Namespace, packages: dict[str, str]) -> tuple[str, list[Diagnostic]]:
     """Return the robot file, and the errors that it has where the source has none."""
-    robot, renamed = with_material_names(with_hardware(read.robot))
+    robot, idle = without_idle_blocks(with_hardware(read.robot))
+    robot, renamed = with_material_names(robot)
     folder = posixpath.dirname(arguments.output or "") or "."
     words = frozenset(re.findall(r"[^\s<>\"'=]+", " ".join(block.text for block in robot.blocks)))
     sensors, undecided = ([], {}) if arguments.no_sensors else recognised(robot, library(), words)
     notes = lost(read.root, read.robot, read.found)
     for mount, said in undecided.items():
         notes.setdefault(("frames", mount), []).append(said)
-    notes.setdefault(("", ""), []).extend(renamed)
+    notes.setdefault(("", ""), []).extend([*renamed, *idle])
     name = arguments.robot or robot_name(robot.name)
     if name != robot.name:
         notes.setdefault(("", ""), []).append(f"the source calls it {robot.name}")
@@ -131,7 +133,11 @@ def _written(read: Read, arguments: Namespace, packages: dict[str, str]) -> tupl
     head = [f"imported from {posixpath.basename(arguments.file)} by tfcompose"]
     text = spec(given, name, target, head)
     compiled = _compiled(text, arguments.output)
-    return spec(given, name, target, [*head, *_faults(compiled)]), list(compiled.errors)
+    errors = [one for one in compiled.errors if one.code != "TF501"]  # such names the source would not have had
+    if errors != list(compiled.errors):
+        why = ("the source has such names",)
+        given = replace(given, rules={"TF501": "warning"}, notes=given.notes | {("rules", "TF501"): why})
+    return spec(given, name, target, [*head, *_faults(compiled)]), errors
 
 
 def _compiled(text: str, output: str | None) -> Compiled:

@@ -53,8 +53,9 @@ def _unreadable(path: str, error: OSError) -> Diagnostic:
     advice = ""
     if isinstance(error, FileNotFoundError):
         folder = import_module("pathlib").Path(path).parent
-        there = sorted(file.name for file in folder.glob("*.yaml")) if folder.is_dir() else []
-        advice = f"in {folder} there is {', '.join(there[:8])}" if there else f"there is no YAML file in {folder}"
+        ending = next((one for one in (".urdf", ".xacro") if path.endswith(one)), ".yaml")
+        there = sorted(file.name for file in folder.glob(f"*{ending}")) if folder.is_dir() else []
+        advice = f"in {folder} there is {', '.join(there[:8])}" if there else f"there is no {ending} file in {folder}"
     elif isinstance(error, IsADirectoryError):
         advice = "no robot file is in it: name one"
     return finding("TF001", f"cannot be read: {error.strerror}", Span(path), help=advice)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -27,9 +28,11 @@ CODES = frozenset(
     | {"TF701", "TF702", "TF704", "TF705", "TF706", "TF707", "TF708", "TF709", "TF710", "TF711"}
 )
 
+#: How a rule says that a frame is missing.
+_DECLARE = re.compile(r"declare it: (?:frames|links): \{(.+): \{\}\}", re.DOTALL)
+
 #: What to do, in URDF's words, where a rule speaks of YAML. Advice that names a near word is kept.
 _HELP = {
-    "TF203": 'add <link name="…"/>',
     "TF204": "join the trees with a fixed joint",
     "TF206": 'add <link name="base_link"/>',
     "TF209": "remove it, or give it a joint",
@@ -82,5 +85,8 @@ def read_urdf(file: str, packages: Packages, arguments: Mapping[str, str] | None
 
 def _said(found: Diagnostic) -> Diagnostic:
     """Return the finding with its advice in URDF's words."""
-    keeps = found.help.startswith("did you mean")
-    return found if keeps else replace(found, help=_HELP.get(found.code, found.help))
+    if found.help.startswith("did you mean"):
+        return found
+    declared = _DECLARE.fullmatch(found.help)
+    advice = f'add <link name="{declared[1]}"/>' if declared else _HELP.get(found.code, found.help)
+    return replace(found, help=advice)

@@ -107,6 +107,8 @@ def _motion(joint: Joint) -> dict[str, Any]:
     limit, reference = joint.limit, joint.reference
     if limit:
         ends = {"lower": limit.lower, "upper": limit.upper}
+        if joint.type in {"revolute", "prismatic"}:  # of these URDF takes 0 for an end that is left out
+            ends = {key: value or 0.0 for key, value in ends.items()}
         limits = {key: place(value) for key, value in ends.items() if value is not None}
         rates = {"effort": limit.effort, "velocity": limit.velocity}
         said["limit"] = limits | {key: value for key, value in rates.items() if value is not None}

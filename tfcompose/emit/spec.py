@@ -63,6 +63,7 @@ class _Writer:
             "frames": {edge.child: self._frame(edge) for edge in self.bare},
             "sensors": {sensor.name: self._sensor(sensor) for sensor in self.given.sensors},
             "processes": self._processes(),
+            "rules": dict(self.given.rules),
         }
         if any("${" in value for value in _texts(sections)):
             lines += entry("vars", {"dollar": "$"})
@@ -170,15 +171,16 @@ class _Writer:
 
 
 def _texts(value: Any) -> list[str]:
+    """Return the texts in which expressions are looked for: in a key none is."""
     if isinstance(value, dict):
-        return [one for key, item in value.items() for one in (*_texts(key), *_texts(item))]
+        return [one for item in value.values() for one in _texts(item)]
     if isinstance(value, (list, tuple)):
         return [one for item in value for one in _texts(item)]
     return [value] if isinstance(value, str) else []
 
 
 def _without_holes(value: Any) -> Any:
-    """Return the data in which no text is taken for an expression; in a key none is."""
+    """Return the data in which no text is taken for an expression."""
     if isinstance(value, dict):
         return {key: _without_holes(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

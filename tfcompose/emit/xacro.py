@@ -92,10 +92,14 @@ def _hardware(robot: Robot) -> list[str]:
 
 def _blocks(robot: Robot) -> list[str]:
     """Return the raw blocks, in which what is a name of the robot's, and nothing else, gets the prefix."""
-    names = [*robot.frames, *(edge.joint_name for edge in robot.edges if edge.joint_name)] if robot.blocks else []
+    if not robot.blocks:
+        return []
+    names = [*robot.frames, *(edge.joint_name for edge in robot.edges if edge.joint_name)]
+    names += [name for block in robot.blocks for name in block.own_names()]
+    names = [_EVALUATED.sub(r"$\1", name) for name in names]  # as they stand in the text below
     again = {name: f"${{prefix}}{name}" for name in names}
     blocks = [replace(block, text=_EVALUATED.sub(r"$\1", block.text)).renamed(again) for block in robot.blocks]
-    return _block_lines((), blocks) if blocks else []
+    return _block_lines((), blocks)
 
 
 def _block_lines(*given: object) -> list[str]:

@@ -91,4 +91,6 @@ def refuse_unreadable(text: str, file: str, most_characters: int = MOST_CHARACTE
         raise RejectedError([finding("TF008", message, Span(file))])
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1
-        raise RejectedError([finding("TF001", "not a text file: it holds a NUL byte", Span(file, line))])
+        raise RejectedError(
+            [finding("TF001", "not a text file: it holds a NUL byte", Span(file, line), help="remove it")]
+        )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import field, replace
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.frozen import dataclass
@@ -48,8 +49,10 @@ class Hardware:
     is_async: bool | None = None
 
 
-#: All that stands between quotes, or between two tags, but for blanks.
-_HELD = re.compile(r"""(=\s*["']\s*|>\s*)([^<>"'\s]+)(?=\s*["'<])""")
+#: What has a name of its own in a raw block.
+_NAMED = re.compile(r"""<(?:transmission|actuator|ros2_control|sensor|gpio)\b[^>]*?\bname\s*=\s*["']([^"']+)""")
+#: All that stands between quotes, or between two tags.
+_HELD = re.compile(r"""(=\s*")([^<"]*)(?=")|(=\s*')([^<']*)(?=')|(>)([^<>]*)(?=<)""")
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +63,18 @@ class Block:
     at: Span
     text: str
 
+    def own_names(self) -> list[str]:
+        """Return the names of the elements in it that have one for themselves in the whole robot."""
+        return _NAMED.findall(self.text)
+
     def renamed(self, names: Mapping[str, str]) -> Block:
         """Return the block with other names: of what an attribute or an element holds, if that is a name alone."""
 
         def other(found: re.Match[str]) -> str:
-            return found[1] + names.get(found[2], found[2])
+            before, held = (part for part in found.groups() if part is not None)
+            name = held.strip()
+            again = names.get(html.unescape(name) if "&" in name else name)
+            return found[0] if again is None else before + held.replace(name, html.escape(again))
 
+        html = import_module("html")  # loaded only for robots with such blocks
         return replace(self, text=_HELD.sub(other, self.text))

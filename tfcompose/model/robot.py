@@ -63,7 +63,8 @@ class Robot:
     tree has no single root; ``sensors`` are those with a known preset, ``as_written`` the numbers of poses and limits
     before they became poses, ``unused`` the variables that nothing uses; ``written`` is the plain data that the robot
     was made from, profiles laid over it; ``broken`` holds the entries (section, name) that were refused
-    already, of a part how its names begin. ``parts`` are those that are robots of their own.
+    already, of a part how its names begin. ``parts`` are those that are robots of their own. ``foreign`` are the
+    files that somebody else wrote: what those say otherwise than is usual here cannot be mended here.
     """
 
     name: str
@@ -84,6 +85,7 @@ class Robot:
     parts: tuple[Part, ...] = ()
     hardware: tuple[Hardware, ...] = ()
     blocks: tuple[Block, ...] = ()
+    foreign: frozenset[str] = field(default=frozenset(), compare=False)
 
     def final(self, frame: str) -> str:
         """Return the frame's name on the live tree: with the prefix, unless it is shared."""

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 ALLOWED = ("transmission", "gazebo", "ros2_control", "sensor", "material")
 #: What belongs into the robot file's own sections, or into an element there.
 _OWN = {"link": "links", "joint": "joints", "robot": "include"}
+#: What names links or joints of the robot.
+REFERRING = frozenset({"gazebo", "transmission", "ros2_control"})
 _INNER = frozenset({"visual", "collision", "inertial", "origin", "geometry", "limit", "mimic", "axis", "plugin"})
 
 
@@ -109,10 +111,10 @@ def _misplaced(root: Element, frames: Collection[str], joints: Collection[str]) 
             yield finding(
                 "TF719", f"unknown element <{element.tag}>", element.at, help=did_you_mean(element.tag, ALLOWED)
             )
-        yield from _references(element, frames, joints)
+        yield from references(element, frames, joints)
 
 
-def _references(element: Element, frames: Collection[str], joints: Collection[str]) -> Iterator[Diagnostic]:
+def references(element: Element, frames: Collection[str], joints: Collection[str]) -> Iterator[Diagnostic]:
     """Yield a finding for each link or joint that a block names and the robot has not."""
     reference = element.attributes.get("reference")
     if element.tag == "gazebo" and reference is not None and reference not in frames and reference not in joints:

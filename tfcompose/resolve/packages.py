@@ -106,7 +106,8 @@ class Packages:
     def _in_package(self, uri: str, at: Span) -> tuple[Asset, Diagnostic | None]:
         name, _, inside = _unquoted(uri.partition("://")[2]).partition("/")
         if not name or not inside:
-            return Asset(uri, at), finding("TF723", f"{uri} is no address of a file", at, help="package://NAME/PATH")
+            advice = f"a slash too many: package://{inside}" if "/" in inside else "package://NAME/PATH"
+            return Asset(uri, at), finding("TF723", f"{uri} is no address of a file", at, help=advice)
         folder = self.folder(name)
         if folder is None:
             return Asset(uri, at, "", name, inside), self.not_found(name, at) if self.disk else None

@@ -10,6 +10,7 @@ from tfcompose.frozen import dataclass
 from tfcompose.load import Place, Source, lay_over
 from tfcompose.model import Part
 from tfcompose.plan import RosSettings
+from tfcompose.resolve.cut import below
 from tfcompose.resolve.renamed import Names, renamed
 
 if TYPE_CHECKING:
@@ -133,15 +134,7 @@ class PartEntry:
         if root not in robot.frames:
             at, advice = self.source.at((*self.at, "root")), did_you_mean(root, robot.frames)
             raise RejectedError([finding("TF203", f"the part {self.name} has no frame {root}", at, help=advice)])
-        below = robot.below(root)
-        return replace(
-            robot,
-            frames={name: at for name, at in robot.frames.items() if name in below},
-            edges=tuple(edge for edge in robot.edges if edge.child in below and edge.child != root),
-            links={name: link for name, link in robot.links.items() if name in below},
-            sensors=tuple(sensor for sensor in robot.sensors if sensor.mount in below),
-            base=root,
-        )
+        return below(robot, root)
 
     def _root(self, robot: Robot, names: Names) -> str | None:
         """Return the frame that the holder bolts on; to have none, or several, is wrong only if it has to be one."""

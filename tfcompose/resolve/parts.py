@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 #: How many parts a robot may have, those of its parts counted.
 MOST_PARTS = 100
+#: Warnings about somebody else's file that its holder is told: something of the robot is left out, or not found.
+_TELLING = frozenset({"TF721", "TF723", "TF724"})
 
 
 @dataclass(slots=True)
@@ -76,7 +78,7 @@ class Parts:
         except RejectedError as error:
             raise RejectedError([_noted(one, part) for one in error.diagnostics]) from None
         self.whole.foreign[made.file] = _note(part)
-        self.found += [_noted(one, part) for one in made.found]
+        self.found += [_noted(one, part) for one in made.found if one.severity == "error" or one.code in _TELLING]
         return made.robot, made.implied
 
     def _resolved(self, part: PartEntry, named: str, read: Reader) -> Robot:

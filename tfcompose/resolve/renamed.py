@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -25,10 +24,6 @@ if TYPE_CHECKING:
         Shape,
     )
     from tfcompose.plan import GuardPolicy
-
-
-#: What has a name of its own in a raw block.
-_NAMED = re.compile(r"""<(?:transmission|actuator|ros2_control|sensor|gpio)\b[^>]*?\bname\s*=\s*["']([^"']+)""")
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,8 +114,7 @@ def _hardware(hardware: Hardware, names: Names) -> Hardware:
 def _blocks(robot: Robot, names: Names) -> Iterator[Block]:
     again = {frame: names.frame(frame) for frame in robot.frames}
     again |= {edge.joint_name: names.joint(edge.joint_name) for edge in robot.edges if edge.joint_name}
-    own = {name for block in robot.blocks for name in _NAMED.findall(block.text)}
-    again = {name: names.joint(name) for name in own} | again
+    again = {name: names.joint(name) for block in robot.blocks for name in block.own_names()} | again
     for block in robot.blocks:
         yield replace(block.renamed(again), name=f"{names.part}/{block.name}")
 

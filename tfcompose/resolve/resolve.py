@@ -205,6 +205,7 @@ class _Work:
             parts=tuple(alone for part in parts for alone in part.parts),
             hardware=tuple(one for part in in_tree for one in part.hardware),
             blocks=tuple(one for part in in_tree for one in part.blocks),
+            foreign=frozenset(file for part in parts for file in part.foreign),
         )
 
 

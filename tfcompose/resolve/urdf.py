@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, finding
 from tfcompose.model import Block, Robot
+from tfcompose.resolve.blocks import REFERRING, references
 from tfcompose.resolve.urdf_bodies import Bodies
 from tfcompose.resolve.urdf_joints import edge_of
 from tfcompose.resolve.urdf_values import Values
@@ -42,6 +44,10 @@ def robot_of_urdf(root: Element, file: str, finder: Finder) -> tuple[Robot, tupl
         _add(joints, element, values)
     edges = [edge for element in root.all("joint") if (edge := edge_of(element, values))]
     frames = {link: element.place("name") for link, element in links.items()}
+    for element in root.children:
+        if element.tag in REFERRING:
+            wrong = references(element, frames, {edge.joint_name: None for edge in edges})
+            values.found += [replace(one, severity="warning") for one in wrong]
     robot = Robot(
         name=name,
         file=file,
@@ -51,6 +57,7 @@ def robot_of_urdf(root: Element, file: str, finder: Finder) -> tuple[Robot, tupl
         processes=(),
         base=None,
         blocks=tuple(_blocks(root)),
+        foreign=frozenset({file}),
     )
     return robot, (*values.found, *bodies.found, *unknown_words(root))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.model import Asset, Inertial, Link, Material, Shape
 from tfcompose.resolve.bodies import name_of_colour, traces
@@ -11,7 +11,7 @@ from tfcompose.resolve.bodies import name_of_colour, traces
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tfcompose.diagnostic import Diagnostic, Span
+    from tfcompose.diagnostic import Diagnostic, Severity, Span
     from tfcompose.load.urdf import Element
     from tfcompose.resolve.urdf_values import Values
 
@@ -24,6 +24,7 @@ _FORMS: dict[str, tuple[tuple[str, int], ...]] = {
     "sphere": (("radius", 1),),
     "capsule": (("radius", 1), ("length", 1)),
 }
+_HUGE = 1e30  # products of three smaller ones stay numbers
 _TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
@@ -61,14 +62,18 @@ class Bodies:
 
     def _primitive(self, element: Element, form: Element) -> list[Shape]:
         size: list[float] = []
+        before = len(self.values.found)
         for key, count in _FORMS[form.tag]:
             if key not in form.attributes:
                 self.values.refuse(f"<{form.tag}> has no {key}", form.at)
                 return []
             size += self.values.numbers(form, key, (0.0,) * count)
-        if not all(0 < value < 1e30 for value in size):  # noqa: PLR2004 (products of three stay numbers)
+        if len(self.values.found) == before and not all(0 < value < _HUGE for value in size):
             at = form.place(_FORMS[form.tag][0][0])
-            self.values.refuse(f"a {form.tag} of size {' '.join(f'{value:g}' for value in size)}", at)
+            flat: Severity = "warning" if min(size) == 0 and max(size) < _HUGE else "error"
+            advice = "give it a size, or remove it: some readers see nothing, others refuse the robot"
+            self.values.refuse(f"a {form.tag} of size {' '.join(f'{value:g}' for value in size)}", at, advice, flat)
+        if len(self.values.found) > before:
             return []
         kind: Any = form.tag
         return [Shape(kind, tuple(size), self.values.pose(element), self._material(element))]
@@ -123,8 +128,8 @@ class Bodies:
             return None
         self.values.text(said, "value", '<mass value="1.5"/>')
         mass = self.values.number(said, "value", 0.0)
-        if not 0 < mass < 1e30:  # noqa: PLR2004 (as above)
-            level: Literal["error", "warning"] = "warning" if mass == 0 else "error"
+        if not 0 < mass < _HUGE:
+            level: Severity = "warning" if mass == 0 else "error"
             advice = "in kg, greater than 0; a link without a body has no inertial"
             self.values.refuse(f"the mass of {name} is {mass:g} kg", said.place("value"), advice, level)
             return None

@@ -24,6 +24,8 @@ _NOT_HELD = {
     "limit": ("acceleration", "jerk", "deceleration"),
     "calibration": ("reference_position",),
 }
+#: Of files, for which nothing is left out; and of blocks, which say it themselves.
+_SAID_ELSEWHERE = frozenset({"TF203", "TF703", "TF723", "TF724"})
 #: What says nothing in a joint that does not move.
 _OF_MOTION = ("axis", "limit", "mimic", "dynamics", "calibration", "safety_controller")
 
@@ -41,13 +43,20 @@ def lost(root: Element, robot: Robot, found: Iterable[Diagnostic]) -> dict[Entry
         several = list(dict.fromkeys(_in_element(element, colours)))
         if several:
             notes.setdefault(at, []).append(f"left out: {', '.join(several)}")
+        if _has_no_ends(element):
+            notes.setdefault(at, []).append("the source says no lower and upper limit, and readers take 0")
     for one in found:
-        if one.span and one.code not in {"TF723", "TF724"}:  # of files: nothing is left out for them
+        if one.span and one.code not in _SAID_ELSEWHERE:
             notes.setdefault(_entry_at(one.span, entries), []).append(f"{one.code} in the source: {one.message}")
     whole = list(_in_whole(root, robot))
     if whole:
         notes.setdefault(("", ""), []).append(f"left out: {', '.join(whole)}")
     return notes
+
+
+def _has_no_ends(element: Element) -> bool:
+    limit = element.first("limit") if element.attributes.get("type") in {"revolute", "prismatic"} else None
+    return limit is not None and not limit.attributes.keys() & {"lower", "upper"}
 
 
 def _entry_at(span: Span, entries: list[tuple[Span, Entry]]) -> Entry:

@@ -41,7 +41,8 @@ class Values:
             values = ()
         if len(values) != len(default) or not all(map(math.isfinite, values)):
             count = "a number" if len(default) == 1 else f"{len(default)} numbers"
-            self.refuse(f"{name}={element.attributes[name]!r} is not {count}", element.place(name))
+            text = element.attributes[name]
+            self.refuse(f"{name}={text!r} is not {count}", element.place(name), _advice(text, len(default)))
             return default
         return values
 
@@ -60,3 +61,12 @@ class Values:
             self.refuse("this rpy is no angle", origin.place("rpy") if origin else parent.at)
             return Pose((x, y, z))
         return Pose((x, y, z), normalised(quat_from_rpy(roll, pitch, yaw)))
+
+
+def _advice(text: str, count: int) -> str:
+    """Return what to write for what is not so many numbers."""
+    if "${" in text or "$(" in text:
+        return "this is xacro that was not expanded: take the .xacro file"
+    if "," in text:
+        return "no commas: numbers stand apart by spaces"
+    return f"{count} finite numbers with spaces between them" if count > 1 else ""

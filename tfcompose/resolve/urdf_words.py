@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding, nearest
+from tfcompose.diagnostic import Diagnostic, finding, nearest, slip_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -44,11 +44,13 @@ WORDS: dict[str, tuple[str, str]] = {
     "calibration": ("rising falling reference_position", ""),
     "safety_controller": ("soft_lower_limit soft_upper_limit k_position k_velocity", ""),
 }
+#: A word that is so near to a known one is a misspelt one.
+_MISSPELT = 0.8
 OPAQUE = frozenset({"transmission", "gazebo", "ros2_control", "sensor"})
 
 
 def unknown_words(root: Element) -> Iterator[Diagnostic]:
-    """Yield a finding for each element and attribute that URDF does not have: an error where a known one is near.
+    """Yield a finding for each element and attribute that URDF does not have: an error where a known one is misspelt.
 
     Others may be somebody's extension, and are warnings; beside links and joints they are let through.
     """
@@ -70,4 +72,5 @@ def _unknown(what: str, word: str, known: list[str], at: Element, attribute: str
     near = nearest(word, known)
     advice = f"did you mean {near}?" if near else f"known here: {', '.join(known)}" if known else "nothing stands here"
     place = at.place(attribute) if attribute else at.at
-    return finding("TF720", f"unknown {what}", place, help=advice, severity="error" if near else "warning")
+    wrong = near and (slip_of(word, known) or nearest(word, known, _MISSPELT))
+    return finding("TF720", f"unknown {what}", place, help=advice, severity="error" if wrong else "warning")

@@ -18,4 +18,6 @@ def no_frames(robot: Robot) -> Iterator[Diagnostic]:
     There is nothing to publish and nothing to describe. A robot has at least a ``base_link``, under ``links``.
     """
     if not robot.frames and not robot.broken:
-        yield finding("TF206", f"{robot.name} has no frames", Span(robot.file), help="links: {base_link: {}}")
+        yield finding(
+            "TF206", f"{robot.name or 'the robot'} has no frames", Span(robot.file), help="links: {base_link: {}}"
+        )

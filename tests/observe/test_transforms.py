@@ -70,6 +70,17 @@ class PoseWithCovarianceStamped:
 
 
 @dataclass
+class Polygon:
+    points: list[Vector3]
+
+
+@dataclass
+class PolygonStamped:
+    header: Header
+    polygon: Polygon
+
+
+@dataclass
 class PointField:
     name: str
     offset: int
@@ -107,6 +118,15 @@ def test_a_point_is_turned_and_moved_and_gets_the_frame_and_the_time() -> None:
 def test_a_vector_is_turned_and_not_moved() -> None:
     moved = laser().transform(Vector3Stamped(header(), Vector3(0.5, -1.0, 2.0)), "base")
     assert (moved.vector.x, moved.vector.y, moved.vector.z) == pytest.approx(tuple(TURN.apply([0.5, -1, 2])))
+
+
+def test_every_corner_of_a_polygon_is_moved() -> None:
+    corners = [(0.5, -1.0, 2.0), (0.0, 0.0, 0.0), (3.0, 4.0, 5.0)]
+    given = PolygonStamped(header(), Polygon([Vector3(*corner) for corner in corners]))
+    moved = laser().transform(given, "base")
+    found = [(corner.x, corner.y, corner.z) for corner in moved.polygon.points]
+    assert found == pytest.approx(TURN.apply(corners) + XYZ)
+    assert (given.polygon.points[0].x, moved.header.frame_id) == (0.5, "base")
 
 
 @pytest.mark.parametrize("quat", [(0.5, 0.5, 0.5, 0.5), (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 2.0)])

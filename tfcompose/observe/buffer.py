@@ -19,6 +19,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
+from tfcompose.observe.awaiting import Awaits
 from tfcompose.observe.core import CACHE_NS, BufferCore, Row
 from tfcompose.observe.exceptions import (
     ConnectivityException,
@@ -28,13 +29,16 @@ from tfcompose.observe.exceptions import (
     TimeoutException,
     TransformException,
 )
-from tfcompose.observe.frames import FrameInfo, as_string, as_yaml, frame_info
-from tfcompose.observe.lookups import Lookups
+from tfcompose.observe.frames import FrameInfo, as_dot, as_string, as_yaml, frame_info
+from tfcompose.observe.interface import BufferInterface
 from tfcompose.observe.refusal import Refusal
 from tfcompose.observe.stamped import nanoseconds
-from tfcompose.observe.transforms import arrays, transform_for
+from tfcompose.observe.transforms import arrays
+from tfcompose.observe.velocity import Asked, Velocity, lookup_velocity
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import ArrayLike, NDArray
 
     from tfcompose.observe.trajectory import Trajectory
@@ -44,12 +48,13 @@ __all__ += ["ConnectivityException", "ExtrapolationException", "InvalidArgumentE
 __all__ += ["TimeoutException", "TransformException"]
 
 
-class Buffer(Lookups):
+class Buffer(Awaits, BufferInterface):
     """tf2_ros's ``Buffer``: takes and gives messages, and waits.
 
     Args:
         cache_time: how long samples are kept, a duration; default 10 s.
         node: an rclpy node; when its clock goes back, all moving edges are forgotten. (A listener sees to that, too.)
+            Where tf2_msgs is installed it offers the service ``tf2_frames``, which view_frames asks.
 
     Frames, times and durations are given as to tf2; see ``stamped`` for what a time may be. All lookups raise
 
@@ -60,9 +65,19 @@ class Buffer(Lookups):
     """
 
     def __init__(self, cache_time: Any = None, node: Any = None) -> None:
-        super().__init__(CACHE_NS if cache_time is None else nanoseconds(cache_time))
+        Awaits.__init__(self, CACHE_NS if cache_time is None else nanoseconds(cache_time))
+        BufferInterface.__init__(self)
+        self._jumps: dict[int, Any] = {}
         if node is not None:
-            self._jump = import_module("tfcompose.ros.listening").on_clock_jump(node, self.time_jump_callback)
+            self.follow_clock(node)
+            self.srv = import_module("tfcompose.ros.listening").offer_frames(node, self.all_frames_as_yaml)
+
+    def follow_clock(self, node: Any) -> None:
+        """Forget all moving edges whenever the node's clock goes back, or changes between the system's and another."""
+        clock = node.get_clock()
+        if id(clock) not in self._jumps:
+            jump = import_module("tfcompose.ros.listening").on_clock_jump(node, self.time_jump_callback)
+            self._jumps[id(clock)] = (clock, jump)
 
     def set_transform(self, transform: Any, authority: str = "default_authority") -> bool:
         """Take a TransformStamped of a moving edge; return False if it was refused."""
@@ -71,33 +86,6 @@ class Buffer(Lookups):
     def set_transform_static(self, transform: Any, authority: str = "default_authority") -> bool:
         """Take a TransformStamped of a fixed edge; return False if it was refused."""
         return not self.insert([_row(transform)], static=True, authority=authority)
-
-    def transform(self, object_stamped: Any, target_frame: str, timeout: Any = 0) -> Any:
-        """Return a message of the same type in another frame, at the time of its own stamp.
-
-        Known are PointStamped, Vector3Stamped, PoseStamped, PoseWithCovarianceStamped and PointCloud2 (needs numpy).
-
-        Raises:
-            TypeException: if it is of another type.
-        """
-        move = transform_for(object_stamped)
-        header = object_stamped.header
-        return move(object_stamped, self.lookup_transform(target_frame, header.frame_id, header.stamp, timeout))
-
-    def transform_full(
-        self, object_stamped: Any, target_frame: str, target_time: Any, fixed_frame: str, timeout: Any = 0
-    ) -> Any:
-        """Return a message in another frame at another time, between which ``fixed_frame`` stands still.
-
-        Raises:
-            TypeException: if it is of a type that ``transform`` does not know.
-        """
-        move = transform_for(object_stamped)
-        header = object_stamped.header
-        return move(
-            object_stamped,
-            self.lookup_transform_full(target_frame, target_time, header.frame_id, header.stamp, fixed_frame, timeout),
-        )
 
     def transform_points(self, cloud: ArrayLike, target: str, source: str, stamp: Any = 0) -> NDArray[Any]:
         """Return points given in ``source`` in ``target``, at a time (0: the newest common one). Needs numpy.
@@ -123,6 +111,40 @@ class Buffer(Lookups):
         found: Trajectory = arrays("trajectory").lookup_many(self, target, source, stamps, outside)
         return found
 
+    def lookup_velocity(  # noqa: PLR0913, PLR0917 (tf2's arguments)
+        self, tracking_frame: str, observation_frame: str, time: Any, averaging_interval: Any,
+        reference_frame: str = "", reference_point: Sequence[float] = (0.0, 0.0, 0.0), reference_point_frame: str = "",
+    ) -> Velocity:  # fmt: skip
+        """Return how fast one frame moves as seen from another: (``linear`` m/s, ``angular`` rad/s).
+
+        It is the mean over ``averaging_interval`` around a time (0: up to the newest), with the axes of
+        ``reference_frame``, default the observation frame. Linear is the velocity of the tracking frame's origin, or of
+        another point that moves along with it. (tf2's ``lookupVelocity`` says the same of what does not turn and stands
+        like the reference frame; of what turns it mixes up the axes.)
+        """
+        x, y, z = reference_point
+        asked = Asked(
+            tracking_frame, observation_frame, reference_frame or observation_frame, (x, y, z),
+            reference_point_frame or tracking_frame,
+        )  # fmt: skip
+        return lookup_velocity(self, asked, nanoseconds(time), nanoseconds(averaging_interval))
+
+    def lookupVelocityCore(  # noqa: N802 (tf2_py's name)
+        self, tracking_frame: str, observation_frame: str, time: Any, averaging_interval: Any
+    ) -> Velocity:
+        """Return what ``lookup_velocity`` does."""
+        return self.lookup_velocity(tracking_frame, observation_frame, time, averaging_interval)
+
+    def lookupVelocityFullCore(  # noqa: N802, PLR0913, PLR0917 (tf2_py's name and arguments)
+        self, tracking_frame: str, observation_frame: str, reference_frame: str, reference_point: Sequence[float],
+        reference_point_frame: str, time: Any, averaging_interval: Any,
+    ) -> Velocity:  # fmt: skip
+        """Return what ``lookup_velocity`` does."""
+        return self.lookup_velocity(
+            tracking_frame, observation_frame, time, averaging_interval,
+            reference_frame, reference_point, reference_point_frame,
+        )  # fmt: skip
+
     def all_frames(self) -> list[FrameInfo]:
         """Return what is known of each frame, in the order in which they were first heard of."""
         with self._lock:
@@ -135,6 +157,18 @@ class Buffer(Lookups):
     def all_frames_as_yaml(self) -> str:
         """Return each edge with its rate and times, as tf2's ``tf2_frames`` service does."""
         return as_yaml(self.all_frames())
+
+    def _allFramesAsDot(self, time: Any = 0) -> str:  # noqa: ARG002, N802 (tf2_py's name)
+        """Return the edges as a graph for graphviz."""
+        return as_dot(self.all_frames())
+
+    def _frameExists(self, frame_id: str) -> bool:  # noqa: N802 (tf2_py's name)
+        """Return whether the frame was heard of."""
+        return frame_id in self.frames
+
+    def _getFrameStrings(self) -> list[str]:  # noqa: N802 (tf2_py's name)
+        """Return every frame that was heard of, in the order in which they were."""
+        return [frame.name for frame in self.all_frames()]
 
     def time_jump_callback(self, time_jump: object = None) -> None:  # noqa: ARG002 (what rclpy's clock gives)
         """Forget all samples of moving edges, since the clock went back."""

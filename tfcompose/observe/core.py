@@ -22,7 +22,7 @@ from tfcompose.observe.walk import newest_ways, ways_at
 from tfcompose.pose import Pose
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
 CACHE_NS = 10_000_000_000
 # Closer to 1 than this a sum of four squares cannot be told from 1.
@@ -52,6 +52,8 @@ class BufferCore:
         self._lock = RLock()
         self._news = Condition(self._lock)
         self._waiting = 0
+        #: Called after something was taken, by whoever gave it.
+        self.on_news: list[Callable[[], object]] = []
         self._histories: dict[str, History] = {}
         self._names: dict[str, None] = {}
         self._chains: dict[tuple[str, str], Chain] = {}
@@ -70,7 +72,7 @@ class BufferCore:
         row = (parent, child, 0, stamp_ns, *pose.xyz, *pose.quat_xyzw)
         return not self.insert([row], static=static, authority=authority)
 
-    def insert(  # noqa: C901 (fifty thousand times a second: a call for each step would cost as much as the step)
+    def insert(  # noqa: C901, PLR0912 (fifty thousand times a second: a call for each step would cost as much as the step)
         self, rows: Iterable[Row], *, static: bool, authority: str = ""
     ) -> list[tuple[str, Refusal]]:
         """Take transforms in order; return the child and the reason of each that was refused.
@@ -112,6 +114,9 @@ class BufferCore:
                 history.authority = authority
             if self._waiting:
                 self._news.notify_all()
+        if self.on_news:
+            for tell in tuple(self.on_news):
+                tell()
         return refused
 
     def lookup(self, target: str, source: str, stamp_ns: int = 0) -> tuple[Pose, int]:

@@ -31,3 +31,10 @@ class TimeoutException(TransformException):
 
 class TypeException(Exception):
     """Raised when a message of that type cannot be transformed; as in tf2 it is no TransformException."""
+
+
+class NotImplementedException(Exception):
+    """Raised by a ``BufferInterface`` that does not look up."""
+
+    def __init__(self) -> None:
+        super().__init__("this buffer does not look up: what inherits from BufferInterface defines lookup_transform")

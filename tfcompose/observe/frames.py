@@ -49,13 +49,35 @@ def as_yaml(frames: Iterable[FrameInfo]) -> str:
     return "".join(map(_yaml, (frame for frame in frames if frame.parent))) or "[]"
 
 
+def as_dot(frames: Iterable[FrameInfo]) -> str:
+    """Return the edges as a graph for graphviz, each with who sent it, its rate and its times."""
+    edges = "".join(map(_dot, (frame for frame in frames if frame.parent)))
+    return f"digraph G {{\n{edges}}}"
+
+
+def _dot(frame: FrameInfo) -> str:
+    length_s = (frame.newest_ns - frame.oldest_ns) / 1e9
+    said = (
+        f"Broadcaster: {frame.authority or 'default_authority'}\\n"
+        f"Average rate: {_rate(frame, length_s):.3f} Hz\\n"
+        f"Most recent transform: {frame.newest_ns / 1e9:.6f} \\n"
+        f"Buffer length: {length_s:.3f} sec\\n"
+    )
+    ends = " -> ".join(f'"{name}"' for name in (frame.parent, frame.name))
+    return f'{ends}[label="{said}"];\n'
+
+
+def _rate(frame: FrameInfo, length_s: float) -> float:
+    return frame.samples / max(length_s, _SHORTEST_S)
+
+
 def _yaml(frame: FrameInfo) -> str:
     length_s = (frame.newest_ns - frame.oldest_ns) / 1e9
     return (
         f"{frame.name}: \n"
         f"  parent: '{frame.parent}'\n"
         f"  broadcaster: '{frame.authority or 'default_authority'}'\n"
-        f"  rate: {frame.samples / max(length_s, _SHORTEST_S):.3f}\n"
+        f"  rate: {_rate(frame, length_s):.3f}\n"
         f"  most_recent_transform: {frame.newest_ns / 1e9:.6f}\n"
         f"  oldest_transform: {frame.oldest_ns / 1e9:.6f}\n"
         f"  buffer_length: {length_s:.3f}\n"

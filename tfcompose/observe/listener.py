@@ -29,16 +29,18 @@ class Listener:
         static_qos: the same for /tf_static; default tf2's: reliable, transient local, the last 100.
         tf_topic: the topic of moving edges.
         tf_static_topic: the topic of fixed edges.
+        static_only: listen to fixed edges alone.
         namespace: listen to /NAMESPACE/tf and /NAMESPACE/tf_static instead.
+        use_sim_time: the listener's own node follows /clock; a node that is handed over has its own parameter.
 
-    When a node's clock goes back, as a simulator's or a bag's does, the buffer forgets all moving edges. What is
-    refused is logged once for each frame and reason.
+    When a node's clock goes back, as a simulator's or a bag's does, the buffer forgets all moving edges, and the node's
+    log says so. What is refused is logged once for each frame and reason.
 
     Raises:
         RosError: if rclpy is not there or cannot be used.
     """
 
-    def __init__(  # noqa: PLR0913 (tf2's arguments, and one)
+    def __init__(  # noqa: PLR0913 (tf2's arguments, and three)
         self,
         buffer: Buffer,
         node: Any = None,
@@ -48,23 +50,29 @@ class Listener:
         static_qos: Any = None,
         tf_topic: str = "/tf",
         tf_static_topic: str = "/tf_static",
+        static_only: bool = False,
         namespace: str = "",
+        use_sim_time: bool = False,
     ) -> None:
         missing = missing_ros()
         if missing:
             raise RosError(missing)
         listening = import_module("tfcompose.ros.listening")
         prefix = f"/{namespace.strip('/')}" if namespace.strip("/") else ""
-        topics = prefix + tf_topic, prefix + tf_static_topic
+        topics = [listening.Topic(prefix + tf_static_topic, static=True, qos=static_qos)]
+        if not static_only:
+            topics.append(listening.Topic(prefix + tf_topic, static=False, qos=qos))
         self.buffer = buffer
         self.node = node
         self._decoder = Decoder()
         self._complaints: set[str] = set()
         if node is None:
-            self._ear = listening.OwnEar(self._hear, topics)
+            self._ear = listening.OwnEar(self._hear, topics, use_sim_time=use_sim_time)
+            buffer.follow_clock(self._ear.node)
+            self._ear.listen()
         else:
-            self._ear = listening.GuestEar(node, self._hear, topics, (qos, static_qos), spin=spin_thread)
-            self._jump = listening.on_clock_jump(node, buffer.time_jump_callback)
+            self._ear = listening.GuestEar(node, self._hear, topics, spin=spin_thread)
+            buffer.follow_clock(node)
             buffer.pollers.append(self._ear.poll)
         self._end = weakref.finalize(self, self._ear.close)  # at the latest when the program ends
 

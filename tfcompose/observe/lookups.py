@@ -73,6 +73,29 @@ class Lookups(BufferCore):
         )
         return (not reason, reason) if return_debug_tuple else not reason
 
+    def lookup_transform_core(self, target_frame: str, source_frame: str, time: Any) -> Any:
+        """Return what ``lookup_transform`` does, without waiting."""
+        return self.lookup_transform(target_frame, source_frame, time)
+
+    def lookup_transform_full_core(
+        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str
+    ) -> Any:
+        """Return what ``lookup_transform_full`` does, without waiting."""
+        return self.lookup_transform_full(target_frame, target_time, source_frame, source_time, fixed_frame)
+
+    def can_transform_core(self, target_frame: str, source_frame: str, time: Any) -> tuple[bool, str]:
+        """Return whether ``lookup_transform`` would answer, and why not."""
+        found: tuple[bool, str] = self.can_transform(target_frame, source_frame, time, 0, return_debug_tuple=True)
+        return found
+
+    def can_transform_full_core(
+        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str
+    ) -> tuple[bool, str]:
+        """Return whether ``lookup_transform_full`` would answer, and why not."""
+        asked = target_frame, target_time, source_frame, source_time, fixed_frame
+        found: tuple[bool, str] = self.can_transform_full(*asked, 0, return_debug_tuple=True)
+        return found
+
     def get_latest_common_time(self, target_frame: str, source_frame: str) -> Any:
         """Return the newest time that all moving edges between the two have reached; 0 where none moves."""
         if target_frame == source_frame:

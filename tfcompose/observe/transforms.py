@@ -12,7 +12,6 @@ from importlib.util import find_spec
 from math import hypot
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.observe.exceptions import TypeException
 from tfcompose.observe.rotation import Seven, product, unit
 from tfcompose.pose import matrix_from_quat
 
@@ -81,6 +80,14 @@ def transform_covariance(covariance: Sequence[float], transform: Any) -> list[fl
     return moved
 
 
+def do_transform_polygon_stamped(polygon: Any, transform: Any) -> Any:
+    """Return a PolygonStamped in the transform's frame."""
+    moved, pose = _headed(polygon, transform), pose_of(transform)
+    for corner in moved.polygon.points:
+        corner.x, corner.y, corner.z = product(pose, (corner.x, corner.y, corner.z, 0.0, 0.0, 0.0, 1.0))[:3]
+    return moved
+
+
 def do_transform_cloud(cloud: Any, transform: Any) -> Any:
     """Return a PointCloud2 in the transform's frame: x, y and z are moved, every other byte is as it was.
 
@@ -95,26 +102,15 @@ def do_transform_cloud(cloud: Any, transform: Any) -> Any:
     return moved
 
 
-#: What ``Buffer.transform`` does with a message, by the name of its type; others may be added.
+#: What ``Buffer.transform`` does with a message, by the name of its type; ``registration`` takes others.
 TRANSFORMS: dict[str, Callable[[Any, Any], Any]] = {
     "PointStamped": do_transform_point,
     "Vector3Stamped": do_transform_vector3,
     "PoseStamped": do_transform_pose_stamped,
     "PoseWithCovarianceStamped": do_transform_pose_with_covariance_stamped,
+    "PolygonStamped": do_transform_polygon_stamped,
     "PointCloud2": do_transform_cloud,
 }
-
-
-def transform_for(message: object) -> Callable[[Any, Any], Any]:
-    """Return the function that moves a message of that type.
-
-    Raises:
-        TypeException: if there is none.
-    """
-    name = type(message).__name__
-    if name not in TRANSFORMS:
-        raise TypeException(f"a {name} cannot be transformed; what can is {', '.join(TRANSFORMS)}")
-    return TRANSFORMS[name]
 
 
 def arrays(module: str) -> Any:

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import threading
 from contextlib import ExitStack, suppress
+from importlib import import_module
+from importlib.util import find_spec
 from itertools import count
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.time import Time
 
-from tfcompose.ros.node import TF_READER, TF_STATIC_READER, open_node
+from tfcompose.ros.clock import SimClock
+from tfcompose.ros.node import TF_READER, TF_STATIC_READER, open_node, qos
 from tfcompose.ros.stop import Stop
-from tfcompose.ros.tf import TFSubscription, wait
+from tfcompose.ros.tf import Subscription, wait
 from tfcompose.ros.typesupport import tf_message_type
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from rclpy.node import Node
 
@@ -29,23 +33,33 @@ if TYPE_CHECKING:
 _numbers = count(1)
 
 
+class Topic(NamedTuple):
+    """What is listened to: fixed edges or moving ones; ``qos`` is rclpy's profile, a depth, or None for tf2's."""
+
+    name: str
+    static: bool
+    qos: Any
+
+    @property
+    def profile(self) -> Any:
+        """The profile to subscribe with; a depth alone leaves fixed edges latched, which else would not come."""
+        default: Any = TF_STATIC_READER if self.static else TF_READER
+        if isinstance(self.qos, int):
+            return qos(self.qos, default.durability, default.reliability)
+        return self.qos or default
+
+
 class GuestEar:
     """Subscriptions in a node that is handed over; its executor calls ``hear``, or ``poll`` does.
 
     With ``spin`` an executor in a thread of its own spins the whole node, as tf2_ros's listener does.
     """
 
-    def __init__(self, node: Node, hear: Hear, topics: tuple[str, str], qos: tuple[Any, Any], *, spin: bool) -> None:
+    def __init__(self, node: Node, hear: Hear, topics: Sequence[Topic], *, spin: bool) -> None:
         self.node: Any = node
         self._hear = hear
         group = ReentrantCallbackGroup()  # another callback of the node may wait for what these bring
-        self._subscriptions = [
-            (self._subscribe(topic, profile, group, static=static), static)
-            for topic, profile, static in (
-                (topics[0], qos[0] or TF_READER, False),
-                (topics[1], qos[1] or TF_STATIC_READER, True),
-            )
-        ]
+        self._subscriptions = [(self._subscribe(topic, group), topic.static) for topic in topics]
         self._executor: Any = None
         if spin:
             self._executor = SingleThreadedExecutor(context=node.context)
@@ -70,11 +84,13 @@ class GuestEar:
             with suppress(_rclpy.InvalidHandle):
                 self.node.destroy_subscription(subscription)
 
-    def _subscribe(self, topic: str, qos: Any, group: ReentrantCallbackGroup, *, static: bool) -> Any:
+    def _subscribe(self, topic: Topic, group: ReentrantCallbackGroup) -> Any:
         def callback(data: bytes) -> None:
-            self._hear(data, static)
+            self._hear(data, topic.static)
 
-        return self.node.create_subscription(tf_message_type(), topic, callback, qos, callback_group=group, raw=True)
+        return self.node.create_subscription(
+            tf_message_type(), topic.name, callback, topic.profile, callback_group=group, raw=True
+        )
 
     def _spin(self) -> None:
         self._executor.add_node(self.node)
@@ -85,20 +101,25 @@ class GuestEar:
 class OwnEar:
     """A node of its own, in a context of its own, with a thread that waits for messages and calls ``hear``.
 
+    With ``use_sim_time`` the node's clock follows /clock.
+
     Raises:
         RosError: if ROS cannot start a node.
     """
 
-    def __init__(self, hear: Hear, topics: tuple[str, str]) -> None:
+    def __init__(self, hear: Hear, topics: Sequence[Topic], *, use_sim_time: bool) -> None:
         self._hear = hear
         self._stop = Stop()
         self._stack = ExitStack()
         self.node = self._stack.enter_context(open_node(f"tfcompose_listener_{next(_numbers)}", ""))
         self._subscriptions = [
-            (TFSubscription(self.node, static=static, topic=topic), static)
-            for topic, static in zip(topics, (False, True), strict=True)
+            (Subscription(self.node, tf_message_type(), topic.name, topic.profile), topic.static) for topic in topics
         ]
+        self._clock = SimClock(self.node) if use_sim_time else None
         self._thread = threading.Thread(target=self._listen, name="tf listener", daemon=True)
+
+    def listen(self) -> None:
+        """Start the thread."""
         self._thread.start()
 
     def close(self) -> None:
@@ -106,21 +127,58 @@ class OwnEar:
         self._stop.request()
         self._thread.join()
         self._subscriptions.clear()
+        self._clock = None
         self._stack.close()
 
     def _listen(self) -> None:
-        subscriptions = [subscription for subscription, _ in self._subscriptions]
+        awaited: list[Subscription] = [subscription for subscription, _ in self._subscriptions]
+        if self._clock:
+            awaited.append(self._clock.subscription)
         while not self._stop.requested:
-            wait(self.node, subscriptions, None, self._stop)
+            wait(self.node, awaited, None, self._stop)
+            self._follow()
             for subscription, static in self._subscriptions:
                 for received in subscription.take():
                     self._hear(received.data, static)
 
+    def _follow(self) -> None:
+        """Set the node's clock to the simulated time, so that whoever watches it hears of jumps."""
+        now_ns = self._clock.now_ns() if self._clock else None
+        if now_ns is not None:
+            clock: Any = self.node.get_clock()
+            if not clock.ros_time_is_active:
+                clock._set_ros_time_is_active(True)  # noqa: FBT003, SLF001 (what the parameter use_sim_time does)
+            clock.set_ros_time_override(Time(nanoseconds=now_ns, clock_type=clock.clock_type))
 
-def on_clock_jump(node: Node, callback: Callable[[], None]) -> Any:
-    """Call back when the node's clock goes back, or becomes a simulator's or the system's; while the result lives."""
+
+def on_clock_jump(node: Node, callback: Callable[[], object]) -> Any:
+    """Call back when the node's clock goes back, or becomes a simulator's or the system's; while the result lives.
+
+    The threshold is that of tf2_ros's ``Buffer`` in C++: any step back counts, and none forward.
+    """
+    log: Any = node
+
+    def jumped(jump: Any) -> None:
+        back_s = -jump.delta.nanoseconds / 1e9
+        why = f"time went back by {back_s:.3f} s" if back_s > 0 else "the clock changed to or from simulated time"
+        log.get_logger().warning(f"{why}: the TF buffer forgets all moving edges")
+        callback()
+
     threshold: Any = JumpThreshold
     return node.get_clock().create_jump_callback(
         threshold(min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=True),
-        post_callback=lambda _: callback(),
+        post_callback=jumped,
     )
+
+
+def offer_frames(node: Node, text: Callable[[], str]) -> Any:
+    """Offer the service ``tf2_frames``, which answers with the text; return it, or None where there is no tf2_msgs."""
+    if find_spec("tf2_msgs") is None:
+        return None
+    type_ = import_module("tf2_msgs.srv").FrameGraph
+
+    def answer(_: object, response: Any) -> Any:
+        response.frame_yaml = text()
+        return response
+
+    return node.create_service(type_, "tf2_frames", answer)

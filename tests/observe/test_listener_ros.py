@@ -207,7 +207,8 @@ def test_a_wait_is_ended_by_ctrl_c(domain: Any) -> None:
         # The shell lets what runs in the background ignore the signal.
         "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "from tfcompose.observe import Buffer, Listener\nbuffer = Buffer()\nListener(buffer)\n"
-        "try:\n    print('up', flush=True)\n    buffer.lookup_transform('a', 'b', 0, 60 * 10**9)\nexcept KeyboardInterrupt:\n    print('out')"
+        "try:\n    print('up', flush=True)\n    buffer.lookup_transform('a', 'b', 0, 60 * 10**9)\n"
+        "except KeyboardInterrupt:\n    print('out')"
     )
     with subprocess.Popen(
         [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=domain.environment

@@ -27,6 +27,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "imported": {"frozen", "model", "pose"},
     "planfields": set(),
     "planfile": {"diagnostic", "plan", "planfields", "pose"},
+    "planschema": {"plan", "pose"},
     "load": {"diagnostic", "frozen"},
     "render": {"codes", "diagnostic", "pose"},
     "validate": {"diagnostic", "frozen", "load", "pose"},

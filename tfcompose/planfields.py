@@ -79,7 +79,7 @@ def floats(data: dict[str, Any], key: str, count: int, where: str) -> tuple[floa
         TypeError, ValueError: if it is not there, or is something else.
     """
     values = get(data, key, list, where)
-    if len(values) != count or not all(isinstance(v, (int, float)) and math.isfinite(v) for v in values):
+    if len(values) != count or not all(type(v) in (int, float) and math.isfinite(v) for v in values):
         raise ValueError(f"{where}: {key} is not {count} finite numbers")
     return tuple(float(value) for value in values)
 
@@ -94,3 +94,33 @@ def texts(data: dict[str, Any], key: str, where: str) -> dict[str, str]:
     if not all(isinstance(value, str) for value in values.values()):
         raise TypeError(f"{where}: {key} holds something that is no text")
     return values
+
+
+def strings(data: dict[str, Any], key: str, where: str) -> tuple[str, ...]:
+    """Return a list of texts.
+
+    Raises:
+        TypeError, ValueError: if it is not there, or is something else.
+    """
+    return tuple(_string(value, f"{where}: {key}") for value in get(data, key, list, where))
+
+
+def pairs(data: dict[str, Any], key: str, where: str) -> tuple[tuple[str, str], ...]:
+    """Return a list of pairs of texts.
+
+    Raises:
+        TypeError, ValueError: if it is not there, or is something else.
+    """
+    made = []
+    for value in get(data, key, list, where):
+        if not isinstance(value, list) or len(value) != 2:  # noqa: PLR2004 (a pair)
+            raise TypeError(f"{where}: {key} holds {value!r}, which is no pair")
+        first, second = value
+        made.append((_string(first, f"{where}: {key}"), _string(second, f"{where}: {key}")))
+    return tuple(made)
+
+
+def _string(value: object, where: str) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{where} holds {value!r}, which is no text")
+    return value

@@ -28,7 +28,7 @@ from tfcompose.plan import (
     StopRule,
     Sweep,
 )
-from tfcompose.planfields import floats, get, one_of, optional, rows, texts
+from tfcompose.planfields import floats, get, one_of, optional, pairs, rows, strings, texts, there
 from tfcompose.pose import Pose, norm
 
 
@@ -64,7 +64,7 @@ def read_plan(text: str, file: str) -> Plan:
         raise RejectedError([_bad(f"not a plan: {error}", Span(file, line, column, line, column + 1))]) from None
     if not isinstance(data, dict) or "edges" not in data or "processes" not in data:
         raise RejectedError([_bad("not a plan: it has no edges and processes", Span(file))])
-    if data.get("version") != VERSION:
+    if data.get("version") != VERSION or data["version"] is True:
         message = f"the plan has version {data.get('version')!r}; this tfcompose reads version {VERSION}"
         raise RejectedError([_bad(message, Span(file))])
     try:
@@ -168,8 +168,8 @@ def _edge_from_json(data: dict[str, Any], where: str) -> PlanEdge:
         pose=_pose_from_json(data, where),
         rate=optional(data, "rate", float, where),
         source=(get(source, "file", str, where), get(source, "line", int, where)),
-        joint=_joint_from_json(data["joint"], where) if data.get("joint") else None,
-        switched=tuple(str(parent) for parent in get(data, "switched", list, where)) if "switched" in data else (),
+        joint=_joint_from_json(get(data, "joint", dict, where), where) if "joint" in data else None,
+        switched=strings(data, "switched", where) if "switched" in data else (),
     )
 
 
@@ -214,16 +214,15 @@ def _states(data: dict[str, Any], where: str) -> dict[str, str]:
 
 def _process_from_json(data: dict[str, Any], where: str) -> PlanProcess:
     where += f", {data.get('name')}"
-    simulation = data.get("simulate")
     return PlanProcess(
         name=get(data, "name", str, where),
         kind=one_of(data, "kind", PROCESS_KINDS, where),
-        argv=tuple(str(word) for word in get(data, "argv", list, where)),
+        argv=strings(data, "argv", where),
         env=texts(data, "env", where),
         cwd=optional(data, "cwd", str, where),
         params_file=optional(data, "params_file", str, where),
         remap=texts(data, "remap", where),
-        nodes=tuple(str(node) for node in get(data, "nodes", list, where)),
+        nodes=strings(data, "nodes", where),
         restart=one_of(data, "restart", ("no", "on-failure", "always"), where),
         max_restarts=optional(data, "max_restarts", int, where),
         required=optional(data, "required", bool, where),
@@ -231,10 +230,10 @@ def _process_from_json(data: dict[str, Any], where: str) -> PlanProcess:
         log_level=one_of(data, "log_level", (None, *LOG_LEVELS), where),
         lifecycle=_states(data, where),
         after=texts(data, "after", where),
-        ready=_ready_from_json(data["ready"], where) if data["ready"] else None,
+        ready=None if there(data, "ready", where) is None else _ready_from_json(get(data, "ready", dict, where), where),
         host=optional(data, "host", str, where),
-        owns=tuple((str(parent), str(child)) for parent, child in get(data, "owns", list, where)),
-        simulate=_simulation_from_json(simulation, where) if simulation else None,
+        owns=pairs(data, "owns", where),
+        simulate=_simulation_from_json(get(data, "simulate", dict, where), where) if "simulate" in data else None,
         description=get(data, "description", str, where) if "description" in data else None,
         drives=rows(data, "drives", _driven_from_json) if "drives" in data else (),
         switches=_switches_from_json(data, where) if "switches" in data else {},
@@ -270,12 +269,16 @@ def _guard_from_json(data: dict[str, Any]) -> GuardPolicy:
         mode=one_of(data, "mode", ("off", "watch", "strict"), "guard"),
         unknown_edges=one_of(data, "unknown_edges", ("ignore", "warn", "error"), "guard"),
         on_violation=one_of(data, "on_violation", ("report", "stop-offender", "stop"), "guard"),
-        allow=tuple((str(edge["parent"]), str(edge["child"])) for edge in get(data, "allow", list, "guard")),
+        allow=rows(data, "allow", _allowed_from_json),
     )
 
 
-def _claim_from_json(data: dict[str, Any]) -> Claim:
-    return Claim(*(get(data, key, str, "claim") for key in ("node", "parent", "child", "switch")))
+def _allowed_from_json(data: dict[str, Any], where: str) -> tuple[str, str]:
+    return get(data, "parent", str, where), get(data, "child", str, where)
+
+
+def _claim_from_json(data: dict[str, Any], where: str) -> Claim:
+    return Claim(*(get(data, key, str, where) for key in ("node", "parent", "child", "switch")))
 
 
 def _plan_from_json(data: dict[str, Any]) -> Plan:
@@ -290,12 +293,12 @@ def _plan_from_json(data: dict[str, Any]) -> Plan:
             discovery=optional(ros, "discovery", str, "ros"),
             clock=one_of(ros, "clock", ("wall", "sim"), "ros"),
             frame_prefix=get(ros, "frame_prefix", str, "ros"),
-            shared_frames=tuple(str(frame) for frame in get(ros, "shared_frames", list, "ros")),
+            shared_frames=strings(ros, "shared_frames", "ros"),
         ),
         edges=rows(data, "edges", _edge_from_json),
         processes=rows(data, "processes", _process_from_json),
         guard=_guard_from_json(get(data, "guard", dict, "plan")),
-        claims=tuple(_claim_from_json(claim) for claim in get(data, "claims", list, "plan")),
+        claims=rows(data, "claims", _claim_from_json),
         description=get(data, "description", str, "plan"),
         host=get(data, "host", str, "plan") if "host" in data else None,
     )

@@ -11,7 +11,7 @@ import jsonschema
 import pytest
 
 from tfcompose.cli.compiling import library
-from tfcompose.cli.schema import schema_text
+from tfcompose.cli.schema import LANGUAGES, schema_text
 from tfcompose.compile import compile_robot
 from tfcompose.load import load
 
@@ -26,7 +26,7 @@ def validator(language: str) -> Any:
     return jsonschema.Draft202012Validator(schema)
 
 
-@pytest.mark.parametrize("language", ["robot", "preset", "node"])
+@pytest.mark.parametrize("language", LANGUAGES)
 def test_the_schema_in_the_repository_is_fresh(language: str) -> None:
     assert (ROOT / "schemas" / f"{language}.schema.json").read_text("utf-8") == schema_text(language)
 

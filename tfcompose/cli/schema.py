@@ -1,6 +1,6 @@
 """``tfcompose schema``: the JSON Schema of the language.
 
-Print the JSON Schema that editors and CI use.
+Print the JSON Schema that editors and CI use: of robot files, of presets of sensors and nodes, or of plan.json.
 """
 
 from __future__ import annotations
@@ -9,17 +9,18 @@ import json
 import sys
 from typing import TYPE_CHECKING
 
+from tfcompose.planschema import plan_schema
 from tfcompose.validate.json_schema import json_schema
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
+LANGUAGES = ("robot", "preset", "node", "plan")
+
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument(
-        "language", nargs="?", choices=("robot", "preset", "node"), default="robot", help="default: robot"
-    )
+    parser.add_argument("language", nargs="?", choices=LANGUAGES, default="robot", help="default: robot")
 
 
 def run(arguments: Namespace) -> int:
@@ -30,4 +31,5 @@ def run(arguments: Namespace) -> int:
 
 def schema_text(language: str) -> str:
     """Return the schema as the files under ``schemas/`` hold it."""
-    return json.dumps(json_schema(language), indent=2, ensure_ascii=False) + "\n"
+    schema = plan_schema() if language == "plan" else json_schema(language)
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"

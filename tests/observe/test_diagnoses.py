@@ -64,8 +64,10 @@ def robot() -> History:
 
 
 def plan(*edges: PlanEdge, **more: Any) -> Plan:
-    owners = {"drive": "/drive", "static": "/static"}
-    processes = tuple(PlanProcess(name, "external", nodes=(node,)) for name, node in owners.items())
+    processes = (
+        PlanProcess("drive", "external", nodes=("/drive",)),
+        PlanProcess("static", "static", nodes=("/static",)),
+    )
     return Plan("rover", "0", "base_link", RosSettings(), edges or planned(), processes, **more)
 
 
@@ -159,7 +161,11 @@ def test_a_scan_whose_clock_is_ahead_is_told_apart_from_an_edge_that_is_late() -
 @pytest.mark.parametrize(
     ("history", "code", "text"),
     [
-        (History().moving("odom base_link"), "TF811", "base_link → laser of static (/static) was not published"),
+        (
+            History().moving("odom base_link"),
+            "TF811",
+            "base_link → laser was never seen; its owner is static (/static)",
+        ),
         (
             History().moving("odom base_link", b"x").fixed("base_link laser"),
             "TF801",
@@ -178,12 +184,12 @@ def test_a_scan_whose_clock_is_ahead_is_told_apart_from_an_edge_that_is_late() -
         (
             History().moving("odom base_link", until_s=3.0).fixed("base_link laser"),
             "TF804",
-            "odom → base_link: nothing for 2.02 s from drive (/drive)",
+            "drive (/drive) fell silent: nothing on odom → base_link for 2.02 s",
         ),
         (
             History().moving("odom base_link", hz=20.0).fixed("base_link laser"),
             "TF805",
-            "odom → base_link comes with 20 Hz from drive (/drive), declared are 50 Hz",
+            "odom → base_link comes at 20 Hz from drive (/drive), declared are 50 Hz",
         ),
         (
             History().moving("odom base_link").moving("base_link laser", b"s"),
@@ -191,15 +197,31 @@ def test_a_scan_whose_clock_is_ahead_is_told_apart_from_an_edge_that_is_late() -
             "base_link → laser is published by its owner /static on /tf, declared for /tf_static",
         ),
         (
+            History().moving("odom base_link").fixed("base_link laser", x=0.02),
+            "TF846",
+            (
+                "the pose of laser in base_link from /static is off by 20 mm: seen xyz 0.02 0 0 m, rpy 0 0 0 deg; "
+                "expected xyz 0 0 0 m, rpy 0 0 0 deg"
+            ),
+        ),
+        (
             robot().moving("odom base_link", b"e"),
             "TF801",
-            "odom → base_link is published by /drive and by another /drive",
+            "odom → base_link is published by another /drive; the owner is drive (/drive)",
         ),
     ],
-    ids=["missing", "foreign", "parent", "undeclared", "silent", "slow", "topic", "twice"],
+    ids=["missing", "foreign", "parent", "undeclared", "silent", "slow", "topic", "pose", "twice"],
 )
 def test_with_a_plan_what_differs_from_it_is_found(history: History, code: str, text: str) -> None:
     assert messages(history.seen(plan=plan()))[code] == text
+
+
+def test_what_a_strict_guard_passes_on_is_its_owners() -> None:
+    strict = plan(guard=GuardPolicy("strict"))
+    strict = replace(strict, processes=(*strict.processes, PlanProcess("guard", "guard", nodes=("/ekf",))))
+    history = History().moving("odom base_link", b"x").fixed("base_link laser", b"x")
+    assert messages(history.seen(plan=strict)) == {}
+    assert set(messages(history.seen(plan=plan()))) == {"TF801"}
 
 
 def test_edges_that_a_plan_allows_or_that_are_another_robots_are_no_finding() -> None:

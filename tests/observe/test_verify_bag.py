@@ -56,7 +56,7 @@ def test_a_built_plan_or_its_folder_does_as_well(tmp_path: Path, robot: str) -> 
     for plan in (tmp_path / "out", tmp_path / "out" / "plan.json"):
         output = tfcompose("verify", str(plan), "--bag", str(bag), code=1).stdout
         assert "error[TF846] the pose of laser_link in base_link is off by 100 mm" in output
-        assert "note: declared in rover.yaml:6" in output
+        assert "note: base_link → laser_link is declared in rover.yaml:6" in output
 
 
 def test_what_is_wrong_is_told_with_the_place_in_the_file(tmp_path: Path, robot: str) -> None:
@@ -66,8 +66,8 @@ def test_what_is_wrong_is_told_with_the_place_in_the_file(tmp_path: Path, robot:
     assert "the pose of laser_link in base_link is off by 2 deg" in output
     assert "error[TF811] base_link → mast_link was never seen" in output
     assert "help: did you mean mast?" in output
-    assert "error[TF805] odom → base_link comes with 20 Hz, declared 50 Hz" in output
-    assert "warning[TF803] base_link → mast was seen" in output
+    assert "error[TF805] odom → base_link comes at 20 Hz from drive (/diff_drive), declared are 50 Hz" in output
+    assert "warning[TF803] base_link → mast is recorded, and nobody declared it" in output
     assert output.endswith(f"rover: 0 of 3 edges as expected, 1 that nobody declared, in {bag}\n")
 
 

@@ -59,7 +59,7 @@ def test_a_second_publisher_and_a_strange_frame_are_told(running: Path) -> None:
     found = {one["code"]: one["message"] for one in json.loads(output)}
     assert found == {
         "TF801": "odom → base_link is published by /rogue; the owner is drive (/rover/drive)",
-        "TF803": "laser → tag_1 was seen from /tags, and nobody declared it",
+        "TF803": "laser → tag_1 is published by /tags, and nobody declared it",
     }
 
 

@@ -13,13 +13,14 @@ from tfcompose.cli.expected import expected
 from tfcompose.cli.looking import from_bag, from_live, nothing_came
 from tfcompose.observe.census import SETTLE_S, Census, topics_below
 from tfcompose.observe.forest import forest
-from tfcompose.observe.verify import edges_by_topics
+from tfcompose.ros.topics import parts_of
+from tfcompose.verdict.offence import code_of, may_be_owners, relays_of
 
 if TYPE_CHECKING:
     from argparse import Namespace
 
     from tfcompose.observe.forest import Branch, Tree
-    from tfcompose.plan import PlanEdge, RosSettings
+    from tfcompose.plan import Plan, PlanEdge
 
     Topics = tuple[str, str]
 
@@ -28,21 +29,21 @@ def live_tree(arguments: Namespace) -> int:
     """Print the published tree; exit code 1 if nothing is published, 2 if a file or a bag cannot be read."""
     gc.enable()  # it may last
     planned: dict[Topics, dict[str, PlanEdge]] | None = None
-    ros: RosSettings | None = None
+    plan: Plan | None = None
     pairs = [topics_below(arguments.namespace)]
     if arguments.file is not None:
         known = expected(arguments.file, arguments)
         if isinstance(known, int):
             return known
-        ros = known[0].ros
-        planned = {pair: {edge.child: edge for edge in some} for pair, some in edges_by_topics(known[0]).items()}
+        plan = known[0]
+        planned = {pair: {edge.child: edge for edge in part.edges} for pair, part in parts_of(plan).items()}
         pairs = list(planned)
     censuses = {pair: Census(settle_s=0.0 if arguments.bag else SETTLE_S) for pair in pairs}
     begun = time.monotonic()
     if arguments.bag:
         code = from_bag(arguments.bag, censuses)
     else:
-        code = from_live("tfcompose_tree", censuses, ros=ros, duration_s=arguments.duration)
+        code = from_live("tfcompose_tree", censuses, ros=plan.ros if plan else None, duration_s=arguments.duration)
     if code is not None:
         return code
     if not any(census.messages for census in censuses.values()):
@@ -51,15 +52,15 @@ def live_tree(arguments: Namespace) -> int:
         now_ns = census.last_ns if arguments.bag else time.time_ns()
         trees = forest(census.edges(now_ns), None if planned is None else planned[pair])
         if arguments.format == "json":
-            sys.stdout.write(_objects(pair, trees, compared=planned is not None))
+            sys.stdout.write(_objects(pair, trees, plan=plan))
         else:
             heading = f"on {pair[0]} and {pair[1]}:\n" if len(pairs) > 1 else ""
-            sys.stdout.write(heading + _drawn(trees, compared=planned is not None))
+            sys.stdout.write(heading + _drawn(trees, plan=plan))
     return 0
 
 
-def _drawn(trees: list[Tree], *, compared: bool) -> str:
-    rows = [[_row(branch, compared=compared) for branch in tree.branches] for tree in trees]
+def _drawn(trees: list[Tree], *, plan: Plan | None) -> str:
+    rows = [[_row(branch, plan=plan) for branch in tree.branches] for tree in trees]
     widths = [max((len(row[column]) for some in rows for row in some), default=0) for column in range(5)]
     parts = []
     if len(trees) > 1:
@@ -80,7 +81,7 @@ def _line(row: tuple[str, ...], widths: list[int]) -> str:
     return "  ".join([*cells, row[5]]).rstrip() + "\n"
 
 
-def _row(branch: Branch, *, compared: bool) -> tuple[str, ...]:
+def _row(branch: Branch, *, plan: Plan | None) -> tuple[str, ...]:
     """Return the columns: frame, kind, node, rate, age, and what there is to say."""
     name = branch.indent + printable(branch.frame)
     if not branch.seen:
@@ -92,34 +93,41 @@ def _row(branch: Branch, *, compared: bool) -> tuple[str, ...]:
     others = [
         f"also {printable(other.name)} from {printable(other.publisher) or 'somebody'}" for other in branch.seen[1:]
     ]
-    remarks = [_status(branch)] if compared else []
+    remarks = [_status(branch, plan)] if plan else []
     rate = "" if one.strand.static else f"{one.timing.rate:.1f} Hz" if one.timing.rate is not None else "–"
     age = "" if one.data_age_s is None else duration(one.data_age_s)
     kind = "static" if one.strand.static else "dynamic"
     return (name, kind, printable(one.publisher) or "–", rate, age, "; ".join([*remarks, *others]))
 
 
-def _status(branch: Branch) -> str:
+def _status(branch: Branch, plan: Plan) -> str:
     planned, one = branch.planned, branch.seen[0] if branch.seen else None
-    if planned is None:
-        return "unexpected"
     if one is None:
         return "missing"
-    if not planned.may_hang_on(one.strand.parent):
-        return f"expected in {planned.parent}"
-    if one.nodes and planned.node not in one.nodes:
-        return f"expected from {planned.node}"
-    return "expected"
+    if planned is None:
+        allowed = plan.may_be_undeclared(one.strand.parent, one.strand.child)
+        return "allowed" if allowed else "unexpected"
+    owner = not one.nodes or may_be_owners(planned, one.nodes, relays_of(plan))
+    code = code_of(planned, one.strand.parent, static=one.strand.static, owner=owner, sure=len(one.nodes) < 2)  # noqa: PLR2004 (one, or a recording)
+    match code:
+        case "TF802":
+            return f"expected in {planned.parent}"
+        case "TF801":
+            return f"expected from {planned.node}"
+        case "TF809":
+            return f"expected on {plan.process(planned.owner).topics[planned.kind == 'static']}"
+        case _:
+            return "expected"
 
 
-def _objects(pair: Topics, trees: list[Tree], *, compared: bool) -> str:
+def _objects(pair: Topics, trees: list[Tree], *, plan: Plan | None) -> str:
     data = {
         "topics": list(pair),
         "trees": [
             {
                 "root": None if tree.loop else tree.branches[0].frame,
                 "loop": list(tree.loop),
-                "edges": [_object(branch, compared=compared) for branch in tree.branches if branch.parent is not None],
+                "edges": [_object(branch, plan=plan) for branch in tree.branches if branch.parent is not None],
             }
             for tree in trees
         ],
@@ -127,8 +135,8 @@ def _objects(pair: Topics, trees: list[Tree], *, compared: bool) -> str:
     return json.dumps(data, ensure_ascii=False) + "\n"
 
 
-def _object(branch: Branch, *, compared: bool) -> dict[str, Any]:
-    status = {"status": _status(branch)} if compared else {}
+def _object(branch: Branch, *, plan: Plan | None) -> dict[str, Any]:
+    status = {"status": _status(branch, plan)} if plan else {}
     return {
         "parent": branch.parent,
         "child": branch.frame,

@@ -21,8 +21,9 @@ from tfcompose.cli.looking import add_bag, add_for, from_bag, from_live, nothing
 from tfcompose.cli.options import add_file, add_variant
 from tfcompose.cli.terminal import complain, print_findings
 from tfcompose.observe.census import SETTLE_S, Census
-from tfcompose.observe.verify import edges_by_topics, summary, verify
-from tfcompose.verdict.offset import Offset
+from tfcompose.observe.verify import summary, verify
+from tfcompose.ros.topics import parts_of
+from tfcompose.verdict.offset import DEFAULT_TOLERANCE, Offset
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 _UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "deg": math.pi / 180, "rad": 1.0}
 _ANGLES = frozenset({"deg", "rad"})
 _QUANTITY = re.compile(r"(\d+\.?\d*|\.\d+)\s*([a-z]+)")
-DEFAULT = Offset(1e-3, math.radians(0.1))
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -44,7 +44,7 @@ def arguments(parser: ArgumentParser) -> None:
     add_bag(parser)
     add_for(parser, "look at the running tree for S seconds; default: 5", 5.0)
     parser.add_argument(
-        "--tolerance", type=tolerance, default=DEFAULT, metavar="T",
+        "--tolerance", type=tolerance, default=DEFAULT_TOLERANCE, metavar="T",
         help="how far a pose may be off: 2mm, 0.5deg, or both as 2mm,0.5deg; default: 1mm,0.1deg",
     )  # fmt: skip
     parser.add_argument("--format", choices=("text", "json", "junit"), default="text", help="default: text")
@@ -62,7 +62,7 @@ def run(arguments: Namespace) -> int:
     if isinstance(known, int):
         return known
     plan, places = known
-    censuses = {topics: Census(settle_s=0.0 if arguments.bag else SETTLE_S) for topics in edges_by_topics(plan)}
+    censuses = {topics: Census(settle_s=0.0 if arguments.bag else SETTLE_S) for topics in parts_of(plan)}
     begun = time.monotonic()
     if arguments.bag:
         code = from_bag(arguments.bag, censuses)
@@ -105,4 +105,4 @@ def tolerance(text: str) -> Offset:
         if match is None or match[2] not in _UNITS or (match[2] in _ANGLES) in given:
             raise ArgumentTypeError(f"{text} is no tolerance, such as 2mm or 2mm,0.5deg")
         given[match[2] in _ANGLES] = float(match[1]) * _UNITS[match[2]]
-    return Offset(given.get(False, DEFAULT.xyz_m), given.get(True, DEFAULT.rot_rad))
+    return Offset(given.get(False, DEFAULT_TOLERANCE.xyz_m), given.get(True, DEFAULT_TOLERANCE.rot_rad))

@@ -135,6 +135,11 @@ class EdgeSeen:
     present: bool | None = None
 
     @property
+    def known_s(self) -> float:
+        """The time since its first message came."""
+        return self.age_s + (self.strand.tally.last_ns - self.strand.first_ns) * 1e-9
+
+    @property
     def name(self) -> str:
         """The edge as people read it."""
         return f"{self.strand.parent} → {self.strand.child}"
@@ -161,6 +166,7 @@ class Census:
     beyond: int = 0
     malformed: dict[bytes | None, int] = field(default_factory=dict)
     publishers: dict[bytes, Publisher] = field(default_factory=dict)
+    others: tuple[str, ...] = ()
     present: frozenset[bytes] | None = None
     _strands: dict[tuple[str, str, bytes | None, bool], Strand] = field(default_factory=dict)
 
@@ -189,8 +195,9 @@ class Census:
         if gid in self.malformed or len(self.malformed) < MOST_STRANDS:
             self.malformed[gid] = self.malformed.get(gid, 0) + 1
 
-    def graph(self, publishers: Sequence[Publisher]) -> None:
-        """Take who is in the graph now; what is known of one that has left is kept."""
+    def graph(self, publishers: Sequence[Publisher], nodes: Sequence[str] = ()) -> None:
+        """Take who is in the graph now, and the names of its nodes; what is known of one that has left is kept."""
+        self.others = tuple(nodes)
         self.present = frozenset(each.gid for each in publishers)
         for each in publishers:
             known = self.publishers.get(each.gid)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from tfcompose.observe.census import Census, Publisher, topics_below
 from tfcompose.ros.clock import SimClock, wall_ns
 from tfcompose.ros.decoder import Decoder
-from tfcompose.ros.graph import UNKNOWN_NODE, own_gid, writers
+from tfcompose.ros.graph import UNKNOWN_NODE, nodes, own_gid, writers
 from tfcompose.ros.origin import origin
 from tfcompose.ros.tf import TFSubscription, wait
 
@@ -96,7 +96,7 @@ class Live:
         nameless = not all(self.census.is_known(gid) for gid in senders)
         if since >= LOOK_EVERY_S or (nameless and since >= LOOK_AGAIN_S):
             self._looked = time.monotonic()
-            self.census.graph(self.publishers())
+            self.census.graph(self.publishers(), nodes(self.node))
 
     def publishers(self) -> list[Publisher]:
         """Return who publishes on the two topics now."""

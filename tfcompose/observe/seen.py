@@ -79,6 +79,7 @@ class Seen:
         processes: other processes of this machine with ROS, as far as they can be looked at.
         skews_s: how far the clock of a publisher's machine is ahead of this one's, at least (negative: or its
             messages are that long under way), by id.
+        recorded: whether it is from a recording, which does not say who published.
     """
 
     seconds: float
@@ -97,6 +98,7 @@ class Seen:
     processes: tuple[RosProcess, ...] = ()
     skews_s: Mapping[bytes, float] = field(default_factory=dict)
     plan: Plan | None = None
+    recorded: bool = False
 
     @property
     def taken(self) -> list[EdgeSeen]:
@@ -112,6 +114,11 @@ class Seen:
     def planned(self) -> frozenset[str]:
         """The frames of which a plan says who publishes them."""
         return frozenset(edge.child for edge in self.plan.edges) if self.plan else frozenset()
+
+    @property
+    def rated(self) -> frozenset[str]:
+        """The frames of which a plan says how often they come: they are judged by that."""
+        return frozenset(edge.child for edge in self.plan.edges if edge.rate) if self.plan else frozenset()
 
     def where(self, edge: EdgeSeen) -> str:
         """Return on which machine and as which process the publisher of an edge runs, empty if that is not known."""

@@ -26,6 +26,8 @@ class Offset(NamedTuple):
         return self.xyz_m > limit.xyz_m or self.rot_rad > limit.rot_rad
 
 
+#: What two poses may be apart and count as the same.
+DEFAULT_TOLERANCE = Offset(1e-3, math.radians(0.1))
 _NO_MM, _NO_RAD = 1e-6, 1e-6
 
 

@@ -30,22 +30,29 @@ def never_seen(edges: Sequence[PlanEdge], advice: str, place: Span | None = None
     return finding("TF811", message, place, notes=[] if place else _declared(edges), help=advice)
 
 
-def silent(edges: Sequence[PlanEdge], quiet_s: float, place: Span | None = None, *, over: bool = False) -> Diagnostic:
-    """Return the finding for edges of one owner that did not come for so long; ``over``: and then came again."""
+def silent(
+    edges: Sequence[PlanEdge], quiet_s: float, place: Span | None = None, *, over: bool = False, gone: bool = False
+) -> Diagnostic:
+    """Return the finding for edges of one owner that did not come for so long.
+
+    ``over`` says that they came again after that, ``gone`` that the owner's publisher has left.
+    """
     first = edges[0]
-    what = "was silent" if over else "fell silent"
+    what = "was silent" if over else "has left" if gone else "fell silent"
     message = f"{_owner(first)} {what}: nothing on {named(edges)} for {quiet_s:.3g} s"
     advice = f"is {first.node} still running, and does it get its data?"
+    if gone:
+        advice = f"start {first.node} again, and look why it ended"
     if over:
         advice = f"what held {first.node} up? An overloaded machine or network does, or a callback that blocks"
     return finding("TF804", message, place, notes=_rated(first, place), help=advice)
 
 
-def left(edges: Sequence[PlanEdge]) -> Diagnostic:
+def left(edges: Sequence[PlanEdge], place: Span | None = None) -> Diagnostic:
     """Return the finding for fixed edges whose owner has left."""
     message = f"{_owner(edges[0])} is gone: nobody latches {named(edges)} any more"
     advice = "listeners that are there keep these frames; those that join later do not get them"
-    return finding("TF804", message, None, help=advice)
+    return finding("TF804", message, place, help=advice)
 
 
 def slow(

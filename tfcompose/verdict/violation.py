@@ -74,7 +74,8 @@ def _message(offences: Sequence[Offence], plan: Plan) -> str:
     if first.of_stamps:
         return _of_stamps(first, more)
     if edge is None:
-        return f"{first.name}{more} {verb} published by {first.who}, and nobody declared {'them' if more else 'it'}"
+        by = "recorded" if first.recorded else f"published by {first.who}"
+        return f"{first.name}{more} {verb} {by}, and nobody declared {'them' if more else 'it'}"
     if first.code == "TF802":
         return _of_parents(first, edge, more)
     if first.code == "TF809":
@@ -130,6 +131,8 @@ def _help(first: Offence) -> str:
         return f"end {first.whom}, or turn the edge round; while it is there, tf2 finds no way through these frames"
     if first.code == "TF809":
         return "static: true says that the owner sends it on /tf_static"
+    if first.namesake:
+        return f"end {first.whom}: is the robot running twice? tf2 takes whatever came last"
     if first.recorded:
         return "tf2 takes whatever came last"
     if first.code == "TF802" and first.is_owners:

@@ -25,8 +25,6 @@ GAP, GAP_S = 10.0, 1.0
 SURE_S = 1.0
 #: Somebody is silent after four of his periods, and this time at least.
 PERIODS, SILENT_S = 4.0, 0.6
-#: An edge comes slower than declared below this part of the declared rate.
-SLOW = 0.8
 
 
 def low_rate(seen: Seen) -> Iterator[Diagnostic]:
@@ -34,7 +32,7 @@ def low_rate(seen: Seen) -> Iterator[Diagnostic]:
     inside = {edge.strand.parent for edge in seen.taken}
     for edge in seen.moving:
         rate, least = edge.timing.rate, least_of(edge, inside)
-        if edge.strand.child in seen.planned or rate is None or rate >= least or is_silent(edge) or _has_gap(edge):
+        if edge.strand.child in seen.rated or rate is None or rate >= least or is_silent(edge) or _has_gap(edge):
             continue
         if edge.strand.tally.count < FEWEST and seen.seconds < 2 * SURE_S:
             continue
@@ -48,7 +46,7 @@ def low_rate(seen: Seen) -> Iterator[Diagnostic]:
 def gap(seen: Seen) -> Iterator[Diagnostic]:
     """An edge comes often, and then not at all for a while."""
     for edge in seen.moving:
-        if not _has_gap(edge):
+        if not _has_gap(edge) or edge.strand.child in seen.rated:
             continue
         rate, longest = edge.timing.rate or 0.0, edge.timing.longest_gap_s or 0.0
         message = f"{edge.name} from {who(edge)} stayed away for {seconds(longest)}, and comes with {rate:.3g} Hz else"
@@ -60,7 +58,7 @@ def fell_silent(seen: Seen) -> Iterator[Diagnostic]:
     """An edge came, and does not come any more."""
     alive = {(edge.strand.parent, edge.strand.child) for edge in seen.moving if not is_silent(edge)}
     for edge in seen.moving:
-        if not is_silent(edge) or edge.strand.child in seen.planned or (edge.strand.parent, edge.strand.child) in alive:
+        if not is_silent(edge) or edge.strand.child in seen.rated or (edge.strand.parent, edge.strand.child) in alive:
             continue
         gone = ", which has left" if edge.present is False else ", which is still there"
         message = f"{edge.name}: nothing for {seconds(edge.age_s)} from {who(edge)}{gone}"
@@ -75,11 +73,11 @@ def least_of(edge: EdgeSeen, inside: set[str]) -> float:
     return named or (LEAST_INSIDE if strand.child in inside else 0.0)
 
 
-def is_silent(edge: EdgeSeen, rate: float | None = None) -> bool:
+def is_silent(edge: EdgeSeen) -> bool:
     """Whether a moving edge that came often does not come any more."""
     count, tally = edge.strand.tally.count, edge.strand.tally
     span_s = (tally.last_ns - edge.strand.first_ns) / 1e9
-    period_s = 1 / rate if rate else span_s / (count - 1) if count >= FEWEST else float("inf")
+    period_s = span_s / (count - 1) if count >= FEWEST else float("inf")
     return edge.age_s > max(SILENT_S, PERIODS * period_s)
 
 

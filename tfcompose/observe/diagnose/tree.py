@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, finding, slip_of
+from tfcompose.observe.refused import refused_transform
 from tfcompose.observe.seen import listed, who
 
 if TYPE_CHECKING:
@@ -23,22 +24,10 @@ def self_transform(seen: Seen) -> Iterator[Diagnostic]:
             yield finding("TF821", message, None, severity="warning", help=advice)
 
 
-def refused_transform(seen: Seen) -> Iterator[Diagnostic]:
+def drops(seen: Seen) -> Iterator[Diagnostic]:
     """Transforms come that no listener takes: a quaternion that is none, a NaN, an empty name."""
     for edge in seen.edges:
-        strand = edge.strand
-        if strand.refused is None or strand.parent == strand.child:
-            continue
-        length = sum(part * part for part in strand.pose.quat_xyzw) ** 0.5
-        why = (
-            f"its quaternion has length {length:.3f}" if strand.refused.name == "DENORMALISED" else strand.refused.text
-        )
-        name = f"{strand.parent or '(no frame)'} → {strand.child or '(no frame)'}"
-        often = "" if strand.static else f" ({strand.refusals} of {strand.tally.count})"
-        message = f"{who(edge)} publishes {name}, which tf2 drops: {why}{often}"
-        yield finding(
-            "TF831", message, None, help="mend what the node computes it from; until then the frame is not there"
-        )
+        yield from refused_transform(edge)
 
 
 def loop(seen: Seen) -> Iterator[Diagnostic]:

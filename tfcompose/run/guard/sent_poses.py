@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tfcompose.run.events import Found
-from tfcompose.verdict.driver_pose import Expected, driver_pose_differs, expected_of, is_off
+from tfcompose.verdict.poses import Expected, driver_pose_differs, expected_of, is_off
 
 if TYPE_CHECKING:
     from tfcompose.plan import Plan

@@ -24,7 +24,7 @@ from tfcompose.run.guard.voice import Voice
 from tfcompose.run.notify import ready
 from tfcompose.run.orders import JOINS
 from tfcompose.run.own import say
-from tfcompose.verdict.driver_pose import expected_of
+from tfcompose.verdict.poses import expected_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

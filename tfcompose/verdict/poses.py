@@ -1,4 +1,4 @@
-"""Where a sensor's driver says that its frames are, against the preset.
+"""Poses that are not what they should be: a fixed edge's, and those that a sensor's driver says against the preset.
 
 A driver sends what its device was calibrated to, which is a few millimetres from nominal; far from it the device is
 another one than the preset's. What a preset calls exact, such as the turn of an optical frame, no device changes.
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 NOMINAL, EXACT = Offset(0.02, radians(5.0)), Offset(0.001, radians(0.2))
 #: A quaternion's length may be so far from 1.
 UNIT_WITHIN = 0.005
+_LISTED = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +53,24 @@ def is_off(expected: Expected, sent: Pose) -> bool:
     if not all(map(isfinite, (*sent.xyz, *sent.quat_xyzw))) or abs(norm(sent.quat_xyzw) - 1) >= UNIT_WITHIN:
         return False
     return offset_of(expected.edge.pose, sent).beyond(NOMINAL if expected.nominal else EXACT)
+
+
+def pose_differs(off: Sequence[tuple[PlanEdge, str, Pose]], publisher: str, place: Span | None = None) -> Diagnostic:
+    """Return the finding for edges that come with another pose than the plan's: each with its parent, as it was sent.
+
+    ``publisher`` is empty where it is not known; ``place`` is where the first edge stands in the robot's file.
+    """
+    (edge, parent, pose), *others = off
+    by = f" from {publisher}" if publisher else ""
+    more = f", and of {len(others)} more frame{'s' if len(others) > 1 else ''} too" if others else ""
+    message = f"the pose of {edge.child} in {parent}{by} is off by {offset_of(edge.pose, pose).text}{more}"
+    notes = [
+        Note(f"{one.child} in {above} by {offset_of(one.pose, sent).text}: {compared(one.pose, sent)}")
+        for one, above, sent in others[:_LISTED]
+    ]
+    notes += [] if place else [Note(f"{edge.name} is declared in {edge.source[0]}:{edge.source[1]}")]
+    advice = "was it changed after the start? tfcompose restart; else correct the one that is wrong"
+    return finding("TF846", f"{message}: {compared(edge.pose, pose)}", place, notes=notes, help=advice)
 
 
 def driver_pose_differs(node: str, off: Sequence[tuple[Expected, Pose]], place: Span | None = None) -> Diagnostic:

@@ -9,7 +9,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 from contextlib import ExitStack
 from pathlib import Path
@@ -22,15 +21,15 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, LaserScan
 from std_msgs.msg import String
 
-from tfcompose.ros.environment import FASTDDS_PROFILE
-from tfcompose.ros.message import Transform, encode
+from tests.observe.stage import doctor, doctor_finds, finds_nothing, message, said
 from tfcompose.ros.node import LATCHED, open_node, qos
 from tfcompose.ros.tf import TFPublisher
-from tfcompose.ros.typesupport import tf_message_type
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from typing import Protocol
+
+    from tests.observe.stage import Stage
 
     class Started(Protocol):
         """A process under test, as conftest starts it."""
@@ -47,103 +46,11 @@ GCC = shutil.which("gcc") or ""
 ROBOT = str(Path(__file__).parents[2] / "robots" / "autonomous_robot.yaml")
 
 SECOND_NS = 1_000_000_000
-IDENTITY = (0.0, 0.0, 0.0, 1.0)
 VOLATILE, RELIABLE = DurabilityPolicy.VOLATILE, ReliabilityPolicy.RELIABLE
 BEST_EFFORT = ReliabilityPolicy.BEST_EFFORT
 ARM = """<robot name="arm"><link name="base_link"/><link name="upper_arm"/><link name="hand"/>
 <joint name="shoulder" type="revolute"><parent link="base_link"/><child link="upper_arm"/></joint>
 <joint name="wrist" type="fixed"><parent link="upper_arm"/><child link="hand"/></joint></robot>"""
-
-
-class Stage:
-    """Nodes that publish, until the test is over."""
-
-    def __init__(self) -> None:
-        self._stack = ExitStack()
-        self._jobs: list[tuple[float, Callable[[int], None]]] = []
-        self._over = threading.Event()
-        self._threads: list[threading.Thread] = []
-
-    def node(self, name: str, namespace: str = "") -> Any:
-        return self._stack.enter_context(open_node(name, namespace))
-
-    def fixed(self, node: Any, *edges: str, topic: str = "/tf_static", x: float = 0.0) -> None:
-        self.keep(TFPublisher(node, static=True, topic=topic)).publish(message(0, edges, x))
-
-    def moving(
-        self,
-        node: Any,
-        *edges: str,
-        hz: float = 30.0,
-        stamp: Callable[[int], int] = lambda now: now,
-        topic: str = "/tf",
-        quat: tuple[float, float, float, float] = IDENTITY,
-    ) -> None:
-        publisher = self.keep(TFPublisher(node, static=False, topic=topic))
-        self.every(hz, lambda now: publisher.publish(message(stamp(now), edges, quat=quat)))
-
-    def odd(self, node: Any, *edges: str, topic: str, profile: Any) -> None:
-        """Publish with other settings than TF has."""
-        publisher = self.keep(node.create_publisher(tf_message_type(), topic, profile))
-        self.every(10, lambda now: publisher.publish(message(now, edges)))
-
-    def typed(self, node: Any, kind: Any, topic: str, make: Callable[[int], Any], hz: float = 20.0) -> None:
-        publisher = self.keep(node.create_publisher(kind, topic, 10))
-        self.every(hz, lambda now: publisher.publish(make(now)))
-
-    def every(self, hz: float, job: Callable[[int], None]) -> None:
-        def run() -> None:
-            while not self._over.wait(1 / hz):
-                job(time.time_ns())
-
-        self._threads.append(threading.Thread(target=run))
-        self._threads[-1].start()
-
-    def keep(self, thing: Any) -> Any:
-        self._stack.callback(lambda: thing)
-        return thing
-
-    def close(self) -> None:
-        self._over.set()
-        for thread in self._threads:
-            thread.join()
-        self._stack.close()
-
-
-def message(stamp_ns: int, edges: tuple[str, ...], x: float = 0.0, quat: Any = IDENTITY) -> bytes:
-    pairs = [edge.split() for edge in edges]
-    return encode([Transform(stamp_ns, parent, child, (x, 0.0, 0.0), quat) for parent, child in pairs])
-
-
-@pytest.fixture
-def stage(domain: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stage]:
-    assert domain.id
-    monkeypatch.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", str(FASTDDS_PROFILE))
-    stage = Stage()
-    yield stage
-    stage.close()
-
-
-def doctor(*words: str, seconds: float = 3.0) -> tuple[int, list[dict[str, Any]]]:
-    """Run it, and return the exit code and the findings."""
-    command = [sys.executable, "-m", "tfcompose", "doctor", "--for", str(seconds), "--format", "json", *words]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=40, check=False)
-    assert "Traceback" not in done.stderr, done.stderr
-    return done.returncode, json.loads(done.stdout)
-
-
-def finds_nothing(*words: str, seconds: float = 3.0) -> bool:
-    """Look up to three times until nothing is found: where much else runs, publishers are late in truth."""
-    return any(doctor(*words, seconds=seconds) == (0, []) for _ in range(3))
-
-
-def said(found: list[dict[str, Any]], code: str) -> str:
-    """Return all that was said of that code."""
-    assert code in {one["code"] for one in found}, found
-    parts = [one for one in found if one["code"] == code]
-    return "\n".join(
-        "\n".join([one["message"], *(note["message"] for note in one["notes"]), one["help"]]) for one in parts
-    )
 
 
 def sound(stage: Stage) -> Any:
@@ -383,7 +290,7 @@ LATE = {"TF805", "TF833", "TF838", "TF839"}
 def test_what_is_wrong_is_found_with_the_node_and_the_numbers(stage: Stage, scene: Callable[[Stage], Any]) -> None:
     scene(stage)
     expected, words = SCENES[scene]
-    code, found = doctor()
+    code, found = doctor_finds(expected)
     text = said(found, expected)
     assert code == 1
     for word in words:

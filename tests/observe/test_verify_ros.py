@@ -67,7 +67,9 @@ def test_a_plan_that_changed_after_the_start_is_told(running: Path) -> None:
     plan = read_plan(running.read_text(), str(running))
     moved = replace(plan.edges[1], pose=Pose((0.0, 0.012, 0.3)))
     running.write_text(write_plan(replace(plan, edges=(plan.edges[0], moved))))
-    assert "error[TF846] the pose of laser in base_link is off by 12 mm" in tfcompose("verify", str(running), code=1)
+    assert "error[TF846] the pose of laser in base_link from /rover/static is off by 12 mm" in tfcompose(
+        "verify", str(running), code=1
+    )
 
 
 def test_the_live_tree_names_nodes_and_what_is_unexpected(running: Path) -> None:

@@ -1,0 +1,218 @@
+"""Real nodes that do otherwise than the plan says: the doctor and verify find it, by one code and in the same words."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tests.observe.stage import LOOKS, doctor, finds_nothing, message, said
+from tfcompose.pose import OPTICAL_XYZW
+from tfcompose.ros.tf import TFPublisher
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from tests.observe.stage import Stage
+
+pytestmark = pytest.mark.ros
+
+ROBOT = """\
+tfcompose: 1
+robot: rover
+frames:
+  odom: {}
+  base_link: {parent: odom, owner: drive, rate: 25 Hz}
+  mast: {parent: base_link, xyz: [0.3, 0, 0], owner: mount, static: true}
+sensors:
+  front: {preset: realsense/d435i, parent: mast, options: {streams: [depth]}, tf: driver, place: front_link}
+processes:
+  drive: {external: true, node: drive}
+  mount: {external: true, node: mount}
+"""
+#: True of publishers on a machine that does much else.
+LATE = {"TF804", "TF805", "TF833", "TF838", "TF839"}
+
+
+class Rover:
+    """The robot as it is meant, part by part."""
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+
+    def all_but(self, *parts: str) -> Rover:
+        for name in ("drive", "mount", "static", "driver"):
+            if name not in parts:
+                getattr(self, name)()
+        return self
+
+    def drive(self, hz: float = 25.0, name: str = "drive") -> None:
+        self.stage.moving(self.stage.node(name), "odom base_link", hz=hz)
+
+    def mount(self, x: float = 0.3) -> None:
+        self.stage.fixed(self.stage.node("mount"), "base_link mast", x=x)
+
+    def static(self) -> None:
+        node, quat = self.stage.node("tfcompose_static"), (0.0, 0.0, 0.0, 1.0)
+        screw = [
+            ("mast", "front_bottom_screw_frame", (-0.0106, -0.0175, -0.0125), quat),
+            ("front_bottom_screw_frame", "front_link", (0.0106, 0.0175, 0.0125), quat),
+        ]
+        self.stage.latched(node, *screw)
+
+    def driver(self, x: float = 0.0) -> None:
+        inside = [
+            ("front_link", "front_depth_frame", (x, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),
+            ("front_depth_frame", "front_depth_optical_frame", (0.0, 0.0, 0.0), OPTICAL_XYZW),
+        ]
+        self.stage.latched(self.stage.node("front", "front"), *inside)
+
+
+def nobody_drives(rover: Rover) -> None:
+    rover.all_but("drive")
+
+
+def named_otherwise(rover: Rover) -> None:
+    rover.all_but("drive").drive(name="base_controller")
+
+
+def second_publisher(rover: Rover) -> None:
+    rover.all_but().drive(name="ekf")
+
+
+def twice(rover: Rover) -> None:
+    rover.all_but().drive()
+
+
+def second_parent(rover: Rover) -> None:
+    rover.all_but()
+    rover.stage.moving(rover.stage.node("slam"), "map base_link")
+
+
+def other_parent(rover: Rover) -> None:
+    rover.all_but("mount")
+    rover.stage.fixed(rover.stage.node("mount"), "odom mast", x=0.3)
+
+
+def stranger(rover: Rover) -> None:
+    rover.all_but()
+    rover.stage.moving(rover.stage.node("tags"), "mast tag_1", "mast tag_2")
+
+
+def falls_silent(rover: Rover) -> None:
+    """It is heard for a second, and stays."""
+    rover.all_but("drive")
+    publisher = rover.stage.keep(TFPublisher(rover.stage.node("drive"), static=False))
+    heard_since: list[float] = []
+
+    def tick(now: int) -> None:
+        if not publisher.publisher.get_subscription_count():
+            heard_since.clear()
+            return
+        heard_since.append(heard_since[0] if heard_since else time.monotonic())
+        if time.monotonic() - heard_since[0] < 1.0:
+            publisher.publish(message(now, ("odom base_link",)))
+
+    rover.stage.every(25.0, tick)
+
+
+def slow(rover: Rover) -> None:
+    rover.all_but("drive").drive(hz=10.0)
+
+
+def moving_though_fixed(rover: Rover) -> None:
+    rover.all_but("mount")
+    publisher = rover.stage.keep(TFPublisher(rover.stage.node("mount"), static=False))
+    rover.stage.every(10.0, lambda now: publisher.publish(message(now, ("base_link mast",), 0.3)))
+
+
+def elsewhere(rover: Rover) -> None:
+    rover.all_but("mount").mount(x=0.312)
+
+
+def other_camera(rover: Rover) -> None:
+    rover.all_but("driver").driver(x=0.02)
+
+
+SCENES: dict[Callable[[Rover], Any], tuple[str, list[str]]] = {
+    nobody_drives: ("TF811", ["odom → base_link was never seen; its owner is drive (/drive)", "nobody named /drive"]),
+    named_otherwise: ("TF801", ["odom → base_link is published by /base_controller; the owner is drive (/drive)"]),
+    second_publisher: ("TF801", ["odom → base_link is published by /ekf; the owner is drive (/drive)", "end /ekf"]),
+    twice: (
+        "TF801",
+        ["odom → base_link is published by another /drive; the owner is", "the robot running twice"],
+    ),
+    second_parent: ("TF802", ["base_link has a second parent: /slam publishes map → base_link, drive (/drive) odom"]),
+    other_parent: (
+        "TF802",
+        ["mast hangs on odom: its owner mount (/mount) publishes odom → mast, declared"],
+    ),
+    stranger: ("TF803", ["published by /tags, and nobody declared", "guard: {allow: [{parent: mast, child: tag_1}]}"]),
+    falls_silent: ("TF804", ["drive (/drive) fell silent: nothing on odom → base_link for", "declared at 25 Hz"]),
+    slow: ("TF805", ["odom → base_link comes at", "Hz from drive (/drive), declared are 25 Hz"]),
+    moving_though_fixed: (
+        "TF809",
+        ["mast is published by its owner /mount on /tf, declared for /tf_static"],
+    ),
+    elsewhere: ("TF846", ["the pose of mast in base_link from /mount is off by 12 mm: seen xyz 0.312 0 0 m"]),
+    other_camera: ("TF828", ["the pose of front_depth_frame in front_link from the driver /front/front is 20 mm off"]),
+}
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> str:
+    file = tmp_path / "rover.yaml"
+    file.write_text(ROBOT, encoding="utf-8")
+    return str(file)
+
+
+def verify(*words: str) -> list[dict[str, Any]]:
+    command = [sys.executable, "-m", "tfcompose", "verify", "--for", "3", "--format", "json", *words]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=40, check=False)
+    assert "Traceback" not in done.stderr, done.stderr
+    found: list[dict[str, Any]] = json.loads(done.stdout)
+    return found
+
+
+def both(robot: str, code: str) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Return what the doctor and verify find, when both find that code."""
+    for _ in range(LOOKS):
+        found = doctor(robot)[1], verify(robot)
+        if all(code in {one["code"] for one in some} for some in found):
+            break
+    return found
+
+
+@pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.__name__)
+def test_what_differs_from_the_plan_is_found_by_both_in_the_same_words(
+    stage: Stage, robot: str, scene: Callable[[Rover], Any]
+) -> None:
+    scene(Rover(stage))
+    code, words = SCENES[scene]
+    by_doctor, by_verify = both(robot, code)
+    for found in (by_doctor, by_verify):
+        text = said(found, code)
+        for word in words:
+            assert word in text
+        assert {one["code"] for one in found} <= {code, *LATE, *ALSO.get(scene, set())}, found
+    at = {one["line"] for one in by_verify if one["code"] == code and one["line"]}
+    assert at or code == "TF803", "verify says where the edge stands in the file"
+
+
+#: What else is found there, since it follows.
+ALSO: dict[Callable[[Rover], Any], set[str]] = {
+    nobody_drives: {"TF830", "TF908"},  # where frames are missing, it looks for processes that it cannot hear
+    second_publisher: {"TF824"},
+    twice: {"TF824"},
+}
+
+
+def test_a_robot_as_planned_has_no_findings(stage: Stage, robot: str) -> None:
+    Rover(stage).all_but()
+    assert finds_nothing(robot)
+    assert any(verify(robot) == [] for _ in range(LOOKS))

@@ -26,6 +26,8 @@ ProcessKind = Literal["static", "joints", "guard", "simulate", "external", "run"
 GuardMode = Literal["off", "watch", "strict"]
 UnknownEdges = Literal["ignore", "warn", "error"]
 OnViolation = Literal["report", "stop-offender", "stop"]
+#: How a strict guard fences processes off; auto: by partition where their rmw is Fast DDS, else by remapping.
+FenceWay = Literal["auto", "partition", "remap"]
 
 ReadyKind = Literal["edges", "topic", "service", "lifecycle", "log", "exit", "time"]
 
@@ -47,6 +49,7 @@ PROCESS_KINDS: tuple[ProcessKind, ...] = ("static", "joints", "guard", "simulate
 READY_KINDS: tuple[ReadyKind, ...] = ("edges", "topic", "service", "lifecycle", "log", "exit", "time")
 #: How well the pose of a frame is known that a driver publishes.
 KNOWN = ("exact", "nominal")
+FENCES: tuple[FenceWay, ...] = ("auto", "partition", "remap")
 LIFECYCLE_STATES = ("inactive", "active")
 LOG_LEVELS = ("debug", "info", "warn", "error", "fatal")
 STOP_SIGNALS = ("SIGINT", "SIGTERM", "SIGQUIT", "SIGHUP", "SIGKILL", "SIGUSR1", "SIGUSR2")
@@ -225,12 +228,16 @@ class RosSettings:
 
 @dataclass(frozen=True, slots=True)
 class GuardPolicy:
-    """What the guard does. ``allow`` holds (parent, child) patterns of edges that need no declaration."""
+    """What the guard does. ``allow`` holds (parent, child) patterns of edges that need no declaration.
+
+    ``fence`` says how a strict guard fences processes off.
+    """
 
     mode: GuardMode = "watch"
     unknown_edges: UnknownEdges = "warn"
     on_violation: OnViolation = "report"
     allow: tuple[tuple[str, str], ...] = ()
+    fence: FenceWay = "auto"
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from typing import Any
 from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
 from tfcompose.plan import (
     EDGE_KINDS,
+    FENCES,
     KNOWN,
     LIFECYCLE_STATES,
     LOG_LEVELS,
@@ -133,7 +134,10 @@ def _process_to_json(process: PlanProcess) -> dict[str, Any]:
 
 
 def _guard_to_json(guard: GuardPolicy) -> dict[str, Any]:
-    return _fields(guard) | {"allow": [{"parent": parent, "child": child} for parent, child in guard.allow]}
+    said = _fields(guard) | {"allow": [{"parent": parent, "child": child} for parent, child in guard.allow]}
+    if guard.fence == "auto":
+        del said["fence"]
+    return said
 
 
 def _pose_from_json(data: dict[str, Any], where: str) -> Pose:
@@ -270,6 +274,7 @@ def _guard_from_json(data: dict[str, Any]) -> GuardPolicy:
         unknown_edges=one_of(data, "unknown_edges", ("ignore", "warn", "error"), "guard"),
         on_violation=one_of(data, "on_violation", ("report", "stop-offender", "stop"), "guard"),
         allow=rows(data, "allow", _allowed_from_json),
+        fence=one_of(data, "fence", FENCES, "guard") if "fence" in data else "auto",
     )
 
 

@@ -43,6 +43,7 @@ _WRITTEN: dict[tuple[str, str], dict[str, Any]] = {
 }
 #: Fields that are left out where there is nothing to say.
 _LEFT_OUT = {
+    "GuardPolicy": {"fence"},
     "Plan": {"host"},
     "PlanEdge": {"joint", "switched"},
     "PlanProcess": {"simulate", "description", "drives", "switches"},

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tfcompose.run.launcher.child import Lines, spawn
-from tfcompose.run.launcher.preflight import Command
+from tfcompose.run.launcher.command import Command
 from tfcompose.run.launcher.signals import Signals
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from tfcompose.diagnostic import Diagnostic
-    from tfcompose.run.launcher.preflight import Command
+    from tfcompose.run.launcher.command import Command
 
 NAV2 = PlanProcess(
     "nav2", "run", ("${launch:nav2_bringup/navigation_launch.py}", "use_composition:=False"), remap={"/tf": "/r/tf"}

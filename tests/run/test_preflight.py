@@ -10,13 +10,14 @@ import pytest
 
 from tfcompose.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.ros.environment import child_environment
-from tfcompose.run.launcher.preflight import Command, commands_of
+from tfcompose.run.launcher.preflight import commands_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
     from tfcompose.diagnostic import Diagnostic
+    from tfcompose.run.launcher.command import Command
 
 
 @pytest.fixture

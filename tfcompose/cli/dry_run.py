@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.up import PLAN, as_asked, plan_in
 from tfcompose.planfile import read_plan
 from tfcompose.ros.environment import FASTDDS_PROFILE, child_environment
+from tfcompose.run.fenced import partition_of, private_topics
 from tfcompose.run.hosts import told
 from tfcompose.run.launcher.state import MAX_RESTARTS
 
@@ -67,7 +68,7 @@ def _process(plan: Plan, process: PlanProcess, files: dict[str, str]) -> Iterato
     if process.kind != "external":
         yield f"  command  {' '.join(map(_quoted, process.argv))}"
     if plan.guard.mode == "strict" and process.kind not in ("external", "guard"):
-        yield f"  fence    its TF goes to the partition tfc_{plan.robot}, and the guard passes on what it owns"
+        yield f"  fence    {_fence(plan, process)}"
     nodes = [name + (f" → {process.lifecycle[name]}" if name in process.lifecycle else "") for name in process.nodes]
     if nodes:
         yield f"  nodes    {', '.join(nodes)}"
@@ -84,6 +85,16 @@ def _process(plan: Plan, process: PlanProcess, files: dict[str, str]) -> Iterato
     for edge in plan.edges_of(process.name):
         rate = f", {edge.rate:g} Hz" if edge.rate else ""
         yield f"  edge     {edge.name} ({edge.kind}{rate})"
+
+
+def _fence(plan: Plan, process: PlanProcess) -> str:
+    topics = private_topics(plan).get(process.name)
+    ways = {
+        "partition": f"the partition {partition_of(plan)}",
+        "remap": " and ".join(topics) if topics else "where it is sent: no remapping reaches it",
+    }
+    way = ways.get(plan.guard.fence) or f"{ways['partition']} with Fast DDS, else to {ways['remap']}"
+    return f"its TF goes to {way}; the guard passes on what it owns"
 
 
 def _times(process: PlanProcess) -> Iterator[str]:

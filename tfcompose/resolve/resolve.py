@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tfcompose.load import Source
-    from tfcompose.plan import GuardMode, OnViolation, UnknownEdges
+    from tfcompose.plan import FenceWay, GuardMode, OnViolation, UnknownEdges
     from tfcompose.resolve.library import Library
     from tfcompose.resolve.packages import Disk
     from tfcompose.resolve.part import Joined
@@ -237,6 +237,7 @@ def _guard(said: GuardSpec, parts: list[Robot]) -> GuardPolicy:
         cast("UnknownEdges", said.unknown_edges),
         cast("OnViolation", said.on_violation),
         allow,
+        cast("FenceWay", said.fence),
     )
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from tfcompose.ros.environment import RosError
+from tfcompose.ros.identity import gid_of, ids_say_who
 from tfcompose.ros.node import TF_PUBLISHER, TF_READER, TF_STATIC_PUBLISHER, TF_STATIC_READER
 from tfcompose.ros.typesupport import tf_message_type
 
@@ -67,9 +68,10 @@ class _MessageInfo(ctypes.Structure):
 class Received:
     """A message as bytes, and how it came.
 
-    ``gid`` is its publisher's id, 16 bytes, as in ``graph.writers``, or None where the rmw gives none. Times are in
-    nanoseconds of the system clock; ``sequence`` counts the publisher's messages, or is the largest uint64 where the
-    rmw does not count.
+    ``gid`` is its publisher's id, 16 bytes, as in ``graph.writers``, or None where the rmw does not say it with a
+    message (``identity``). ``raw_gid`` is what the rmw says instead: it tells one's own publishers from others, and
+    senders apart. Times are in nanoseconds of the system clock; ``sequence`` counts the publisher's messages, or is the
+    largest uint64 where the rmw does not count.
     """
 
     data: bytes
@@ -77,6 +79,7 @@ class Received:
     source_ns: int
     received_ns: int
     sequence: int
+    raw_gid: bytes | None = None
 
 
 class TFPublisher:
@@ -85,6 +88,11 @@ class TFPublisher:
     def __init__(self, node: Node, *, static: bool, topic: str | None = None) -> None:
         qos = TF_STATIC_PUBLISHER if static else TF_PUBLISHER
         self.publisher: Any = node.create_publisher(tf_message_type(), topic or _topic(static=static), qos)
+
+    @property
+    def raw_gid(self) -> bytes:
+        """The id that its messages come with, as ``Received.raw_gid``."""
+        return gid_of(self.publisher)
 
     def publish(self, data: bytes) -> None:
         """Publish a message that ``message.encode`` or a ``message.Template`` made."""
@@ -96,6 +104,7 @@ class Subscription:
 
     def __init__(self, node: Node, message_type: Any, topic: str, qos: QoSProfile) -> None:
         self.subscription: Any = node.create_subscription(message_type, topic, _ignore, qos, raw=True)
+        self._says_who = ids_say_who(node)
         rcl = _rcl()
         self._bytes = _Bytes(allocator=rcl.rcutils_get_default_allocator())
         self._info = _MessageInfo()
@@ -133,13 +142,14 @@ class Subscription:
 
     def _received(self) -> Received:
         info = self._info
-        gid = bytes(info.gid)
+        gid = None if (raw := bytes(info.gid)) == _NO_GID else raw
         return Received(
             data=ctypes.string_at(self._bytes.buffer, self._bytes.length),
-            gid=None if gid == _NO_GID else gid,
+            gid=gid if self._says_who else None,
             source_ns=info.source_ns,
             received_ns=info.received_ns,
             sequence=info.publication_sequence,
+            raw_gid=gid,
         )
 
 

@@ -39,8 +39,8 @@ class Own:
 
     @property
     def ros_args(self) -> list[str]:
-        """What its node is told: the plan's remappings, and what is on the command line."""
-        return [*(word for old, new in self.process.remap.items() for word in ("-r", f"{old}:={new}")), *self.given]
+        """What its node is told: what is on the command line, which comes first, and the plan's remappings."""
+        return [*self.given, *(word for old, new in self.process.remap.items() for word in ("-r", f"{old}:={new}"))]
 
     @property
     def edges(self) -> tuple[PlanEdge, ...]:

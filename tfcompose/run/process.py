@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING
 from tfcompose.diagnostic import RejectedError
 from tfcompose.planfile import read_plan
 from tfcompose.ros.environment import child_environment
-from tfcompose.run.launcher.preflight import Command, commands_of
+from tfcompose.run.launcher.preflight import commands_of
 from tfcompose.run.orders import JOINS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from tfcompose.diagnostic import Diagnostic
+    from tfcompose.run.launcher.command import Command
 
 _ARGUMENTS = 2
 

@@ -83,6 +83,11 @@ class GuardSpec(Model):
         "stop-offender ends the plan's own process that surely did it, stop ends everything",
     )
     allow: tuple[AllowedEdge, ...] = key(listing(record(AllowedEdge)), ())
+    fence: str = key(
+        choice("auto", "partition", "remap"),
+        "auto",
+        "how strict fences processes off: by a DDS partition, which needs Fast DDS, or by remapping /tf and /tf_static",
+    )
 
 
 class RosSpec(Model):

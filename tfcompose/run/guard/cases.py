@@ -114,7 +114,7 @@ class Cases:
         driven = sensor_of(offences[0], self._drives)
         found = violation(offences, self._plan, where, driven)
         if self._plan.guard.mode == "strict" and not offences[0].of_stamps:
-            found = replace(found, notes=(*found.notes, Note(_fate(ours=self._senders.is_of_this_run(cases[0].gid)))))
+            found = replace(found, notes=(*found.notes, Note(_fate(held=self._senders.is_held_back(cases[0].gid)))))
         return Found(found, self._process(offences[0], cases[0].gid))
 
     def _process(self, offence: Offence, gid: bytes | None) -> str:
@@ -167,8 +167,12 @@ class Cases:
         return now - case.last > OVER_S
 
 
-def _fate(*, ours: bool) -> str:
-    return "held back: no listener gets it" if ours else "not of this run, so it cannot be held back: listeners get it"
+def _fate(*, held: bool) -> str:
+    return (
+        "held back: no listener gets it"
+        if held
+        else "not behind the fence, so it cannot be held back: listeners get it"
+    )
 
 
 def _to_json(case: Case) -> list[Any]:

@@ -114,8 +114,8 @@ class Judge:
         return stream.admitted
 
     def name_of(self, gid: bytes | None) -> str:
-        """Return the publisher's node, empty while that is not known."""
-        return next(iter(self._senders.nodes(gid, static=False)), "") if gid is not None else ""
+        """Return the publisher's node, or all that it may be; empty while that is not known."""
+        return " or ".join(self._senders.nodes(gid, static=False)) if gid is not None else ""
 
     def graph(self, writers: Sequence[Writer], now: float) -> list[GuardEvent]:
         """Take who publishes on /tf and /tf_static now, and return what that means."""

@@ -18,9 +18,12 @@ if TYPE_CHECKING:
     from tfcompose.run.events import GuardEvent
     from tfcompose.run.guard.judge import Judge
     from tfcompose.run.guard.relay import Relay
+    from tfcompose.run.guard.switches import Switches
 
 #: A longer part is not handed on: the launcher takes no longer lines; characters.
 LONGEST = 900_000
+#: The part of the memory that no topics have.
+_SWITCHES, _ANSWERED = "switches", "answered"
 
 
 def recalled(env: Mapping[str, str]) -> dict[str, Any]:
@@ -59,3 +62,20 @@ class Memory:
             if self._left.get(part) != value and len(json.dumps(value)) < LONGEST:
                 self._emit(Remember({f"{self._topics} {part}": value}))
         self._left = known
+
+
+class SwitchMemory:
+    """Hands on which nodes have answered what their switches are, so that nobody is told twice."""
+
+    def __init__(self, switches: Switches, emit: Callable[[GuardEvent], None], left: Mapping[str, Any]) -> None:
+        self._switches = switches
+        self._emit = emit
+        self._left = left.get(_SWITCHES, {}).get(_ANSWERED, [])
+        switches.recall(self._left)
+
+    def look(self) -> None:
+        """Hand on what has changed."""
+        answered = self._switches.answered
+        if answered != self._left:
+            self._left = answered
+            self._emit(Remember({f"{_SWITCHES} {_ANSWERED}": answered}))

@@ -3,72 +3,102 @@
 from __future__ import annotations
 
 import os
+from hashlib import blake2b
 from typing import TYPE_CHECKING
 
 from tfcompose.ros.graph import UNKNOWN_NODE, own_gid, writers, writers_unmapped
+from tfcompose.ros.identity import ids_say_who
 from tfcompose.ros.origin import carries, origin
+from tfcompose.ros.topics import GLOBAL
 from tfcompose.run.guard.senders import PARTICIPANT, Writer
 from tfcompose.run.place import RUN_ID
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator, Sequence
 
     from rclpy.node import Node
 
     from tfcompose.ros.graph import Writer as Found
 
-#: The names that no namespace moves: (moving, fixed).
-GLOBAL = ("/tf", "/tf_static")
+    Topics = tuple[str, str]
+
+_ID_BYTES = 16
+
+
+def id_of_topic(topic: str) -> bytes:
+    """Return what stands for the id of whoever sends on a process's own topic, where the rmw does not say who sent."""
+    return blake2b(topic.encode(), digest_size=_ID_BYTES).digest()
 
 
 class Graph:
-    """The publishers on a plan's topics (moving, fixed), and on the global ones; ``own`` are the guard's, left out."""
+    """The publishers on a plan's topics (moving, fixed), and on the global ones; the guard's own are left out.
 
-    def __init__(self, node: Node, topics: tuple[str, str]) -> None:
+    ``private`` are the pairs of topics that processes are remapped to, where they are.
+    """
+
+    def __init__(self, node: Node, topics: Topics, private: Sequence[Topics] | None = None) -> None:
         self.topics = topics
+        self._private = private
+        self.says_who = ids_say_who(node)
         self._node = node
         self._where: dict[bytes, str] = {}
         self._ours: dict[bytes, bool | None] = {}
         self._run = f"{RUN_ID}={os.environ[RUN_ID]}" if RUN_ID in os.environ else ""
         self._own = b""
-        self.own: set[bytes] = set()
 
     def writers(self) -> list[Writer]:
-        """Return who publishes on the plan's topics now."""
-        return self._on(writers, self.topics)
+        """Return who publishes now: on the plan's topics, and on those that processes are remapped to."""
+        if self._private is None:
+            return self._on(writers, self.topics)
+        found = self._on(writers, self.topics, fenced=False)
+        for topics in self._private:
+            there = self._on(writers, topics, fenced=True)
+            found += there if self.says_who else [*there, *self._by_topic(topics, there)]
+        return found
 
-    def is_ours(self, gid: bytes) -> bool | None:
-        """Whether the publisher is surely a process of the guard's own run; None: it is not in the graph yet."""
-        return bool(self._ours[gid]) if gid in self._ours else None
+    def may_pass(self, gid: bytes) -> bool | None:
+        """Whether what the publisher sends behind the fence is of the guard's own run; None: it is not known yet.
 
-    def look_for_own(self) -> None:
-        """Find out the ids of what the guard's own node publishes on the plan's topics."""
-        own = self._own_gid()[:PARTICIPANT]
-        for topic in self.topics:
-            self.own |= {one.gid for one in writers(self._node, topic) if one.gid[:PARTICIPANT] == own}
+        In the common partition that must be seen; on a topic of a process's own, nobody else is expected.
+        """
+        if gid not in self._ours:
+            return None
+        ours = self._ours[gid]
+        return bool(ours) if self._private is None else ours is not False
 
     def global_writers(self) -> list[Writer]:
         """Return who publishes on the global topics now."""
         return self._on(writers_unmapped, GLOBAL)
 
-    def _on(self, look: Callable[[Node, str], list[Found]], topics: tuple[str, str]) -> list[Writer]:
+    def _on(
+        self, look: Callable[[Node, str], list[Found]], topics: Topics, *, fenced: bool | None = None
+    ) -> list[Writer]:
         moving, fixed = topics
-        pairs = ((True, fixed), (False, moving))
+        own = self._own_gid()[:PARTICIPANT]
         return [
-            self._writer(one, static=static)
-            for static, topic in pairs
+            self._writer(one, static=static, fenced=fenced)
+            for static, topic in ((True, fixed), (False, moving))
             for one in look(self._node, topic)
-            if one.gid not in self.own
+            if one.gid[:PARTICIPANT] != own
         ]
 
-    def _writer(self, one: Found, *, static: bool) -> Writer:
+    def _by_topic(self, topics: Topics, there: list[Writer]) -> Iterator[Writer]:
+        """Yield what stands for all that send on a topic, as a message does not say which of them did."""
+        for static, topic in zip((False, True), topics, strict=True):
+            gid = id_of_topic(topic)
+            nodes = sorted({one.node for one in there if one.static == static and one.node})
+            if nodes:
+                self._ours[gid] = None
+                yield Writer(gid, nodes[0], static, volatile=False, fenced=True, others=tuple(nodes[1:]))
+
+    def _writer(self, one: Found, *, static: bool, fenced: bool | None) -> Writer:
         where = self._where.get(one.gid)
         if where is None:
             where = self._where[one.gid] = origin(one.gid, self._own_gid())
             self._ours[one.gid] = carries(one.gid, self._own_gid(), self._run) if self._run else None
         node = None if one.node.endswith(UNKNOWN_NODE) else one.node
         volatile, best_effort = one.durability == "volatile", one.reliability == "best_effort"
-        return Writer(one.gid, node, static, volatile, best_effort, where, self._ours[one.gid])
+        return Writer(one.gid, node, static, volatile, best_effort, where, self._ours[one.gid], fenced)
 
     def _own_gid(self) -> bytes:
         """Return an id of this process's: that of its reader."""

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from base64 import b64decode, b64encode
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.ros.message import Transform, decode, encode
 from tfcompose.ros.tf import TFPublisher
+from tfcompose.run.guard.held import Held
 from tfcompose.run.guard.senders import Message
 from tfcompose.run.own import say
-
-Edge = tuple[str, str]
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping
@@ -24,87 +23,85 @@ if TYPE_CHECKING:
     from rclpy.node import Node
 
     from tfcompose.plan import Plan
-    from tfcompose.ros.tf import Received
+    from tfcompose.run.guard.ear import Heard
+    from tfcompose.run.guard.feedback import Feedback
     from tfcompose.run.guard.neighbours import Graph
+    from tfcompose.run.guard.senders import Writer
 
+    Edge = tuple[str, str]
     #: Says which edges of a message may pass; None: all.
     Admits = Callable[[Message], Collection[Edge] | None]
 
 #: The parts of a guard's memory that are a sender's fixed edges begin so.
 _LATCHED = "latched:"
-#: Of so many senders' edges what was held back is counted.
-MOST_COUNTED = 1000
-NAMED_AT_MOST = 6
 #: So many messages with fixed edges wait for their senders' names.
 MOST_WAITING = 200
 
 
 @dataclass(slots=True)
 class _Latched:
-    """The fixed edges of one sender, by their child."""
+    """The fixed edges of one sender, by their child, and the process whose own topic they came on, if any."""
 
     publisher: TFPublisher
+    process: str
     edges: dict[str, Transform] = field(default_factory=dict)
     data: bytes = b""
 
 
 class Relay:
-    """Passes on what is sent on one pair of topics (moving, fixed).
+    """Passes on what is sent behind the fence on one pair of topics (moving, fixed).
 
-    ``held_back`` counts the transforms that were not passed on, by the sender's node, parent and child; ``changes``
-    counts what was latched.
+    ``own`` takes the ids of its publishers. With ``feedback`` the fence is one of remappings. ``changes`` counts what
+    was latched.
     """
 
-    def __init__(self, node: Node, graph: Graph, plan: Plan) -> None:
+    def __init__(
+        self, node: Node, graph: Graph, plan: Plan, own: set[bytes | None], feedback: Feedback | None = None
+    ) -> None:
         self._node = node
         self._graph = graph
+        self._own = own
+        self._feedback = feedback
         self._moving = TFPublisher(node, static=False, topic=graph.topics[0])
+        own.add(self._moving.raw_gid)
         self._fixed: dict[bytes, _Latched] = {}
         self._nodes = {name for process in plan.processes if process.kind != "external" for name in process.nodes}
         self._finds_until = 0.0
         self.changes = 0
-        self.waiting: list[tuple[Received, Message]] = []
-        self.held_back: dict[tuple[str, str, str], int] = {}
-        self._reported: dict[tuple[str, str, str], int] = {}
+        self.waiting: list[tuple[Heard, Message]] = []
+        self.held = Held()
 
-    def pass_on(self, received: Received, message: Message, admitted: Collection[Edge] | None, who: str) -> None:
+    def pass_on(self, heard: Heard, message: Message, admitted: Collection[Edge] | None, who: str) -> None:
         """Pass on what is admitted of the message that ``who`` sent; None: all of it."""
-        gid = received.gid
-        ours = None if gid is None else self._graph.is_ours(gid)
-        if gid is None or ours is False:
+        if self._feedback and not heard.process:
+            self._feed(heard, message)  # everybody has it
+            return
+        gid = heard.received.gid
+        may_pass = False if gid is None else self._graph.may_pass(gid)
+        if gid is None or may_pass is False:
             self._complain(who)  # it is not fenced off, and has reached everybody, or nobody knows whose it is
             return
-        if not who or ours is None:
+        if not who or may_pass is None:
             if message.static and len(self.waiting) < MOST_WAITING:
-                self.waiting.append((received, message))
+                self.waiting.append((heard, message))
             return
         if admitted is not None:
-            self._count(message, admitted, who)
+            self.held.count(message, admitted, who)
+        data = heard.received.data
         if message.static:
-            self._latch(gid, received.data, message, admitted)
+            self._latch(gid, data, message, admitted, heard.process)
         elif admitted is None:
-            self._moving.publish(received.data)
+            self._send(data, heard.process)
         elif admitted:
-            self._moving.publish(encode(list(_admitted(received.data, message, admitted))))
+            self._send(encode(list(_admitted(data, message, admitted))), heard.process)
 
-    def _complain(self, who: str) -> None:
-        if who in self._nodes:
-            self._nodes.discard(who)
-            say(f"{who} is not seen to be a process of this run: what it sends is not passed on")
-
-    def report(self) -> str:
-        """Return how much was held back since the last time, and whose it is; empty if nothing was."""
-        now = {key: count for key, count in self.held_back.items() if count != self._reported.get(key)}
-        self._reported.update(now)
-        said = [f"{count} × {parent} → {child} from {who}" for (who, parent, child), count in now.items()]
-        more = [f"and {len(said) - NAMED_AT_MOST} more"] if len(said) > NAMED_AT_MOST else []
-        return ", ".join([*said[:NAMED_AT_MOST], *more])
-
-    def memory(self) -> dict[str, str | None]:
+    def memory(self) -> dict[str, Any]:
         """Return what the guard that follows must latch: not every sender latches all that it has sent."""
-        return {f"{_LATCHED}{gid.hex()}": b64encode(one.data).decode() for gid, one in self._fixed.items()}
+        return {
+            f"{_LATCHED}{gid.hex()}": [one.process, b64encode(one.data).decode()] for gid, one in self._fixed.items()
+        }
 
-    def recall(self, memory: Mapping[str, str | None], admits: Admits, until: float) -> None:
+    def recall(self, memory: Mapping[str, Any], admits: Admits, until: float) -> None:
         """Latch what the guard before this one latched and may still pass, and forget nobody before ``until``.
 
         Until then the senders are found again.
@@ -112,42 +109,74 @@ class Relay:
         self._finds_until = until
         for part, said in memory.items():
             if part.startswith(_LATCHED) and said is not None:
-                gid, data = bytes.fromhex(part.removeprefix(_LATCHED)), b64decode(said)
+                gid, data = bytes.fromhex(part.removeprefix(_LATCHED)), b64decode(said[1])
                 edges = tuple((t.parent.removeprefix("/"), t.child.removeprefix("/")) for t in decode(data))
                 message = Message(edges, static=True, gid=gid, source_ns=0, sequence=0)
-                self._latch(gid, data, message, admits(message))
+                self._latch(gid, data, message, admits(message), said[0])
 
-    def forget(self, gids: Collection[bytes], now: float) -> None:
-        """Latch the edges of those no more who are not among these any more."""
-        if now < self._finds_until:
+    def look(self, writers: Collection[Writer], now: float) -> None:
+        """Latch the edges of those no more who are not in the graph any more, and feed listeners."""
+        if now >= self._finds_until:
+            present = {writer.gid for writer in writers}
+            for gid in [gid for gid in self._fixed if gid not in present]:
+                self.changes += 1
+                self._node.destroy_publisher(self._fixed.pop(gid).publisher.publisher)
+                if self._feedback:
+                    self._feedback.forget([gid])
+            self._forget_others(writers, present)
+        if self._feedback:
+            self._feedback.look()
+
+    def _forget_others(self, writers: Collection[Writer], present: Collection[bytes]) -> None:
+        """Feed no more what everybody had from one that has left; where ids do not tell who, from all when all have."""
+        if self._feedback is None:
             return
-        for gid in [gid for gid in self._fixed if gid not in gids]:
-            self.changes += 1
-            self._node.destroy_publisher(self._fixed.pop(gid).publisher.publisher)
+        others = self._feedback.sources("")
+        if not self._graph.says_who and any(one.static and not one.fenced for one in writers):
+            return
+        self._feedback.forget([source for source in others if source not in present])
 
-    def _latch(self, gid: bytes, data: bytes, message: Message, admitted: Collection[Edge] | None) -> None:
+    def _complain(self, who: str) -> None:
+        if who in self._nodes:
+            self._nodes.discard(who)
+            say(f"{who} is not seen to be a process of this run: what it sends is not passed on")
+
+    def _send(self, data: bytes, process: str) -> None:
+        self._moving.publish(data)
+        if self._feedback:
+            self._feedback.moving(data, process)
+
+    def _feed(self, heard: Heard, message: Message) -> None:
+        if self._feedback is None:
+            return
+        if message.static:
+            found = {t.child: t for t in decode(heard.received.data)}
+            self._feedback.fixed(heard.received.raw_gid or b"", found, "")
+        else:
+            self._feedback.moving(heard.received.data, "")
+
+    def _latch(
+        self, gid: bytes, data: bytes, message: Message, admitted: Collection[Edge] | None, process: str
+    ) -> None:
         found = {t.child: t for t in _admitted(data, message, admitted)}
         latched = self._fixed.get(gid)
         if latched is None:
             if not found:
                 return
-            latched = self._new(gid)
+            latched = self._new(gid, process)
         whole = admitted is None and found.keys() >= latched.edges.keys()
         latched.edges |= found
         latched.data = data if whole else encode(list(latched.edges.values()))
         latched.publisher.publish(latched.data)
+        if self._feedback:
+            self._feedback.fixed(gid, latched.edges, process)
         self.changes += 1
 
-    def _new(self, gid: bytes) -> _Latched:
-        latched = self._fixed[gid] = _Latched(TFPublisher(self._node, static=True, topic=self._graph.topics[1]))
-        self._graph.look_for_own()
+    def _new(self, gid: bytes, process: str) -> _Latched:
+        publisher = TFPublisher(self._node, static=True, topic=self._graph.topics[1])
+        self._own.add(publisher.raw_gid)
+        latched = self._fixed[gid] = _Latched(publisher, process)
         return latched
-
-    def _count(self, message: Message, admitted: Collection[Edge], who: str) -> None:
-        for parent, child in message.edges:
-            key = (who, parent, child)
-            if (parent, child) not in admitted and (key in self.held_back or len(self.held_back) < MOST_COUNTED):
-                self.held_back[key] = self.held_back.get(key, 0) + 1
 
 
 def _admitted(data: bytes, message: Message, admitted: Collection[Edge] | None) -> Iterator[Transform]:

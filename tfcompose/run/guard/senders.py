@@ -44,7 +44,8 @@ class Writer:
     """A publisher in the graph; ``node`` is None while its name is not known.
 
     ``where`` says on which machine and as which process it runs, as far as that is known. ``ours`` says whether that
-    process is of the guard's own run; None: not known.
+    process is of the guard's own run; None: not known. ``fenced`` says whether it sends behind the fence of a strict
+    plan; None: if it is ours. ``others`` are further nodes of which it may be one.
     """
 
     gid: bytes
@@ -54,6 +55,8 @@ class Writer:
     best_effort: bool = False
     where: str = ""
     ours: bool | None = None
+    fenced: bool | None = None
+    others: tuple[str, ...] = ()
 
 
 @dataclass(slots=True)
@@ -92,7 +95,7 @@ class Senders:
 
     def __init__(self) -> None:
         self.writers: dict[bytes, Writer] = {}
-        self._names: dict[bytes, str] = {}
+        self._names: dict[bytes, tuple[str, ...]] = {}
         self._where: dict[bytes, str] = {}
         self._heard: dict[bytes, Sender] = {}
 
@@ -110,7 +113,7 @@ class Senders:
     def graph(self, writers: Sequence[Writer]) -> None:
         """Take who is in the graph now; the name of one that has left is kept."""
         self.writers = {writer.gid: writer for writer in writers}
-        self._names.update({writer.gid: writer.node for writer in writers if writer.node is not None})
+        self._names.update({one.gid: (one.node, *one.others) for one in writers if one.node is not None})
         self._where.update({writer.gid: writer.where for writer in writers if writer.where})
 
     def where(self, gid: bytes | None) -> str:
@@ -125,7 +128,14 @@ class Senders:
         writer = self.writers.get(gid) if gid is not None else None
         if writer is None or writer.ours is not None:
             return writer is not None and bool(writer.ours)
+        if writer.fenced:
+            return True
         return len({one.gid[:PARTICIPANT] for one in self.writers.values() if one.node == writer.node}) == 1
+
+    def is_held_back(self, gid: bytes | None) -> bool:
+        """Whether what the publisher may not send reaches nobody in a strict plan."""
+        writer = self.writers.get(gid) if gid is not None else None
+        return self.is_of_this_run(gid) if writer is None or writer.fenced is None else writer.fenced
 
     @property
     def mark(self) -> tuple[int, int]:
@@ -135,25 +145,28 @@ class Senders:
     def memory(self) -> dict[str, list[Any]]:
         """Return what the next guard must know of those that are there, as values of JSON."""
         known = {gid: sender for gid, sender in self._heard.items() if gid in self.writers}
-        return {gid.hex(): [self._names.get(gid), *_to_json(one)] for gid, one in known.items()}
+        return {gid.hex(): [self._names.get(gid, ()), *_to_json(one)] for gid, one in known.items()}
 
     def recall(self, memory: dict[str, list[Any]]) -> None:
         """Know what the guard before knew."""
-        for hexed, (name, *said) in memory.items():
+        for hexed, (names, *said) in memory.items():
             gid = bytes.fromhex(hexed)
             self._heard[gid] = Sender(*said)
-            if name is not None:
-                self._names[gid] = name
+            if names:
+                self._names[gid] = tuple(names)
 
     def sender(self, gid: bytes | None) -> Sender | None:
         """Return what is known of that publisher's messages."""
         return None if gid is None else self._heard.get(gid)
 
     def nodes(self, gid: bytes | None, *, static: bool) -> tuple[str, ...]:
-        """Return the publisher's node; where the rmw gives no id, all on the topic; nothing while none is known."""
+        """Return the publisher's node; where the rmw gives no id, all on the topic; nothing while none is known.
+
+        One that sends behind a fence of remappings has an id in any case.
+        """
         if gid is not None:
-            return (self._names[gid],) if gid in self._names else ()
-        return tuple(sorted({w.node for w in self.writers.values() if w.static == static and w.node is not None}))
+            return self._names.get(gid, ())
+        return tuple(sorted({w.node for w in self.writers.values() if w.static == static and w.node and not w.fenced}))
 
     def is_present(self, gid: bytes | None) -> bool:
         """Whether the publisher is in the graph; one without an id is while anybody is."""

@@ -16,7 +16,7 @@ from tfcompose.diagnostic import Diagnostic, finding
 from tfcompose.run.events import Found
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection
 
     from rclpy.node import Node
 
@@ -29,6 +29,8 @@ LOOK_EVERY_S = 0.5
 #: For so long a parameter that the node does not have is asked for again, so often.
 DECLARED_WITHIN_S = 20.0
 AGAIN_EVERY_S = 2.0
+#: A guard that follows one that died misses no node for so long: it takes that to find all of them again.
+FINDING_S = 5.0
 
 
 @dataclass(slots=True)
@@ -49,12 +51,23 @@ class Switches:
 
     def __init__(self, node: Node, plan: Plan, emit: Callable[[GuardEvent], None]) -> None:
         self._emit = emit
-        self._due = 0.0
+        self._due = self._finds_until = 0.0
         self._nodes = [
             _Asked(name, wanted, process.drives, _reader(node, name, tuple(wanted)))
             for process in plan.processes
             for name, wanted in process.switches.items()
         ]
+
+    @property
+    def answered(self) -> list[str]:
+        """The nodes that have been asked, and are there since."""
+        return [one.node for one in self._nodes if one.done]
+
+    def recall(self, answered: Collection[str]) -> None:
+        """Ask these no more, unless they leave: the guard before this one has; those that are not found yet, too."""
+        self._finds_until = time.monotonic() + FINDING_S
+        for one in self._nodes:
+            one.done = one.node in answered
 
     def look(self) -> None:
         """Take what was answered, ask whom there is to ask, and wait for nothing."""
@@ -67,7 +80,7 @@ class Switches:
 
     def _at(self, one: _Asked, now: float) -> None:
         if not one.reader.is_there:
-            one.since, one.done = None, False
+            one.since, one.done = None, one.done and now < self._finds_until
             return
         if one.done:
             return

@@ -18,8 +18,9 @@ from tfcompose.run.launcher.replan import change
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from tfcompose.run.launcher.command import Command
     from tfcompose.run.launcher.happening import Event
-    from tfcompose.run.launcher.preflight import Command, Environment
+    from tfcompose.run.launcher.preflight import Environment
     from tfcompose.run.launcher.state import State, Tracked
 
 

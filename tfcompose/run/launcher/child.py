@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from io import FileIO
     from typing import IO
 
-    from tfcompose.run.launcher.preflight import Command
+    from tfcompose.run.launcher.command import Command
 
 #: A line longer than this comes in pieces; bytes.
 LINE_LIMIT = 64 * 1024

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from selectors import BaseSelector
 
     from tfcompose.plan import PlanProcess
+    from tfcompose.run.launcher.command import Command
     from tfcompose.run.launcher.guard_pipes import GuardPipes
     from tfcompose.run.launcher.happening import Event
     from tfcompose.run.launcher.notice import Notice, Stream
-    from tfcompose.run.launcher.preflight import Command
     from tfcompose.run.orders import GuardOrder
 
 #: So much of a line is compared with what a gate waits for, in characters.

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 from tfcompose.diagnostic import Diagnostic, finding
-from tfcompose.ros.environment import PROFILE_VARIABLES, RosError
-from tfcompose.ros.fence import can_fence, profile
+from tfcompose.ros.environment import RosError
+from tfcompose.run.fenced import REMAPPED
+from tfcompose.run.launcher.command import Command
 from tfcompose.run.launcher.executable import NotFound, executable_of, filled_in, folder_of, not_found, own_env
+from tfcompose.run.launcher.fencing import by_partition, not_remapped, remapped, way_of
 from tfcompose.run.launcher.launch_file import is_launch, launch_command
 
 if TYPE_CHECKING:
@@ -27,22 +29,6 @@ class Environment(Protocol):
         Raises:
             RosError: if the plan's settings cannot be followed.
         """
-
-
-@dataclass(frozen=True, slots=True)
-class Command:
-    """What is executed: program and arguments, environment, and folder.
-
-    ``own`` says that it is one of tfcompose's. ``fence`` is a file that must be there first, and what it holds.
-    ``missing`` says, of a process that the run goes on without, why it cannot be started.
-    """
-
-    argv: tuple[str, ...]
-    env: dict[str, str]
-    folder: Path
-    own: bool = False
-    fence: tuple[Path, str] | None = None
-    missing: str = ""
 
 
 def started_by_us(plan: Plan) -> list[PlanProcess]:
@@ -66,6 +52,10 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
     found = _never_started(plan)
     commands: dict[str, Command] = {}
     missing = []
+    way = way_of(plan, base)
+    if way == "remap":
+        found += not_remapped(plan)
+        processes = [remapped(plan, process) for process in processes]
     for process in processes:
         command = _command_of(process, plan.ros, (plan_file.absolute(), folder), base, environment)
         if isinstance(command, Diagnostic):
@@ -74,8 +64,11 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
             missing.append(command)
         else:
             commands[process.name] = command
-    if plan.guard.mode == "strict":
-        found += _fence(plan, commands, plan_file.absolute().parent)
+    if way == "partition":
+        commands, wrong = by_partition(plan, commands, plan_file.absolute().parent)
+        found += wrong
+    elif way == "remap":
+        commands = {name: _told_of_remapping(plan, name, command) for name, command in commands.items()}
     if missing:
         found.append(not_found(missing))
     return commands, list(dict.fromkeys(found))
@@ -109,35 +102,10 @@ def _command_of(
     return command
 
 
-def _fence(plan: Plan, commands: dict[str, Command], folder: Path) -> list[Diagnostic]:
-    """Fence off what the commands send on TF, and return why that cannot be done."""
-    found = []
-    for name, command in commands.items():
-        process = plan.process(name)
-        reads = process.kind == "guard"
-        processes = plan.processes if reads else (process,)
-        topics = [one.remap.get(topic, topic) for one in processes for topic in ("/tf", "/tf_static")]
-        moved = [topic for topic in topics if not topic.startswith("/")]
-        if moved:
-            message = f"guard: strict needs full names of TF's topics, and {name} has {', '.join(moved)}"
-            found.append(finding("TF902", message, None, help="write the remapping with a leading slash"))
-            continue
-        if not can_fence(command.env):
-            rmw = command.env["RMW_IMPLEMENTATION"]
-            message = f"guard: strict needs rmw_fastrtps_cpp, and {name} is started with {rmw}"
-            found.append(
-                finding("TF902", message, None, help="unset RMW_IMPLEMENTATION, or watch: guard: {mode: watch}")
-            )
-            continue
-        try:
-            text = profile(command.env, topics, f"tfc_{plan.robot}", reads=reads)
-        except RosError as error:
-            found.append(finding("TF902", f"{name}: {error}", None))
-            continue
-        file = folder / "fence" / f"{name.replace('/', '.')}.xml"
-        env = command.env | dict.fromkeys(PROFILE_VARIABLES, str(file))
-        commands[name] = replace(command, env=env, fence=(file, text))
-    return found
+def _told_of_remapping(plan: Plan, name: str, command: Command) -> Command:
+    if plan.process(name).kind != "guard":
+        return command
+    return replace(command, env=command.env | {REMAPPED: "1"})
 
 
 def _never_started(plan: Plan) -> list[Diagnostic]:

@@ -40,9 +40,10 @@ if TYPE_CHECKING:
     from tfcompose.diagnostic import Diagnostic
     from tfcompose.plan import Plan
     from tfcompose.run.launcher.action import Action
+    from tfcompose.run.launcher.command import Command
     from tfcompose.run.launcher.happening import Event
     from tfcompose.run.launcher.notice import Notice
-    from tfcompose.run.launcher.preflight import Command, Environment
+    from tfcompose.run.launcher.preflight import Environment
     from tfcompose.run.launcher.state import State, Times
 
 #: The loop looks at its children at least this often, whatever signals say; seconds.

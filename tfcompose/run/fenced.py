@@ -1,0 +1,66 @@
+"""Behind which fence a strict plan's processes send TF: what launcher and guard must both know.
+
+A fence is a DDS partition, or topics of each process's own, to which it is remapped.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+from zlib import crc32
+
+from tfcompose.ros.topics import parts_of
+
+if TYPE_CHECKING:
+    from tfcompose.plan import Plan, PlanProcess
+
+    Topics = tuple[str, str]
+
+#: Says to the guard that the processes of its run are fenced off by remapping.
+REMAPPED = "TFCOMPOSE_REMAPPED"
+#: What no part of a topic's name may hold.
+_UNDERSCORES = re.compile(r"__+|_(?=/|$)")
+
+
+def partition_of(plan: Plan) -> str:
+    """Return the partition that the plan's processes send TF in."""
+    return f"tfc_{plan.robot}"
+
+
+def judged_topics(plan: Plan) -> set[Topics]:
+    """Return the pairs of topics that the guard watches: a process that sends on others is nobody's business."""
+    return {process.topics for process in plan.processes if process.kind == "guard"} | parts_of(plan).keys()
+
+
+def private_topics(plan: Plan) -> dict[str, Topics]:
+    """Return, for each process that can be remapped, the topics (moving, fixed) that it is remapped to.
+
+    Their first underscore hides them from lists of topics.
+    """
+    judged = judged_topics(plan)
+    folders = {
+        process.name: f"/_tfcompose/{_plain(plan.robot)}/{_plain(process.name)}"
+        for process in plan.processes
+        if takes_remappings(process) and process.topics in judged
+    }
+    return {name: (f"{folder}/tf", f"{folder}/tf_static") for name, folder in folders.items()}
+
+
+def takes_remappings(process: PlanProcess) -> bool:
+    """Return whether it is started by us, may send TF, and takes ROS arguments as far as anybody knows."""
+    if process.kind != "run":
+        return process.kind in ("static", "joints", "simulate")
+    if not process.argv:
+        return False
+    return process.argv[0].startswith("${") or (bool(process.nodes) and not _is_shell(process))
+
+
+def _is_shell(process: PlanProcess) -> bool:
+    """Whether the command is a text that a shell reads: what follows it does not reach the program."""
+    return process.argv[:2] == ("/bin/sh", "-c")
+
+
+def _plain(name: str) -> str:
+    """Return the name as part of a topic's, which holds no two underscores in a row and ends with none."""
+    plain = _UNDERSCORES.sub("_0", name)
+    return name if plain == name else f"{plain}_{crc32(name.encode()):08x}"

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any
-from xml.etree import ElementTree as ET
+from typing import TYPE_CHECKING
 
 import pytest
 
-from tfcompose.plan import GuardPolicy, Plan, PlanProcess, RosSettings
+from tfcompose.plan import Plan, PlanProcess, RosSettings
 from tfcompose.ros.environment import child_environment
 from tfcompose.run.launcher.preflight import commands_of
 
@@ -146,70 +145,3 @@ def test_a_guard_is_started_first_whatever_it_is_said_to_wait_for(tmp_path: Path
     guard = PlanProcess("guard", "guard", argv=("true",), after={"lidar": "started"})
     waiting = PlanProcess("lidar", "run", argv=("true",), after={"guard": "ready"})
     assert look(tmp_path, guard, waiting)[1] == []
-
-
-def look_strictly(tmp_path: Path, *processes: PlanProcess, **env: str) -> tuple[dict[str, Command], list[Diagnostic]]:
-    plan = Plan("rover", "", None, RosSettings(), (), processes, GuardPolicy("strict"))
-    base = {"PATH": os.environ["PATH"]} | env
-    return commands_of(plan, list(processes), tmp_path / "plan.json", base, child_environment)
-
-
-def partitions(command: Command) -> dict[tuple[str, str], str]:
-    """Return the partitions that a command's fence gives readers or writers of a topic."""
-    assert command.fence
-    root = ET.fromstring(command.fence[1])  # noqa: S314 (made here)
-    name = "{http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles}"
-    return {
-        (one.tag.removeprefix(name), one.attrib["profile_name"]): one.findtext(f".//{name}value") or ""
-        for one in root.iter()
-        if one.tag.startswith(f"{name}data_")
-    }
-
-
-def test_a_strict_plan_fences_off_what_children_send_and_lets_the_guard_read_both(tmp_path: Path) -> None:
-    slam = PlanProcess("slam", "run", argv=("true",), remap={"/tf": "/r/tf"})
-    commands, found = look_strictly(tmp_path, slam, PlanProcess("guard", "guard", argv=("true",)))
-    assert found == []
-    assert partitions(commands["slam"]) == {
-        ("data_writer", "/r/tf"): "tfc_rover",
-        ("data_writer", "/tf_static"): "tfc_rover",
-    }
-    readers = {("data_reader", topic): ";tfc_rover" for topic in ("/r/tf", "/tf_static", "/tf")}
-    assert partitions(commands["guard"]) == readers
-    for command in commands.values():
-        assert command.fence
-        assert command.env["FASTRTPS_DEFAULT_PROFILES_FILE"] == str(command.fence[0])
-        assert not command.fence[0].exists(), "nothing is written before the start"
-    assert "leaseAnnouncement" in (commands["guard"].fence or ("", ""))[1]
-    assert "leaseAnnouncement" not in (commands["slam"].fence or ("", ""))[1]
-
-
-def test_a_users_own_profiles_stay_behind_the_fence(tmp_path: Path) -> None:
-    own = tmp_path / "own.xml"
-    own.write_text("<profiles><data_writer profile_name='/scan'/></profiles>")
-    slam = PlanProcess("slam", "run", argv=("true",))
-    commands, found = look_strictly(tmp_path, slam, FASTRTPS_DEFAULT_PROFILES_FILE=str(own))
-    assert found == []
-    assert "profile_name='/scan'" in (commands["slam"].fence or ("", ""))[1]
-
-
-@pytest.mark.parametrize(
-    ("process", "env", "why"),
-    [
-        (
-            {},
-            {"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"},
-            "guard: strict needs rmw_fastrtps_cpp, and slam is started with",
-        ),
-        ({"remap": {"/tf": "tf"}}, {}, "guard: strict needs full names of TF's topics, and slam has tf"),
-        ({}, {"FASTRTPS_DEFAULT_PROFILES_FILE": "/no/such.xml"}, "slam: the profile file /no/such.xml cannot be read"),
-        ({}, {"FASTRTPS_DEFAULT_PROFILES_FILE": "OWN"}, "says what its writers of TF do"),
-    ],
-)
-def test_what_cannot_be_fenced_off_is_refused(tmp_path: Path, process: Any, env: dict[str, str], why: str) -> None:
-    own = tmp_path / "own.xml"
-    own.write_text('<profiles><data_writer profile_name="/tf"></data_writer></profiles>')
-    env = {name: value.replace("OWN", str(own)) for name, value in env.items()}
-    _, (found,) = look_strictly(tmp_path, PlanProcess("slam", "run", argv=("true",), **process), **env)
-    assert found.code == "TF902"
-    assert why in found.message

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -14,15 +15,16 @@ import pytest
 
 from tests.waiting import until
 from tfcompose.ros.graph import writers
-from tfcompose.ros.message import decode
+from tfcompose.ros.message import Transform, decode, encode
 from tfcompose.ros.node import open_node
 from tfcompose.ros.stop import Stop
-from tfcompose.ros.tf import TFSubscription, wait
+from tfcompose.ros.tf import TFPublisher, TFSubscription, wait
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
+    from tests.conftest import Started
     from tfcompose.ros.tf import Received
 
 pytestmark = pytest.mark.ros
@@ -37,9 +39,11 @@ name, fixed, moving = sys.argv[1], json.loads(sys.argv[2]), json.loads(sys.argv[
 signal.signal(signal.SIGINT, lambda *_: sys.exit())
 def message(edges):
     return encode([Transform(time.time_ns(), *edge.split(), (0.1, 0.2, 0.3), (0.0, 0.0, 0.6, 0.8)) for edge in edges])
-with open_node(name, "/") as node:
+with open_node(name, "/", args=sys.argv[5:]) as node:
     readers = [TFSubscription(node, static=static) for static in (False, True)]
     latched, sent, heard = TFPublisher(node, static=True), TFPublisher(node, static=False), set()
+    while not latched.publisher.get_subscription_count():  # only the last is there for who comes later
+        time.sleep(0.01)
     for edge in fixed:  # one after the other, as some nodes do
         latched.publish(message([edge]))
         time.sleep(0.3)
@@ -73,7 +77,14 @@ processes:
   drive: {drive}
   arm: {arm}
   rogue: {rogue}
-guard: {{mode: strict}}
+guard: {{mode: strict, fence: {fence}}}
+"""
+#: Read by each Python that starts: the guard's rmw does not say with a message who sent it, as that of Cyclone DDS.
+NAMELESS = """
+import sys
+if "tfcompose.run.guard" in sys.orig_argv:
+    import tfcompose.ros.identity
+    tfcompose.ros.identity.ids_say_who = lambda node: False
 """
 FRAMES = {"odom", "base_link", "laser", "arm", "tool", "hand"}
 FIXED = {"laser", "arm", "tool"}
@@ -87,17 +98,20 @@ def child(name: str, fixed: list[str], moving: list[str], folder: Path) -> str:
 class Fenced:
     """A robot under a strict guard."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, fence: str) -> None:
         (folder / "child.py").write_text(CHILD, encoding="utf-8")
         text = ROBOT.format(
+            fence=fence,
             drive=child("drive", [], ["odom base_link"], folder),
             arm=child("arm", ["base_link arm", "arm tool"], [], folder),
             rogue=child("rogue", ["base_link laser"], ["map odom", "tool hand", "tool cup"], folder),
         )
         (folder / "robot.yaml").write_text(text, encoding="utf-8")
         self.output = folder / "output.txt"
+        env = os.environ | {"PYTHONPATH": os.pathsep.join([str(folder / "site"), *sys.path])}
         with self.output.open("wb") as out:
-            self.popen = subprocess.Popen([sys.executable, "-m", "tfcompose", "up"], cwd=folder, stdout=out, stderr=out)
+            command = [sys.executable, "-m", "tfcompose", "up"]
+            self.popen = subprocess.Popen(command, cwd=folder, stdout=out, stderr=out, env=env)
 
     @property
     def text(self) -> str:
@@ -118,10 +132,14 @@ class Fenced:
             self.popen.kill()
 
 
-@pytest.fixture
-def robot(domain: object, tmp_path: Path) -> Iterator[Fenced]:
+@pytest.fixture(params=["partition", "remap", "remap nameless"])
+def robot(request: pytest.FixtureRequest, domain: object, tmp_path: Path) -> Iterator[Fenced]:
     assert domain
-    running = Fenced(tmp_path)
+    fence, _, nameless = request.param.partition(" ")
+    if nameless:
+        (tmp_path / "site").mkdir()
+        (tmp_path / "site" / "sitecustomize.py").write_text(NAMELESS, encoding="utf-8")
+    running = Fenced(tmp_path, fence)
     try:
         running.says("tree complete")
         yield running
@@ -200,3 +218,79 @@ def test_while_the_guard_is_dead_nothing_passes_and_the_next_one_passes_all_on_a
         assert children(joined.hears(10, lambda some: children(some) >= FRAMES)) == FRAMES
     assert robot.text.count("tree complete") == 1
     assert told(robot) == before
+
+
+#: A node that latches an edge, and counts what it hears: a line of JSON, by frame, whenever it has changed.
+LISTENER = """
+import json, signal, sys, time
+from collections import Counter
+from tfcompose.ros.message import Transform, decode, encode
+from tfcompose.ros.node import open_node
+from tfcompose.ros.stop import Stop
+from tfcompose.ros.tf import TFPublisher, TFSubscription, wait
+signal.signal(signal.SIGINT, lambda *_: sys.exit())
+with open_node("ear", "/", args=sys.argv[2:]) as node:
+    readers = [TFSubscription(node, static=static) for static in (False, True)]
+    latched, heard = TFPublisher(node, static=True), Counter()
+    latched.publish(encode([Transform(0, "base_link", "ear", (0.1, 0.2, 0.3), (0.0, 0.0, 0.6, 0.8))]))
+    while True:
+        wait(node, readers, 0.5, Stop())
+        heard.update(t.child for reader in readers for one in reader.take() for t in decode(one.data))
+        print("heard", json.dumps(heard), flush=True)
+"""
+LISTENING = """
+tfcompose: 1
+robot: listening__robot
+ros: {{discovery: localhost}}
+links: {{base_link: {{}}}}
+frames:
+  odom: {{}}
+  base_link: {{parent: odom, owner: drive, rate: 20 Hz}}
+  laser: {{parent: base_link}}
+  ear: {{parent: base_link, owner: ear__, static: true}}
+processes:
+  drive: {{simulate: {{fixed: {{}}, rate: 20 Hz}}}}
+  ear__: {{run: [{python}, {file}], node: /ear}}
+guard: {{mode: strict, fence: remap, allow: [{{child: "dock*"}}]}}
+"""
+
+
+def heard_by(up: Started) -> dict[str, int]:
+    """Return what the listener has heard since it was started last."""
+    since = up.output.rpartition("started ear__")[2]
+    lines = [line.partition("heard ")[2] for line in since.splitlines() if "| heard " in line]
+    found: dict[str, int] = json.loads(lines[-1]) if lines else {}
+    return found
+
+
+def one(parent: str, child: str) -> bytes:
+    return encode([Transform(time.time_ns(), parent, child, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
+
+
+def test_a_remapped_listener_hears_the_whole_tree_once_also_when_it_starts_late(
+    start: Callable[..., Started], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "ear.py").write_text(LISTENER, encoding="utf-8")
+    (tmp_path / "robot.yaml").write_text(
+        LISTENING.format(python=sys.executable, file=tmp_path / "ear.py"), encoding="utf-8"
+    )
+    up = start("tfcompose", "up", tmp_path / "robot.yaml")
+    with open_node("outside", "/test") as node:
+        fixed, moving = TFPublisher(node, static=True), TFPublisher(node, static=False)
+        fixed.publish(one("odom", "dock"))
+        up.until_says("tree complete")
+        sent = 0
+        while "dock_2" not in heard_by(up) and sent < 200:
+            moving.publish(one("odom", "dock_2"))
+            sent += 1
+            time.sleep(0.05)
+        whole = {"base_link", "laser", "ear", "dock"}
+        assert until(lambda: heard_by(up).keys() >= whole), up.output
+        assert heard_by(up)["dock_2"] <= sent
+        assert heard_by(up)["ear"] == 1, "its own came back to it"
+        start("tfcompose", "restart", "ear__").process.wait(30)
+        assert until(lambda: heard_by(up).keys() >= whole), up.output
+        assert heard_by(up)["ear"] == 1
+        names = {one.node for one in writers(node, "/tf_static")}
+        assert names == {"/tfcompose_guard", "/test/outside"}

@@ -67,6 +67,36 @@ def test_every_joint_with_a_position_of_its_own_is_simulated_within_its_limits_a
     assert tuples(found.sweep) == approx(sweeps)
 
 
+UNLIMITED = """
+tfcompose: 1
+robot: arm
+rules: {TF704: off}
+links: {base_link: {}, a: {}, b: {}, c: {}}
+joints:
+  bend: {type: revolute, parent: base_link, child: a}
+  half: {type: revolute, parent: a, child: b, limit: {lower: -1, velocity: 0.1, effort: 1}}
+  lift: {type: prismatic, parent: b, child: c}
+processes: {states: {simulate: {joints: %s}}}
+"""
+
+
+def test_without_limits_a_turn_sweeps_all_round_and_a_slide_stays() -> None:
+    done = compile_robot(UNLIMITED % "sweep", "arm.yaml", library())
+    assert not done.errors
+    assert done.robot
+    text = next(file.text for file in emit(done.robot) if file.path == "plan.json")
+    found = read_plan(text, "plan.json").process("states").simulate
+    assert found
+    assert found.joints == {"bend": 0.0, "half": 0.0, "lift": 0.0}
+    sweeps = {"bend": Sweep(6.0, -math.pi, math.pi), "half": Sweep(math.pi / 0.1, -1.0, 0.0)}
+    assert tuples(found.sweep) == approx(sweeps)
+
+
+def test_a_slide_without_limits_cannot_sweep() -> None:
+    (found,) = compile_robot(UNLIMITED % "{lift: sweep}", "arm.yaml", library()).errors
+    assert (found.code, found.message) == ("TF106", "lift slides and has no limits to sweep between")
+
+
 @pytest.mark.parametrize(
     ("written", "code", "words"),
     [

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from tfcompose.plan import Sweep
+from tfcompose.plan import Joint, Simulation, Sweep
+from tfcompose.run.publishing.joint_source import JointSource
 from tfcompose.run.publishing.motion import circle, swept
 
 
@@ -51,3 +52,18 @@ def test_a_joint_without_ends_turns_round_and_round() -> None:
 
 def test_a_sweep_between_two_places_that_are_one_stays() -> None:
     assert swept(Sweep(1.0, 0.2, 0.2), 0.0, 0.3) == 0.2
+
+
+def test_what_mimics_a_simulated_joint_follows_it_through_a_chain_in_any_order() -> None:
+    axis = (0.0, 0.0, 1.0)
+    joints = [
+        Joint("a_last", "prismatic", axis, "m_mid", 2.0, 0.1),
+        Joint("m_mid", "revolute", axis, "z_first", -1.0, 0.5),
+        Joint("z_first", "continuous", axis),
+        Joint("other", "revolute", axis, "nobody", 1.0, 0.0),
+        Joint("free", "floating", axis, "z_first", 1.0, 0.0),
+    ]
+    simulation = Simulation("joints", 50.0, joints={"z_first": 0.25, "lift": 1.0}, sweep={"lift": Sweep(4.0, 0.0, 2.0)})
+    source = JointSource(simulation, joints)
+    assert source.names == ["z_first", "lift", "a_last", "m_mid"]
+    assert source.positions(1.0) == pytest.approx([0.25, 2.0, 2 * (0.5 - 0.25) + 0.1, 0.5 - 0.25])

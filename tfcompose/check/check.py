@@ -112,7 +112,7 @@ RULES: tuple[Rule, ...] = (
     Rule("TF309", many_static_publishers, WARNING),
     Rule("TF310", switched_edge_without_owner),
     Rule("TF311", switched_edge_static),
-    Rule("TF314", publish_frequency_too_low),
+    Rule("TF314", publish_frequency_too_low, WARNING),
     Rule("TF334", parameters_of_another_node),
     Rule("TF335", clocks_mixed),
     Rule("TF401", optical_frame_not_rotated),

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
 from tfcompose.plan import Sweep
 from tfcompose.validate.process import SWEEP
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from tfcompose.load import Source
     from tfcompose.model import Edge, Joint, Process
     from tfcompose.validate.spec import RobotSpec
@@ -24,19 +26,16 @@ def with_positions(
 ) -> Process:
     """Give a stand-in for joint states what it says of every joint that has a position of its own.
 
-    A joint that mimics another is left out: it follows. Where nothing is said a joint is at 0, or in the middle between
-    its limits if 0 is not between them, as joint_state_publisher has it.
+    A joint that mimics another is left out: it follows, and the process computes it. Where nothing is said a joint is
+    at 0, or in the middle between its limits if 0 is not between them, as joint_state_publisher has it.
     """
     said = spec.processes.get(process.name)
     wanted = said.simulate.joints if said and said.simulate else None
     if process.simulate is None or process.simulate.kind != "joints" or wanted is None:
         return process
     joints = {edge.joint.name: edge.joint for edge in edges if edge.joint and _has_position(edge.joint)}
-    for name in wanted if isinstance(wanted, dict) else ():
-        if name not in joints:
-            place = source.at_key(("processes", process.name, "simulate", "joints", name))
-            advice = did_you_mean(name, joints, f"there is {', '.join(joints)}" if joints else "no joint moves")
-            found.append(finding("TF703", f"no moving joint {name}", place, help=advice))
+    if isinstance(wanted, dict):
+        found += _findings(wanted, joints, process, source)
     each = {name: wanted.get(name, None) if isinstance(wanted, dict) else wanted for name in joints}
     positions = {
         name: _rest(joints[name]) if what is None or isinstance(what, str) else what for name, what in each.items()
@@ -44,6 +43,20 @@ def with_positions(
     sweeps = {name: _sweep(joints[name]) for name, what in each.items() if what == SWEEP}
     moving = {name: sweep for name, sweep in sweeps.items() if sweep}
     return replace(process, simulate=replace(process.simulate, joints=positions, sweep=moving))
+
+
+def _findings(
+    wanted: dict[str, Any], joints: dict[str, Joint], process: Process, source: Source
+) -> Iterator[Diagnostic]:
+    """Give a finding for each joint that is not there, or cannot move as it should."""
+    for name, what in wanted.items():
+        place = source.at_key(("processes", process.name, "simulate", "joints", name))
+        if name not in joints:
+            advice = did_you_mean(name, joints, f"there is {', '.join(joints)}" if joints else "no joint moves")
+            yield finding("TF703", f"no moving joint {name}", place, help=advice)
+        elif what == SWEEP and _sweep(joints[name]) is None:
+            advice = f"give {name} a limit: {{lower, upper}}, or say a position here"
+            yield finding("TF106", f"{name} slides and has no limits to sweep between", place, help=advice)
 
 
 def _has_position(joint: Joint) -> bool:
@@ -59,11 +72,18 @@ def _rest(joint: Joint) -> float:
 
 
 def _sweep(joint: Joint) -> Sweep | None:
-    """Return the sweep between the joint's limits, no faster than it may move; None without limits."""
+    """Return the sweep between the joint's limits, no faster than it may move; None for a slide without limits.
+
+    Of two limits a missing one is 0, as URDF's readers have it.
+    """
     limit = joint.limit
     fastest = limit.velocity if limit and limit.velocity else math.inf
     if joint.type == "continuous":
         return Sweep(max(PERIOD_S, math.tau / fastest))
-    if limit is None or limit.lower is None or limit.upper is None:
+    if limit is not None and (limit.lower is not None or limit.upper is not None):
+        lower, upper = limit.lower or 0.0, limit.upper or 0.0
+    elif joint.type == "revolute":
+        lower, upper = -math.pi, math.pi
+    else:
         return None
-    return Sweep(max(PERIOD_S, math.pi * (limit.upper - limit.lower) / fastest), limit.lower, limit.upper)
+    return Sweep(max(PERIOD_S, math.pi * (upper - lower) / fastest), lower, upper)

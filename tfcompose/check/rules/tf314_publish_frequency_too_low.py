@@ -42,7 +42,7 @@ def publish_frequency_too_low(robot: Robot) -> Iterator[Diagnostic]:
             if process.package is None:
                 advice = f"leave publish_frequency of {process.name} out, and every joint state is published"
             notes = (Note(f"{process.name} is here", process.at),) if at != process.at else ()
-            yield finding("TF314", message, at, notes=notes, help=advice, severity="warning")
+            yield finding("TF314", message, at, notes=notes, help=advice)
 
 
 def _most(process: Process) -> float | None:

@@ -14,7 +14,8 @@ from tfcompose.ros.tf import TFPublisher, wait
 from tfcompose.run.clock_watch import CLOCK_AFTER_S, no_clock
 from tfcompose.run.notify import ready
 from tfcompose.run.own import count, say
-from tfcompose.run.publishing.motion import circle, swept
+from tfcompose.run.publishing.joint_source import JointSource
+from tfcompose.run.publishing.motion import circle
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -35,7 +36,7 @@ def simulate(own: Own, stop: Stop) -> None:
         return
     with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
         if simulation.kind == "joints":
-            publish, what = _joint_states(node, simulation)
+            publish, what = _joint_states(own, node, simulation)
         else:
             publish, what = _body(own, node, simulation)
         say(f"{what}, simulated at {simulation.rate:g} Hz")
@@ -65,14 +66,14 @@ def _body(own: Own, node: Node, simulation: Simulation) -> tuple[Callable[[float
     return publish, f"{count(len(edges), 'edge')} on /tf"
 
 
-def _joint_states(node: Node, simulation: Simulation) -> tuple[Callable[[float, int], None], str]:
-    publisher = JointStatePublisher(node, list(simulation.joints))
-    moves = [(start, simulation.sweep.get(name)) for name, start in simulation.joints.items()]
+def _joint_states(own: Own, node: Node, simulation: Simulation) -> tuple[Callable[[float, int], None], str]:
+    source = JointSource(simulation, [edge.joint for edge in own.plan.edges if edge.joint])
+    publisher = JointStatePublisher(node, source.names)
 
     def publish(time_s: float, stamp_ns: int) -> None:
-        publisher.publish(stamp_ns, [swept(sweep, start, time_s) if sweep else start for start, sweep in moves])
+        publisher.publish(stamp_ns, source.positions(time_s))
 
-    return publish, f"{count(len(moves), 'joint')} on {publisher.topic}"
+    return publish, f"{count(len(source.names), 'joint')} on {publisher.topic}"
 
 
 def _wall_ticks(rate: float, stop: Stop) -> Iterator[tuple[float, int]]:

@@ -22,6 +22,7 @@ from sensor_msgs.msg import JointState, LaserScan
 from std_msgs.msg import String
 
 from tests.observe.stage import doctor, doctor_finds, finds_nothing, message, said
+from tests.waiting import until
 from tfcompose.ros.node import LATCHED, open_node, qos
 from tfcompose.ros.tf import TFPublisher
 
@@ -35,9 +36,11 @@ if TYPE_CHECKING:
         """A process under test, as conftest starts it."""
 
         output: str
+        errors: list[str]
 
         def until_says(self, text: str) -> None: ...
         def end(self, number: int = ...) -> tuple[int, float]: ...
+        def close(self) -> None: ...
 
 
 pytestmark = pytest.mark.ros
@@ -449,10 +452,77 @@ def test_a_robot_that_runs_as_planned_gives_no_finding_and_one_beside_its_plan_i
     up.end()
 
 
-@pytest.mark.usefixtures("stage")
-def test_ctrl_c_ends_the_look_and_says_what_was_found(start: Callable[..., Started]) -> None:
+def test_ctrl_c_ends_the_look_and_says_what_was_found(stage: Stage, start: Callable[..., Started]) -> None:
+    stage.moving(node := stage.node("drive"), "odom base_link", stamp=lambda _: 0)
     process = start("tfcompose", "doctor", "--for", "60")
-    time.sleep(2.0)
+    assert until(lambda: node.count_subscribers("/tf"))
+    time.sleep(2.0)  # it is to have looked for so long
     code, seconds = process.end(signal.SIGINT)
-    assert (code, seconds < 3.0) == (1, True)
-    assert "TF845" in process.output
+    process.close()
+    assert (code, seconds < 3.0, process.errors) == (1, True, [])
+    assert "TF825" in process.output
+
+
+@pytest.mark.usefixtures("domain")
+def test_ctrl_c_before_anything_came_is_no_finding(start: Callable[..., Started], tmp_path: Path) -> None:
+    robot = tmp_path / "robot.yaml"
+    robot.write_text("{tfcompose: 1, robot: a, frames: {b: {}, c: {parent: b}}}")
+    picture = ["graph", "--live", "-o", str(tmp_path / "tree.svg"), "--for", "60"]
+    for words in (["monitor"], ["echo", "b", "c"], ["verify", str(robot), "--for", "60"], ["tree", "--live"], picture):
+        process = start("tfcompose", *words)
+        time.sleep(0.9)
+        code, seconds = process.end(signal.SIGINT)
+        process.close()
+        assert (code, seconds < 3.0, process.output) == (130, True, ""), process.errors
+        assert len(process.errors) <= 1, process.errors
+        assert all(line.startswith("tfcompose: ended by a signal after 0.") for line in process.errors)
+
+
+OTHER_RMW = """
+import mmap, sys, time
+with open(sys.argv[1], "rb") as file:
+    library = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    print("up", flush=True)
+    time.sleep(60)
+"""
+
+
+def test_a_process_with_another_middleware_is_named(domain: Any) -> None:
+    """ROS's wheels bring one middleware, and a node that asks for another ends: what has rcl mapped stands for it."""
+    rcl = next(
+        path for folder in os.environ["LD_LIBRARY_PATH"].split(":") if (path := Path(folder, "librcl.so")).exists()
+    )
+    environment = {**domain.environment, "RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}
+    command = [sys.executable, "-c", OTHER_RMW, str(rcl)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        try:
+            assert process.stdout
+            assert process.stdout.readline() == "up\n"
+            _, found = doctor(seconds=1.0)
+        finally:
+            process.kill()
+    text = said(found, "TF908")
+    assert "RMW_IMPLEMENTATION=rmw_cyclonedds_cpp, and here it is rmw_fastrtps_cpp" in text
+    assert f"pid {process.pid}: " in text
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("RMW_IMPLEMENTATION", "rmw_none_cpp", "RMW_IMPLEMENTATION=rmw_none_cpp, and this ROS has no such middleware"),
+        ("ROS_DOMAIN_ID", "300", "ROS_DOMAIN_ID=300 is no domain: they go from 0 to 232"),
+        ("ROS_DOMAIN_ID", "lab", "ROS_DOMAIN_ID=lab is no domain: they go from 0 to 232"),
+    ],
+)
+@pytest.mark.usefixtures("domain")
+def test_settings_with_which_ros_does_not_start_are_said_by_every_command_that_looks(
+    monkeypatch: pytest.MonkeyPatch, name: str, value: str, said: str
+) -> None:
+    """ROS itself ends the process, with exit code 102, or with Fast DDS's own words."""
+    monkeypatch.setenv(name, value)
+    for words in (["doctor"], ["monitor", "--for", "1"], ["echo", "a", "b", "--once"], ["tree", "--live"]):
+        command = [sys.executable, "-m", "tfcompose", *words]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=40, check=False)
+        output = done.stdout + done.stderr
+        assert (done.returncode, output.splitlines()[0]) == (1, f"error[TF909] {said}")
+        assert len(output.splitlines()) == 2

@@ -72,8 +72,9 @@ ROS_AUTOMATIC_DISCOVERY_RANGE, or a network that does not pass multicast.""",
 Processes hear each other with the same ROS_DOMAIN_ID, where neither has ROS_AUTOMATIC_DISCOVERY_RANGE=OFF, and surely
 only with the same RMW_IMPLEMENTATION. What a process was started with is read from /proc, for one's own processes; of
 other machines, and of containers, it cannot be seen.""",
-    "TF909": """Variables that set up ROS contradict each other, or leave nobody to be heard.
+    "TF909": """Variables that set up ROS contradict each other, leave nobody to be heard, or say what cannot be.
 
-ROS_LOCALHOST_ONLY=1 overrides ROS_AUTOMATIC_DISCOVERY_RANGE and is out of use since Iron; OFF discovers nobody, not
-even on the same machine.""",
+A domain is a whole number from 0 to 232. RMW_IMPLEMENTATION names a middleware that has to be installed: ROS ends a
+process that asks for another. ROS_LOCALHOST_ONLY=1 overrides ROS_AUTOMATIC_DISCOVERY_RANGE and is out of use since
+Iron; OFF discovers nobody, not even on the same machine.""",
 }

@@ -15,11 +15,13 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tfcompose.cli.looking import ended_early
 from tfcompose.cli.options import add_variant, positive
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings
 from tfcompose.diagnostic import finding
 from tfcompose.plan import RosSettings
 from tfcompose.ros.environment import RosError, child_environment, missing_ros
+from tfcompose.ros.settings import ros_trouble
 from tfcompose.ros.stop import Stop
 from tfcompose.ros.topics import parts_of
 
@@ -28,9 +30,6 @@ if TYPE_CHECKING:
 
     from tfcompose.diagnostic import Diagnostic
     from tfcompose.plan import Plan
-
-#: Publishers that were there before are found within this time, or almost always.
-SURE_S = 2.0
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -54,18 +53,20 @@ def run(arguments: Namespace) -> int:
         return plan
     gc.enable()  # it may be asked to look for hours
     os.environ.update(child_environment(os.environ, plan.ros if plan else RosSettings(), own=True))
+    trouble = ros_trouble(os.environ)
+    if trouble:
+        return _say([trouble], arguments, "")
     with Stop() as stop:
         module = import_module("tfcompose.observe.doctor")
         try:
             found = module.examine(_expected(plan, arguments.namespace), arguments.duration, stop)
         except RosError as error:
             return _say([finding("TF901", str(error), None)], arguments, "")
+        code = ended_early(found.seconds, arguments.duration, heard=bool(found.edges)) if stop.requested else None
+    if code is not None:
+        return code
     seen = f"{_counted(found.edges, 'edge')} from {_counted(found.nodes, 'node')}"
-    looked = f"looked for {found.seconds:.1f} s at {seen}"
-    code = _say(found.findings, arguments, looked)
-    if found.seconds < min(SURE_S, arguments.duration):
-        complain(f"looked for {found.seconds:.1f} s only, in which not every publisher is found")
-    return code
+    return _say(found.findings, arguments, f"looked for {found.seconds:.1f} s at {seen}")
 
 
 def _say(found: list[Diagnostic], arguments: Namespace, looked: str) -> int:

@@ -7,7 +7,6 @@ radians and degrees. Where there is none it says why, with exit code 1. Without 
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 import time
@@ -15,15 +14,14 @@ from argparse import ArgumentTypeError
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.looking import add_bag, add_namespace, reading
+from tfcompose.cli.looking import INTERRUPTED, add_bag, add_namespace, reading, ready_for_ros
 from tfcompose.cli.options import positive
-from tfcompose.cli.terminal import print_findings
+from tfcompose.cli.terminal import complain, print_findings
 from tfcompose.diagnostic import finding
 from tfcompose.emit.numbers import clean
 from tfcompose.observe.asked import Asked
-from tfcompose.plan import RosSettings
 from tfcompose.render.pose import pose_json, pose_text
-from tfcompose.ros.environment import RosError, child_environment, missing_ros
+from tfcompose.ros.environment import RosError
 from tfcompose.ros.stop import Stop
 
 if TYPE_CHECKING:
@@ -86,18 +84,25 @@ def run(arguments: Namespace) -> int:
 
 
 def _live(asked: Asked, say: Callable[[Pose, int | None], None]) -> Missed | int | None:
-    missing = missing_ros()
-    if missing:
-        print_findings([finding("TF901", missing, None)], sys.stderr)
+    if not ready_for_ros():
         return 1
-    os.environ.update(child_environment(os.environ, RosSettings(), own=True))
+    begun = time.monotonic()
+    said: list[int | None] = []
+
+    def note(pose: Pose, stamp_ns: int | None) -> None:
+        said[:] = [stamp_ns]
+        say(pose, stamp_ns)
+
     with Stop() as stop:
         module = import_module("tfcompose.observe.echo")
         try:
-            missed: Missed | None = module.echo(asked, say, stop)
+            missed: Missed | None = module.echo(asked, note, stop)
         except RosError as error:
             print_findings([finding("TF901", str(error), None)], sys.stderr)
             return 1
+        if stop.requested and not said and missed is None:
+            complain(f"ended by a signal after {time.monotonic() - begun:.1f} s, before there was a pose")
+            return INTERRUPTED
     return missed
 
 

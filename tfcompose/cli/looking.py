@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from importlib import import_module
 from typing import TYPE_CHECKING, TypeVar
 
 from tfcompose.cli.options import positive
-from tfcompose.cli.terminal import UNREADABLE, print_findings
+from tfcompose.cli.terminal import UNREADABLE, complain, print_findings
 from tfcompose.diagnostic import finding
 from tfcompose.plan import RosSettings
-from tfcompose.ros.environment import RosError, child_environment, missing_ros
+from tfcompose.ros.environment import RosError, child_environment
+from tfcompose.ros.settings import ros_trouble
 from tfcompose.ros.stop import Stop
 
 if TYPE_CHECKING:
@@ -23,6 +25,11 @@ if TYPE_CHECKING:
     Topics = tuple[str, str]
 
 T = TypeVar("T")
+
+#: Publishers that were there before are found within this time, or almost always.
+SURE_S = 2.0
+#: The exit code of what a signal ended, as a shell has it for Ctrl-C.
+INTERRUPTED = 130
 
 
 def add_namespace(parser: ArgumentParser) -> None:
@@ -77,18 +84,43 @@ def from_live(  # noqa: PLR0913 (all but two are named)
 
     Return None, or the exit code after saying why not. ``show`` is called as by ``watch``.
     """
-    missing = missing_ros()
-    if missing:
-        print_findings([finding("TF901", missing, None)], sys.stderr)
+    if not ready_for_ros(ros):
         return 1
-    os.environ.update(child_environment(os.environ, ros or RosSettings(), own=True))
     with Stop() as stop:
         watch = import_module("tfcompose.observe.watching").watch
+        begun = time.monotonic()
         try:
             watch(name, censuses, stop, duration_s=duration_s, every_s=every_s, show=show)
         except RosError as error:
             print_findings([finding("TF901", str(error), None)], sys.stderr)
             return 1
+        if stop.requested:
+            heard = any(census.messages for census in censuses.values())
+            return ended_early(time.monotonic() - begun, duration_s, heard=heard)
+    return None
+
+
+def ready_for_ros(ros: RosSettings | None = None) -> bool:
+    """Set this process up as the plan says, and return whether ROS can be started so, after saying why not."""
+    os.environ.update(child_environment(os.environ, ros or RosSettings(), own=True))
+    trouble = ros_trouble(os.environ)
+    if trouble:
+        print_findings([trouble], sys.stderr)
+    return trouble is None
+
+
+def ended_early(seconds: float, duration_s: float | None, *, heard: bool) -> int | None:
+    """Say that a signal ended a look before all publishers can be found, and return the exit code if it saw nothing.
+
+    ``duration_s`` is how long it was to last, None: until the signal.
+    """
+    if seconds >= min(SURE_S, duration_s or SURE_S):
+        return None
+    if not heard:
+        complain(f"ended by a signal after {seconds:.1f} s, before anything came")
+        return INTERRUPTED
+    if duration_s is not None:
+        complain(f"looked for {seconds:.1f} s only, in which not every publisher is found")
     return None
 
 

@@ -16,6 +16,7 @@ from tfcompose.cli.terminal import UNREADABLE, coloured, complain, print_finding
 from tfcompose.cli.up import PLAN, as_asked, plan_in
 from tfcompose.diagnostic import finding
 from tfcompose.ros.environment import child_environment, missing_ros
+from tfcompose.ros.settings import ros_trouble
 from tfcompose.run.launcher.control import listen
 from tfcompose.run.launcher.logs import Logs
 from tfcompose.run.launcher.outlet import Outlet
@@ -50,7 +51,8 @@ def start(arguments: Namespace) -> int:
     if plan.guard.mode == "off" and arguments.settle is not None:
         complain("the guard is off, so nobody looks before the start: leave out --settle")
         return UNREADABLE
-    found = commands_of(plan, started_by_us(plan), file, os.environ, child_environment)[1]
+    trouble = ros_trouble(child_environment(os.environ, plan.ros, own=True))
+    found = [trouble] if trouble else commands_of(plan, started_by_us(plan), file, os.environ, child_environment)[1]
     if found:
         print_findings([_with_profile(one, arguments) for one in found], sys.stderr)
         return 1

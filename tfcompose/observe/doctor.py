@@ -14,8 +14,9 @@ from tfcompose.observe.seen import GLOBAL, RosProcess, Seen, Topic
 from tfcompose.observe.sideline import Sideline
 from tfcompose.ros.clock import wall_ns
 from tfcompose.ros.graph import ends, nodes, topics
-from tfcompose.ros.node import open_node
+from tfcompose.ros.node import middleware, open_node
 from tfcompose.ros.processes import ros_processes, settings_in
+from tfcompose.ros.settings import RMW
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -154,5 +155,6 @@ def _beside(ear: _Ear, graph: dict[str, Topic]) -> tuple[str, ...]:
 
 
 def own_settings() -> dict[str, str]:
-    """Return ROS's variables in this process's environment."""
-    return settings_in(b"\0".join(f"{name}={value}".encode() for name, value in os.environ.items()))
+    """Return ROS's variables in this process's environment, and the middleware that it uses, set or not."""
+    own = settings_in(b"\0".join(f"{name}={value}".encode() for name, value in os.environ.items()))
+    return {**own, RMW: middleware()}

@@ -13,6 +13,7 @@ from rclpy.exceptions import InvalidParameterTypeException, NameValidationExcept
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.utilities import get_rmw_implementation_identifier
 from std_msgs.msg import String
 
 from tfcompose.ros.environment import RosError
@@ -106,6 +107,12 @@ def _node(context: Context, name: str, namespace: str) -> Any:
         start_parameter_services=False,
         parameter_overrides=[parameter("start_type_description_service", value=False)],
     )
+
+
+def middleware() -> str:
+    """Return the name of the middleware (rmw) that this process uses."""
+    name: str = get_rmw_implementation_identifier()
+    return name
 
 
 def latch(node: Node, topic: str, text: str) -> Any:

@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING
 from tfcompose.diagnostic import Diagnostic, Note, finding
 from tfcompose.observe.diagnose.senders import TF_TYPE
 from tfcompose.observe.seen import counted, listed
+from tfcompose.ros.settings import DOMAIN, RMW
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from tfcompose.observe.seen import RosProcess, Seen
 
-DOMAIN, RANGE, LOCALHOST_ONLY, RMW = (
-    "ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY", "RMW_IMPLEMENTATION",
-)  # fmt: skip
+RANGE, LOCALHOST_ONLY = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY"
 #: What decides who hears whom, with what holds where it is not set.
 DEFAULTS = {DOMAIN: "0", RANGE: "SUBNET", LOCALHOST_ONLY: "0", RMW: ""}
 VARIABLES = (*DEFAULTS, "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER")

@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 from tfcompose.load import composed, load
 from tfcompose.pose import angle_between
 from tfcompose.validate import Validated, validate
-from tfcompose.validate.expression import ExpressionError, evaluate
+from tfcompose.validate.arithmetic import ExpressionError
+from tfcompose.validate.expression import evaluate
 from tfcompose.validate.quantity import LENGTH, NUMBER, TURN_RATE, Quantity, UnitError, quantity
 
 HEAD = "tfcompose: 1\nrobot: r\n"

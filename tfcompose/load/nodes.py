@@ -15,6 +15,7 @@ import yaml
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, finding
 from tfcompose.frozen import dataclass
+from tfcompose.load.not_yaml import no_character, no_syntax
 from tfcompose.load.places import Place
 from tfcompose.load.scalars import MAP, SCALAR_TAGS, SEQ, STR, TAG, plain, scalar
 
@@ -95,9 +96,9 @@ class Reader:
                 elif isinstance(event, yaml.DocumentStartEvent):
                     self._begin(event, single=single)
         except yaml.MarkedYAMLError as error:
-            raise RejectedError([_syntax(error, text, self.file)]) from None
+            raise RejectedError([no_syntax(error, text, self.file)]) from None
         except yaml.reader.ReaderError as error:
-            raise RejectedError([_no_character(error, text, self.file)]) from None
+            raise RejectedError([no_character(error, text, self.file)]) from None
         except UnicodeEncodeError as error:
             message = f"the text is not Unicode: {error.reason}"
             raise RejectedError([finding("TF001", message, Span(self.file))]) from None
@@ -257,25 +258,3 @@ class Reader:
             top.merges.append((value, place))
         else:
             top.data[top.key], top.inside[top.key] = value, place
-
-
-def _no_character(error: yaml.reader.ReaderError, text: str, file: str) -> Diagnostic:
-    hit = yaml.reader.Reader.NON_PRINTABLE.search(text)  # the C parser's position counts bytes
-    position = hit.start() if hit else error.position
-    line, column = text.count("\n", 0, position) + 1, position - text.rfind("\n", 0, position)
-    return finding("TF002", "a character that YAML does not allow", Span(file, line, column, line, column + 1))
-
-
-def _syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Diagnostic:
-    mark = error.problem_mark or error.context_mark
-    line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
-    message, advice = ", ".join(filter(None, (error.context, error.problem))), ""
-    lines = text.splitlines()
-    written = lines[line - 1] if line <= len(lines) else ""
-    if "\t" in written[: len(written) - len(written.lstrip())]:
-        message, advice = "a tab in the indentation", "indent with spaces; YAML does not allow tabs there"
-    notes = []
-    if error.context_mark and mark and error.context_mark.line != mark.line:
-        at = error.context_mark
-        notes = [Note("it began here", Span(file, at.line + 1, at.column + 1, at.line + 1, at.column + 2))]
-    return finding("TF002", message, Span(file, line, column, line, column + 1), help=advice, notes=notes)

@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, did_you_mean, finding
+from tfcompose.load.choices import choices_at
 from tfcompose.load.places import Path, Place
 from tfcompose.load.source import Source
 
@@ -18,47 +19,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tfcompose.diagnostic import Span
-
-ROTATIONS = frozenset({"rpy", "quat_xyzw", "axis_angle", "matrix", "look"})
-RUNNING = frozenset({"run", "simulate", "external"})
-COMMANDS = (
-    *(frozenset({"argv", key}) for key in ("package", "executable", "args", "launch")),
-    *(frozenset({"launch", key}) for key in ("package", "executable")),
-)
-READY = frozenset({"edges", "topic", "service", "lifecycle", "log", "exit", "time"})
-SHAPES = frozenset({"box", "cylinder", "sphere", "capsule", "mesh"})
-MASSES = frozenset({"mass", "density"})
-SIMULATIONS = frozenset({"circle", "fixed", "joints"})
-
-PARTS = frozenset({"spec", "urdf", "xacro"})
-
-_POSES: tuple[tuple[str, ...], ...] = (
-    ("frames", "*"),
-    ("links", "*"),
-    ("links", "*", "visual"),
-    ("links", "*", "collision"),
-    ("links", "*", "inertial"),
-    ("joints", "*"),
-    ("sensors", "*"),
-    ("parts", "*"),
-    ("sensors", "*", "frames", "*"),
-    ("processes", "*", "simulate", "fixed"),
-)
-_PROCESSES: tuple[tuple[str, ...], ...] = (("processes", "*"), ("sensors", "*", "driver"))
-
-#: Where a mapping stands (``*`` is any name), and the keys of which it can hold one.
-CHOICES: tuple[tuple[tuple[str, ...], frozenset[str]], ...] = (
-    *((place, ROTATIONS) for place in _POSES),
-    *(((*place, "run"), choice) for place in _PROCESSES for choice in COMMANDS),
-    *((place, RUNNING) for place in _PROCESSES),
-    *(((*place, "ready"), READY) for place in _PROCESSES),
-    *((("processes", "*"), frozenset({"nodes", key})) for key in ("node", "lifecycle")),
-    (("processes", "*", "simulate"), SIMULATIONS),
-    (("links", "*", "visual"), SHAPES),
-    (("links", "*", "collision"), SHAPES),
-    (("links", "*", "inertial"), MASSES),
-    (("parts", "*"), PARTS),
-)
 
 
 def composed(source: Source, profiles: Sequence[str] = (), overlays: Sequence[Source] = ()) -> Source:
@@ -125,7 +85,7 @@ class _Merger:
     def merge(self, base: Part, overlay: Part, path: Path) -> Part:
         """Return ``base`` with ``overlay`` laid over it."""
         data, inside, keys = dict(base[0]), dict(base[1].inside), dict(base[1].keys)
-        for choice in _choices_at(path, overlay[0]):
+        for choice in choices_at(path, overlay[0]):
             for dropped in choice & (data.keys() - overlay[0].keys()):
                 new = next(key for key in overlay[0] if key in choice and overlay[0][key] is not None)
                 self.remember((*path, new), inside[dropped])
@@ -182,16 +142,6 @@ def _is_for_later(path: Path) -> bool:
 def _drop(key: str, *tables: dict[Any, Any]) -> None:
     for table in tables:
         table.pop(key, None)
-
-
-def _choices_at(path: Path, data: dict[str, Any]) -> list[frozenset[str]]:
-    return [
-        keys
-        for pattern, keys in CHOICES
-        if len(pattern) == len(path)
-        and all(want in {"*", step} for want, step in zip(pattern, path, strict=True))
-        and any(data.get(key) is not None for key in keys)
-    ]
 
 
 def _shown(value: Any) -> str:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, did_you_mean, finding, nearest
 from tfcompose.frozen import dataclass
-from tfcompose.load.overlay import ROTATIONS
+from tfcompose.load.choices import ROTATIONS
 from tfcompose.model import Calibration
 from tfcompose.resolve.beside import beside
 from tfcompose.validate.calibration import CalibrationLimit, CalibrationSpec

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, RejectedError, Span, did_you_mean, finding
 from tfcompose.frozen import dataclass
-from tfcompose.model import BUILT_IN, AsInFile, Claim, Edge, Node, Process
+from tfcompose.model import BUILT_IN, Claim, Edge, Node, Process
 from tfcompose.plan import switch_text
 from tfcompose.resolve.node_presets import node_preset, node_preset_names
 from tfcompose.resolve.roles import Roles
+from tfcompose.resolve.told import Told, flat
 
 if TYPE_CHECKING:
     from tfcompose.load import Path, Source
@@ -29,53 +30,6 @@ def settled(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[
     processes = tuple(work.process(process) for process in robot.processes)
     edges = tuple(work.edge(edge) for edge in robot.edges)
     return replace(robot, processes=processes, edges=edges, claims=(*robot.claims, *work.claims)), work.found
-
-
-def flat(params: dict[str, Any], above: str = "") -> dict[str, Any]:
-    """Return nested parameters by their full names, with dots."""
-    found: dict[str, Any] = {}
-    for key, value in params.items():
-        found |= flat(value, f"{above}{key}.") if isinstance(value, dict) else {f"{above}{key}": _meant(value)}
-    return found
-
-
-def _meant(value: Any) -> Any:
-    """Return a word of a parameter file as ROS reads it, as far as switches and names need it: true, false, or text."""
-    if not isinstance(value, AsInFile):
-        return value
-    return {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}.get(
-        value.lower(), str(value)
-    )
-
-
-@dataclass(slots=True)
-class _Told:
-    """One node: what is known of it, what the user told it, and what tfcompose tells it."""
-
-    process: Process
-    node: Node
-    claims: tuple[ClaimSpec, ...]
-    preset: NodePresetSpec | None
-    roles: Roles
-    given: dict[str, Any]
-    computed: dict[str, Any] = field(default_factory=dict)
-
-    def ends(self, claim: ClaimSpec) -> tuple[str, str]:
-        return self.roles.fill(claim.parent), self.roles.fill(claim.child)
-
-    def has(self, params: dict[str, Any]) -> bool:
-        """Return whether the user gave exactly these parameters."""
-        return bool(params) and all(self.given.get(key) == value for key, value in params.items())
-
-    def is_published(self, claim: ClaimSpec) -> bool:
-        """Return whether the node publishes the edge as the user has set it."""
-        return (claim.by_default or self.has(claim.on)) and not self.has(claim.off)
-
-    @property
-    def can_be_told(self) -> bool:
-        """Return whether parameters that tfcompose writes reach the node."""
-        process = self.process
-        return process.kind == "run" and (process.package is not None or "${params_file}" in " ".join(process.argv))
 
 
 @dataclass(slots=True)
@@ -123,7 +77,7 @@ class _Work:
             self.found.append(finding("TF332", message, at, help=advice, severity="warning"))
         return edge
 
-    def _node(self, process: Process, node: Node) -> _Told | None:
+    def _node(self, process: Process, node: Node) -> Told | None:
         """Return what is known of a node and what it is told, or None where nothing is said."""
         said = self.spec.processes[process.name]
         inner = said.nodes.get(str(node.path[-1])) if len(node.path) > 2 else None  # noqa: PLR2004 (below nodes)
@@ -134,7 +88,7 @@ class _Work:
             return None
         claims = (*(preset.publishes if preset else ()), *by_hand)
         roles = Roles(self.robot, process.name, preset, claims)
-        told = _Told(process, node, claims, preset, roles, flat(node.params))
+        told = Told(process, node, claims, preset, roles, flat(node.params))
         self._tell_names(told)
         for claim in self._of_one(told) if preset and preset.one_of else claims:
             self._settle(told, claim)
@@ -151,7 +105,7 @@ class _Work:
             self.found += error.diagnostics
         return None
 
-    def _of_one(self, told: _Told) -> tuple[ClaimSpec, ...]:
+    def _of_one(self, told: Told) -> tuple[ClaimSpec, ...]:
         """Return the claim that a node makes which makes one out of several: its own, or the one that is chosen."""
         for claim in told.claims:
             if self._is_own(told, claim):
@@ -161,7 +115,7 @@ class _Work:
                 return (claim,)
         return told.claims[:1]
 
-    def _tell_names(self, told: _Told) -> None:
+    def _tell_names(self, told: Told) -> None:
         """Write the parameters that hold frames' names, and those without which they would mean something else."""
         preset = told.preset
         if preset is None:
@@ -180,7 +134,7 @@ class _Work:
     def _is_frame(self, name: Any) -> bool:
         return any(name == self.robot.final(frame) for frame in self.robot.frames)
 
-    def _tell(self, told: _Told, key: str, value: Any) -> None:
+    def _tell(self, told: Told, key: str, value: Any) -> None:
         given = told.given.get(key)
         if given is None:
             told.computed[key] = value
@@ -188,7 +142,7 @@ class _Work:
             message = f"{key} of {told.process.name} is {given!r}, and by the tree it is {value!r}"
             self.found.append(finding("TF333", message, self._at(told, key), help="remove it: tfcompose writes it"))
 
-    def _is_own(self, told: _Told, claim: ClaimSpec) -> bool:
+    def _is_own(self, told: Told, claim: ClaimSpec) -> bool:
         edge = self._edge(*told.ends(claim))
         return edge is not None and edge.owner == told.process.name
 
@@ -196,7 +150,7 @@ class _Work:
         edges = (edge for edge in self.robot.edges if edge.child == child)
         return next((edge for edge in edges if parent in {edge.parent, *edge.switched}), None)
 
-    def _settle(self, told: _Told, claim: ClaimSpec) -> None:
+    def _settle(self, told: Told, claim: ClaimSpec) -> None:
         parent, child = told.ends(claim)
         if "*" in parent + child:
             self._settle_pattern(told, claim, parent, child)
@@ -215,7 +169,7 @@ class _Work:
         else:
             self._foreign(told, claim, f"{parent} → {child}", other)
 
-    def _own(self, told: _Told, claim: ClaimSpec, edge: Edge) -> None:
+    def _own(self, told: Told, claim: ClaimSpec, edge: Edge) -> None:
         self.publishers[told.process.name, edge.child] = told.node.name
         for key, value in claim.chosen_by.items():
             self._tell(told, key, told.roles.final(value))
@@ -226,7 +180,7 @@ class _Work:
             place = self._at(told, next(iter(claim.off)))
             self.found.append(finding("TF333", message, place, help="remove it, or name another owner"))
 
-    def _foreign(self, told: _Told, claim: ClaimSpec, name: str, other: Edge) -> None:
+    def _foreign(self, told: Told, claim: ClaimSpec, name: str, other: Edge) -> None:
         """Write the switch, or say that it cannot be written."""
         against = next((key for key, off in claim.off.items() if told.given.get(key, off) != off), None)
         if against is not None and told.can_be_told and not told.has(claim.on):
@@ -246,7 +200,7 @@ class _Work:
             message = f"{told.process.name} publishes {name} by default, and {owner}"
         self.found.append(finding("TF330", message, told.node.at, help=self._way_out(told, claim, needed=needed)))
 
-    def _way_out(self, told: _Told, claim: ClaimSpec, *, needed: bool) -> str:
+    def _way_out(self, told: Told, claim: ClaimSpec, *, needed: bool) -> str:
         hint = f"; {told.preset.hint}" if told.preset and told.preset.hint else ""
         if not claim.off:
             return f"it has no switch: name {told.process.name} as the owner{hint}"
@@ -254,7 +208,7 @@ class _Work:
             return f"its switch, {switch_text(claim.off)}, stops its own edge too: name it as the owner of both{hint}"
         return f"set {switch_text(claim.off)} where {told.process.name} is started, or name it as the owner{hint}"
 
-    def _undeclared(self, told: _Told, claim: ClaimSpec, parent: str, child: str) -> None:
+    def _undeclared(self, told: Told, claim: ClaimSpec, parent: str, child: str) -> None:
         static = ", static: true" if claim.static else ""
         advice = f"frames: {{{child}: {{parent: {parent}, owner: {told.process.name}{static}}}}}"
         if claim.off:
@@ -262,7 +216,7 @@ class _Work:
         message = f"{told.process.name} publishes {parent} → {child} by default, which nobody declared"
         self.found.append(finding("TF331", message, told.node.at, help=advice, severity="warning"))
 
-    def _settle_pattern(self, told: _Told, claim: ClaimSpec, parent: str, child: str) -> None:
+    def _settle_pattern(self, told: Told, claim: ClaimSpec, parent: str, child: str) -> None:
         self.claims.append(Claim(told.node.name, parent, child, claim.off))
         guard = self.robot.guard
         owns = any(edge.owner == told.process.name for edge in self.robot.edges)
@@ -273,5 +227,5 @@ class _Work:
         advice = f'guard: {{allow: [{{child: "{child}"}}]}}'
         self.found.append(finding("TF331", message, told.node.at, help=advice, severity="warning"))
 
-    def _at(self, told: _Told, key: str) -> Span:
+    def _at(self, told: Told, key: str) -> Span:
         return self.source.at((*told.node.path, "params", *key.split(".")))

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 from tfcompose.diagnostic import Diagnostic, Note, did_you_mean, finding
-from tfcompose.load.overlay import SIMULATIONS
+from tfcompose.load.choices import SIMULATIONS
 from tfcompose.model import BUILT_IN, JOINTS, STATIC, Node, Process
 from tfcompose.plan import Simulation
 from tfcompose.resolve.built_in import built_in_keys
@@ -16,7 +16,8 @@ from tfcompose.resolve.running import how, program
 
 if TYPE_CHECKING:
     from tfcompose.load import Path, Source
-    from tfcompose.validate.process import ProcessSpec, Run, Simulate, Started
+    from tfcompose.validate.process import ProcessSpec, Started
+    from tfcompose.validate.running import Run, Simulate
     from tfcompose.validate.spec import RobotSpec
 
 

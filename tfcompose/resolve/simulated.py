@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
 from tfcompose.plan import Sweep
-from tfcompose.validate.process import SWEEP
+from tfcompose.validate.running import SWEEP
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -6,23 +6,18 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.validate.claims import ClaimSpec
-from tfcompose.validate.expression import inserted
 from tfcompose.validate.fields import (
     ANYTHING,
     BOOLEAN,
     DURATION,
     ONLY_TRUE,
-    POSITION,
     RATE_,
-    SIZE,
     TEXT,
-    TURN_RATE_,
     choice,
     integer,
     text,
 )
-from tfcompose.validate.posed import Posed
-from tfcompose.validate.quantity import Quantity
+from tfcompose.validate.running import LIST, WORD, Run, Simulate
 from tfcompose.validate.schema import BROKEN, Model, Problems, Type, key, listing, mapping, record, shown, then
 
 if TYPE_CHECKING:
@@ -32,93 +27,6 @@ if TYPE_CHECKING:
 
 _NODE = r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*"
 _NODE_MEANS = "a node's name: letters, digits and _"
-_LIST = {"type": "array", "items": {"type": "string"}}
-
-
-def _word(value: Any, path: Path, problems: Problems) -> Any:
-    return TEXT.read(inserted(value) if isinstance(value, Quantity) else value, path, problems)
-
-
-#: A text; a computed number is written as one.
-WORD = Type(_word, TEXT.schema)
-
-
-def _arguments(value: Any, path: Path, problems: Problems) -> Any:
-    """Read a command's arguments: words, or names with values, as launch files take them."""
-    if not isinstance(value, dict):
-        return listing(WORD).read(value, path, problems)
-    words = [_argument(name, item, (*path, name), problems) for name, item in value.items()]
-    return BROKEN if BROKEN in words else tuple(words)
-
-
-def _argument(name: str, value: Any, path: Path, problems: Problems) -> Any:
-    if value is BROKEN or isinstance(value, (dict, list)):
-        return value if value is BROKEN else problems.refuse("TF103", path, f"{shown(value)} is no text or number")
-    if isinstance(value, Quantity):
-        value = int(value.value) if value.value == int(value.value) else value.value
-    return f"{name}:={value if isinstance(value, str) else shown(value)}"
-
-
-ARGUMENTS = Type(_arguments, {"anyOf": [_LIST, {"type": "object"}]})
-
-
-class Run(Model):
-    """An installed executable, a launch file, or a command, word by word; no shell reads it."""
-
-    package: str | None = key(TEXT, None, examples=("slam_toolbox",))
-    executable: str | None = key(TEXT, None, examples=("async_slam_toolbox_node",))
-    launch: str | None = key(
-        text(r"[^/]+/[^/]+(/[^/]+)*", "package/file.launch.py"),
-        None,
-        "a package's launch file, run as one process",
-        ("nav2_bringup/navigation_launch.py",),
-    )
-    args: tuple[str, ...] = key(
-        ARGUMENTS, (), "words; for a launch file name: value", (["--verbose"], {"use_composition": False})
-    )
-    argv: tuple[str, ...] = key(listing(WORD), (), "the whole command instead of package and executable")
-
-
-class Circle(Model):
-    """A body that drives on a circle, counter-clockwise."""
-
-    radius: float = key(SIZE, 1.0)
-    speed: float = key(TURN_RATE_, 0.5)
-
-
-SWEEP = "sweep"
-
-
-def _positions() -> Type:
-    """Return the type of ``zero``, ``sweep``, or joints with a position or ``sweep``."""
-    words = choice("zero", SWEEP)
-    word = choice(SWEEP)
-    one = Type(
-        lambda value, path, problems: (word if isinstance(value, str) and value.isalpha() else POSITION).read(
-            value, path, problems
-        ),
-        {"anyOf": [word, POSITION]},
-    )
-    several = mapping(one)
-
-    def read(value: Any, path: Path, problems: Problems) -> Any:
-        if not isinstance(value, str):
-            return several.read(value, path, problems)
-        said = words.read(value, path, problems)
-        return {} if said == "zero" else said
-
-    return Type(read, {"anyOf": [words, several]})
-
-
-class Simulate(Model):
-    """A stand-in for the owner: one of circle, fixed and joints."""
-
-    circle: Circle | None = key(record(Circle), None, "drives its edge on a circle")
-    fixed: Posed | None = key(record(Posed), None, "sends one pose again and again")
-    joints: dict[str, float | str] | str | None = key(
-        _positions(), None, "zero, sweep, or joints with a position or sweep; the others are at 0"
-    )
-    rate: float = key(RATE_, 20.0)
 
 
 def _environment(value: Any, path: Path, problems: Problems) -> Any:
@@ -174,6 +82,9 @@ LIFECYCLE = choice("inactive", "active")
 
 
 PUBLISHES = listing(record(ClaimSpec))
+_PARAMS_ABOUT = (
+    "the node's parameters, passed on as they are; file: names parameter files, over which the others are laid"
+)
 _PUBLISHES_ABOUT = "edges that the node publishes by default, and what stops it; a preset knows them"
 
 
@@ -182,11 +93,7 @@ class NodeSpec(Model):
 
     preset: str | None = key(TEXT, None, "what is known of this node: its edges and parameters", ("slam_toolbox",))
     publishes: tuple[ClaimSpec, ...] = key(PUBLISHES, (), _PUBLISHES_ABOUT)
-    params: dict[str, Any] = key(
-        mapping(ANYTHING),
-        {},
-        "the node's parameters, passed on as they are; file: names parameter files, over which the others are laid",
-    )
+    params: dict[str, Any] = key(mapping(ANYTHING), {}, _PARAMS_ABOUT)
     lifecycle: str | None = key(LIFECYCLE, None, "a lifecycle node is brought into this state after the start")
 
 
@@ -214,7 +121,7 @@ class Started(Model):
         record(
             Run,
             lambda value: {"argv": value} if isinstance(value, list) else value,
-            {"anyOf": [_LIST | {"minItems": 1}, {"type": "string", "description": "with shell: true"}]},
+            {"anyOf": [LIST | {"minItems": 1}, {"type": "string", "description": "with shell: true"}]},
         ),
         None,
         "{package, executable, args}, {launch, args}, or a command as a list",
@@ -229,11 +136,7 @@ class Started(Model):
         ("slam_toolbox", {"preset": "slam_toolbox"}),
     )
     publishes: tuple[ClaimSpec, ...] = key(PUBLISHES, (), _PUBLISHES_ABOUT)
-    params: dict[str, Any] = key(
-        mapping(ANYTHING),
-        {},
-        "the node's parameters, passed on as they are; file: names parameter files, over which the others are laid",
-    )
+    params: dict[str, Any] = key(mapping(ANYTHING), {}, _PARAMS_ABOUT)
     lifecycle: str | None = key(LIFECYCLE, None, "the lifecycle node is brought into this state after the start")
     log_level: str | None = key(choice("debug", "info", "warn", "error", "fatal"), None, "of its nodes' loggers")
     remap: dict[str, str] = key(mapping(TEXT), {}, "topic names: from, to")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Edit, Note, RejectedError, finding
 from tfcompose.frozen import dataclass
-from tfcompose.load.overlay import CHOICES
+from tfcompose.load.choices import CHOICES
 from tfcompose.validate.claims import NodePresetSpec
 from tfcompose.validate.preset import PresetSpec
 from tfcompose.validate.preset_names import check_names

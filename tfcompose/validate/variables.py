@@ -6,7 +6,8 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import did_you_mean
-from tfcompose.validate.expression import IDENTIFIER, RESERVED, ExpressionError, Value, fill, names_in
+from tfcompose.validate.arithmetic import ExpressionError, Value
+from tfcompose.validate.expression import IDENTIFIER, RESERVED, fill, names_in
 from tfcompose.validate.quantity import NUMBER, Quantity, UnitError, quantity
 from tfcompose.validate.schema import BROKEN, Problems, shown
 

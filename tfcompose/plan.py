@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import field
 from fnmatch import fnmatchcase
 from typing import Any, Literal
 
-from tfcompose.frozen import dataclass
+from tfcompose.frozen import dataclass, field
 from tfcompose.pose import Pose
 
 VERSION = 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.check.rules.tf201_two_parents import two_parents
@@ -67,7 +66,7 @@ from tfcompose.check.rules.tf815_process_without_role import process_without_rol
 from tfcompose.check.rules.tf818_required_without_role import required_without_role
 from tfcompose.check.rules.tf847_needed_but_optional import needed_but_optional
 from tfcompose.diagnostic import Diagnostic, Severity, Span, finding
-from tfcompose.frozen import dataclass
+from tfcompose.frozen import dataclass, replace
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

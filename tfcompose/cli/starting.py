@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from contextlib import ExitStack
-from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +14,7 @@ from tfcompose.cli.status import Status, columns_of
 from tfcompose.cli.terminal import UNREADABLE, coloured, complain, print_findings
 from tfcompose.cli.up import PLAN, as_asked, plan_in
 from tfcompose.diagnostic import finding
+from tfcompose.frozen import replace
 from tfcompose.ros.environment import child_environment, missing_ros
 from tfcompose.ros.settings import ros_trouble
 from tfcompose.run.launcher.control import listen

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import os
 import sys
-from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import DEFAULT_FILE, add_variant, not_negative, positive
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings, read_text, unreadable
 from tfcompose.diagnostic import RejectedError
+from tfcompose.frozen import replace
 from tfcompose.plan import Plan
 from tfcompose.planfile import read_plan
 from tfcompose.run.hosts import share_of

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.check import apply, check, idle
@@ -11,6 +10,7 @@ from tfcompose.cli.disk import disk
 from tfcompose.cli.terminal import read_text
 from tfcompose.cli.xacro import expanded
 from tfcompose.diagnostic import Diagnostic, RejectedError
+from tfcompose.frozen import dataclass, replace
 from tfcompose.load.comments import allows_in_xml
 from tfcompose.load.urdf import load_xml
 from tfcompose.resolve.packages import Packages

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from dataclasses import dataclass, field
 from xml.parsers import expat
 
 from tfcompose.diagnostic import RejectedError, Span, finding
+from tfcompose.frozen import dataclass, field
 from tfcompose.load.source import MOST_VALUES, refuse_unreadable
 
 DEEPEST = 100

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from tfcompose.frozen import dataclass
+from tfcompose.frozen import dataclass, field, replace
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.frozen import dataclass
+from tfcompose.frozen import dataclass, field
 from tfcompose.plan import GuardPolicy, RosSettings
 
 if TYPE_CHECKING:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import re
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
 from tfcompose.diagnostic import Diagnostic, RejectedError, finding
+from tfcompose.frozen import dataclass, replace
 from tfcompose.load.urdf import load_xml
 from tfcompose.model import BUILT_IN, Node, Process, Robot
 from tfcompose.resolve.beside import beside

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import os
 from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.load import load
@@ -12,13 +12,22 @@ from tfcompose.validate import validate_node_preset
 if TYPE_CHECKING:
     from tfcompose.validate.claims import NodePresetSpec
 
-FOLDER = Path(__file__).parents[1] / "presets" / "nodes"
+FOLDER = os.path.join(os.path.dirname(os.path.dirname(__file__)), "presets", "nodes")
+
+
+@cache
+def _places() -> dict[str, str]:
+    """Return where each preset is below the folder: PACKAGE/NAME.yaml, by its name."""
+    found = [
+        f"{package}/{file}" for package in sorted(os.listdir(FOLDER)) for file in os.listdir(f"{FOLDER}/{package}")
+    ]
+    return {place.rpartition("/")[2].removesuffix(".yaml"): place for place in found if place.endswith(".yaml")}
 
 
 @cache
 def node_preset_names() -> tuple[str, ...]:
     """Return the names of all presets of nodes, sorted."""
-    return tuple(sorted(file.stem for file in FOLDER.glob("*/*.yaml")))
+    return tuple(sorted(_places()))
 
 
 @cache
@@ -29,7 +38,6 @@ def node_preset(name: str) -> NodePresetSpec:
         KeyError: if there is none of that name.
         RejectedError: if the preset itself is wrong.
     """
-    if name not in node_preset_names():
-        raise KeyError(name)
-    file = next(FOLDER.glob(f"*/{name}.yaml"))
-    return validate_node_preset(load(file.read_text("utf-8"), f"presets/nodes/{file.parent.name}/{file.name}"))
+    place = _places()[name]
+    with open(os.path.join(FOLDER, place), encoding="utf-8") as file:
+        return validate_node_preset(load(file.read(), f"presets/nodes/{place}"))

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import posixpath
 import re
-from dataclasses import field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Span, did_you_mean, finding
-from tfcompose.frozen import dataclass
+from tfcompose.frozen import dataclass, field
 from tfcompose.model import Asset
 from tfcompose.resolve.beside import beside
 

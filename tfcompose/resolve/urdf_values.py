@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Severity, Span, finding
+from tfcompose.frozen import dataclass, field
 from tfcompose.pose import Pose, normalised, quat_from_rpy
 
 if TYPE_CHECKING:

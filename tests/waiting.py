@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
+import psutil
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -19,3 +21,12 @@ def until(condition: Callable[[], object], timeout_s: float = TIMEOUT_S) -> bool
             return False
         time.sleep(0.005)
     return True
+
+
+def gone(process: int | psutil.Process) -> bool:
+    """Return whether the process has ended: nobody may have buried it yet."""
+    try:
+        found = psutil.Process(process) if isinstance(process, int) else process
+        return not found.is_running() or bool(found.status() == psutil.STATUS_ZOMBIE)
+    except psutil.NoSuchProcess:
+        return True

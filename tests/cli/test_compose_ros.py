@@ -14,32 +14,14 @@ from typing import TYPE_CHECKING, Any
 import psutil
 import pytest
 
+from tests.rover import EXTERNAL, ROVER
+from tests.waiting import gone, until
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
 pytestmark = pytest.mark.ros
-
-ROVER = """
-tfcompose: 1
-robot: rover
-ros: {discovery: localhost}
-frames:
-  odom: {}
-  base_link: {parent: odom, owner: drive, rate: 20 Hz}
-  lidar: {parent: base_link, xyz: [0, 0, 0.3]}
-processes:
-  drive: {simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}
-"""
-
-
-def until(condition: Callable[[], object], seconds: float = 20.0) -> bool:
-    end = time.monotonic() + seconds
-    while not condition():
-        if time.monotonic() > end:
-            return False
-        time.sleep(0.01)
-    return True
 
 
 @pytest.fixture
@@ -61,11 +43,12 @@ def tfc(domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iter
     below = [child for pid in launchers for child in psutil.Process(pid).children(recursive=True)]
     for pid in launchers:
         os.kill(pid, signal.SIGKILL)
-    assert until(lambda: not any(map(psutil.pid_exists, launchers)) and not any(map(_alive, below)), 5)
+    assert until(lambda: all(map(gone, (*launchers, *below))), 5)
 
 
-def _alive(process: psutil.Process) -> bool:
-    return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
+def launcher_of(folder: Path) -> int:
+    (lock,) = (folder / "runtime").glob("tfcompose/*/lock")
+    return int(json.loads(lock.read_text())["pid"])
 
 
 def ps(tfc: Callable[..., Any]) -> dict[str, dict[str, Any]]:
@@ -89,7 +72,7 @@ def test_a_robot_in_the_background_is_ready_when_the_command_returns_is_listed_a
     pids = [process["pid"] for process in processes.values()]
     down = tfc("down")
     assert (down.returncode, down.stdout.split("@")[0]) == (0, "rover")
-    assert until(lambda: not any(map(psutil.pid_exists, pids)), 2)
+    assert until(lambda: all(map(gone, pids)), 2)
     assert tfc("ps").returncode == 1
     assert "ended" in tfc("logs", "tfcompose", "-n", "1").stdout
 
@@ -97,8 +80,7 @@ def test_a_robot_in_the_background_is_ready_when_the_command_returns_is_listed_a
 def test_what_is_missing_when_the_time_is_over_is_said_with_1_and_the_robot_goes_on(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
-    external = ROVER.replace("{simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}", "{external: true, node: diff}")
-    (tmp_path / "robot.yaml").write_text(external)
+    (tmp_path / "robot.yaml").write_text(EXTERNAL)
     up = tfc("up", "--wait", "--timeout", "6")
     assert up.returncode == 1
     assert "not ready: drive (expected, 0 of 1 edges live)" in up.stderr
@@ -161,12 +143,27 @@ def test_of_two_that_start_at_the_same_moment_one_wins_and_the_other_says_who() 
     assert "started" not in loser[0]
 
 
+def test_a_run_with_another_runtime_folder_is_found_and_is_nobodys_leftover(
+    tfc: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert tfc("up", "--wait").returncode == 0
+    with monkeypatch.context() as elsewhere:
+        (tmp_path / "other").mkdir(mode=0o700)
+        elsewhere.setenv("XDG_RUNTIME_DIR", str(tmp_path / "other"))
+        second = tfc("up", "--for", "3")
+        assert (second.returncode, second.stdout) == (1, "")
+        assert f"runs already: pid {launcher_of(tmp_path)}, with XDG_RUNTIME_DIR={tmp_path}/runtime" in second.stderr
+        down = tfc("down", "--leftovers")
+        assert (down.returncode, down.stdout) == (0, "0 processes of earlier runs stopped\n")
+    assert {process["state"] for process in ps(tfc).values()} == {"RUNNING"}
+
+
 def test_a_launcher_that_was_killed_leaves_no_process_and_nothing_that_is_in_the_way(tfc: Callable[..., Any]) -> None:
     assert tfc("up", "--wait").returncode == 0
     (robot,) = json.loads(tfc("ps", "--format", "json").stdout)
     below = psutil.Process(robot["launcher"]).children(recursive=True)
     os.kill(robot["launcher"], signal.SIGKILL)
-    assert until(lambda: not any(map(_alive, below)), 3)
+    assert until(lambda: all(map(gone, below)), 3)
     assert tfc("ps").returncode == 1
     assert "was killed" in tfc("logs").stdout or "tree complete" in tfc("logs").stdout
     assert tfc("up", "--wait", "--timeout", "30").returncode == 0

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 import psutil
 import pytest
 
-from tests.waiting import until
+from tests.rover import EXTERNAL, ROVER
+from tests.waiting import gone, until
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -23,18 +24,6 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.ros
 
-ROVER = """
-tfcompose: 1
-robot: rover
-ros: {discovery: localhost}
-frames:
-  odom: {}
-  base_link: {parent: odom, owner: drive, rate: 20 Hz}
-  lidar: {parent: base_link, xyz: [0, 0, 0.3]}
-processes:
-  drive: {simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}
-"""
-EXTERNAL = ROVER.replace("{simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}", "{external: true, node: diff_drive}")
 #: Publishes odom → base_link on /tf without end.
 ROGUE = """
 import time
@@ -77,13 +66,6 @@ def first_on_the_path(folder: Path) -> dict[str, str]:
     """Return the environment in which this folder's modules come first."""
     before = os.environ.get("PYTHONPATH")
     return {"PYTHONPATH": os.pathsep.join([str(folder), *([before] if before else [])])}
-
-
-def gone(process: psutil.Process) -> bool:
-    try:
-        return bool(process.status() == psutil.STATUS_ZOMBIE)
-    except psutil.NoSuchProcess:
-        return True
 
 
 @dataclass

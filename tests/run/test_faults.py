@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import psutil
 import pytest
 
+from tests.waiting import gone, until
 from tfcompose.plan import Plan, PlanProcess, RosSettings
 from tfcompose.planfile import write_plan
 from tfcompose.run.launcher.control import ask, connect
@@ -72,20 +73,6 @@ if os.fork() == 0:
 """
 
 
-def until(condition: Callable[[], object], seconds: float = 15.0) -> None:
-    end_at = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end_at, "it did not come to pass in time"
-        time.sleep(0.01)
-
-
-def alive(pid: int) -> bool:
-    try:
-        return bool(psutil.Process(pid).status() != psutil.STATUS_ZOMBIE)
-    except psutil.NoSuchProcess:
-        return False
-
-
 class Run:
     """A launcher that runs in a folder, and who can be asked there."""
 
@@ -123,7 +110,7 @@ def launch(tmp_path: Path) -> Iterator[Callable[..., Run]]:
         if run.popen.poll() is None:
             run.popen.kill()
         run.popen.wait()
-    until(lambda: not end(leftovers(f"{NAME}:")))
+    assert until(lambda: not end(leftovers(f"{NAME}:")))
 
 
 def program(name: str, code: str, **more: Any) -> PlanProcess:
@@ -134,7 +121,7 @@ def test_a_flood_blocks_neither_its_writer_nor_anybody_else_and_takes_little_mem
     launch: Callable[..., Run], tmp_path: Path
 ) -> None:
     run = launch(program("flood", FLOOD), program("calm", SLEEPER))
-    until(run.is_up)
+    assert until(run.is_up)
     slowest, end = 0.0, time.monotonic() + 100
     while not (tmp_path / "flooded").exists():
         assert time.monotonic() < end
@@ -156,8 +143,8 @@ def test_a_reader_that_stops_reading_stops_nobody(launch: Callable[..., Run]) ->
     run = launch(program("flood", FLOOD), program("calm", SLEEPER), stdout=writer)
     os.close(writer)
     try:
-        until(run.is_up)
-        until(lambda: run.ps()["flood"]["state"] == "RUNNING")
+        assert until(run.is_up)
+        assert until(lambda: run.ps()["flood"]["state"] == "RUNNING")
         assert run.down() == 0
     finally:
         os.close(reader)
@@ -168,8 +155,8 @@ def test_a_disk_that_takes_no_more_stops_nobody(launch: Callable[..., Run], tmp_
     chatty = "import time\nwhile True: print('x' * 100, flush=True); time.sleep(0.0005)"
     with (tmp_path / "output").open("wb") as output:
         run = launch(program("chatty", chatty), stdout=output.fileno(), words=("20000",))
-        until((tmp_path / "log" / "chatty.log").exists)
-        until(lambda: (tmp_path / "log" / "chatty.log").stat().st_size >= 19_900)
+        assert until((tmp_path / "log" / "chatty.log").exists)
+        assert until(lambda: (tmp_path / "log" / "chatty.log").stat().st_size >= 19_900)
         time.sleep(0.3)
         assert run.is_up()
         assert run.down() == 0
@@ -179,75 +166,77 @@ def test_a_disk_that_takes_no_more_stops_nobody(launch: Callable[..., Run], tmp_
 @pytest.mark.parametrize("how", ["is stopped", "is killed"])
 def test_a_daemon_that_left_its_group_ends_with_the_run(launch: Callable[..., Run], tmp_path: Path, how: str) -> None:
     run = launch(program("daemon", DAEMON), program("calm", SLEEPER))
-    until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
+    assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
     pid = int((tmp_path / "daemon").read_text())
-    until(lambda: run.ps()["daemon"]["state"] == "EXITED")
-    assert alive(pid)
+    assert until(lambda: run.ps()["daemon"]["state"] == "EXITED")
+    assert not gone(pid)
     if how == "is killed":
         run.popen.kill()
     else:
         assert run.down() == 0
-    until(lambda: not alive(pid), 4)
+    assert until(lambda: gone(pid), 4)
 
 
 def test_leftovers_are_recognised_by_the_runs_id_and_ended_on_request_only(
     launch: Callable[..., Run], tmp_path: Path
 ) -> None:
     run = launch(program("daemon", DAEMON), program("calm", SLEEPER))
-    until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
+    assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
     pid = int((tmp_path / "daemon").read_text())
+    assert {one.launcher for one in leftovers(f"{NAME}:")} == {run.popen.pid}
     keeper = next(child for child in psutil.Process(run.popen.pid).children() if child.name() == "sh")
     os.kill(keeper.pid, signal.SIGKILL)
     run.popen.kill()
     run.popen.wait()
-    until(lambda: [one.pid for one in leftovers(f"{NAME}:")] == [pid])
+    assert until(lambda: [one.pid for one in leftovers(f"{NAME}:")] == [pid])
+    assert [one.launcher for one in leftovers(f"{NAME}:")] == [None]
     assert leftovers(f"{NAME}1:") == []
     assert end(leftovers(f"{NAME}:"), 0.3) == []
-    assert not alive(pid)
+    assert gone(pid)
 
 
 def test_200_processes_are_started_listed_and_stopped_and_all_are_gone(launch: Callable[..., Run]) -> None:
     run = launch(*(PlanProcess(f"p{number}", "run", argv=("sleep", "60")) for number in range(200)))
     began = time.monotonic()
-    until(run.is_up)
+    assert until(run.is_up)
     assert time.monotonic() - began < 10
     pids = [process["pid"] for process in run.ps().values()]
     assert len(set(pids)) == 200
     began = time.monotonic()
     assert run.down() == 0
     assert time.monotonic() - began < 10
-    assert not any(map(alive, pids))
+    assert all(map(gone, pids))
 
 
 def test_40_restarts_leave_no_process_and_no_descriptor(launch: Callable[..., Run]) -> None:
     """A part of the 500 that were tried by hand."""
     run = launch(PlanProcess("a", "run", argv=("sleep", "60")), PlanProcess("b", "run", argv=("sleep", "60")))
-    until(run.is_up)
+    assert until(run.is_up)
     launcher = psutil.Process(run.popen.pid)
 
     def restart(count: int) -> None:
         for _ in range(count):
             before = run.ps()["a"]["restarts"]
             assert ask(run.place, do="restart", name="a") == {"ok": True}
-            until(lambda before=before: run.ps()["a"]["restarts"] == before + 1 and run.is_up())  # type: ignore[misc]
+            assert until(lambda before=before: run.ps()["a"]["restarts"] == before + 1 and run.is_up())  # type: ignore[misc]
 
     restart(3)
     fds, children = launcher.num_fds(), len(launcher.children(recursive=True))
     restart(40)
-    until(lambda: launcher.num_fds() <= fds)
+    assert until(lambda: launcher.num_fds() <= fds)
     assert len(launcher.children(recursive=True)) == children
     assert run.down() == 0
 
 
 def test_a_socket_that_was_left_there_by_a_killed_launcher_is_not_in_the_way(launch: Callable[..., Run]) -> None:
     first = launch(program("a", SLEEPER))
-    until(first.is_up)
+    assert until(first.is_up)
     first.popen.kill()
     first.popen.wait()
     assert first.place.socket.exists()
     assert first.place.holder() is None
     second = launch(program("a", SLEEPER))
-    until(second.is_up)
+    assert until(second.is_up)
     assert second.place.socket.stat().st_mode & 0o777 == 0o600
     assert second.down() == 0
 
@@ -255,7 +244,7 @@ def test_a_socket_that_was_left_there_by_a_killed_launcher_is_not_in_the_way(lau
 @pytest.mark.parametrize("line", [b"rubbish", b"[1]", b'{"do": "dance"}', b"x" * 200_000])
 def test_rubbish_on_the_socket_is_answered_and_harms_nobody(launch: Callable[..., Run], line: bytes) -> None:
     run = launch(program("a", SLEEPER))
-    until(run.is_up)
+    assert until(run.is_up)
     with connect(run.place) as connection:
         try:
             connection.sendall(line + b"\n")

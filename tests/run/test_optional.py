@@ -61,7 +61,7 @@ def test_one_that_ends_as_it_should_has_not_failed() -> None:
 
 
 def test_ready_does_not_wait_for_it_nor_for_its_edges_and_says_what_is_left_out() -> None:
-    camera = replace(optional(), owns=(("base_link", "camera"),))
+    camera = replace(optional(), owns=(("base_link", "camera"),), restart="always", max_restarts=0)
     history = begin(GUARD, STATIC, camera).feed(Clear(), *LIVE, Exited("camera", 1)).wait(60)
     (ready,) = history.all(AllReady)
     assert ready.without == ("camera",)

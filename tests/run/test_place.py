@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tfcompose.plan import Plan, RosSettings
+from tfcompose.run import place as place_module
 from tfcompose.run.place import Lock, PlaceError, place_of, places
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ ROVER = Plan("rover", "", None, RosSettings(domain_id=7), (), ())
 HOLD = """
 import os, sys
 from pathlib import Path
+from tfcompose.run import place as place_module
 from tfcompose.run.place import Lock, Place
 lock = Lock(Place("rover@7", Path(sys.argv[1]), Path(sys.argv[1])))
 print(lock.run, flush=True)
@@ -51,9 +53,21 @@ def test_without_a_safe_runtime_folder_one_of_the_users_own_is_made(
     (tmp_path / "shared").mkdir(mode=0o777)
     (tmp_path / "shared").chmod(0o777)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(place_module, "USERS", tmp_path / "nobody")
     place = place_of(ROVER, env | {"XDG_RUNTIME_DIR": str(tmp_path / given) if given == "shared" else given})
     assert place.folder.parent == tmp_path / f"tfcompose-{os.getuid()}"
     assert place.folder.parent.stat().st_mode & 0o777 == 0o700
+
+
+def test_who_is_not_told_of_the_users_folder_uses_it_too(
+    env: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a service does, or cron: so that ``ps`` in a terminal sees what was started there."""
+    monkeypatch.setattr(place_module, "USERS", tmp_path)
+    (tmp_path / str(os.getuid())).mkdir(mode=0o700)
+    told = place_of(ROVER, env | {"XDG_RUNTIME_DIR": str(tmp_path / str(os.getuid()))})
+    del env["XDG_RUNTIME_DIR"]
+    assert place_of(ROVER, env) == told
 
 
 @pytest.mark.parametrize("how", ["open to all", "a link"])
@@ -61,6 +75,7 @@ def test_a_folder_that_somebody_else_may_have_prepared_is_refused(
     how: str, env: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(place_module, "USERS", tmp_path / "nobody")
     folder = tmp_path / f"tfcompose-{os.getuid()}"
     if how == "a link":
         (tmp_path / "trap").mkdir(mode=0o700)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.rover import ROVER
 from tests.waiting import until
 
 if TYPE_CHECKING:
@@ -22,25 +23,14 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.ros
 
-ROVER = """
-tfcompose: 1
-robot: rover
-ros: {discovery: localhost}
-frames:
-  odom: {}
-  base_link: {parent: odom, owner: drive, rate: 20 Hz}
-  lidar: {parent: base_link, xyz: [0, 0, 0.3]}
-processes:
-  drive: {simulate: {fixed: {xyz: [1, 0, 0]}, rate: 20 Hz}}
-  hello: {run: [sh, -c, 'echo $GREETING; exec sleep 60'], env: {GREETING: good day}}
-"""
+HELLO = ROVER + "  hello: {run: [sh, -c, 'echo $GREETING; exec sleep 60'], env: {GREETING: good day}}\n"
 
 
 @pytest.fixture
 def units(domain: object, tmp_path: Path) -> Path:
     """The robot's units, exported."""
     assert domain
-    (tmp_path / "robot.yaml").write_text(ROVER, "utf-8")
+    (tmp_path / "robot.yaml").write_text(HELLO, "utf-8")
     words = [sys.executable, "-m", "tfcompose", "export", "systemd", str(tmp_path / "robot.yaml"), "-o", str(tmp_path)]
     done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr

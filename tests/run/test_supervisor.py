@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import psutil
 import pytest
 
-from tests.waiting import until
+from tests.waiting import gone, until
 from tfcompose.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.planfile import write_plan
 from tfcompose.run.events import Clear, Complete, Live, OwnerReady, Remember, to_line
@@ -73,13 +73,6 @@ def guard(*events: Any, end: str = SLEEPER) -> PlanProcess:
 
 def plan_of(*processes: PlanProcess) -> Plan:
     return Plan("rover", "", None, RosSettings(), (), processes, GuardPolicy())
-
-
-def gone(pid: int) -> bool:
-    try:
-        return bool(psutil.Process(pid).status() == psutil.STATUS_ZOMBIE)
-    except psutil.NoSuchProcess:
-        return True
 
 
 @dataclass
@@ -248,6 +241,18 @@ def test_what_cannot_be_executed_is_named_and_everything_ends_with_1(tmp_path: P
     assert [notice.state for notice in told if isinstance(notice, ProcessState) and notice.process == "b"][
         -1
     ] == "STOPPED"
+
+
+def test_the_rest_goes_on_without_optional_processes_that_are_not_there_or_fail(tmp_path: Path) -> None:
+    absent = PlanProcess("absent", "run", argv=("${executable:no_package/no_program}",), required=False)
+    failing = program("failing", "raise SystemExit(3)", required=False)
+    lasting = program("lasting", "import time; time.sleep(0.3); print('to the end')")
+    code, told = run(tmp_path, absent, failing, lasting)
+    assert (code, logged(told, "lasting")) == (1, ["to the end"])
+    found = [notice.found for notice in told if isinstance(notice, FindingShown)]
+    assert [one.severity for one in found] == ["warning", "warning"]
+    assert "the executable no_package/no_program of absent was not found" in found[0].message
+    assert found[1].message == "failing ended with exit code 3"
 
 
 def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:

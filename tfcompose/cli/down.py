@@ -11,7 +11,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import positive
-from tfcompose.cli.running import add_robot, asked, chosen, events, running, told
+from tfcompose.cli.running import add_robot, asked, chosen, events, told
 from tfcompose.cli.terminal import complain
 from tfcompose.run.launcher.leftovers import end, leftovers
 from tfcompose.run.launcher.notice import Ended
@@ -67,5 +67,4 @@ def _leftovers(robot: str | None) -> int:
 
 
 def _left_by(place: Place) -> list[Leftover]:
-    now = {holder.run for other, holder in running() if other == place}
-    return [one for one in leftovers(f"{place.name}:") if one.run not in now]
+    return [one for one in leftovers(f"{place.name}:") if one.launcher is None]

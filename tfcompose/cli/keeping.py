@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import os
 import shutil
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.terminal import UNREADABLE, complain
 from tfcompose.planfile import write_plan
-from tfcompose.run.launcher.leftovers import leftovers
+from tfcompose.run.launcher.leftovers import leftovers, variables_of
 from tfcompose.run.publishing.addresses import with_whole_addresses
 
 if TYPE_CHECKING:
@@ -56,9 +58,21 @@ def _addressed(urdf: bytes, folder: Path) -> bytes:
         return urdf
 
 
+def runs_elsewhere(place: Place) -> str | None:
+    """Return what is to be said if the robot runs already, where this runtime folder does not show it."""
+    led = [one for one in leftovers(f"{place.name}:") if one.launcher not in (None, os.getpid())]
+    if not led or led[0].launcher is None:
+        return None
+    with contextlib.suppress(OSError):
+        folder = variables_of(led[0].launcher).get("XDG_RUNTIME_DIR")
+        where = f"XDG_RUNTIME_DIR={folder}" if folder else "no XDG_RUNTIME_DIR"
+        return f"{place.name} runs already: pid {led[0].launcher}, with {where}; ps and down find it there"
+    return None
+
+
 def left_behind(place: Place, run_id: str) -> list[str]:
     """Return what is to be said about processes of earlier runs that are still there."""
-    found = [one for one in leftovers(f"{place.name}:") if one.run != run_id]
+    found = [one for one in leftovers(f"{place.name}:") if one.run != run_id and one.launcher is None]
     if not found:
         return []
     lines = [f"an earlier run left {one.pid} behind: {one.command}" for one in found]

@@ -75,7 +75,11 @@ def _start(plan: Plan, file: Path, arguments: Namespace) -> int:
         return UNREADABLE
     with ExitStack() as stack:
         stack.callback(lock.close)
-        kept = import_module("tfcompose.cli.keeping").kept(plan, file, place, alone=True)
+        keeping = import_module("tfcompose.cli.keeping")
+        if elsewhere := keeping.runs_elsewhere(place):
+            complain(elsewhere)
+            return 1
+        kept = keeping.kept(plan, file, place, alone=True)
         if isinstance(kept, int):
             return kept
         session = Session(kept, lock.run, file.absolute().parent, listen(place))

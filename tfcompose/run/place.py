@@ -1,8 +1,8 @@
 """Where a running robot is found: a folder that only the user can open, with a lock, a control socket and the plan.
 
 A robot is one name in one ROS domain; a host's share of it has the host in its name.
-Its folder is in XDG_RUNTIME_DIR, or else in ``tfcompose-UID`` below the folder
-for temporary files. Logs outlive the run: they are in ROS's folder for logs (ROS_LOG_DIR, else ROS_HOME/log, else
+Its folder is in XDG_RUNTIME_DIR, or else in ``/run/user/UID``, or else in ``tfcompose-UID`` below the folder for
+temporary files. Logs outlive the run: they are in ROS's folder for logs (ROS_LOG_DIR, else ROS_HOME/log, else
 ~/.ros/log), in ``tfcompose/ROBOT@DOMAIN``.
 """
 
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 #: The variable that every process of a run carries, and its children: ROBOT@DOMAIN:ID.
 RUN_ID = "TFCOMPOSE_RUN"
+#: Where systemd makes a folder for each user who is logged in, also for services and cron, which are not told of it.
+USERS = Path("/run/user")
 
 
 class PlaceError(Exception):
@@ -142,7 +144,7 @@ def _place(name: str, base: Path, env: Mapping[str, str]) -> Place:
 
 
 def _runtime_folder(env: Mapping[str, str]) -> Path:
-    given = env.get("XDG_RUNTIME_DIR", "")
+    given = env.get("XDG_RUNTIME_DIR") or str(USERS / str(os.getuid()))
     if given.startswith("/") and _is_ours(Path(given)):
         folder = Path(given) / "tfcompose"
     else:

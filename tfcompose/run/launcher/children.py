@@ -13,8 +13,8 @@ from tfcompose.run.events import from_line
 from tfcompose.run.launcher.child import LAST_LINE_LENGTH, Child, Pipe, bury_adopted, has_ended, kill_group, spawn
 from tfcompose.run.launcher.happening import Exited, LogSeen, Started, StartFailed
 from tfcompose.run.launcher.keeper import Keeper
+from tfcompose.run.launcher.leftovers import LAUNCHER, launcher_mark, leftovers
 from tfcompose.run.launcher.leftovers import end as end_leftovers
-from tfcompose.run.launcher.leftovers import leftovers
 from tfcompose.run.launcher.notice import LogLine
 from tfcompose.run.place import RUN_ID
 
@@ -51,6 +51,7 @@ class Children:
         self._children: dict[str, Child] = {}
         self._guard = ""
         self._guard_pipes: GuardPipes | None = None
+        self._marks = {RUN_ID: run_id, LAUNCHER: launcher_mark()} if run_id else {}
         self._keeper = Keeper(run_id)
 
     def start(self, process: PlanProcess, command: Command, guard: GuardPipes | None = None) -> Event:
@@ -110,7 +111,7 @@ class Children:
     # A process's life.
 
     def _spawn(self, process: PlanProcess, command: Command, guard: GuardPipes | None) -> Child:
-        more = (guard.env if guard else {}) | ({RUN_ID: self._run_id} if self._run_id else {})
+        more = (guard.env if guard else {}) | self._marks
         if command.fence:
             command.fence[0].parent.mkdir(exist_ok=True)
             command.fence[0].write_text(command.fence[1], encoding="utf-8")

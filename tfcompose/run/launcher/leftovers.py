@@ -11,18 +11,29 @@ from pathlib import Path
 
 from tfcompose.run.place import RUN_ID
 
+#: The variable that names the launcher of a run: its process number, and when it began (clock ticks).
+LAUNCHER = "TFCOMPOSE_LAUNCHER"
 #: The kernel ends a killed process within this time, in seconds, also where much is going on.
 KILLED_WITHIN_S = 5.0
 
 
 @dataclass(frozen=True, slots=True)
 class Leftover:
-    """A process that a run started: its number, its run's id, its command, and when it began (clock ticks)."""
+    """A process that a run started: its number, its run's id, its command, and when it began (clock ticks).
+
+    ``launcher`` is the number of the run's launcher if that one still runs: then nothing was left behind.
+    """
 
     pid: int
     run: str
     command: str
     began: int
+    launcher: int | None = None
+
+
+def launcher_mark() -> str:
+    """Return what a process of a run is told of its launcher, which is this process."""
+    return f"{os.getpid()}:{_began(Path('/proc/self'))}"
 
 
 def leftovers(run: str) -> list[Leftover]:
@@ -38,17 +49,35 @@ def leftovers(run: str) -> list[Leftover]:
     return sorted(found, key=lambda one: one.pid)
 
 
+def variables_of(pid: int) -> dict[str, str]:
+    """Return the environment that a process was started with.
+
+    Raises:
+        OSError: if the process has ended, or is somebody else's.
+    """
+    words = (Path("/proc") / str(pid) / "environ").read_bytes().decode(errors="replace").split("\0")
+    return {name: value for name, _, value in (word.partition("=") for word in words)}
+
+
 def _look(folder: Path, run: str) -> Leftover | None:
-    marks = [word for word in (folder / "environ").read_bytes().split(b"\0") if word.startswith(RUN_ID.encode() + b"=")]
-    if not marks or not marks[0].decode(errors="replace").partition("=")[2].startswith(run):
+    if RUN_ID.encode() not in (folder / "environ").read_bytes():
+        return None
+    env = variables_of(int(folder.name))
+    if not env.get(RUN_ID, "").startswith(run):
         return None
     words = (folder / "cmdline").read_bytes().rstrip(b"\0").split(b"\0")
-    return Leftover(
-        int(folder.name),
-        marks[0].decode(errors="replace").partition("=")[2],
-        b" ".join(words).decode(errors="replace")[:200],
-        _began(folder),
-    )
+    command = b" ".join(words).decode(errors="replace")[:200]
+    return Leftover(int(folder.name), env[RUN_ID], command, _began(folder), _launcher(env.get(LAUNCHER, "")))
+
+
+def _launcher(mark: str) -> int | None:
+    """Return the launcher's number if it still runs, in this network."""
+    pid, _, began = mark.partition(":")
+    with contextlib.suppress(OSError, ValueError, IndexError):
+        folder = Path("/proc") / str(int(pid))
+        same = (folder / "ns/net").readlink() == Path("/proc/self/ns/net").readlink()
+        return int(pid) if same and _began(folder) == int(began) else None
+    return None
 
 
 def _began(folder: Path) -> int:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.benchmarks import bench_buffer, bench_joints
 from tfcompose.cli.parser import COMMANDS, parser_of
 from tfcompose.cli.shelves import library
 from tfcompose.codes import CODES
@@ -102,6 +103,12 @@ def test_it_has_exactly_the_two_commands_that_ci_takes_out_of_it() -> None:
     assert len(commands) == 2
     assert commands[0].endswith("tfcompose up robots/autonomous_robot.yaml --profile demo")
     assert commands[1].endswith("pytest")
+
+
+def test_its_figures_are_those_that_the_benchmarks_print() -> None:
+    section = README.partition("### What it costs\n")[2].partition("\n## ")[0]
+    shown = {row[0]: row[2] for row in re.findall(r"^\| (`?[^|]+) \| ([^|]+) \| ?([^|]*?) ?\|$", section, re.MULTILINE)}
+    assert shown == bench_buffer.ROWS | bench_joints.ROWS
 
 
 def test_its_python_programs_run_and_give_what_they_say() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import rclpy
+import tf2_geometry_msgs
 from geometry_msgs.msg import PointStamped
 from rclpy.duration import Duration
 from rclpy.node import Node
@@ -18,8 +19,9 @@ class LaserInBase(Node):
         self.done = False
 
     def on_timer(self) -> None:
+        now = rclpy.time.Time()
         try:
-            t = self.tf_buffer.lookup_transform("base_link", "laser_link", rclpy.time.Time())
+            t = self.tf_buffer.lookup_transform("base_link", "laser_link", now)
         except TransformException as error:
             print(f"not yet: {error}", flush=True)
             return
@@ -36,6 +38,12 @@ class LaserInBase(Node):
         point.point.x = 2.0
         moved = self.tf_buffer.transform(point, "odom", timeout=Duration(seconds=1.0))
         print(f"point in {moved.header.frame_id}: ({moved.point.x:.3f}, {moved.point.y:.3f}, {moved.point.z:.3f})")
+        by_hand = tf2_geometry_msgs.do_transform_point(
+            point, self.tf_buffer.lookup_transform("base_link", "laser_link", now)
+        )
+        print(
+            f"point in {by_hand.header.frame_id}: ({by_hand.point.x:.3f}, {by_hand.point.y:.3f}, {by_hand.point.z:.3f})"
+        )
         self.done = True
 
 

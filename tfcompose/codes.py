@@ -193,4 +193,5 @@ CODES = {
     "TF907": "bad_bag",
     "TF908": "other_ros_settings",
     "TF909": "ros_settings_contradict",
+    "TF910": "written_otherwise",
 }

@@ -77,4 +77,8 @@ other machines, and of containers, it cannot be seen.""",
 A domain is a whole number from 0 to 232. RMW_IMPLEMENTATION names a middleware that has to be installed: ROS ends a
 process that asks for another. ROS_LOCALHOST_ONLY=1 overrides ROS_AUTOMATIC_DISCOVERY_RANGE and is out of use since
 Iron; OFF discovers nobody, not even on the same machine.""",
+    "TF910": """A URDF that was to be written does not read back as the robot.
+
+build --read-back reads each description with another parser and compares links, joints, poses, limits, masses and
+shapes. Nothing is written then. It is a fault of tfcompose: report it, with the robot file.""",
 }

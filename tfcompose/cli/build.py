@@ -7,6 +7,7 @@ nothing.
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,6 +34,10 @@ def arguments(parser: ArgumentParser) -> None:
         "--mesh", choices=("package", "file", "relative"), default="as-written",
         help="how meshes are addressed: package://…, file:///…, or relative to DIR; default: as they are written",
     )  # fmt: skip
+    parser.add_argument(
+        "--read-back", action="store_true",
+        help="read the URDF again with another parser, and write only what is the robot, value by value",
+    )  # fmt: skip
 
 
 def run(arguments: Namespace) -> int:
@@ -56,7 +61,13 @@ def build(arguments: Namespace) -> tuple[Path, list[str]] | int:
         print_findings(lost, sys.stderr)
         return 1
     folder = Path(arguments.output) if arguments.output else Path("build") / robot.name
-    written = emit(robot, Target(form, folder.as_posix(), Path.cwd().as_posix()))
+    target = Target(form, folder.as_posix(), Path.cwd().as_posix())
+    written = emit(robot, target)
+    if getattr(arguments, "read_back", False):  # what reads it is loaded only then
+        unlike = import_module("tfcompose.emit.read_back").unlike(robot, written, target)
+        if unlike:
+            print_findings([_otherwise(path, what) for path, what in unlike], sys.stderr)
+            return 1
     try:
         write_all(folder, written)
     except OSError as error:
@@ -64,6 +75,13 @@ def build(arguments: Namespace) -> tuple[Path, list[str]] | int:
         complain(f"nothing was written to {folder}: {error.strerror}{where}")
         return UNREADABLE
     return folder, [file.path for file in written]
+
+
+def _otherwise(path: str, what: str) -> Diagnostic:
+    """Return the finding that a description is not the robot's."""
+    return finding(
+        "TF910", f"{path}: {what}", None, help="nothing was written; this is a fault of tfcompose: report it"
+    )
 
 
 def _no_address(asset: Asset, form: Form) -> Diagnostic:

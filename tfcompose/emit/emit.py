@@ -38,7 +38,7 @@ def emit(robot: Robot, target: Target = AS_WRITTEN) -> tuple[File, ...]:
     """
     live = with_final_names(robot)
     descriptions = {
-        part: _descriptions(robot_of, target, f"{part}/" if part else "") for part, robot_of in _alone(robot)
+        part: _descriptions(robot_of, target, f"{part}/" if part else "") for part, robot_of in described(robot)
     }
     stock = {part: files[1].text for part, files in descriptions.items()}
     return (
@@ -50,7 +50,7 @@ def emit(robot: Robot, target: Target = AS_WRITTEN) -> tuple[File, ...]:
     )
 
 
-def _alone(robot: Robot) -> list[tuple[str, Robot]]:
+def described(robot: Robot) -> list[tuple[str, Robot]]:
     """Return what has a description of its own: the robot, and each part that is a robot, by its name."""
     return [("", robot), *((part.name, part.robot) for part in robot.parts)]
 

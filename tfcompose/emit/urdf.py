@@ -57,7 +57,7 @@ def body_of(robot: Robot, target: Target = AS_WRITTEN) -> Body:
     full = link_lines(robot.base, root, target) + links
     stock = link_lines(robot.base, root and replace(root, inertial=None), target) + links
     for edge, name in zip(edges, _joint_names(edges), strict=True):
-        joint = _joint(edge, name, _kind(edge))
+        joint = _joint(edge, name, joint_type(edge))
         full += joint
         stock += joint if edge.owner in {STATIC, JOINTS} else _joint(edge, name, "floating")
     return Body(full, stock)
@@ -97,7 +97,8 @@ def _joint_names(edges: list[Edge]) -> list[str]:
     return names
 
 
-def _kind(edge: Edge) -> str:
+def joint_type(edge: Edge) -> str:
+    """Return what URDF calls the joint that the edge is."""
     joint = edge.joint or edge.free
     if joint:
         return joint.type

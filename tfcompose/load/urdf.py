@@ -8,11 +8,15 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
+from itertools import accumulate
+from typing import TYPE_CHECKING
 from xml.parsers import expat
 
 from tfcompose.diagnostic import RejectedError, Span, finding
-from tfcompose.frozen import dataclass, field
 from tfcompose.load.source import MOST_VALUES, refuse_unreadable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 DEEPEST = 100
 
@@ -21,22 +25,70 @@ MOST_CHARACTERS = 16_000_000
 
 _ATTRIBUTE = re.compile(r"""([^\s=/>"']+)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 _BREAK = re.compile("\r\n|\r|\n")
+#: The bytes that begin no character in UTF-8.
+_INSIDE = bytes(range(0x80, 0xC0))
+_BLOCK = 4096
 
 
-@dataclass(slots=True, eq=False)
+class _Text:
+    """A file's text, with the places of its bytes: a place is computed when somebody asks for it, and few do."""
+
+    def __init__(self, text: str, file: str) -> None:
+        self.text, self.file = text, file
+        self.data = text.encode()
+        self.starts = [0, *(found.end() for found in _BREAK.finditer(text))]
+        self.before: list[int] = []  # the characters before each block of bytes; none where each byte is a character
+        if len(self.data) != len(text):
+            lengths = (_characters(self.data[at : at + _BLOCK]) for at in range(0, len(self.data), _BLOCK))
+            self.before = list(accumulate(lengths, initial=0))
+
+    def position(self, byte: int) -> int:
+        """Return the character that begins at a byte."""
+        if not self.before or byte <= 0:  # -1 in an empty text
+            return max(byte, 0)
+        block = byte // _BLOCK
+        return self.before[block] + _characters(self.data[block * _BLOCK : byte])
+
+    def span(self, begin: int, length: int) -> Span:
+        """Return the place of so many characters."""
+        end = min(begin + length, len(self.text))
+        line, end_line = bisect_right(self.starts, begin), bisect_right(self.starts, end)
+        return Span(self.file, line, begin - self.starts[line - 1] + 1, end_line, end - self.starts[end_line - 1] + 1)
+
+
+def _characters(data: bytes) -> int:
+    return len(data.translate(None, _INSIDE))
+
+
 class Element:
-    """A tag with its attributes; ``places`` are those of the attributes' values, ``raw`` is the element as written.
+    """A tag with its attributes and the elements in it; ``text`` is what stands directly in it, where asked for.
 
-    ``text`` is what stands directly in it, where that was asked for.
+    ``begin`` and ``end`` are the bytes at which its first and its last tag begin.
     """
 
-    tag: str
-    at: Span
-    attributes: dict[str, str] = field(default_factory=dict)
-    places: dict[str, Span] = field(default_factory=dict)
-    children: list[Element] = field(default_factory=list)
-    raw: str = ""
-    text: str = ""
+    __slots__ = ("_source", "attributes", "begin", "children", "end", "tag", "text")
+
+    def __init__(self, tag: str, attributes: dict[str, str], source: _Text, begin: int) -> None:
+        self.tag, self.attributes = tag, attributes
+        self.children: list[Element] = []
+        self.text = ""
+        self.begin = self.end = begin
+        self._source = source
+
+    @property
+    def at(self) -> Span:
+        """The place of its tag."""
+        return self._source.span(self._source.position(self.begin), len(self.tag) + 1)
+
+    @property
+    def raw(self) -> str:
+        """The element as it is written."""
+        text, begin = self._source.text, self._source.position(self.begin)
+        after = max((written.end() for written in self._written()), default=begin)
+        end = text.find(">", after)
+        if text[end - 1] != "/":  # it has an end tag; of the others expat's versions give different places
+            end = text.find(">", self._source.position(self.end))
+        return text[begin : end + 1]
 
     def all(self, tag: str) -> list[Element]:
         """Return the children of a tag."""
@@ -44,11 +96,28 @@ class Element:
 
     def first(self, tag: str) -> Element | None:
         """Return the first child of a tag, or None."""
-        return next(iter(self.all(tag)), None)
+        for child in self.children:
+            if child.tag == tag:
+                return child
+        return None
 
     def place(self, name: str) -> Span:
         """Return the place of an attribute's value, or the element's where it is missing."""
-        return self.places.get(name, self.at)
+        for written in self._written():
+            if written[1] == name:
+                group = 2 if written[2] is not None else 3
+                return self._source.span(written.start(group), len(written[group]) or 1)
+        return self.at
+
+    def _written(self) -> Iterator[re.Match[str]]:
+        """Yield the attributes as they are written."""
+        position = self._source.position(self.begin) + 1 + len(self.tag)
+        for _ in self.attributes:
+            written = _ATTRIBUTE.search(self._source.text, position)
+            if written is None:
+                return
+            yield written
+            position = written.end()
 
 
 def load_xml(text: str, file: str, *, with_text: bool = False) -> Element:
@@ -66,12 +135,8 @@ def load_xml(text: str, file: str, *, with_text: bool = False) -> Element:
 
 class _Reader:
     def __init__(self, text: str, file: str) -> None:
-        self.text, self.file = text, file
-        self.data = text.encode()
-        self.passed = (0, 0)  # how many bytes and characters stand before the last place that was asked for
-        self.starts = [0, *(found.end() for found in _BREAK.finditer(text))]
+        self.source = _Text(text, file)
         self.stack: list[Element] = []
-        self.begins: list[tuple[int, int]] = []  # of each open tag: where it begins, and where its attributes end
         self.root: Element | None = None
         self.elements = 0
         self.parser = expat.ParserCreate("utf-8")
@@ -81,65 +146,37 @@ class _Reader:
 
     def read(self) -> Element:
         try:
-            self.parser.Parse(self.data, True)  # noqa: FBT003 (the last piece; it takes no keywords)
+            self.parser.Parse(self.source.data, True)  # noqa: FBT003 (the last piece; it takes no keywords)
         except expat.ExpatError as error:
-            at = self._span(self._position(self.parser.ErrorByteIndex), 1)
+            at = self._at(self.parser.ErrorByteIndex, 1)
             said = expat.ErrorString(error.code) or "not XML"
             raise RejectedError([finding("TF018", said, at, help="mend it; other readers stop here too")]) from None
         if self.root is None:
-            raise RejectedError([finding("TF018", "no element", Span(self.file))])
+            raise RejectedError([finding("TF018", "no element", Span(self.source.file))])
         return self.root
 
     def add_text(self, piece: str) -> None:
         if self.stack:
             self.stack[-1].text += piece
 
+    def _at(self, byte: int, length: int) -> Span:
+        return self.source.span(self.source.position(byte), length)
+
     def _refuse_type(self, *_: object) -> None:
-        at = self._span(self._position(self.parser.CurrentByteIndex), 9)
+        at = self._at(self.parser.CurrentByteIndex, 9)
         raise RejectedError([finding("TF018", "a document type, which can declare entities", at, help="remove it")])
 
     def _open(self, tag: str, attributes: dict[str, str]) -> None:
-        begin = self._position(self.parser.CurrentByteIndex)
         self.elements += 1
-        at = self._span(begin, len(tag) + 1)
+        element = Element(tag, attributes, self.source, self.parser.CurrentByteIndex)
         if self.elements > MOST_VALUES or len(self.stack) >= DEEPEST:
             what = f"more than {MOST_VALUES:,} elements" if self.elements > MOST_VALUES else f"deeper than {DEEPEST}"
-            raise RejectedError([finding("TF008", what, at)])
-        element = Element(tag, at, attributes)
-        position = begin + 1 + len(tag)
-        for _ in attributes:
-            written = _ATTRIBUTE.search(self.text, position)
-            if written is None:
-                break
-            group = 2 if written[2] is not None else 3
-            element.places[written[1]] = self._span(written.start(group), len(written[group]) or 1)
-            position = written.end()
+            raise RejectedError([finding("TF008", what, element.at)])
         if self.stack:
             self.stack[-1].children.append(element)
         else:
             self.root = element
         self.stack.append(element)
-        self.begins.append((begin, position))
 
     def _close(self, _: str) -> None:
-        element = self.stack.pop()
-        begin, after_attributes = self.begins.pop()
-        if len(self.stack) != 1:  # of what stands in the root only
-            return
-        end = self.text.find(">", after_attributes)
-        if self.text[end - 1] != "/":  # it has an end tag; of the others expat's versions give different places
-            end = self.text.find(">", self._position(self.parser.CurrentByteIndex))
-        element.raw = self.text[begin : end + 1]
-
-    def _position(self, byte: int) -> int:
-        """Return the character that begins at a byte; places are asked for in the order of the text."""
-        bytes_before, characters = self.passed
-        if byte > bytes_before:  # -1 in an empty text
-            characters += len(self.data[bytes_before:byte].decode("utf-8", "ignore"))
-            self.passed = (byte, characters)
-        return characters
-
-    def _span(self, begin: int, length: int) -> Span:
-        end = min(begin + length, len(self.text))
-        line, end_line = bisect_right(self.starts, begin), bisect_right(self.starts, end)
-        return Span(self.file, line, begin - self.starts[line - 1] + 1, end_line, end - self.starts[end_line - 1] + 1)
+        self.stack.pop().end = self.parser.CurrentByteIndex

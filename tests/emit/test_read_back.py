@@ -1,0 +1,130 @@
+"""``build --read-back``: a description that is not the robot is not written, whatever in it is other."""
+
+from __future__ import annotations
+
+import json
+import re
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tests.emit.test_xacro import EVERYTHING
+from tests.readers.family import spec
+from tfcompose.cli import main
+from tfcompose.cli.compiling import library
+from tfcompose.compile import compile_robot
+from tfcompose.emit import Target, emit
+from tfcompose.emit import read_back as work
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model import Robot
+
+ROBOTS = Path(__file__).parents[2] / "robots"
+PRESETS = library()
+TARGET = Target()
+MORE = """tfcompose: 1
+robot: more
+links:
+  base_link: {visual: [{capsule: {radius: 0.1, length: 0.5}}, {cylinder: {radius: 1, length: 2}, xyz: [1, 0, 0]}]}
+  a: {visual: {mesh: {uri: "http://here/a.stl", scale: [1, 2, 3]}, material: {name: m, texture: "http://here/a.png"}}}
+  b: {collision: {sphere: {radius: 0.1}}, inertial: {mass: 2, inertia: {ixx: 1, iyy: 2, izz: 2, ixy: 0.1}, rpy: [0.1, 0, 0]}}
+joints:
+  j: {type: revolute, parent: base_link, child: a, rpy: [0.1, 0.2, 0.3], limit: {lower: -1, upper: 1, effort: 1},
+      dynamics: {damping: 1}, safety_controller: {k_velocity: 1}, calibration: {rising: 0.5}}
+  k: {type: prismatic, parent: a, child: b, mimic: {joint: j, offset: 1}, axis: [0, 1, 0],
+      limit: {lower: 0, upper: 1}}
+"""
+SPECS = [*(pytest.param(json.dumps(spec(seed, links=9)), id=f"family_{seed}") for seed in (60, 61))]
+SPECS += [pytest.param(EVERYTHING, id="everything"), pytest.param(MORE, id="more")]
+
+
+def robot_of(text: str) -> Robot:
+    compiled = compile_robot(text, "r.yaml", PRESETS, read=lambda name: (ROBOTS / name).read_text("utf-8"))
+    assert not compiled.errors, compiled.errors
+    assert compiled.robot
+    return compiled.robot
+
+
+def texts(robot: Robot) -> dict[str, str]:
+    return {file.path: file.text for file in emit(robot, TARGET)}
+
+
+@pytest.mark.parametrize("file", sorted(ROBOTS.glob("*.yaml")), ids=lambda file: file.stem)
+def test_what_build_writes_reads_back(file: Path, tmp_path: Path) -> None:
+    assert main(["build", str(file), "-o", str(tmp_path / "out"), "--read-back"]) == 0
+    assert (tmp_path / "out" / "plan.json").exists()
+
+
+def changed(text: str) -> Iterator[tuple[str, str]]:
+    """Yield the text with one value of a link or joint changed, for each of them, and what was changed."""
+    root = ET.fromstring(text)  # noqa: S314 (our own text)
+    for top in (*root.iterfind("link"), *root.iterfind("joint")):
+        for element in top.iter():
+            for key, value in element.attrib.items():
+                if (top.tag, element, key) == ("joint", top, "name"):
+                    continue  # joints are told apart by the links that they move
+                element.set(key, other(key, value))
+                yield ET.tostring(root, "unicode"), f"{top.get('name')}: {element.tag} {key}={value}"
+                element.set(key, value)
+
+
+def other(key: str, value: str) -> str:
+    if key in {"name", "link", "joint", "filename", "type"}:
+        return "floating" if value == "planar" else "planar" if key == "type" else f"{value}x"
+    first, *rest = value.split()
+    return " ".join([str(float(first) + 0.25), *rest])
+
+
+@pytest.mark.parametrize("text", SPECS)
+def test_whatever_value_is_another_one_is_noticed(text: str) -> None:
+    robot = robot_of(text)
+    files, seen = texts(robot), 0
+    for name, full in (("robot.full.urdf", True), ("robot.urdf", False)):
+        assert not list(work.differences(robot, files[name], TARGET, full=full))
+        for again, what in changed(files[name]):
+            assert list(work.differences(robot, again, TARGET, full=full)), what
+            seen += 1
+    assert seen > 40
+
+
+@pytest.mark.parametrize("text", SPECS)
+def test_whatever_is_missing_or_there_twice_is_noticed(text: str) -> None:
+    robot = robot_of(text)
+    whole = texts(robot)["robot.full.urdf"]
+    pieces = re.findall(r"^  <(?:link|joint) (?:[^>]*/>|.*?^  </(?:link|joint)>)\n", whole, re.MULTILINE | re.DOTALL)
+    pieces += re.findall(r"^    <(?:visual|inertial|axis|limit|mimic|origin).*?(?:/>|>)\n", whole, re.MULTILINE)
+    for piece in dict.fromkeys(pieces):
+        if piece.endswith("/>\n") or "\n  </" in piece:
+            assert list(work.differences(robot, whole.replace(piece, "", 1), TARGET, full=True)), piece
+        if piece.startswith(("  <link", "  <joint")):
+            assert list(work.differences(robot, whole.replace(piece, piece * 2), TARGET, full=True)), piece
+
+
+def test_nothing_is_written_that_is_not_the_robot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def wrong(*given: Any, **more: Any) -> Any:
+        kept = work_emit(*given, **more)
+        return tuple(
+            type(one)(
+                one.path, one.text.replace('xyz="0 0 ', 'xyz="0 1e-9 ') if one.path.endswith("urdf") else one.text
+            )
+            for one in kept
+        )
+
+    work_emit = emit
+    monkeypatch.setattr("tfcompose.cli.build.emit", wrong)
+    words = ["build", str(ROBOTS / "rover.yaml"), "-o", str(tmp_path / "out")]
+    assert main([*words, "--read-back"]) == 1
+    assert "error[TF910] robot.full.urdf: the joint " in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    assert main(words) == 0
+
+
+@pytest.mark.parametrize("text", ["", "<robot", "<robot/>"])
+def test_what_is_no_robot_is_said_and_is_no_traceback(text: str) -> None:
+    assert list(work.differences(robot_of(MORE), text, TARGET, full=True))

@@ -21,6 +21,8 @@ RUNS = 3
 TIMES_FASTER = {1_000: 3.0, 5_000: 10.0}
 MOST_GROWTH = 12.0  # from 1,000 frames to 10,000
 MOST_MB = 1_000.0
+#: What --read-back may add to building, of what building costs.
+MOST_OF_READING = 0.5
 
 XACRO = """<robot name="bench" xmlns:xacro="http://www.ros.org/wiki/xacro">
   <xacro:macro name="segment" params="name parent length angle">
@@ -103,16 +105,23 @@ def measure(runs: int = RUNS) -> dict[str, tuple[float, float]]:
             for frames in (*TIMES_FASTER, 10_000):
                 build = ["-m", "tfcompose", "build", f"{frames}.yaml", "-o", f"out{frames}"]
                 taken.setdefault(f"tfcompose {frames}", []).append(cost(build, folder))
+                taken.setdefault(f"--read-back {frames}", []).append(cost([*build, "--read-back"], folder))
                 if frames in TIMES_FASTER and (turn == 0 or frames == 1_000):
                     run = ["-c", f"import xacro; open('x.urdf', 'w').write(xacro.process('{frames}.xacro'))"]
                     taken.setdefault(f"xacro {frames}", []).append(cost(run, folder))
     return {name: (min(t for t, _ in costs), max(m for _, m in costs)) for name, costs in taken.items()}
 
 
+def reading(found: dict[str, tuple[float, float]], frames: int) -> float:
+    """Return what reading the result back costs, as a part of what building costs."""
+    return found[f"--read-back {frames}"][0] / found[f"tfcompose {frames}"][0] - 1
+
+
 def test_building_is_3_and_10_times_faster_than_xacro_and_grows_with_the_robot() -> None:
     found = measure()
     for frames, times in TIMES_FASTER.items():
         assert found[f"xacro {frames}"][0] >= times * found[f"tfcompose {frames}"][0], found
+        assert reading(found, frames) <= MOST_OF_READING, found
     assert found["tfcompose 10000"][0] <= MOST_GROWTH * found["tfcompose 1000"][0], found
     assert found["tfcompose 10000"][1] <= MOST_MB, found
 
@@ -124,5 +133,6 @@ if __name__ == "__main__":
     for frames, times in TIMES_FASTER.items():
         ratio = figures[f"xacro {frames}"][0] / figures[f"tfcompose {frames}"][0]
         sys.stdout.write(f"{frames} frames: {ratio:.1f} times faster than xacro, at least {times:g}\n")
+        sys.stdout.write(f"reading the result back costs {reading(figures, frames):.2f} of a build, at most 0.5\n")
     growth = figures["tfcompose 10000"][0] / figures["tfcompose 1000"][0]
     sys.stdout.write(f"10,000 frames cost {growth:.1f} times 1,000, at most {MOST_GROWTH:g}\n")

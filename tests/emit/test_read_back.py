@@ -31,7 +31,9 @@ robot: more
 links:
   base_link: {visual: [{capsule: {radius: 0.1, length: 0.5}}, {cylinder: {radius: 1, length: 2}, xyz: [1, 0, 0]}]}
   a: {visual: {mesh: {uri: "http://here/a.stl", scale: [1, 2, 3]}, material: {name: m, texture: "http://here/a.png"}}}
-  b: {collision: {sphere: {radius: 0.1}}, inertial: {mass: 2, inertia: {ixx: 1, iyy: 2, izz: 2, ixy: 0.1}, rpy: [0.1, 0, 0]}}
+  b:
+    collision: {sphere: {radius: 0.1}}
+    inertial: {mass: 2, inertia: {ixx: 1, iyy: 2, izz: 2, ixy: 0.1}, rpy: [0.1, 0, 0]}
 joints:
   j: {type: revolute, parent: base_link, child: a, rpy: [0.1, 0.2, 0.3], limit: {lower: -1, upper: 1, effort: 1},
       dynamics: {damping: 1}, safety_controller: {k_velocity: 1}, calibration: {rising: 0.5}}

@@ -57,7 +57,7 @@ def _move(staging: Path, folder: Path, paths: list[str]) -> None:
             target.parent.mkdir(parents=True, exist_ok=True)
             if target.exists():
                 old.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy2(target, old)
+                _keep(target, old)
         for path in paths:
             (staging / "new" / path).replace(folder / path)
             done.append(path)
@@ -67,6 +67,15 @@ def _move(staging: Path, folder: Path, paths: list[str]) -> None:
         for parent in reversed(made):
             _remove_if_empty(parent)
         raise
+
+
+def _keep(target: Path, old: Path) -> None:
+    """Keep the file under another name: what takes its place does not change it. A copy where that cannot be."""
+    with contextlib.suppress(OSError):
+        if not target.is_symlink():
+            os.link(target, old)
+            return
+    shutil.copy2(target, old)
 
 
 def _put_back(old: Path, target: Path) -> None:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from tfcompose.load import Path, Source
 
+_HOLDERS = frozenset({dict, list})
 _SECTIONS = ("frames", "links", "joints", "sensors", "parts", "processes")
 
 #: Keys whose values are numbers of a pose or a limit.
@@ -41,7 +42,7 @@ def as_written(data: dict[str, Any], source: Source) -> tuple[AsWritten, ...]:
 
 def _walk(value: Any, path: Path, source: Source, found: list[AsWritten]) -> None:
     for key, item in value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ():
-        if not isinstance(item, (dict, list)):
+        if type(item) not in _HOLDERS:  # most are numbers and texts
             continue
         if key in _LISTS and isinstance(item, list):
             _take(item, range(len(item)), (*path, key), source, found)
@@ -58,6 +59,11 @@ def _take(item: Any, steps: Iterable[str | int], path: Path, source: Source, fou
     kept: list[str | int] = []
     for step in steps:
         number: Any = item[step]
+        if type(number) is float or type(number) is int:  # as most are
+            numbers.append(float(number))
+            units.append(False)
+            kept.append(step)
+            continue
         with_unit = False
         if isinstance(number, str):
             try:

@@ -51,7 +51,8 @@ def _filled(value: Any, path: Path, variables: _Variables) -> Any:
         return value
     filled: dict[Any, Any] = {}
     for step, item in value.items() if isinstance(value, dict) else enumerate(value):
-        if isinstance(item, (dict, list)) or (isinstance(item, str) and "${" in item):
+        kind = type(item)
+        if kind is not float and (kind is dict or kind is list or (kind is str and "${" in item)):
             new = _filled(item, (*path, step), variables)
             if new is not item:
                 filled[step] = new

@@ -43,16 +43,14 @@ def far_from_the_robot(robot: Robot) -> Iterator[Diagnostic]:
     )
     moved = {edge.joint_name: edge.child for edge in robot.edges if edge.joint_name}
     mounted = {sensor.name: sensor.mount for sensor in robot.sensors}
+    named: dict[str | int, dict[str, str]] = {"joints": moved, "sensors": mounted}
     for value in robot.as_written:
-        if value.key != "xyz" or len(value.path) != _OF_AN_EDGE or value.path[0] == "processes":
+        if value.path[2:] != ("xyz",) or norm(value.numbers) <= limit or value.path[0] == "processes":
             continue
-        child = {"joints": moved, "sensors": mounted}.get(str(value.path[0]), {}).get(value.entry, value.entry)
+        child = named.get(value.path[0], {}).get(value.entry, value.entry)
         distance = norm(tuple(n for n, unit in zip(value.numbers, value.with_unit, strict=True) if not unit))
         if child in below and distance > limit:
             message = f"{value.entry} is {distance:g} m away; the rest of the robot is within {limit:.3g} m"
             farthest = max(range(len(value.numbers)), key=lambda index: abs(value.numbers[index]))
             advice = f"a bare number is in metres; in millimetres: {value.numbers[farthest]:g} mm"
             yield finding("TF414", message, value.place(farthest), help=advice)
-
-
-_OF_AN_EDGE = 3  # section, name, xyz

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 _GOOD = re.compile(r"[A-Za-z0-9_]+(/[A-Za-z0-9_]+)*")
 #: What URDF and TF take, and a person can type.
-_TAKEN = re.compile(r"[\w.:+@-]+(/[\w.:+@-]+)*")
+_TAKEN = r"[\w.:+@-]+(/[\w.:+@-]+)*"
 #: What no listener can look up, or no XML file can hold.
-_LOST = re.compile(r"|/.*|\s.*|.*\s|.*[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff].*", re.DOTALL)
+_LOST = r"(?s)|/.*|\s.*|.*\s|.*[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff].*"
 _PROCESS = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(/[A-Za-z0-9_][A-Za-z0-9_.-]*)*")
 _NODE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
@@ -40,7 +40,7 @@ def bad_frame_name(robot: Robot) -> Iterator[Diagnostic]:
             names.setdefault(edge.joint_name, edge.joint.at if edge.joint else edge.at)
     for name, at in names.items():
         if not _GOOD.fullmatch(name):
-            taken = _TAKEN.fullmatch(name) or (at.file in robot.foreign and not _LOST.fullmatch(name))
+            taken = re.fullmatch(_TAKEN, name) or (at.file in robot.foreign and not re.fullmatch(_LOST, name))
             yield _bad(name, at, "name", "warning" if taken else "error")
     for process in robot.processes:
         if not _PROCESS.fullmatch(process.name):

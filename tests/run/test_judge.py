@@ -865,7 +865,7 @@ def test_remembered_verdicts_are_those_that_would_be_given_anew(sends: list[tupl
         }
         for who, pause in sends:
             if forgets:
-                running.judge._streams.clear()
+                running.judge._streams.forget()
             running.send(*senders[who]).wait(pause)
         running.wait(1)
         said.append(running.events)

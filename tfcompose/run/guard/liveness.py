@@ -3,20 +3,19 @@
 Edges that have always come together share one history. At first those of one owner do, and a message that holds only
 some of them parts them; so a message costs what it tells, however many edges it holds.
 
-Times are monotonic seconds. What is measured is the time in which the guard looked: a guard that was kept from looking
-knows nothing of the time between, and blames nobody for it.
+Times are monotonic seconds. What is measured is the time in which the guard looked (``track``).
 """
 
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.plan import SLOW_BELOW
 from tfcompose.run.events import Complete, Found, GuardEvent, Live, OwnerReady, Recovered
 from tfcompose.run.guard.silence import change_event
+from tfcompose.run.guard.track import Track, Watched
 from tfcompose.verdict.timing import left
 
 if TYPE_CHECKING:
@@ -24,100 +23,10 @@ if TYPE_CHECKING:
 
     from tfcompose.plan import Plan, PlanEdge
 
-#: A rate is judged over this time, or so many periods, and is fast enough again above this part of what is declared.
-WINDOW_S = 2.0
-WINDOW_PERIODS = 8.0
+#: A rate is fast enough again above this part of what is declared.
 FAST_AGAIN_ABOVE = 0.9
-#: What is kept of the arrivals before the window: a rate needs two gaps, the longer of which may be a hiccup.
-FEWEST_ARRIVALS = 4
-#: Of the time between two looks only so much counts; the guard looks ten times a second.
-LOOK_COUNTS_S = 0.25
-#: After so long without a look messages are lost, and come when the writer's next heartbeat does: 3 s in Fast DDS.
-STALLED_S = 1.0
-CATCH_UP_S = 3.5
 #: For so many combinations of edges their tracks are remembered.
 MOST_MESSAGES = 1000
-
-
-@dataclass(slots=True)
-class Watched:
-    """The seconds in which the guard looked, as a clock that stands while it is kept from looking."""
-
-    _seconds: float = 0.0
-    _looked: float | None = None
-    _catching_up_until: float = 0.0
-
-    def at(self, now: float) -> float:
-        """Return the seconds until ``now``."""
-        if self._looked is None or now < self._catching_up_until:
-            return self._seconds
-        return self._seconds + min(max(now - self._looked, 0.0), LOOK_COUNTS_S)
-
-    def begins_late(self, until: float) -> None:
-        """Take what is missing until then as not found yet."""
-        self._catching_up_until = until
-
-    def look(self, now: float) -> float:
-        """Note that the guard looks now, and return the seconds until then."""
-        if self._looked is not None and now - self._looked > STALLED_S:
-            self._catching_up_until = now + CATCH_UP_S
-        self._seconds, self._looked = self.at(now), now
-        return self._seconds
-
-
-@dataclass(slots=True)
-class Track:
-    """What is known of planned edges that come together: of one owner, kind and rate.
-
-    ``arrivals`` and ``heard`` are watched seconds, ``last`` is monotonic; ``delay_s`` is the age of the last stamp when
-    it came, ``silent_after`` how long the edges may be quiet, in seconds, or None if they say no rate.
-    """
-
-    edges: tuple[PlanEdge, ...]
-    silent_after: float | None = field(init=False)
-    _window: float = field(init=False)
-    delay_s: float | None = None
-    live: bool = False
-    last: float = 0.0
-    heard: float = 0.0
-    silent: bool = False
-    silent_since: float = 0.0
-    steady: bool = False
-    slow: bool = False
-    arrivals: deque[float] = field(default_factory=deque)
-
-    @property
-    def edge(self) -> PlanEdge:
-        """One of them."""
-        return self.edges[0]
-
-    def __post_init__(self) -> None:
-        rate = self.edge.rate
-        self._window = max(WINDOW_S, WINDOW_PERIODS / (rate or WINDOW_PERIODS))
-        self.silent_after = self.edge.silent_after_s
-
-    def arrived(self, seen: float, now: float) -> None:
-        """Note an arrival. An edge that was silent is steady again with two arrivals close enough to each other."""
-        after = self.silent_after
-        self.steady = after is not None and self.live and seen - self.heard <= after
-        self.last, self.heard = now, seen
-        if after is not None:
-            self.arrivals.append(seen)
-            self._forget(seen)
-
-    def rate(self, seen: float) -> float | None:
-        """Return the rate over the window in hertz, without its longest gap; None while there is too little to say."""
-        self._forget(seen)
-        times = self.arrivals
-        if len(times) < 3 or times[-1] - times[0] < self._window / 2:  # noqa: PLR2004 (two gaps need three arrivals)
-            return None
-        longest = max(b - a for a, b in pairwise(times))
-        rest = times[-1] - times[0] - longest
-        return (len(times) - 2) / rest if rest > 0 else None
-
-    def _forget(self, seen: float) -> None:
-        while len(self.arrivals) > FEWEST_ARRIVALS and seen - self.arrivals[0] > self._window:
-            self.arrivals.popleft()
 
 
 class Liveness:

@@ -8,7 +8,7 @@ from tfcompose.run.events import Found, GuardEvent, Recovered
 from tfcompose.verdict.timing import named, silent, slow
 
 if TYPE_CHECKING:
-    from tfcompose.run.guard.liveness import Track
+    from tfcompose.run.guard.track import Track
 
 
 def change_event(change: str, tracks: list[Track], seen: float, now: float) -> GuardEvent:

@@ -1,0 +1,76 @@
+"""Publishers that do wrong by being there: no listener hears them, or they are where they do not belong.
+
+Each is told once, for as long as guards follow each other.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.ros.misfits import best_effort_writer, leak, volatile_writer
+from tfcompose.run.events import Found
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.plan import Plan
+    from tfcompose.run.guard.senders import Writer
+
+
+class Endpoints:
+    """What was told of publishers as the graph shows them; ``changes`` counts it."""
+
+    def __init__(self, plan: Plan) -> None:
+        self._plan = plan
+        self._nodes = {node for process in plan.processes for node in process.nodes}
+        self._told: set[tuple[str, bytes]] = set()
+
+    @property
+    def changes(self) -> int:
+        """How much was told."""
+        return len(self._told)
+
+    def misfits(self, writers: Sequence[Writer]) -> list[Found]:
+        """Return the findings for those on the plan's topics whose quality of service no listener accepts."""
+        return [
+            found
+            for writer in writers
+            if writer.node
+            for code, wrong in self._misfit(writer, writer.node)
+            for found in self._once(code, writer, wrong)
+        ]
+
+    def _misfit(self, writer: Writer, node: str) -> Iterator[tuple[str, Diagnostic]]:
+        topic = "/tf_static" if writer.static else "/tf"
+        if writer.static and writer.volatile:
+            owned = [edge.name for edge in self._plan.edges if edge.node == node and edge.kind == "static"]
+            yield "TF806", volatile_writer(node, topic, owned)
+        if writer.best_effort:
+            yield "TF826", best_effort_writer(node, topic)
+
+    def leaks(self, writers: Sequence[Writer], topics: tuple[str, str]) -> list[Found]:
+        """Return the findings for the plan's nodes on the global topics, while its own (moving, static) are others."""
+        inside = f"/{self._plan.ros.namespace.strip('/')}/"
+        return [
+            found
+            for one in writers
+            if one.node and (one.node in self._nodes or one.node.startswith(inside))
+            for found in self._once(
+                "TF827", one, leak(one.node, "/tf_static" if one.static else "/tf", topics[one.static])
+            )
+        ]
+
+    def memory(self) -> list[list[str]]:
+        """Return what was told, as values of JSON."""
+        return sorted([code, gid.hex()] for code, gid in self._told)
+
+    def recall(self, memory: list[list[str]]) -> None:
+        """Take this as told by the guard before."""
+        self._told = {(code, bytes.fromhex(gid)) for code, gid in memory}
+
+    def _once(self, code: str, writer: Writer, found: Diagnostic) -> list[Found]:
+        if (code, writer.gid) in self._told:
+            return []
+        self._told.add((code, writer.gid))
+        return [Found(found)]

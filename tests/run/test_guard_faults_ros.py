@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -13,6 +14,8 @@ import psutil
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+
+from tests.waiting import until
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -77,8 +80,11 @@ class Running:
 
     def joins(self, name: str, *edges: str, reliability: str = "reliable", stamps: str = "right") -> int:
         """Let a node send these edges, and return its process id."""
-        command = [sys.executable, "-c", NODE, name, reliability, stamps, *edges]
-        node = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        return self.starts(NODE, name, reliability, stamps, *edges)
+
+    def starts(self, code: str, *arguments: str) -> int:
+        """Start a node of this code, wait for its first line, and return its process id."""
+        node = subprocess.Popen([sys.executable, "-c", code, *arguments], stdout=subprocess.PIPE, text=True)
         self.nodes.append(node)
         assert node.stdout
         assert node.stdout.readline()
@@ -259,3 +265,76 @@ def test_the_policy_stop_offender_stops_the_plans_own_offender_and_no_stranger(
     children = [p.cmdline() for p in psutil.Process(robot.popen.pid).children()]
     assert {"guard", "slam"} <= {words[-1] for words in children if words}
     assert not any("traitor.py" in words for words in children)
+
+
+#: A node that sends edges of others at 1 kHz.
+FLOOD = """
+import signal, sys, time
+from tfcompose.ros.message import Template
+from tfcompose.ros.node import open_node
+from tfcompose.ros.tf import TFPublisher
+signal.signal(signal.SIGTERM, lambda *_: sys.exit())
+with open_node("rogue", "/") as node:
+    publisher, template, due = TFPublisher(node, static=False), Template([("map", "odom")]), time.monotonic()
+    print("ready", flush=True)
+    while True:
+        template.set_stamp(time.time_ns())
+        publisher.publish(template.data)
+        due += 0.001
+        time.sleep(max(0.0, due - time.monotonic()))
+"""
+#: A node with so many latched publishers: one for each frame, as a static_transform_publisher is.
+MANY = """
+import signal
+from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.node import open_node
+from tfcompose.ros.tf import TFPublisher
+with open_node("foreign", "/") as node:
+    publishers = [TFPublisher(node, static=True) for _ in range(120)]
+    for n, publisher in enumerate(publishers):
+        publisher.publish(encode([Transform(1, "map", f"dock_{n}", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))]))
+    print("ready", flush=True)
+    signal.pause()
+"""
+GUARDS = ["mode: watch", "mode: strict, fence: partition", "mode: strict, fence: remap"]
+
+
+@pytest.mark.parametrize("guard", GUARDS)
+def test_a_rogue_at_1_khz_is_named_once_and_takes_little_of_the_guard(up: Callable[[str], Running], guard: str) -> None:
+    robot = up(ROBOT.replace("guard: {", f"guard: {{{guard}, "))
+    robot.joins("/drive", "odom base_link")
+    robot.says("complete")
+    robot.starts(FLOOD)
+    robot.says("error[TF801]", "map → odom is published by /rogue; the owner is slam (/slam)", within=5)
+    process = robot.child("guard")
+    before_s, before_bytes, begun = sum(process.cpu_times()[:2]), process.memory_info().rss, time.monotonic()
+    time.sleep(4)
+    part = (sum(process.cpu_times()[:2]) - before_s) / (time.monotonic() - begun)
+    assert part < 0.25, f"{part:.0%} of a core"
+    assert process.memory_info().rss - before_bytes < 8e6
+    assert robot.count("TF801") == 1
+    assert robot.count("fell silent") == 0
+    robot.leaves()
+    robot.says("over", "map → odom is no longer published by /rogue")
+
+
+@pytest.mark.parametrize("guard", GUARDS)
+def test_of_more_static_publishers_than_a_listener_keeps_every_one_is_seen(
+    up: Callable[[str], Running], guard: str
+) -> None:
+    foreign = subprocess.Popen([sys.executable, "-c", MANY], stdout=subprocess.PIPE, text=True)
+    try:
+        assert foreign.stdout
+        assert foreign.stdout.readline()
+        robot = up(ROBOT.replace("guard: {", f"guard: {{{guard}, "))
+        robot.joins("/drive", "odom base_link")
+        robot.says("complete")
+        told = re.compile(r"dock_\d+(?: and (\d+) more)?.* published by /foreign")
+
+        def named() -> int:
+            return sum(1 + int(more or 0) for more in told.findall(robot.output.read_text("utf-8")))
+
+        assert until(lambda: named() == 120), named()
+    finally:
+        foreign.kill()
+        foreign.communicate()

@@ -45,6 +45,8 @@ def qos(depth: int, durability: DurabilityPolicy, reliability: ReliabilityPolicy
 TF_PUBLISHER = TF_READER = qos(100, DurabilityPolicy.VOLATILE, ReliabilityPolicy.RELIABLE)
 TF_STATIC_PUBLISHER = qos(1, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
 TF_STATIC_READER = qos(100, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
+DEEP_TF_READER = qos(1000, DurabilityPolicy.VOLATILE, ReliabilityPolicy.RELIABLE)
+DEEP_TF_STATIC_READER = qos(1000, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
 #: Matches any publisher of ``joint_states``, as robot_state_publisher's subscription does; that one keeps 5 messages,
 #: and loses those of a fast source while it does not run for a moment.
 JOINT_STATES = qos(50, DurabilityPolicy.VOLATILE, ReliabilityPolicy.BEST_EFFORT)

@@ -16,7 +16,14 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from tfcompose.ros.environment import RosError
 from tfcompose.ros.identity import gid_of, ids_say_who
-from tfcompose.ros.node import TF_PUBLISHER, TF_READER, TF_STATIC_PUBLISHER, TF_STATIC_READER
+from tfcompose.ros.node import (
+    DEEP_TF_READER,
+    DEEP_TF_STATIC_READER,
+    TF_PUBLISHER,
+    TF_READER,
+    TF_STATIC_PUBLISHER,
+    TF_STATIC_READER,
+)
 from tfcompose.ros.typesupport import tf_message_type
 
 if TYPE_CHECKING:
@@ -154,11 +161,15 @@ class Subscription:
 
 
 class TFSubscription(Subscription):
-    """A subscription to /tf or /tf_static, or to another ``topic`` with the same QoS, as a tf2 listener's."""
+    """A subscription to /tf or /tf_static, or to another ``topic`` with the same QoS, as a tf2 listener's.
 
-    def __init__(self, node: Node, *, static: bool, topic: str | None = None) -> None:
-        qos = TF_STATIC_READER if static else TF_READER
-        super().__init__(node, tf_message_type(), topic or _topic(static=static), qos)
+    With ``deep`` it keeps ten times as many messages as listeners do, for one that must miss nobody: of a hundred
+    latched publishers that it finds at once, or a flood.
+    """
+
+    def __init__(self, node: Node, *, static: bool, topic: str | None = None, deep: bool = False) -> None:
+        profiles = (TF_READER, TF_STATIC_READER, DEEP_TF_READER, DEEP_TF_STATIC_READER)
+        super().__init__(node, tf_message_type(), topic or _topic(static=static), profiles[static + 2 * deep])
 
 
 def wait(node: Node, subscriptions: Sequence[Subscription], timeout_s: float | None, stop: Stop) -> None:

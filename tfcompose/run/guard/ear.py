@@ -33,7 +33,7 @@ class Ear:
     def __init__(self, node: Node, topics: Topics, private: Mapping[str, Topics]) -> None:
         self.own: set[bytes | None] = set()
         self._subscriptions = [
-            (TFSubscription(node, static=static, topic=pair[static]), static, process)
+            (TFSubscription(node, static=static, topic=pair[static], deep=True), static, process)
             for process, pair in [("", topics), *private.items()]
             for static in (True, False)
         ]

@@ -11,9 +11,10 @@ from tfcompose.observe.census import Census, Publisher
 from tfcompose.observe.diagnose import diagnose
 from tfcompose.observe.diagnose.surroundings import differences
 from tfcompose.observe.joint_list import joints_of
-from tfcompose.observe.seen import Seen, Stamped, Topic, seconds
+from tfcompose.observe.seen import RosProcess, Seen, Stamped, Topic, seconds
 from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.pose import Pose
+from tfcompose.ros.settings import RANGE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -231,12 +232,18 @@ def test_edges_that_a_plan_allows_or_that_are_another_robots_are_no_finding() ->
 
 def test_processes_with_other_settings_cannot_be_heard_and_why_is_said() -> None:
     ours = {"ROS_DOMAIN_ID": "7"}
-    assert differences({"ROS_DOMAIN_ID": "7", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, ours) == ""
-    assert differences({}, ours) == "ROS_DOMAIN_ID=0, and here it is 7"
-    assert "OFF" in differences({**ours, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, ours)
-    assert differences({**ours, "RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}, ours) == "", "the default may be the same"
-    apart = differences({**ours, "RMW_IMPLEMENTATION": "a"}, {**ours, "RMW_IMPLEMENTATION": "b"})
-    assert apart == "RMW_IMPLEMENTATION=a, and here it is b"
+    assert differences({"ROS_DOMAIN_ID": "7", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, ours) == {}
+    assert differences({}, ours) == {"ROS_DOMAIN_ID": "0"}
+    assert differences({**ours, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, ours) == {RANGE: "OFF"}
+    assert differences({**ours, "RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}, ours) == {}, "the default may be the same"
+    seen = Seen(1.0, settings={**ours, "RMW_IMPLEMENTATION": "b"})
+    other = RosProcess(9, "nav", {**ours, "ROS_DOMAIN_ID": "8", "RMW_IMPLEMENTATION": "a"})
+    [found] = [one for one in diagnose(replace(seen, processes=(other,))) if one.code == "TF908"]
+    assert found.message == (
+        "a ROS process on this machine cannot be heard from here: started with ROS_DOMAIN_ID=8, RMW_IMPLEMENTATION=a, "
+        "and here ROS_DOMAIN_ID is 7 and RMW_IMPLEMENTATION is b"
+    )
+    assert found.help.startswith("to look there: ROS_DOMAIN_ID=8 RMW_IMPLEMENTATION=a tfcompose doctor; ")
 
 
 @pytest.mark.parametrize(

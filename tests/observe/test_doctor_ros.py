@@ -380,7 +380,7 @@ def test_a_robot_in_another_domain_is_seen_by_its_process(domain: Any) -> None:
         finally:
             process.kill()
     text = said(found, "TF908")
-    assert "ROS_DOMAIN_ID=101" in text
+    assert "to look there: ROS_DOMAIN_ID=101 tfcompose doctor" in text
     assert f"pid {process.pid}: " in text
 
 
@@ -502,7 +502,7 @@ def test_a_process_with_another_middleware_is_named(domain: Any) -> None:
         finally:
             process.kill()
     text = said(found, "TF908")
-    assert "RMW_IMPLEMENTATION=rmw_cyclonedds_cpp, and here it is rmw_fastrtps_cpp" in text
+    assert "RMW_IMPLEMENTATION=rmw_cyclonedds_cpp, and here RMW_IMPLEMENTATION is rmw_fastrtps_cpp" in text
     assert f"pid {process.pid}: " in text
 
 

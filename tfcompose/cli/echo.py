@@ -79,7 +79,7 @@ def run(arguments: Namespace) -> int:
     if missed is None or isinstance(missed, int):
         return missed or 0
     message = f"no pose of {arguments.b} in {arguments.a}: {missed.reason}"
-    print_findings([finding("TF814", message, None)], sys.stderr)
+    print_findings([finding("TF814", message, None, help=missed.help)], sys.stderr)
     return 1
 
 

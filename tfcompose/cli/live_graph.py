@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.edge_table import printable
-from tfcompose.cli.looking import from_bag, from_live, nothing_came
+from tfcompose.cli.looking import from_bag, from_live
 from tfcompose.draw import Arrow, Graph
 from tfcompose.emit.tree import pose_words
 from tfcompose.observe.census import SETTLE_S, Census, topics_below
@@ -25,15 +24,12 @@ def seen(arguments: Namespace) -> Graph | int:
     """Return the published tree as a graph, or the exit code: 1 if nothing is published, 2 for a bag that is none."""
     topics = topics_below(arguments.namespace)
     census = Census(settle_s=0.0 if arguments.bag else SETTLE_S)
-    begun = time.monotonic()
     if arguments.bag:
         code = from_bag(arguments.bag, {topics: census})
     else:
         code = from_live("tfcompose_graph", {topics: census}, duration_s=arguments.duration)
     if code is not None:
         return code
-    if not census.messages:
-        return nothing_came(", ".join(topics), time.monotonic() - begun)
     return graph_of_census(census, arguments.bag or topics[0], poses=arguments.poses)
 
 

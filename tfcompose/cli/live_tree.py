@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.edge_table import duration, object_of, printable
 from tfcompose.cli.expected import expected
-from tfcompose.cli.looking import from_bag, from_live, nothing_came
+from tfcompose.cli.looking import from_bag, from_live
 from tfcompose.observe.census import SETTLE_S, Census, topics_below
 from tfcompose.observe.forest import forest
 from tfcompose.ros.topics import parts_of
@@ -39,15 +39,12 @@ def live_tree(arguments: Namespace) -> int:
         planned = {pair: {edge.child: edge for edge in part.edges} for pair, part in parts_of(plan).items()}
         pairs = list(planned)
     censuses = {pair: Census(settle_s=0.0 if arguments.bag else SETTLE_S) for pair in pairs}
-    begun = time.monotonic()
     if arguments.bag:
         code = from_bag(arguments.bag, censuses)
     else:
         code = from_live("tfcompose_tree", censuses, ros=plan.ros if plan else None, duration_s=arguments.duration)
     if code is not None:
         return code
-    if not any(census.messages for census in censuses.values()):
-        return nothing_came(", ".join(topic for pair in pairs for topic in pair), time.monotonic() - begun)
     for pair, census in censuses.items():
         now_ns = census.last_ns if arguments.bag else time.time_ns()
         trees = forest(census.edges(now_ns), None if planned is None else planned[pair])

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from tfcompose.cli.options import positive
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings
-from tfcompose.diagnostic import finding
+from tfcompose.diagnostic import Note, finding
 from tfcompose.plan import RosSettings
 from tfcompose.ros.environment import RosError, child_environment
 from tfcompose.ros.settings import ros_trouble
@@ -18,7 +18,7 @@ from tfcompose.ros.stop import Stop
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from tfcompose.observe.census import Census
 
@@ -49,12 +49,18 @@ def add_for(parser: ArgumentParser, text: str, default: float | None = None) -> 
     parser.add_argument("--for", dest="duration", type=positive, default=default, metavar="S", help=text)
 
 
-def from_bag(path: str, censuses: Mapping[Topics, Census]) -> int | None:
+def from_bag(path: str, censuses: Mapping[Topics, Census], *, may_be_silent: bool = False) -> int | None:
     """Put a bag into the censuses of these topics (moving, fixed).
 
-    Return None, or the exit code after saying why not.
+    Return None, or the exit code after saying why not: nothing came is a reason, unless it ``may_be_silent``.
     """
-    return reading(lambda: import_module("tfcompose.observe.bag").take_bag(path, censuses))
+    code = reading(lambda: import_module("tfcompose.observe.bag").take_bag(path, censuses))
+    if code is None and not may_be_silent and not any(census.messages for census in censuses.values()):
+        message = f"no message was recorded on {names_of(censuses)} in {path}"
+        advice = "was the robot running? /tf_static comes once: who records it must ask for durability transient_local"
+        print_findings([finding("TF811", message, None, help=advice)], sys.stderr)
+        return 1
+    return code
 
 
 def reading(read: Callable[[], T]) -> T | int:
@@ -79,10 +85,12 @@ def from_live(  # noqa: PLR0913 (all but two are named)
     duration_s: float | None,
     every_s: float = 1.0,
     show: Callable[[int], None] | None = None,
+    may_be_silent: bool = False,
 ) -> int | None:
     """Fill the censuses from the running system, until the time is over or a signal comes.
 
-    Return None, or the exit code after saying why not. ``show`` is called as by ``watch``.
+    Return None, or the exit code after saying why not: nothing came is a reason, unless it ``may_be_silent``. ``show``
+    is called as by ``watch``.
     """
     if not ready_for_ros(ros):
         return 1
@@ -90,14 +98,13 @@ def from_live(  # noqa: PLR0913 (all but two are named)
         watch = import_module("tfcompose.observe.watching").watch
         begun = time.monotonic()
         try:
-            watch(name, censuses, stop, duration_s=duration_s, every_s=every_s, show=show)
+            elsewhere = watch(name, censuses, stop, duration_s=duration_s, every_s=every_s, show=show)
         except RosError as error:
             print_findings([finding("TF901", str(error), None)], sys.stderr)
             return 1
-        if stop.requested:
-            heard = any(census.messages for census in censuses.values())
-            return ended_early(time.monotonic() - begun, duration_s, heard=heard)
-    return None
+        seconds, heard = time.monotonic() - begun, any(census.messages for census in censuses.values())
+        code = ended_early(seconds, duration_s, heard=heard) if stop.requested else None
+    return code if code or heard or may_be_silent else _nothing_came(list(censuses), seconds, elsewhere)
 
 
 def ready_for_ros(ros: RosSettings | None = None) -> bool:
@@ -124,9 +131,15 @@ def ended_early(seconds: float, duration_s: float | None, *, heard: bool) -> int
     return None
 
 
-def nothing_came(where: str, seconds: float) -> int:
+def _nothing_came(topics: Sequence[Topics], seconds: float, elsewhere: Sequence[str]) -> int:
     """Say that there was no TF at all, and return the exit code."""
-    message = f"no TF message came on {where} for {seconds:.1f} s"
-    advice = "is the robot running, and with the same ROS_DOMAIN_ID and discovery range?"
-    print_findings([finding("TF811", message, None, help=advice)], sys.stderr)
+    words = import_module("tfcompose.observe.elsewhere")
+    message = f"no TF message came on {names_of(topics)} for {seconds:.1f} s"
+    notes = [Note(f"looked with {words.said(os.environ)}")]
+    print_findings([finding("TF811", message, None, notes=notes, help=words.advice(elsewhere))], sys.stderr)
     return 1
+
+
+def names_of(topics: Iterable[Topics]) -> str:
+    """Return the topics as people read them."""
+    return " and ".join(topic for pair in topics for topic in pair)

@@ -8,16 +8,15 @@ until Ctrl-C; into a pipe each table follows the last.
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from functools import partial
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.edge_table import lines_of, objects_of
-from tfcompose.cli.looking import add_bag, add_for, add_namespace, from_bag, from_live, nothing_came
+from tfcompose.cli.looking import add_bag, add_for, add_namespace, from_bag, from_live, names_of
 from tfcompose.cli.options import positive
-from tfcompose.cli.redrawn import Redrawn
+from tfcompose.cli.redrawn import Redrawn, can_redraw
 from tfcompose.observe.census import SETTLE_S, Census, topics_below
 
 if TYPE_CHECKING:
@@ -48,26 +47,30 @@ def run(arguments: Namespace) -> int:
         if code is None:
             _show(arguments, census, None, census.last_ns)
         return code or 0
-    begun = time.monotonic()
-    redrawn = Redrawn(sys.stdout) if arguments.format == "text" and sys.stdout.isatty() else None
+    redrawn = Redrawn(sys.stdout) if arguments.format == "text" and can_redraw(sys.stdout) else None
     show = None if arguments.duration and not redrawn else partial(_show, arguments, census, redrawn)
     code = from_live(
         "tfcompose_monitor", {topics: census}, duration_s=arguments.duration, every_s=arguments.every, show=show
     )
     if code is not None:
         return code
-    if arguments.duration and census.messages:
+    if arguments.duration:
         _show(arguments, census, redrawn, time.time_ns())
-    return 0 if census.messages else nothing_came(" and ".join(topics), time.monotonic() - begun)
+    return 0
 
 
 def _show(arguments: Namespace, census: Census, redrawn: Redrawn | None, now_ns: int) -> None:
     edges = sorted(census.edges(now_ns), key=lambda seen: seen.strand.static)  # what moves first
     if arguments.format == "json":
         sys.stdout.write(objects_of(edges, census, now_ns))
-    elif redrawn is not None:
-        redrawn.draw(lines_of(edges, census, now_ns, width=os.get_terminal_size(sys.stdout.fileno()).columns))
+        sys.stdout.flush()
         return
-    else:
-        sys.stdout.write("".join(f"{line}\n" for line in lines_of(edges, census, now_ns)))
+    width = redrawn.width if redrawn else None
+    lines = lines_of(edges, census, now_ns, width=width)
+    if not census.messages:
+        lines = [f"no TF yet on {names_of([topics_below(arguments.namespace)])}"]
+    if redrawn is not None:
+        redrawn.draw(lines)
+        return
+    sys.stdout.write("".join(f"{line}\n" for line in lines))
     sys.stdout.flush()

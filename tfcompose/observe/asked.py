@@ -23,6 +23,7 @@ class Asked:
 
 @dataclass(frozen=True, slots=True)
 class Missed:
-    """Why there was no pose."""
+    """Why there was no pose, and what to do about it, where more is known than the reason says."""
 
     reason: str
+    help: str = ""

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 from tfcompose.observe.asked import Asked, Missed
 from tfcompose.observe.buffer import Buffer, TransformException
+from tfcompose.observe.elsewhere import advice, tf_elsewhere
 from tfcompose.observe.refusal import Refusal
 from tfcompose.ros.decoder import Decoder
+from tfcompose.ros.graph import topics as topics_of
 from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFSubscription, wait
 
@@ -53,7 +55,10 @@ def echo(asked: Asked, say: Callable[[Pose, int | None], None], stop: Stop) -> M
                     continue
                 reason = f"nothing new came on {ear.buffer.behind(asked.a, asked.b)} for {now - last:.1f} s"
             if now - last > asked.timeout_s:
-                return Missed(ear.why(reason, now - begun))
+                if ear.messages:
+                    return Missed(ear.why(reason))
+                elsewhere = tf_elsewhere(topics_of(node), [topic for _, topic in topics])
+                return Missed(f"no TF message came for {now - begun:.1f} s", advice(elsewhere))
     return None
 
 
@@ -64,12 +69,12 @@ class _Ear:
         self.buffer = Buffer()
         self._asked = asked
         self._decoder = Decoder()
-        self._messages = 0
+        self.messages = 0
         self._too_old: str | None = None
 
     def take(self, subscription: TFSubscription, *, static: bool) -> None:
         for received in subscription.take():
-            self._messages += 1
+            self.messages += 1
             try:
                 refused = self.buffer.insert(self._decoder.rows(received.data), static=static)
             except ValueError:
@@ -83,13 +88,8 @@ class _Ear:
         pose, stamp_ns = self.buffer.latest(a, b)
         return self.buffer.lookup(a, b, stamp_ns + at_ns) if stamp_ns and at_ns else (pose, stamp_ns)
 
-    def why(self, reason: str, seconds: float) -> str:
+    def why(self, reason: str) -> str:
         """Return the reason with what explains it."""
-        if not self._messages:
-            return (
-                f"no TF message came for {seconds:.1f} s; is the robot running, "
-                "and with the same ROS_DOMAIN_ID and discovery range?"
-            )
         if self._too_old is None:
             return reason
         return (

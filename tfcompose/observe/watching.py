@@ -5,7 +5,9 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
+from tfcompose.observe.elsewhere import tf_elsewhere
 from tfcompose.observe.live import Live
+from tfcompose.ros.graph import topics as topics_of
 from tfcompose.ros.node import open_node
 
 if TYPE_CHECKING:
@@ -26,10 +28,11 @@ def watch(  # noqa: PLR0913 (all but two are named)
     duration_s: float | None,
     every_s: float = 1.0,
     show: Callable[[int], None] | None = None,
-) -> None:
+) -> tuple[str, ...]:
     """Fill the censuses of the topics (moving, fixed) for so many seconds, or until ``stop`` is requested.
 
     ``show`` is called ``every_s`` with the time, in nanoseconds of the system's clock. The node's name is ``name``.
+    Return the names of other topics on which there is TF.
 
     Raises:
         RosError: if ROS cannot start a node, or take messages.
@@ -48,3 +51,4 @@ def watch(  # noqa: PLR0913 (all but two are named)
             if show is not None and time.monotonic() >= due:
                 due = time.monotonic() + every_s
                 show(time.time_ns())
+        return tf_elsewhere(topics_of(node), [topic for pair in censuses for topic in pair])

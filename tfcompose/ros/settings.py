@@ -16,7 +16,7 @@ from tfcompose.ros.environment import missing_ros
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-DOMAIN, RMW = "ROS_DOMAIN_ID", "RMW_IMPLEMENTATION"
+DOMAIN, RANGE, RMW = "ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "RMW_IMPLEMENTATION"
 #: A port number holds no more domains (RTPS: 7400 + 250 times the domain, below 65536).
 LAST_DOMAIN = 232
 

@@ -6,18 +6,20 @@ from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, finding
 from tfcompose.observe.diagnose.senders import TF_TYPE
+from tfcompose.observe.elsewhere import namespace_words, said
 from tfcompose.observe.seen import counted, listed
-from tfcompose.ros.settings import DOMAIN, RMW
+from tfcompose.ros.settings import DOMAIN, RANGE, RMW
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from tfcompose.observe.seen import RosProcess, Seen
 
-RANGE, LOCALHOST_ONLY = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY"
+LOCALHOST_ONLY = "ROS_LOCALHOST_ONLY"
 #: What decides who hears whom, with what holds where it is not set.
 DEFAULTS = {DOMAIN: "0", RANGE: "SUBNET", LOCALHOST_ONLY: "0", RMW: ""}
-VARIABLES = (*DEFAULTS, "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER")
+#: Of processes with other settings, those of so many settings are named.
+MOST_SETTINGS = 3
 
 
 def no_tf(seen: Seen) -> Iterator[Diagnostic]:
@@ -31,11 +33,9 @@ def no_tf(seen: Seen) -> Iterator[Diagnostic]:
     notes = [Note(f"seen: {listed(seen.nodes)}")] if seen.nodes else []
     notes.append(Note(f"looked with {said(seen.settings)}"))
     elsewhere = [t.name for t in seen.typed(TF_TYPE) if t.publishers and t.name not in seen.topics]
-    namespaces = list(dict.fromkeys(name.rpartition("/")[0] for name in elsewhere))
     if elsewhere:
         notes.append(Note(f"there is TF on {listed(elsewhere)}"))
-        words = [f"--namespace {name}" if name else "without --namespace" for name in namespaces]
-        advice = f"look there: tfcompose doctor {' or '.join(words)}"
+        advice = f"look there: tfcompose doctor {namespace_words(elsewhere)}"
     elif seen.nodes:
         advice = "start robot_state_publisher, or tfcompose up; tfcompose doctor --for 20 looks longer"
     else:
@@ -49,18 +49,25 @@ def other_settings(seen: Seen) -> Iterator[Diagnostic]:
     """Where frames are missing: processes of this machine that cannot be heard, because ROS is set up otherwise."""
     if seen.edges and not seen.planned - {edge.strand.child for edge in seen.edges}:
         return
-    found: dict[str, list[RosProcess]] = {}
+    found: dict[tuple[tuple[str, str], ...], list[RosProcess]] = {}
     for process in seen.processes:
         apart = differences(process.settings, seen.settings)
         if apart:
-            found.setdefault(apart, []).append(process)
-    for apart, processes in found.items():
+            found.setdefault(tuple(apart.items()), []).append(process)
+    # Those of this domain first: they are of this robot.
+    order = sorted(found.items(), key=lambda item: (DOMAIN in dict(item[0]), -len(item[1])))
+    for apart_items, processes in order[:MOST_SETTINGS]:
         number = "a ROS process" if len(processes) == 1 else f"{len(processes)} ROS processes"
-        message = f"{number} on this machine cannot be heard from here: started with {apart}"
+        settings = [f"{name}={value}" for name, value in apart_items]
+        here = [f"{name} is {seen.settings.get(name) or DEFAULTS[name]}" for name, _ in apart_items]
+        message = f"{number} on this machine cannot be heard from here: started with {', '.join(settings)}, "
+        message += f"and here {' and '.join(here)}"
         notes = [Note(f"pid {one.pid}: {one.command}") for one in processes[:6]]
         more = len(processes) - len(notes)
         notes += [Note(f"and {more} more")] if more else []
-        advice = "start both with the same settings; a shell's own: env | grep -E '^(ROS|RMW)_'"
+        advice = (
+            f"to look there: {' '.join(settings)} tfcompose doctor; who is to hear each other needs the same settings"
+        )
         yield finding("TF908", message, None, severity="warning", notes=notes, help=advice)
 
 
@@ -80,22 +87,14 @@ def settings_contradict(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF909", message, None, help=f"export {RANGE}=LOCALHOST, or SUBNET for several machines")
 
 
-def differences(theirs: Mapping[str, str], ours: Mapping[str, str]) -> str:
-    """Return why processes with these settings on one machine do not hear each other; empty if nothing says so."""
-    parts = []
+def differences(theirs: Mapping[str, str], ours: Mapping[str, str]) -> dict[str, str]:
+    """Return with which of their settings processes on one machine do not hear each other; none if nothing says so."""
+    apart = {}
     for name, default in DEFAULTS.items():
         their, our = theirs.get(name) or default, ours.get(name) or default
         if their == our or name == LOCALHOST_ONLY or (name == RANGE and "OFF" not in {their, our}):
             continue
         if name == RMW and not (their and our):
             continue  # the installation's default, which may be the same
-        parts.append(f"{name}={their}, and here it is {our}")
-    return ", ".join(parts)
-
-
-def said(settings: Mapping[str, str]) -> str:
-    """Return the settings as people read them."""
-    words = [f"{name}={settings[name]}" for name in VARIABLES if settings.get(name)]
-    if DOMAIN not in settings:
-        words.insert(0, f"{DOMAIN} unset (0)")
-    return ", ".join(words)
+        apart[name] = their
+    return apart

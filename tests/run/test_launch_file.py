@@ -94,6 +94,15 @@ def test_the_file_is_included_with_namespace_remappings_sim_time_and_arguments(
     ]
 
 
+@pytest.mark.parametrize(("theirs", "output"), [({}, "both"), ({"OVERRIDE_LAUNCH_PROCESS_OUTPUT": "log"}, "log")])
+def test_what_the_nodes_say_comes_to_the_log_unless_the_user_said_where_it_goes(
+    tmp_path: Path, env: dict[str, str], theirs: dict[str, str], output: str
+) -> None:
+    env.pop("OVERRIDE_LAUNCH_PROCESS_OUTPUT", None)
+    commands, _ = look(tmp_path, env | theirs)
+    assert commands["nav2"].env["OVERRIDE_LAUNCH_PROCESS_OUTPUT"] == output
+
+
 def test_without_ros2_it_says_what_brings_it(tmp_path: Path, env: dict[str, str]) -> None:
     _, found = look(tmp_path, env | {"PATH": "/nowhere"})
     assert found

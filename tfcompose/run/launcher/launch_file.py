@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from tfcompose.plan import PlanProcess, RosSettings
 
 _LAUNCH = re.compile(r"\$\{launch:([^/}]+)/([^}]+)\}")
+_OUTPUT = "OVERRIDE_LAUNCH_PROCESS_OUTPUT"
 _KINDS = ("*launch.py", "*launch.xml", "*launch.yaml", "*launch.yml")
 
 
@@ -58,7 +59,9 @@ def launch_command(
         "sim_time": ros.clock == "sim",
     }
     wrapper = str(Path(launch_wrapper.__file__).absolute())
-    return (ros2, "launch", "--noninteractive", wrapper), {launch_wrapper.LAUNCH: json.dumps(given, sort_keys=True)}
+    # Without being told, ros2 launch keeps what its nodes say to files of its own.
+    more = {launch_wrapper.LAUNCH: json.dumps(given, sort_keys=True), _OUTPUT: env.get(_OUTPUT) or "both"}
+    return (ros2, "launch", "--noninteractive", wrapper), more
 
 
 def _find(process: PlanProcess, package: str, name: str, env: Mapping[str, str]) -> Path | NotFound:

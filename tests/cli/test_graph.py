@@ -52,7 +52,7 @@ def test_poses_are_written_where_they_are_asked_for(tmp_path: Path) -> None:
             "tfcompose: .jpg is no kind of picture that graph writes; -o takes a file that ends in svg, pdf, ",
         ),
         ("tree", "tfcompose: tree has no ending; -o takes a file that ends in svg, pdf, png, dot or mmd\n"),
-        ("no/folder/tree.svg", "tfcompose: no/folder/tree.svg was not written: No such file or directory\n"),
+        ("no/folder/tree.svg", "tfcompose: no/folder/tree.svg cannot be written: there is no folder no/folder\n"),
     ],
 )
 def test_what_cannot_be_written_is_said_in_one_sentence(name: str, said: str, tmp_path: Path) -> None:

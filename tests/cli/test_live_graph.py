@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
-from tfcompose.cli.live_graph import graph_of_census
+from tfcompose.cli import main
+from tfcompose.cli.live_graph import graph_of_censuses
 from tfcompose.observe.census import Census, Publisher
+from tfcompose.plan import Plan, PlanEdge, RosSettings
+from tfcompose.pose import Pose
 
 SECOND = 1_000_000_000
 
@@ -26,7 +31,7 @@ def census() -> Census:
 
 
 def test_each_edge_has_its_publisher_its_kind_and_its_rate(census: Census) -> None:
-    arrows = {(one.parent, one.child): one for one in graph_of_census(census, "/tf").arrows}
+    arrows = {(one.parent, one.child): one for one in graph_of_censuses([census], "/tf").arrows}
     assert len(arrows) == 3
     moving, fixed, second = arrows["odom", "base"], arrows["base", "lidar"], arrows["mast", "lidar"]
     assert (moving.owner, moving.kind, moving.beside, moving.below) == ("/drive", "dynamic", "1.0 Hz", "")
@@ -35,6 +40,43 @@ def test_each_edge_has_its_publisher_its_kind_and_its_rate(census: Census) -> No
 
 
 def test_poses_stand_below_and_a_rotation_that_is_none_is_said(census: Census) -> None:
-    arrows = {(one.parent, one.child): one for one in graph_of_census(census, "/tf", poses=True).arrows}
+    arrows = {(one.parent, one.child): one for one in graph_of_censuses([census], "/tf", poses=True).arrows}
     assert arrows["base", "lidar"].below == "xyz 0.25 0 0"
     assert arrows["mast", "lidar"].below == "no rotation"
+
+
+def test_what_the_plan_expects_and_nobody_publishes_is_said_to_be_missing(census: Census) -> None:
+    edges = (
+        PlanEdge("odom", "base", "dynamic", "drive", "/drive", Pose(), 1.0, ("rover.yaml", 1)),
+        PlanEdge("base", "imu", "static", "static", "/static", Pose(), None, ("rover.yaml", 2)),
+    )
+    plan = Plan("rover", "0", "base", RosSettings(), edges, ())
+    graph = graph_of_censuses([census], "rover", plan)
+    assert [(one.child, one.owner) for one in graph.arrows if one.beside == "missing"] == [("imu", "/static")]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--live", "--bag", "x"], "give one of them"),
+        (["--live", "-o", "none/tree.svg"], "there is no folder none"),
+    ],
+)
+def test_what_cannot_be_is_said_before_anybody_looks(words: list[str], said: str, capsys: Any) -> None:
+    assert main(["graph", *words]) == 2
+    assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["graph --live", "tree --live", "monitor", "echo a b", "doctor"])
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("ro bot", "is no namespace"),
+        ("a//b", "is no namespace"),
+        ("1st", "is no namespace"),
+        ("/robot1/tf", "is a topic; the namespace is what stands before it"),
+    ],
+)
+def test_a_namespace_that_is_none_is_wrong_use(command: str, name: str, said: str, capsys: Any) -> None:
+    assert main([*command.split(), "--namespace", name]) == 2
+    assert said in capsys.readouterr().err

@@ -16,9 +16,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.looking import ended_early
-from tfcompose.cli.options import add_variant, positive
+from tfcompose.cli.options import add_variant, namespace, positive
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings
 from tfcompose.diagnostic import finding
+from tfcompose.observe.census import topics_below
 from tfcompose.plan import RosSettings
 from tfcompose.ros.environment import RosError, child_environment, missing_ros
 from tfcompose.ros.settings import ros_trouble
@@ -39,7 +40,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--for", dest="duration", type=positive, default=5.0, metavar="S", help="look for S seconds; default: 5"
     )
-    parser.add_argument("--namespace", metavar="NS", help="look at /NS/tf and /NS/tf_static")
+    parser.add_argument("--namespace", type=namespace, metavar="NS", help="look at /NS/tf and /NS/tf_static")
     parser.add_argument("--format", choices=("text", "json"), default="text", help="default: text")
 
 
@@ -108,11 +109,10 @@ def _plan(arguments: Namespace) -> Plan | int | None:
     return plan
 
 
-def _expected(plan: Plan | None, namespace: str | None) -> dict[tuple[str, str], Plan | None]:
+def _expected(plan: Plan | None, below: str | None) -> dict[tuple[str, str], Plan | None]:
     """Return the topics to look at, each pair with the part of the plan that is expected there."""
-    prefix = f"/{namespace.strip('/')}" if namespace and namespace.strip("/") else ""
-    asked = (f"{prefix}/tf", f"{prefix}/tf_static")
+    asked = topics_below(below or "")
     if plan is None:
         return {asked: None}
     parts = parts_of(plan)
-    return {asked: parts.get(asked, plan)} if namespace is not None else dict(parts) or {asked: plan}
+    return {asked: parts.get(asked, plan)} if below is not None else dict(parts) or {asked: plan}

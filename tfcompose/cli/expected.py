@@ -6,13 +6,19 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tfcompose.observe.census import topics_below
+from tfcompose.ros.topics import parts_of
+
 if TYPE_CHECKING:
     from argparse import Namespace
 
     from tfcompose.diagnostic import Span
     from tfcompose.plan import Plan
 
+    Topics = tuple[str, str]
+
 PLAN = "plan.json"
+BOTH = "--live looks at the running tree and --bag at a recording: give one of them"
 
 
 def expected(file: str, arguments: Namespace) -> tuple[Plan, dict[str, Span]] | int:
@@ -35,3 +41,20 @@ def expected(file: str, arguments: Namespace) -> tuple[Plan, dict[str, Span]] | 
         return robot
     final = import_module("tfcompose.emit.final").with_final_names(robot)
     return import_module("tfcompose.emit.plan").plan_of(final), {edge.child: edge.at for edge in final.edges}
+
+
+def where_to_look(arguments: Namespace) -> tuple[Plan | None, list[Topics]] | int:
+    """Return the plan of FILE, if one is given, and the topics (moving, fixed) to look at: its own, or --namespace's.
+
+    What cannot be read, or cannot be asked for together, is said, and the exit code returned.
+    """
+    if arguments.live and arguments.bag:
+        import_module("tfcompose.cli.terminal").complain(BOTH)
+        return 2
+    if arguments.file is None:
+        return None, [topics_below(arguments.namespace)]
+    known = expected(arguments.file, arguments)
+    if isinstance(known, int):
+        return known
+    plan = known[0]
+    return plan, list(parts_of(plan)) or [topics_below(plan.ros.namespace)]

@@ -2,7 +2,7 @@
 
 Draw the tree: frames coloured by owner, fixed and moving edges, sensors in frames of their own. The ending of the file
 says how: .svg, .pdf, .png, .dot (Graphviz) or .mmd (Mermaid). With --live or --bag it is the published tree, coloured
-by publisher; second parents and loops are drawn as they are.
+by publisher; second parents and loops are drawn as they are, and with FILE what is missing.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.compiling import robot_or_code
 from tfcompose.cli.looking import add_for
-from tfcompose.cli.options import add_file, add_variant
+from tfcompose.cli.options import DEFAULT_FILE, add_variant, namespace
 from tfcompose.cli.terminal import UNREADABLE, complain
 from tfcompose.emit.final import with_final_names
 from tfcompose.emit.graph import graph_of
@@ -35,15 +35,19 @@ NAMED = "svg, pdf, png, dot or mmd"
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    add_file(parser)
+    parser.add_argument("file", nargs="?", metavar="FILE", help="default: robot.yaml; with --live or --bag: none")
     add_variant(parser)
     parser.add_argument(
         "-o", "--output", default="tree.svg", metavar="PICTURE", help=f"a file that ends in {NAMED}; default: tree.svg"
     )
-    parser.add_argument("--live", action="store_true", help="the tree that is published now, not FILE")
+    parser.add_argument(
+        "--live", action="store_true", help="the tree that is published now; with FILE what is missing too"
+    )
     parser.add_argument("--bag", metavar="BAG", help="the tree of a recording: a rosbag2 folder, .mcap or .db3")
     add_for(parser, "with --live: look so long; default: 3", 3.0)
-    parser.add_argument("--namespace", default="", metavar="NS", help="/NS/tf and /NS/tf_static instead")
+    parser.add_argument(
+        "--namespace", type=namespace, default="", metavar="NS", help="/NS/tf and /NS/tf_static instead, without FILE"
+    )
     parser.add_argument("--poses", action="store_true", help="write each frame's pose in its parent, in m and degrees")
 
 
@@ -71,7 +75,7 @@ def _graph(arguments: Namespace) -> Graph | int:
     if arguments.live or arguments.bag:
         published: Graph | int = import_module("tfcompose.cli.live_graph").seen(arguments)
         return published
-    robot = robot_or_code(arguments.file, arguments)
+    robot = robot_or_code(arguments.file or DEFAULT_FILE, arguments)
     return robot if isinstance(robot, int) else graph_of(with_final_names(robot), poses=arguments.poses)
 
 
@@ -81,6 +85,8 @@ def _refused(path: Path) -> str:
     if ending not in FORMATS:
         said = f"{path.suffix} is no kind of picture that graph writes" if ending else f"{path} has no ending"
         return f"{said}; -o takes a file that ends in {NAMED}"
+    if not path.parent.is_dir():
+        return f"{path} cannot be written: there is no folder {path.parent}"
     if ending == ".png" and find_spec("pypdfium2") is None:
         return "PNG needs the package pypdfium2: pip install 'tfcompose[pictures]'; svg and pdf need nothing"
     return ""

@@ -9,9 +9,9 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.edge_table import duration, object_of, printable
-from tfcompose.cli.expected import expected
+from tfcompose.cli.expected import where_to_look
 from tfcompose.cli.looking import from_bag, from_live
-from tfcompose.observe.census import SETTLE_S, Census, topics_below
+from tfcompose.observe.census import SETTLE_S, Census
 from tfcompose.observe.forest import forest
 from tfcompose.ros.topics import parts_of
 from tfcompose.verdict.offence import code_of, may_be_owners, relays_of
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from argparse import Namespace
 
     from tfcompose.observe.forest import Branch, Tree
-    from tfcompose.plan import Plan, PlanEdge
+    from tfcompose.plan import Plan
 
     Topics = tuple[str, str]
 
@@ -28,16 +28,11 @@ if TYPE_CHECKING:
 def live_tree(arguments: Namespace) -> int:
     """Print the published tree; exit code 1 if nothing is published, 2 if a file or a bag cannot be read."""
     gc.enable()  # it may last
-    planned: dict[Topics, dict[str, PlanEdge]] | None = None
-    plan: Plan | None = None
-    pairs = [topics_below(arguments.namespace)]
-    if arguments.file is not None:
-        known = expected(arguments.file, arguments)
-        if isinstance(known, int):
-            return known
-        plan = known[0]
-        planned = {pair: {edge.child: edge for edge in part.edges} for pair, part in parts_of(plan).items()}
-        pairs = list(planned)
+    known = where_to_look(arguments)
+    if isinstance(known, int):
+        return known
+    plan, pairs = known
+    parts = parts_of(plan) if plan else {}
     censuses = {pair: Census(settle_s=0.0 if arguments.bag else SETTLE_S) for pair in pairs}
     if arguments.bag:
         code = from_bag(arguments.bag, censuses)
@@ -47,7 +42,8 @@ def live_tree(arguments: Namespace) -> int:
         return code
     for pair, census in censuses.items():
         now_ns = census.last_ns if arguments.bag else time.time_ns()
-        trees = forest(census.edges(now_ns), None if planned is None else planned[pair])
+        planned = {edge.child: edge for edge in parts[pair].edges} if pair in parts else None
+        trees = forest(census.edges(now_ns), planned)
         if arguments.format == "json":
             sys.stdout.write(_objects(pair, trees, plan=plan))
         else:

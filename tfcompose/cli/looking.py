@@ -8,7 +8,7 @@ import time
 from importlib import import_module
 from typing import TYPE_CHECKING, TypeVar
 
-from tfcompose.cli.options import positive
+from tfcompose.cli.options import namespace, positive
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings
 from tfcompose.diagnostic import Note, finding
 from tfcompose.plan import RosSettings
@@ -34,7 +34,9 @@ INTERRUPTED = 130
 
 def add_namespace(parser: ArgumentParser) -> None:
     """Add --namespace."""
-    parser.add_argument("--namespace", default="", metavar="NS", help="/NS/tf and /NS/tf_static instead")
+    parser.add_argument(
+        "--namespace", type=namespace, default="", metavar="NS", help="/NS/tf and /NS/tf_static instead"
+    )
 
 
 def add_bag(parser: ArgumentParser) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from argparse import ArgumentTypeError
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser
 
 DEFAULT_FILE = "robot.yaml"
+TF_TOPICS = ("tf", "tf_static")
 
 
 def add_file(parser: ArgumentParser) -> None:
@@ -29,6 +31,20 @@ def add_variant(parser: ArgumentParser, text: str = "lay this profile over the f
         "--set", action="append", default=[], metavar="PATH=VALUE", dest="settings",
         help="set one value, last of all: sensors.camera.tf=driver; repeatable",
     )  # fmt: skip
+
+
+def namespace(text: str) -> str:
+    """Read a namespace as ROS has it, and return it without slashes around; empty for the global one.
+
+    Raises:
+        ArgumentTypeError: if no topic can be below it.
+    """
+    name = text.strip("/")
+    if name in TF_TOPICS or name.endswith(tuple(f"/{topic}" for topic in TF_TOPICS)):
+        raise ArgumentTypeError(f"{text} is a topic; the namespace is what stands before it")
+    if name and not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*", name):
+        raise ArgumentTypeError(f"{text} is no namespace, such as robot1: letters, digits and _, with / between")
+    return name
 
 
 def positive(text: str) -> float:

@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import robot_or_code
-from tfcompose.cli.options import DEFAULT_FILE, add_variant, positive
+from tfcompose.cli.options import DEFAULT_FILE, add_variant, namespace, positive
 from tfcompose.emit.final import with_final_names
 from tfcompose.emit.tree import tree
 
@@ -29,7 +29,9 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--for", dest="duration", type=positive, default=3.0, metavar="S", help="look so long; default: 3"
     )
-    parser.add_argument("--namespace", default="", metavar="NS", help="/NS/tf and /NS/tf_static instead, without FILE")
+    parser.add_argument(
+        "--namespace", type=namespace, default="", metavar="NS", help="/NS/tf and /NS/tf_static instead, without FILE"
+    )
     parser.add_argument("--format", choices=("text", "json"), default="text", help="json with --live or --bag")
 
 

@@ -16,7 +16,7 @@ from argparse import ArgumentTypeError
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.expected import expected
+from tfcompose.cli.expected import BOTH, expected
 from tfcompose.cli.looking import add_bag, add_for, from_bag, from_live
 from tfcompose.cli.options import add_file, add_variant
 from tfcompose.cli.terminal import complain, print_findings
@@ -56,7 +56,7 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Verify; exit code 0 if all is as expected, 1 if not, 2 if something cannot be read."""
     if arguments.live and arguments.bag:
-        complain("--live looks at the running tree and --bag at a recording: give one of them")
+        complain(BOTH)
         return 2
     known = expected(arguments.file, arguments)
     if isinstance(known, int):

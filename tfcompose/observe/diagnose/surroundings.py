@@ -32,7 +32,7 @@ def no_tf(seen: Seen) -> Iterator[Diagnostic]:
     message += "was seen" if len(seen.nodes) < 2 else "were seen"  # noqa: PLR2004 (one, or none)
     notes = [Note(f"seen: {listed(seen.nodes)}")] if seen.nodes else []
     notes.append(Note(f"looked with {said(seen.settings)}"))
-    elsewhere = [t.name for t in seen.typed(TF_TYPE) if t.publishers and t.name not in seen.topics]
+    elsewhere = _elsewhere(seen)
     if elsewhere:
         notes.append(Note(f"there is TF on {listed(elsewhere)}"))
         advice = f"look there: tfcompose doctor {namespace_words(elsewhere)}"
@@ -47,7 +47,8 @@ def no_tf(seen: Seen) -> Iterator[Diagnostic]:
 
 def other_settings(seen: Seen) -> Iterator[Diagnostic]:
     """Where frames are missing: processes of this machine that cannot be heard, because ROS is set up otherwise."""
-    if seen.edges and not seen.planned - {edge.strand.child for edge in seen.edges}:
+    complete = not seen.planned - {edge.strand.child for edge in seen.edges}
+    if (seen.edges and complete) or (not seen.edges and _elsewhere(seen)):
         return
     found: dict[tuple[tuple[str, str], ...], list[RosProcess]] = {}
     for process in seen.processes:
@@ -69,6 +70,11 @@ def other_settings(seen: Seen) -> Iterator[Diagnostic]:
             f"to look there: {' '.join(settings)} tfcompose doctor; who is to hear each other needs the same settings"
         )
         yield finding("TF908", message, None, severity="warning", notes=notes, help=advice)
+
+
+def _elsewhere(seen: Seen) -> list[str]:
+    """Return the topics with TF that are not looked at."""
+    return [topic.name for topic in seen.typed(TF_TYPE) if topic.publishers and topic.name not in seen.topics]
 
 
 def settings_contradict(seen: Seen) -> Iterator[Diagnostic]:

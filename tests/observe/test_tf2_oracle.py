@@ -5,6 +5,7 @@ PyPI has no tf2; with a ROS installation on the path (``tf2_py``) this runs.
 
 from __future__ import annotations
 
+import math
 import random
 from typing import Any
 
@@ -41,13 +42,31 @@ class Pair:
 
     def compare(self, target: str, source: str, stamp_ns: int) -> None:
         asked = target, source, time.Time(nanoseconds=stamp_ns)
+        self._both("lookup_transform_core", asked)
+        assert self.ours.can_transform_core(*asked)[0] == bool(self.theirs.can_transform_core(*asked)[0])
+
+    def compare_full(self, target: str, target_ns: int, source: str, source_ns: int, fixed: str) -> None:
+        times = time.Time(nanoseconds=target_ns), time.Time(nanoseconds=source_ns)
+        asked = target, times[0], source, times[1], fixed
+        self._both("lookup_transform_full_core", asked)
+        assert self.ours.can_transform_full_core(*asked)[0] == bool(self.theirs.can_transform_full_core(*asked)[0])
+
+    def clear(self) -> None:
+        self.ours.clear()
+        self.theirs.clear()
+
+    def compare_frames(self) -> None:
+        lines = [line for line in self.theirs.all_frames_as_string().splitlines() if "NO_PARENT" not in line]
+        assert sorted(self.ours.all_frames_as_string().splitlines()) == sorted(lines)
+
+    def _both(self, name: str, asked: tuple[Any, ...]) -> None:
         try:
-            found = self.ours.lookup_transform(*asked)
+            found = getattr(self.ours, name)(*asked)
         except TransformException as error:
             with pytest.raises(getattr(tf2, type(error).__name__)):
-                self.theirs.lookup_transform_core(*asked)
+                getattr(self.theirs, name)(*asked)
             return
-        same(found, self.theirs.lookup_transform_core(*asked))
+        same(found, getattr(self.theirs, name)(*asked))
 
 
 def same(ours: Any, theirs: Any) -> None:
@@ -61,16 +80,28 @@ def same(ours: Any, theirs: Any) -> None:
     assert angle_between(turns[0], normalised(turns[1])) < 1e-6
 
 
-@pytest.mark.parametrize("seed", range(50))
-def test_random_histories_with_new_parents_loops_and_gaps(seed: int) -> None:
+@pytest.mark.parametrize("seed", range(100))
+def test_random_histories_with_new_parents_loops_gaps_and_refusals(seed: int) -> None:
     rng = random.Random(seed)
     frames = [f"f{index}" for index in range(rng.choice([3, 5, 8]))]
+    grid_ns = rng.choice([1, S])  # with times that come twice, or hardly any
     pair = Pair()
-    for _ in range(100):
-        parent, child = rng.choice(frames), rng.choice(frames)
-        x, y, z, w = (rng.gauss(0, 1) for _ in range(4))
-        pose = Pose((rng.uniform(-5, 5), rng.uniform(-5, 5), 0.0), normalised((x, y, z, w)))
-        if rng.random() < 0.5:
-            pair.set(parent, child, pose, rng.randrange(S, 16 * S), static=frames.index(child) % 3 == 0)
+
+    def stamp() -> int:
+        return rng.randrange(S, 16 * S) // grid_ns * grid_ns if rng.random() < 0.9 else 0
+
+    for _ in range(150):
+        parent, child, fixed = (rng.choice(frames) for _ in range(3))
+        what = rng.random()
+        if what < 0.5:
+            x, y, z, w = (rng.gauss(0, 1) for _ in range(4))
+            xyz = rng.uniform(-5, 5), rng.uniform(-5, 5), math.nan if rng.random() < 0.02 else 0.0
+            static = (frames.index(child) % 3 == 0) is not (rng.random() < 0.02)
+            pair.set(rng.choice(["", "/"]) + parent, child, Pose(xyz, normalised((x, y, z, w))), stamp(), static=static)
+        elif what < 0.51:
+            pair.clear()
+        elif what < 0.9:
+            pair.compare(rng.choice([parent, parent, "nobody", "", "/f0"]), child, stamp())
         else:
-            pair.compare(parent, child, rng.choice([0, rng.randrange(S, 16 * S)]))
+            pair.compare_full(parent, stamp(), child, stamp(), fixed)
+    pair.compare_frames()

@@ -236,6 +236,31 @@ def test_what_readers_take_is_a_warning_and_no_error(what: str, tmp_path: Path) 
     assert [one.severity for one in found] == [severity], [one.message for one in found]
 
 
+QUAT = """<robot name="r"{}><link name="base_link"/><link name="a"/><joint name="j" type="fixed">
+<parent link="base_link"/><child link="a"/><origin {}/></joint></robot>"""
+TURN = 'quat_xyzw="0 0 3 3"'
+
+
+@pytest.mark.parametrize(
+    ("version", "origin", "said"),
+    [
+        ("", TURN, ["error: quat_xyzw is passed over by readers"]),
+        (' version="1.0"', TURN, ["error: quat_xyzw is passed over by readers"]),
+        (' version="1.1"', TURN, ["warning: readers of ROS 2 Jazzy refuse version 1.1: they know 1.0 only"]),
+        (' version="1"', "", ["error: '1' is no version"]),
+        ("", 'quat_xyzw="0 0 1"', ["error: quat_xyzw='0 0 1' is not 4 numbers"]),
+        ("", 'quat_xyzw="0 0 0 0"', ["error: this quaternion is no rotation"]),
+        ("", f'{TURN} rpy="0 0 0"', ["error: rpy and quat_xyzw in one origin: readers refuse the robot"]),
+    ],
+)
+def test_a_rotation_as_a_quaternion_is_taken_and_said(version: str, origin: str, said: list[str]) -> None:
+    text = QUAT.format(version, origin)
+    robot, found = robot_of_urdf(load_xml(text, "r.urdf"), "r.urdf", Packages().asset)
+    assert [f"{one.severity}: {one.message}" for one in found] == said
+    if TURN in origin:
+        assert robot.edges[0].pose.quat_xyzw == pytest.approx((0, 0, 0.5**0.5, 0.5**0.5))
+
+
 def test_without_xacro_that_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "xacro", None)
     (tmp_path / "r.xacro").write_text(XACRO)

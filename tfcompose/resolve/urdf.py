@@ -11,7 +11,7 @@ from tfcompose.model import Block, Robot
 from tfcompose.resolve.blocks import REFERRING, references
 from tfcompose.resolve.urdf_bodies import Bodies
 from tfcompose.resolve.urdf_joints import edge_of
-from tfcompose.resolve.urdf_values import Values
+from tfcompose.resolve.urdf_values import Values, version_of
 from tfcompose.resolve.urdf_words import unknown_words
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ def robot_of_urdf(root: Element, file: str, finder: Finder) -> tuple[Robot, tupl
         message = f"the document is <{root.tag}>, not <robot>"
         raise RejectedError([finding("TF018", message, root.at, help="a URDF begins with <robot name=…>")])
     values = Values()
+    values.has_quaternions = version_of(root, values) >= (1, 1)
     bodies = Bodies(values, finder, root)
     name = values.text(root, "name", '<robot name="rover">')
     links: dict[str, Element] = {}

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Severity, Span, finding
 from tfcompose.frozen import dataclass, field
-from tfcompose.pose import Pose, normalised, quat_from_rpy
+from tfcompose.pose import Pose, normalised, quat_from_rpy, rpy_from_quat
 
 if TYPE_CHECKING:
     from tfcompose.load.urdf import Element
+    from tfcompose.pose import Quaternion
 
 
 @dataclass(slots=True)
 class Values:
-    """Reads attributes; ``found`` is what was wrong with them."""
+    """Reads attributes; ``found`` is what was wrong with them, ``has_quaternions`` whether rotations may be such."""
 
     found: list[Diagnostic] = field(default_factory=list)
+    has_quaternions: bool = False
 
     def refuse(self, message: str, at: Span, advice: str = "", severity: Severity = "error") -> None:
         """Note that a value is wrong."""
@@ -56,11 +59,43 @@ class Values:
         """Return what the element's origin says."""
         origin = parent.first("origin")
         x, y, z = self.numbers(origin, "xyz", (0.0, 0.0, 0.0))
+        if origin is not None and "quat_xyzw" in origin.attributes:
+            return Pose((x, y, z), self._quaternion(origin))
         roll, pitch, yaw = self.numbers(origin, "rpy", (0.0, 0.0, 0.0))
         if max(map(abs, (roll, pitch, yaw))) > 1e9:  # noqa: PLR2004 (no angle has so many turns, and none is left of it)
             self.refuse("this rpy is no angle", origin.place("rpy") if origin else parent.at)
             return Pose((x, y, z))
         return Pose((x, y, z), normalised(quat_from_rpy(roll, pitch, yaw)))
+
+    def _quaternion(self, origin: Element) -> Quaternion:
+        """Return the rotation that is given as a quaternion, which URDF has from version 1.1 on."""
+        before, at = len(self.found), origin.place("quat_xyzw")
+        x, y, z, w = self.numbers(origin, "quat_xyzw", (0.0, 0.0, 0.0, 1.0))
+        if not any((x, y, z, w)):
+            self.refuse("this quaternion is no rotation", at, "no rotation at all is 0 0 0 1")
+        if len(self.found) > before:
+            return (0.0, 0.0, 0.0, 1.0)
+        turned = normalised((x, y, z, w))
+        angles = " ".join(f"{angle + 0.0:.17g}" for angle in rpy_from_quat(turned))
+        if "rpy" in origin.attributes:
+            self.refuse("rpy and quat_xyzw in one origin: readers refuse the robot", at, "leave one of them out")
+        elif not self.has_quaternions:
+            self.refuse("quat_xyzw is passed over by readers", at, f'write rpy="{angles}"')
+        return turned
+
+
+def version_of(root: Element, values: Values) -> tuple[int, ...]:
+    """Return the version of URDF that the document says it is; a finding where readers of ROS 2 Jazzy refuse it."""
+    said = root.attributes.get("version", "1.0")
+    numbers = tuple(map(int, said.split("."))) if re.fullmatch(r"\d{1,4}\.\d{1,4}", said) else ()
+    if numbers != (1, 0):
+        at = root.place("version")
+        if numbers:
+            message = f"readers of ROS 2 Jazzy refuse version {said}: they know 1.0 only"
+            values.refuse(message, at, "leave it out, if nothing here needs it", "warning")
+        else:
+            values.refuse(f"{said!r} is no version", at, 'version="1.0"')
+    return numbers
 
 
 def _advice(text: str, count: int) -> str:

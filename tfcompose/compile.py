@@ -28,15 +28,15 @@ _IDLE = frozenset({"TF504", "TF619", "TF815"})
 class Compiled:
     """A robot and everything that was found; ``robot`` is None where the text did not get that far.
 
-    ``allows`` are the comments that let findings stand, ``used`` those that did, with the code. ``source`` is what the
-    robot was made from, overlays laid over it.
+    ``allows`` are the comments that let findings stand, ``used`` those that did, with the code. ``sources`` are what
+    the robot was made from, overlays laid over it: its own file's, and those of the robot files that are parts.
     """
 
     robot: Robot | None
     found: tuple[Diagnostic, ...]
     allows: tuple[Allow, ...] = ()
     used: frozenset[tuple[Allow, str]] = frozenset()
-    source: Source | None = None
+    sources: tuple[Source, ...] = ()
 
     @property
     def errors(self) -> tuple[Diagnostic, ...]:
@@ -87,10 +87,13 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     found = [*validated.found, *(one for one in later if _stands(one, validated) and (plain or one.code not in _IDLE))]
     rules = validated.spec.rules
     found += unknown_rules({word: source.at_key(("rules", word)) for word in rules})
-    found = with_replaced(with_edits(found, source), source)
+    found = with_edits(found, source)
+    sources = (source, *resolved.whole.sources)
+    for one in sources:
+        found = with_replaced(found, one)
     kept, used = apply(levelled(dict.fromkeys(found), rules), (*source.allows, *resolved.whole.allows))
     ordered = sorted(kept, key=lambda one: one.sort_key)
-    return Compiled(resolved.robot, tuple(ordered), source.allows, frozenset(used), source)
+    return Compiled(resolved.robot, tuple(ordered), source.allows, frozenset(used), sources)
 
 
 def _about_parts(found: list[Diagnostic], whole: Whole) -> list[Diagnostic]:

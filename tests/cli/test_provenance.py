@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from tfcompose.cli import main
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 BASE = """\
 tfcompose: 1
@@ -51,6 +48,30 @@ def test_explain_names_the_place_of_each_value_and_of_all_that_it_replaced(
         "xyz: [0, 0, 0.6]  --set frames.mast.xyz=[0, 0, 0.6]:1:1"
         ", over over.yaml:1:22, over robot.yaml:3:15, over base.yaml:5:34"
     ) in lines
+
+
+CELL = """\
+tfcompose: 1
+robot: cell
+links: {world: {}}
+parts: {left: {spec: robot.yaml, prefix: l_, parent: world, xyz: [1, 0, 0], profiles: [far]}}
+"""
+
+
+def test_the_values_of_parts_have_their_places_in_the_files_of_the_parts(
+    robot: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("outer.yaml").write_text(CELL.replace("robot.yaml", "cell.yaml").replace(", profiles: [far]", ""), "utf-8")
+    Path("cell.yaml").write_text(CELL.replace(robot, "robot.yaml"), "utf-8")
+    assert main(["explain", "outer.yaml", "world", "l_l_mast"]) == 0
+    said = capsys.readouterr()
+    lines = [line.strip() for line in said.out.splitlines()]
+    assert [line for line in lines if line.startswith("xyz: ")] == [
+        "xyz: [1, 0, 0]  outer.yaml:4:65",
+        "xyz: [1, 0, 0]  cell.yaml:4:66",
+        "xyz: [0, 0, 400]  robot.yaml:6:30, over robot.yaml:3:15, over base.yaml:5:34",
+    ]
+    assert "note: robot.yaml:3:15: it replaces the value here" in said.err
 
 
 def test_explain_names_the_rotation_that_another_way_to_write_it_replaced(

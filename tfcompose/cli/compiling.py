@@ -34,12 +34,12 @@ def overlays_of(arguments: Namespace) -> list[Source]:
 
 def robot_or_code(file: str, arguments: Namespace) -> Robot | int:
     """Return the robot without errors in it, or the exit code after printing what is wrong. Warnings are printed."""
-    made = source_and_robot(file, arguments)
+    made = sources_and_robot(file, arguments)
     return made if isinstance(made, int) else made[1]
 
 
-def source_and_robot(file: str, arguments: Namespace) -> tuple[Source, Robot] | int:
-    """Return what ``robot_or_code`` does, with what the robot was made from: its file with overlays laid over it."""
+def sources_and_robot(file: str, arguments: Namespace) -> tuple[tuple[Source, ...], Robot] | int:
+    """Return what ``robot_or_code`` does, with what it was made from: files with overlays laid over them, parts too."""
     compiled = None
     try:
         overlays = overlays_of(arguments)
@@ -50,6 +50,6 @@ def source_and_robot(file: str, arguments: Namespace) -> tuple[Source, Robot] | 
     except RejectedError as error:
         found = error.diagnostics
     print_findings(found, sys.stderr)
-    if compiled is None or compiled.robot is None or compiled.source is None or compiled.errors:
+    if compiled is None or compiled.robot is None or compiled.errors:
         return UNREADABLE if unreadable(found) else 1
-    return compiled.source, compiled.robot
+    return compiled.sources, compiled.robot

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.check import code_of
 from tfcompose.check.pages import page, rule_table
-from tfcompose.cli.compiling import source_and_robot
+from tfcompose.cli.compiling import sources_and_robot
 from tfcompose.cli.options import add_variant
 from tfcompose.cli.provenance import written_values
 from tfcompose.cli.terminal import UNREADABLE, complain
@@ -22,6 +22,7 @@ from tfcompose.emit.tree import edge_facts
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
+    from collections.abc import Sequence
 
     from tfcompose.load import Source
     from tfcompose.model import Calibration, Edge, Robot
@@ -47,7 +48,7 @@ def run(arguments: Namespace) -> int:
     if len(words) != 3:  # noqa: PLR2004 (FILE A B)
         complain("explain takes a code, or FILE A B")
         return UNREADABLE
-    made = source_and_robot(words[0], arguments)
+    made = sources_and_robot(words[0], arguments)
     return made if isinstance(made, int) else _explain_chain(*made, words[1], words[2])
 
 
@@ -60,7 +61,7 @@ def _explain_code(word: str) -> int:
     return 0
 
 
-def _explain_chain(source: Source, robot: Robot, a: str, b: str) -> int:
+def _explain_chain(sources: Sequence[Source], robot: Robot, a: str, b: str) -> int:
     for frame in (a, b):
         if frame not in robot.frames:
             complain(f"no frame {frame}; {did_you_mean(frame, robot.frames, f'{robot.file} has other frames')}")
@@ -73,8 +74,8 @@ def _explain_chain(source: Source, robot: Robot, a: str, b: str) -> int:
         complain(f"{a} and {b} are in two trees")
         return 1
     lines = [f"pose of {b} in {a}\n"]
-    lines += [f"  up    {_line(edge, source)}" for edge in rising]
-    lines += [f"  down  {_line(edge, source)}" for edge in reversed(falling)]
+    lines += [f"  up    {_line(edge, sources)}" for edge in rising]
+    lines += [f"  down  {_line(edge, sources)}" for edge in reversed(falling)]
     sys.stdout.write("".join(lines))
     return 0
 
@@ -87,11 +88,11 @@ def _ancestry(robot: Robot, frame: str) -> list[Edge]:
     return chain
 
 
-def _line(edge: Edge, source: Source) -> str:
+def _line(edge: Edge, sources: Sequence[Source]) -> str:
     facts = edge_facts(edge)
     inside = f" (inside {edge.sensor})" if edge.sensor and not edge.given else ""
     measured = f"          {_measured(edge.calibration)}\n" if edge.calibration else ""
-    values = "".join(f"          {line}\n" for line in written_values(edge, source))
+    values = "".join(f"          {line}\n" for line in written_values(edge, sources))
     at = f"          {edge.at}{inside}\n" if inside or not values else ""
     return f"{edge.name}\n          {facts}\n{measured}{at}{values}"
 

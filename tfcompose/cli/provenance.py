@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from tfcompose.load import Path, Source
     from tfcompose.model import Edge
@@ -17,35 +17,41 @@ _KEYS = (
 )
 
 
-def written_values(edge: Edge, source: Source) -> list[str]:
-    """Return a line for each value that the edge was made of: key, value, place, and the places of what it replaced."""
+def written_values(edge: Edge, sources: Sequence[Source]) -> list[str]:
+    """Return a line for each value that the edge was made of: key, value, place, and the places of what it replaced.
+
+    ``sources`` are the robot's own, and those of its parts.
+    """
     lines = []
-    for path, value in _values(edge, source):
+    for source, path, value in _values(edge, sources):
         over = ", over ".join(str(old) for old in source.replaced.get(path, ()))
         place = f"{source.at(path)}, over {over}" if over else str(source.at(path))
         lines.append(f"{path[-1]}: {_shown(value)}  {place}")
     return lines
 
 
-def _values(edge: Edge, source: Source) -> Iterator[tuple[Path, Any]]:
-    for entry in _entries(edge):
-        data: Any = source.data
-        for step in entry:
-            data = data.get(step) if isinstance(data, dict) else None
-        if isinstance(data, dict) and (source.at((*entry, "parent")) == edge.at or not edge.given):
-            yield from (((*entry, key), data[key]) for key in _KEYS if key in data)
-            return
+def _values(edge: Edge, sources: Sequence[Source]) -> Iterator[tuple[Source, Path, Any]]:
+    for source in sources:
+        for entry in _entries(edge, source):
+            data: Any = source.data
+            for step in entry:
+                data = data.get(step) if isinstance(data, dict) else None
+            if isinstance(data, dict) and (source.at((*entry, "parent")) == edge.at or not edge.given):
+                yield from ((source, (*entry, key), data[key]) for key in _KEYS if key in data)
+                return
 
 
-def _entries(edge: Edge) -> Iterator[Path]:
-    """Yield where the edge may be written."""
-    if edge.joint_name:
-        yield ("joints", edge.joint_name)
-    elif edge.sensor:
-        yield ("sensors", edge.sensor) if edge.given else ("sensors", edge.sensor, "frames", edge.child)
-    else:
-        yield ("frames", edge.child)
-        yield ("links", edge.child)
+def _entries(edge: Edge, source: Source) -> Iterator[Path]:
+    """Yield where the edge may be written; in a part without the prefix that its names have in the robot."""
+    name = edge.joint_name or edge.sensor or edge.child
+    sections = ("joints",) if edge.joint_name else ("sensors",) if edge.sensor else ("frames", "links", "parts")
+    for section in sections:
+        entries = source.data.get(section)
+        known = (
+            [one for one in entries if name.endswith(one) or section == "parts"] if isinstance(entries, dict) else []
+        )
+        for one in sorted(known, key=len, reverse=True):
+            yield (section, one) if edge.given else (section, one, "frames", edge.child)
 
 
 def _shown(value: Any) -> str:

@@ -7,7 +7,7 @@ import re
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
-from tfcompose.diagnostic import Diagnostic, RejectedError, finding
+from tfcompose.diagnostic import Diagnostic, RejectedError, did_you_mean, finding
 from tfcompose.frozen import dataclass, replace
 from tfcompose.load.urdf import load_xml
 from tfcompose.model import BUILT_IN, Node, Process, Robot
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from tfcompose.resolve.part import PartEntry
 
 _MACRO = re.compile(r"""<xacro:macro\s[^>]*?\bname\s*=\s*["'](?:xacro:)?([^"']+)""")
+_PARAMS = re.compile(r"""\bparams\s*=\s*(?:"([^"]*)"|'([^']*)')""")
+_WORD = re.compile(r"""["']?(\w+)["']?""")
 _PACKAGE = re.compile(r"(?:package://|\$\(find(?:-pkg-share)?\s+)([A-Za-z][A-Za-z0-9_]*)\)?/(.+)")
 
 
@@ -94,8 +96,30 @@ def _expanded(part: PartEntry, file: str, at: Span, packages: Packages) -> str:
     try:
         return disk.expand(file, packages, said.args, _document(part, file, packages, disk.absolute))
     except RejectedError as error:
-        place = part.source.at((*part.at, "xacro" if said.macro is None else "macro"))
-        raise RejectedError([_at(place, one) for one in error.diagnostics]) from None
+        if said.macro is None:
+            place = part.source.at((*part.at, "xacro"))
+            raise RejectedError([_at(place, one) for one in error.diagnostics]) from None
+        raise RejectedError([_in_call(part, file, one, disk.read) for one in error.diagnostics]) from None
+
+
+def _in_call(part: PartEntry, file: str, found: Diagnostic, read: Callable[[str], str]) -> Diagnostic:
+    """Return the finding about a call of a macro, at the parameter that it names, with what the macro takes."""
+    said, macro = part.said, part.said.macro or ""
+    place = part.source.at((*part.at, "macro"))
+    if found.code != "TF018":
+        return _at(place, found)
+    named = [word for word in _WORD.findall(found.message) if word in said.params]
+    text = read(file)
+    macros = {one[1]: text[one.start() : text.find(">", one.end())] for one in _MACRO.finditer(text)}
+    if macro in macros:
+        takes = _PARAMS.search(macros[macro])
+        names = " ".join((takes[1] or takes[2] or "").split()) if takes else ""
+        advice = f"{macro} takes {names or 'nothing'}"
+        advice += "; what begins with * is {xyz, rpy}, or XML" if "*" in names else ""
+        place = part.source.at_key((*part.at, "params", named[-1])) if named else place
+    else:
+        advice = did_you_mean(macro, macros, f"{file} has {', '.join(macros)}" if macros else "")
+    return replace(_at(place, found), help=advice)
 
 
 def _at(place: Span, found: Diagnostic) -> Diagnostic:

@@ -94,6 +94,7 @@ class Parts:
         self.found += [_noted(one, part) for one in (*validated.found, *resolved.found)]
         self.found += _useless(part, file, validated, loaded)
         self.whole.allows += validated.source.allows
+        self.whole.sources.append(validated.source)
         return resolved.robot
 
 

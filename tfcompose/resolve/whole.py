@@ -8,6 +8,7 @@ from tfcompose.frozen import dataclass, field
 
 if TYPE_CHECKING:
     from tfcompose.diagnostic import Allow, Note
+    from tfcompose.load import Source
 
 
 @dataclass(slots=True)
@@ -15,10 +16,12 @@ class Whole:
     """What is known of all parts of a robot, and of theirs, together.
 
     ``allows`` are the comments that let findings in their files stand, ``foreign`` the files that somebody else wrote,
-    with a note that says as which part. ``own`` are the robot files that are parts, with such notes, one for each use.
+    with a note that says as which part. ``own`` are the robot files that are parts, with such notes, one for each use;
+    ``sources`` are what these were resolved from.
     """
 
     count: int = 0
     allows: list[Allow] = field(default_factory=list)
     foreign: dict[str, Note] = field(default_factory=dict)
     own: dict[str, list[Note]] = field(default_factory=dict)
+    sources: list[Source] = field(default_factory=list)

@@ -25,6 +25,7 @@ profiles:
   tilt: {frames: {head_optical: {axis_angle: {axis: [0, 1, 0], angle: 0}}}}
   far: {frames: {mast: {xyz: [0, 0, 400]}}}
   lost: {frames: {mast: {parent: base_lnk}}}
+  bent: {frames: {head_optical: {rpy: [-1.57, 0, -1.57]}}}
 """
 
 
@@ -54,24 +55,24 @@ CELL = """\
 tfcompose: 1
 robot: cell
 links: {world: {}}
-parts: {left: {spec: robot.yaml, prefix: l_, parent: world, xyz: [1, 0, 0], profiles: [far]}}
+parts: {left: {spec: robot.yaml, prefix: l_, parent: world, xyz: [1, 0, 0], profiles: [bent]}}
 """
 
 
 def test_the_values_of_parts_have_their_places_in_the_files_of_the_parts(
     robot: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    Path("outer.yaml").write_text(CELL.replace("robot.yaml", "cell.yaml").replace(", profiles: [far]", ""), "utf-8")
+    Path("outer.yaml").write_text(CELL.replace("robot.yaml", "cell.yaml").replace(", profiles: [bent]", ""), "utf-8")
     Path("cell.yaml").write_text(CELL.replace(robot, "robot.yaml"), "utf-8")
-    assert main(["explain", "outer.yaml", "world", "l_l_mast"]) == 0
+    assert main(["explain", "outer.yaml", "world", "l_l_head_optical"]) == 0
     said = capsys.readouterr()
     lines = [line.strip() for line in said.out.splitlines()]
     assert [line for line in lines if line.startswith("xyz: ")] == [
         "xyz: [1, 0, 0]  outer.yaml:4:65",
         "xyz: [1, 0, 0]  cell.yaml:4:66",
-        "xyz: [0, 0, 400]  robot.yaml:6:30, over robot.yaml:3:15, over base.yaml:5:34",
+        "xyz: [0, 0, 0.4]  robot.yaml:3:15, over base.yaml:5:34",
     ]
-    assert "note: robot.yaml:3:15: it replaces the value here" in said.err
+    assert "note: base.yaml:6:37: it replaces the value here" in said.err
 
 
 def test_explain_names_the_rotation_that_another_way_to_write_it_replaced(

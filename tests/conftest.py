@@ -21,7 +21,7 @@ import pytest
 
 from tests.waiting import until
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
-from tfcompose.planfile import write_plan
+from tfcompose.plan.file import write_plan
 from tfcompose.pose import Pose
 from tfcompose.ros.environment import missing_ros
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 
 if TYPE_CHECKING:
     from tfcompose.plan import Plan

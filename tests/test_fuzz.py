@@ -14,7 +14,7 @@ from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.diagnostic import RejectedError
 from tfcompose.emit import emit
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 from tfcompose.render.json import render_json
 from tfcompose.render.text import render_text
 

@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "tfcompose"
 
-FOUNDATIONS = {"__init__", "codes", "diagnostic", "frozen", "pose", "model", "plan", "planfields", "planfile"}
+FOUNDATIONS = {"__init__", "codes", "diagnostic", "frozen", "pose", "model", "plan"}
 STAGES = {"load", "validate", "resolve", "check"}
 
 #: Which parts of the package each part may import, besides itself.
@@ -22,23 +22,20 @@ MAY_IMPORT: dict[str, set[str]] = {
     "frozen": set(),
     "diagnostic": {"codes", "frozen"},
     "pose": set(),
-    "plan": {"frozen", "pose"},
+    "plan": {"diagnostic", "frozen", "pose"},
     "model": {"diagnostic", "frozen", "plan", "pose"},
     "imported": {"frozen", "model", "pose"},
-    "planfields": set(),
-    "planfile": {"diagnostic", "plan", "planfields", "pose"},
-    "planschema": {"plan", "pose"},
     "load": {"diagnostic", "frozen"},
     "render": {"codes", "diagnostic", "pose"},
     "validate": {"diagnostic", "frozen", "load", "pose"},
     "resolve": {"diagnostic", "frozen", "imported", "load", "model", "plan", "pose", "validate"},
     "check": {"codes", "diagnostic", "frozen", "load", "model", "pose"},
     "draw": {"frozen"},
-    "emit": {"draw", "imported", "model", "plan", "planfile", "pose"},
+    "emit": {"draw", "imported", "model", "plan", "pose"},
     "ros": {"diagnostic", "plan", "pose"},
     "verdict": {"diagnostic", "plan", "pose"},
-    "run": {"diagnostic", "plan", "planfile", "pose", "ros", "verdict"},
-    "observe": {"diagnostic", "model", "plan", "planfile", "pose", "ros", "verdict"},
+    "run": {"diagnostic", "plan", "pose", "ros", "verdict"},
+    "observe": {"diagnostic", "model", "plan", "pose", "ros", "verdict"},
     "compile": FOUNDATIONS | STAGES,
     "cli": {"*"},
     "__main__": {"cli"},
@@ -200,7 +197,7 @@ def test_commands_before_the_plan_load_yaml_and_nothing_else_from_elsewhere(
 
 
 def test_reading_and_supervising_a_plan_loads_nothing_from_elsewhere_and_no_compiler(bare: set[str]) -> None:
-    loaded = loaded_by("import tfcompose.planfile, tfcompose.run.launcher.supervisor")
+    loaded = loaded_by("import tfcompose.plan.file, tfcompose.run.launcher.supervisor")
     assert not foreign(loaded, bare)
     assert not {name for name in loaded for stage in (*STAGES, "emit") if name.startswith(f"tfcompose.{stage}")}
 

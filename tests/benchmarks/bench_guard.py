@@ -18,7 +18,7 @@ import psutil
 import pytest
 
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
-from tfcompose.planfile import write_plan
+from tfcompose.plan.file import write_plan
 from tfcompose.pose import Pose
 
 EDGES, TOGETHER, HERTZ = 1000, 100, 50.0

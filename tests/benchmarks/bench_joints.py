@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tfcompose.plan import Joint, Plan, PlanEdge, PlanProcess, RosSettings
-from tfcompose.planfile import write_plan
+from tfcompose.plan.file import write_plan
 from tfcompose.pose import Pose
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from tfcompose.check.allow import can_be_allowed
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 
 SPECS = sorted((Path(__file__).parent / "specs").glob("*.yaml"))
 PRESETS = library()

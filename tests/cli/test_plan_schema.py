@@ -12,7 +12,7 @@ import pytest
 
 from tfcompose.cli.schema import schema_text
 from tfcompose.diagnostic import RejectedError
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

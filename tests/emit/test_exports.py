@@ -21,7 +21,7 @@ from tfcompose.emit.launch import launch
 from tfcompose.emit.supervised import Machine
 from tfcompose.emit.systemd import systemd
 from tfcompose.plan import Plan, PlanProcess, StopRule
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 
 ROBOT = (Path(__file__).parents[2] / "robots" / "autonomous_robot.yaml").read_text("utf-8")
 DRIVEN = """

@@ -9,7 +9,7 @@ import pytest
 from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 
 ROBOT = """
 tfcompose: 1

@@ -15,7 +15,7 @@ from tfcompose.compile import compile_robot
 from tfcompose.diagnostic import RejectedError
 from tfcompose.emit import Target, emit
 from tfcompose.plan import PlanProcess, Ready, StopRule
-from tfcompose.planfile import read_plan, write_plan
+from tfcompose.plan.file import read_plan, write_plan
 from tfcompose.run.launcher.executable import filled_in, own_env
 
 if TYPE_CHECKING:

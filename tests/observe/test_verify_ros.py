@@ -12,7 +12,7 @@ import pytest
 
 from tests.observe.test_monitor_ros import sending
 from tfcompose.plan import PlanProcess, Simulation
-from tfcompose.planfile import read_plan, write_plan
+from tfcompose.plan.file import read_plan, write_plan
 from tfcompose.pose import Pose
 
 if TYPE_CHECKING:

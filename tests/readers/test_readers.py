@@ -22,7 +22,7 @@ from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
 from tfcompose.plan import RosSettings
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 from tfcompose.pose import Pose
 from tfcompose.ros.joint_message import encode_names, fill
 from tfcompose.ros.message import decode

@@ -10,7 +10,7 @@ import yaml
 from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 from tfcompose.resolve.node_presets import node_preset, node_preset_names
 
 ROBOT = """tfcompose: 1

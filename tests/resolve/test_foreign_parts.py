@@ -15,7 +15,7 @@ from tfcompose.cli.disk import disk
 from tfcompose.cli.terminal import read_text
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -15,7 +15,7 @@ from tfcompose.compile import Compiled, compile_robot
 from tfcompose.diagnostic import RejectedError, Span, finding
 from tfcompose.emit import emit
 from tfcompose.load.params import load_params
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 from tfcompose.resolve.param_files import matches
 
 HEAD = "tfcompose: 1\nrobot: r\nros: {namespace: robot1}\nframes: {base_link: {}}\nprocesses:\n"

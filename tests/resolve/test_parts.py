@@ -12,7 +12,7 @@ from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.diagnostic import RejectedError, Span, finding
 from tfcompose.emit import emit
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 
 ROVER = """
 tfcompose: 1

@@ -14,7 +14,7 @@ from tfcompose.cli.compiling import library
 from tfcompose.cli.diff import differences
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 from tfcompose.pose import Pose, angle_between
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
 from tfcompose.plan import Simulation, Sweep
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 
 ARM = """
 tfcompose: 1

@@ -15,7 +15,7 @@ import pytest
 
 from tests.waiting import gone, until
 from tfcompose.plan import Plan, PlanProcess, RosSettings
-from tfcompose.planfile import write_plan
+from tfcompose.plan.file import write_plan
 from tfcompose.run.launcher.control import ask, connect
 from tfcompose.run.launcher.leftovers import end, leftovers
 from tfcompose.run.place import Place
@@ -29,7 +29,7 @@ LAUNCHER = """
 import resource, sys
 from pathlib import Path
 from tfcompose.cli.console import Console
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 from tfcompose.run.launcher.control import listen
 from tfcompose.run.launcher.logs import Logs
 from tfcompose.run.launcher.outlet import Outlet

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tfcompose.plan import Plan, PlanProcess, Ready, RosSettings
-from tfcompose.planfile import write_plan
+from tfcompose.plan.file import write_plan
 from tfcompose.run.launcher.notice import AllReady, FindingShown, Notice, ProcessReady
 from tfcompose.run.launcher.supervisor import supervise
 

@@ -11,7 +11,7 @@ import pytest
 from tests.planned import compiled_plan
 from tfcompose.diagnostic import Diagnostic
 from tfcompose.plan import Plan, Ready
-from tfcompose.planfile import read_plan, write_plan
+from tfcompose.plan.file import read_plan, write_plan
 from tfcompose.run.hosts import hosts_of, share_of, told
 from tfcompose.run.place import place_of
 

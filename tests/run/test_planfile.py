@@ -9,7 +9,7 @@ import pytest
 
 from tfcompose.diagnostic import RejectedError
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
-from tfcompose.planfile import read_plan, write_plan
+from tfcompose.plan.file import read_plan, write_plan
 from tfcompose.pose import Pose
 
 EDGES = [PlanEdge("base", child, "static", "static", "/s", Pose(), None, ("r.yaml", 1)) for child in ("a", "b")]

@@ -17,7 +17,7 @@ import pytest
 
 from tests.waiting import gone, until
 from tfcompose.plan import GuardPolicy, Plan, PlanProcess, RosSettings
-from tfcompose.planfile import write_plan
+from tfcompose.plan.file import write_plan
 from tfcompose.run.events import Clear, Complete, Live, OwnerReady, Remember, to_line
 from tfcompose.run.launcher.notice import Ended, FindingShown, LogLine, Notice, ProcessState
 from tfcompose.run.launcher.state import Times
@@ -51,7 +51,7 @@ time.sleep(30)
 LAUNCHER = """
 import signal, sys
 from pathlib import Path
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 from tfcompose.run.launcher.supervisor import supervise
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # the tests may run below nohup
 file = Path(sys.argv[1])

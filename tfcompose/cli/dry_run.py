@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.up import PLAN, as_asked, plan_in
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 from tfcompose.ros.environment import FASTDDS_PROFILE, child_environment
 from tfcompose.run.fenced import partition_of, private_topics
 from tfcompose.run.hosts import told

@@ -9,7 +9,7 @@ import shutil
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.terminal import UNREADABLE, complain
-from tfcompose.planfile import write_plan
+from tfcompose.plan.file import write_plan
 from tfcompose.run.launcher.leftovers import leftovers, variables_of
 from tfcompose.run.publishing.addresses import with_whole_addresses
 

@@ -9,7 +9,7 @@ import json
 import sys
 from typing import TYPE_CHECKING
 
-from tfcompose.planschema import plan_schema
+from tfcompose.plan.schema import plan_schema
 from tfcompose.validate.json_schema import json_schema
 
 if TYPE_CHECKING:

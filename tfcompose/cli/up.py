@@ -17,7 +17,7 @@ from tfcompose.cli.terminal import UNREADABLE, complain, print_findings, read_te
 from tfcompose.diagnostic import RejectedError
 from tfcompose.frozen import replace
 from tfcompose.plan import Plan
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 from tfcompose.run.hosts import share_of
 
 if TYPE_CHECKING:

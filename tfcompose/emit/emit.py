@@ -17,7 +17,7 @@ from tfcompose.emit.tree import tree
 from tfcompose.emit.urdf import body_of, whole
 from tfcompose.emit.xacro import MACRO, caller, macro
 from tfcompose.plan import DESCRIPTION
-from tfcompose.planfile import write_plan
+from tfcompose.plan.file import write_plan
 
 if TYPE_CHECKING:
     from tfcompose.model import Process, Robot

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import RejectedError, Span, finding
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import RejectedError
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 from tfcompose.ros.environment import child_environment
 from tfcompose.run.launcher.preflight import commands_of
 from tfcompose.run.orders import JOINS

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import RejectedError
-from tfcompose.planfile import read_plan
+from tfcompose.plan.file import read_plan
 from tfcompose.run.launcher.gates import is_ready, waits_for
 from tfcompose.run.launcher.happening import Asked, Down, NewPlan
 from tfcompose.run.launcher.lives import refusal

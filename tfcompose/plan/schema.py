@@ -1,4 +1,4 @@
-"""The JSON Schema of ``plan.json``, made from the classes that hold a plan and what ``planfile`` writes of them."""
+"""The JSON Schema of ``plan.json``, made from the classes that hold a plan and what ``file`` writes of them."""
 
 from __future__ import annotations
 

@@ -183,6 +183,7 @@ CODES = {
     "TF845": "no_tf",
     "TF846": "wrong_live_pose",
     "TF847": "needed_but_optional",
+    "TF848": "gate_never_opens",
     # the environment
     "TF901": "no_ros",
     "TF902": "bad_plan",

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import sys
 import time
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tfcompose.plan import Plan, PlanProcess, Ready, RosSettings
+from tfcompose.plan import Plan, PlanEdge, PlanProcess, Ready, RosSettings, Simulation
 from tfcompose.plan.file import write_plan
+from tfcompose.pose import Pose
 from tfcompose.run.launcher.notice import AllReady, FindingShown, Notice, ProcessReady
 from tfcompose.run.launcher.supervisor import supervise
 
@@ -53,8 +55,25 @@ def node(name: str, *words: str, ready: Ready | None = None, lifecycle: dict[str
     return PlanProcess(name, "run", argv, ready=ready, lifecycle=lifecycle or {}, nodes=(f"/robot/{name}",))
 
 
+def script(name: str, text: str, ready: Ready | None, **more: Any) -> PlanProcess:
+    return PlanProcess(name, "run", ("sh", "-c", text), ready=ready, nodes=(f"/robot/{name}",), **more)
+
+
+def simulated(ready: Ready) -> PlanProcess:
+    """Return the owner of odom → base_link, which stands still there."""
+    argv = ("${python}", "-m", "tfcompose.run.simulate", "${plan}", "drive")
+    owns = (("odom", "base_link"),)
+    still = Simulation("fixed", 20.0, pose=Pose())
+    return PlanProcess("drive", "simulate", argv, ready=ready, nodes=("/robot/drive",), owns=owns, simulate=still)
+
+
 def run(tmp_path: Path, seconds: float, *processes: PlanProcess) -> list[Notice]:
-    plan = Plan("rover", "", None, RosSettings(), (), (*processes, GUARD))
+    edges = tuple(
+        PlanEdge(parent, child, "dynamic", one.name, one.nodes[0], Pose(), None, ("robot.yaml", 1))
+        for one in processes
+        for parent, child in one.owns
+    )
+    plan = Plan("rover", "", None, RosSettings(), edges, (*processes, GUARD))
     file = tmp_path / "plan.json"
     file.write_text(write_plan(plan))
     told: list[Notice] = []
@@ -86,6 +105,36 @@ def test_a_lifecycle_node_is_configured_and_activated_and_then_ready(tmp_path: P
     assert ready.seen == "/robot/slam is active"
     said = [getattr(notice, "text", "") for notice in told if getattr(notice, "process", "") == "slam"]
     assert [text for text in said if text] == ["configured", "activated"]
+
+
+@pytest.mark.usefixtures("domain")
+def test_edges_a_line_an_exit_code_and_a_time_open_gates_and_what_waits_follows(tmp_path: Path) -> None:
+    drive = simulated(Ready("edges"))
+    line = script("line", "echo booting; sleep 0.3; echo ready 17; sleep 60", Ready("log", "ready [0-9]+"))
+    code = script("code", "exit 4", Ready("exit", number=4.0))
+    later = script("later", "sleep 60", Ready("time", number=0.4))
+    last = script("last", "sleep 60", None, after=dict.fromkeys(("drive", "line", "code", "later"), "ready"))
+    told = run(tmp_path, 15, drive, line, code, later, last)
+    seen = {notice.process: notice.seen for notice in told if isinstance(notice, ProcessReady)}
+    assert seen == {"drive": "its edges are live", "line": "ready 17", "later": "0.4 s have passed"}
+    assert isinstance(told[-1], AllReady)
+    assert {row.process for row in told[-1].rows} >= {"drive", "line", "code", "later", "last"}
+
+
+@pytest.mark.usefixtures("domain")
+def test_edges_a_line_and_an_exit_code_that_do_not_come_are_told_with_what_was_seen_instead(tmp_path: Path) -> None:
+    idle = replace(simulated(Ready("edges", timeout_s=2.0)), kind="run", argv=("sleep", "60"), simulate=None)
+    line = script("line", "echo booting; sleep 60", Ready("log", "ready [0-9]+", timeout_s=1.0))
+    code = script("code", "sleep 60", Ready("exit", timeout_s=1.0))
+    told = run(tmp_path, 5, idle, line, code)
+    found = {notice.found.message: notice.found for notice in told if isinstance(notice, FindingShown)}
+    notes = [
+        note.message for note in found["line is not ready after 1 s: no line of its output holds ready [0-9]+"].notes
+    ]
+    assert notes == ["line: booting"]
+    assert "code is not ready after 1 s: it still runs" in found
+    edges = found["drive is not ready after 2 s: nobody published odom → base_link"]
+    assert edges.notes[0].message == "seen instead: /tf is published by nobody; /tf_static is published by nobody"
 
 
 @pytest.mark.usefixtures("domain")

@@ -89,6 +89,32 @@ def test_an_exit_code_that_is_not_the_one_is_a_failure() -> None:
     assert [found.message for found in history.found()] == ["code ended with exit code 0"]
 
 
+def test_who_sends_on_tf_is_looked_at_while_an_edges_gate_is_shut_and_no_longer() -> None:
+    slam = replace(SLAM, ready=Ready("edges", timeout_s=3.0))
+    history = begin(GUARD, STATIC, slam).feed(Clear(), GateShut("slam", "/tf is published by nobody"))
+    assert history.orders == [Gate("slam", writers=("/tf", "/tf_static"))]
+    history.wait(3)
+    (late,) = history.late
+    assert late.message == "slam is not ready after 3 s: nobody published map → odom"
+    assert late.notes[0].message == "seen instead: /tf is published by nobody"
+    assert history.feed(OwnerReady("slam")).orders[-1] == Gate("slam")
+
+
+@pytest.mark.parametrize("restart", ["no", "on-failure"])
+def test_one_that_was_ready_and_is_done_stays_what_others_wait_for(restart: str) -> None:
+    both = run_process("both", after={"map": "ready", "lidar": "ready"})
+    history = begin(run_process("map", restart), gated(kind="log"), both).feed(Exited("map", 0), LogSeen("lidar", "up"))
+    assert history.started[-1] == "both"
+
+
+def test_who_waits_for_one_that_ended_before_it_was_ready_fails_with_the_reason() -> None:
+    history = begin(STATIC, gated(), AFTER).feed(Exited("lidar", 0))
+    assert history.started == ["static", "lidar", "b"], "without a guard nobody looks at a topic"
+    history = begin(GUARD, STATIC, gated(), AFTER).feed(Clear(), Exited("lidar", 0))
+    assert history.found()[-1].message == "b is not started: it waits for lidar to be ready, and lidar has ended"
+    assert history.state.stop
+
+
 def test_lifecycle_nodes_are_driven_and_ready_means_that_they_are_there() -> None:
     slam = PlanProcess("lidar", "run", lifecycle={"/slam": "active"}, owns=(("map", "odom"),))
     history = begin(GUARD, slam, AFTER).feed(Clear(), OwnerReady("lidar"))

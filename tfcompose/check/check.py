@@ -65,6 +65,7 @@ from tfcompose.check.rules.tf812_start_order_loop import start_order_loop
 from tfcompose.check.rules.tf815_process_without_role import process_without_role
 from tfcompose.check.rules.tf818_required_without_role import required_without_role
 from tfcompose.check.rules.tf847_needed_but_optional import needed_but_optional
+from tfcompose.check.rules.tf848_gate_never_opens import gate_never_opens
 from tfcompose.diagnostic import Diagnostic, Severity, Span, finding
 from tfcompose.frozen import dataclass, replace
 
@@ -153,6 +154,7 @@ RULES: tuple[Rule, ...] = (
     Rule("TF815", process_without_role, WARNING),
     Rule("TF818", required_without_role, WARNING),
     Rule("TF847", needed_but_optional, WARNING),
+    Rule("TF848", gate_never_opens),
 )
 
 

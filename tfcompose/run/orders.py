@@ -33,7 +33,8 @@ class Gate:
     """Say when this is there: a topic with a publisher, a service, or nodes in lifecycle states.
 
     ``topic`` and ``service`` are full names, or empty. ``nodes`` holds the lifecycle states that are waited for;
-    ``drive`` says that the guard brings them there.
+    ``drive`` says that the guard brings them there. ``writers`` are topics whose publishers are named while others look
+    at what comes there. A gate at which nothing is to be seen replaces the process's, and is not looked at.
     """
 
     process: str
@@ -41,6 +42,7 @@ class Gate:
     service: str = ""
     nodes: dict[str, str] = field(default_factory=dict)
     drive: bool = False
+    writers: tuple[str, ...] = ()
 
 
 GuardOrder = Absent | Present | Gate
@@ -63,5 +65,7 @@ def order_of(line: str) -> GuardOrder:
     kind = _KINDS.get(data.pop("order", "")) if isinstance(data, dict) else None
     if kind is None:
         raise ValueError(f"not an order: {line!r}")
+    if "writers" in data:
+        data["writers"] = tuple(data["writers"])
     order: GuardOrder = kind(**data)
     return order

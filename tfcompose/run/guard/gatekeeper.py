@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.ros.graph import services, writers
 from tfcompose.run.events import GateOpen, GateShut
+from tfcompose.run.orders import Gate
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
     from tfcompose.ros.lifecycle import Lifecycle
     from tfcompose.run.events import GuardEvent
-    from tfcompose.run.orders import Gate
 
 #: How often a gate is looked at, in seconds.
 LOOK_EVERY_S = 0.2
@@ -37,6 +37,8 @@ class Gates:
     def add(self, gate: Gate) -> None:
         """Look at this gate from now on."""
         self.forget(gate.process)
+        if gate == Gate(gate.process):
+            return
         self._gates[gate.process] = gate
         for name, state in gate.nodes.items():
             self._nodes[gate.process, name] = _lifecycle(self._node, name, state, drive=gate.drive)
@@ -73,6 +75,9 @@ class Gates:
             there = services(self._node)
             is_there = gate.service in there
             looks.append((is_there, f"the service {gate.service} is there" if is_there else _some("services", there)))
+        for topic in gate.writers:
+            names = ", ".join(one.node for one in writers(self._node, topic))
+            looks.append((False, f"{topic} is published by {names or 'nobody'}"))
         return all(is_open for is_open, _ in looks), "; ".join(seen for _, seen in looks)
 
     def _topics(self) -> str:

@@ -57,9 +57,9 @@ def not_started(name: str, why: str) -> Diagnostic:
     return finding("TF808", f"{name} could not be started: {why}", None)
 
 
-def waits_in_vain(name: str, other: str, what: str) -> Diagnostic:
-    """Return the finding for a process that is not started, because it waits for one that has failed."""
-    return finding("TF808", f"{name} is not started: it waits for {other} to be {what}, and {other} has failed", None)
+def waits_in_vain(name: str, other: str, what: str, why: str) -> Diagnostic:
+    """Return the finding for a process that is not started, because it waits for what cannot come any more."""
+    return finding("TF808", f"{name} is not started: it waits for {other} to be {what}, and {other} {why}", None)
 
 
 def never_clear(name: str, seconds: float) -> Diagnostic:

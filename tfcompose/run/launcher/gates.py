@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from tfcompose.diagnostic import Note, finding
 from tfcompose.run.launcher.action import Order, TellLate
 from tfcompose.run.launcher.notice import AllReady, AllStarted, ProcessReady, StartRow
+from tfcompose.run.launcher.prerequisites import unmet_in_words
 from tfcompose.run.orders import Gate
 
 if TYPE_CHECKING:
@@ -38,13 +39,16 @@ def order_gate(turn: Turn, one: Tracked) -> None:
     """Tell the guard what to look for, and which nodes to bring into their states."""
     process, kind = one.process, kind_of(one.process)
     ready = process.ready
-    if turn.state.guard is None or not (process.lifecycle or kind in ("topic", "service", "lifecycle")):
+    by_edges = kind == "edges" and ready is not None
+    if turn.state.guard is None or not (process.lifecycle or by_edges or kind in ("topic", "service", "lifecycle")):
         return
     nodes, text = process.lifecycle, ready.text if ready else ""
     if kind == "lifecycle" and not nodes:
         nodes = dict.fromkeys(process.nodes, text)
     topic, service = (text if kind == name else "" for name in ("topic", "service"))
-    turn.actions.append(Order(Gate(process.name, topic, service, dict(nodes), drive=bool(process.lifecycle))))
+    writers = process.topics if by_edges else ()
+    gate = Gate(process.name, topic, service, dict(nodes), drive=bool(process.lifecycle), writers=writers)
+    turn.actions.append(Order(gate))
 
 
 def opened(turn: Turn, name: str, seen: str = "") -> None:
@@ -53,6 +57,8 @@ def opened(turn: Turn, name: str, seen: str = "") -> None:
     if one.ready:
         return
     turn.track(name, replace(one, ready=True, ready_since=turn.now, seen=seen, late=False))
+    if kind_of(one.process) == "edges" and has_own_gate(one.process):
+        turn.actions.append(Order(Gate(name)))  # nobody need look any more
     if has_own_gate(one.process):
         turn.tell(ProcessReady(name, seen, turn.now - (turn.state.begun or 0.0)))
 
@@ -99,7 +105,9 @@ def opens_at(one: Tracked) -> float | None:
 
 
 def waits_for(state: State, one: Tracked) -> str:
-    """Return what a process that runs is still without, in words; "" if it is ready, or does not run."""
+    """Return what a process is still without, in words; "" if it is ready, or is not to run."""
+    if one.state == "STOPPED" and one.wanted and (others := unmet_in_words(state, one)):
+        return f"waits for {others}"
     if one.ready or one.state not in ("RUNNING", "EXPECTED"):
         return ""
     ready = one.process.ready

@@ -29,6 +29,7 @@ def exited(turn: Turn, event: Exited) -> None:
     if name == turn.state.guard and turn.state.clear is not None and not one.leaving:
         _guard_ended(turn, one, event)
         return
+    before = one
     lose(turn, one)
     one = turn.state.tracked[name]
     if one.leaving:
@@ -41,8 +42,9 @@ def exited(turn: Turn, event: Exited) -> None:
         _restart_later(turn, one, event)
         return
     turn.enter(name, "EXITED", how)
-    if done and ready and ready.kind == "exit":
-        turn.track(name, replace(turn.state.tracked[name], ready=True, ready_since=turn.now))
+    # What others wait for has come, and does not go with the process.
+    if done and ((before.ready and not process.owns) or (ready and ready.kind == "exit")):
+        turn.track(name, replace(turn.state.tracked[name], ready=True, ready_since=before.ready_since or turn.now))
     early = name == turn.state.guard and turn.state.clear is None
     when = " before it said whether somebody publishes the plan's edges already" if early else ""
     if not done or process.required:

@@ -19,7 +19,7 @@ from tfcompose.run.events import (
     Taken,
 )
 from tfcompose.run.launcher.ending import asked_to_end, stop_on, taken
-from tfcompose.run.launcher.failures import never_clear, not_started, waits_in_vain
+from tfcompose.run.launcher.failures import never_clear, not_started
 from tfcompose.run.launcher.gates import kind_of, look, opened, order_gate, say_progress
 from tfcompose.run.launcher.guard_said import guard_said, owner_ready, say_of
 from tfcompose.run.launcher.happening import (
@@ -34,13 +34,14 @@ from tfcompose.run.launcher.happening import (
 )
 from tfcompose.run.launcher.lives import asked, exited, follow
 from tfcompose.run.launcher.notice import Missing, Waiting
+from tfcompose.run.launcher.prerequisites import give_up_waiting, unmet
 from tfcompose.run.launcher.timing import backoff_s, by_owner, waiting_due
 from tfcompose.run.launcher.turn import Turn
 
 if TYPE_CHECKING:
     from tfcompose.plan import Plan, PlanEdge
     from tfcompose.run.launcher.action import Action
-    from tfcompose.run.launcher.state import State, Tracked
+    from tfcompose.run.launcher.state import State
 
 
 def step(state: State, event: Event, now: float) -> tuple[State, tuple[Action, ...]]:
@@ -139,11 +140,11 @@ def _settle(turn: Turn) -> None:
 
 def _go_on(turn: Turn) -> None:
     look(turn)
-    _give_up_waiting(turn)
+    give_up_waiting(turn)
     for name, one in turn.state.tracked.items():
         if one.state not in ("STOPPED", "BACKOFF"):
             continue
-        fresh = one.state == "STOPPED" and one.wanted and turn.state.clear is not None and _may_start(turn, one)
+        fresh = one.state == "STOPPED" and one.wanted and turn.state.clear is not None and not unmet(turn.state, one)
         again = one.state == "BACKOFF" and turn.now >= one.since + backoff_s(turn.state.times, one.failures)
         if fresh or again:
             turn.start(name)
@@ -158,29 +159,5 @@ def _go_on(turn: Turn) -> None:
         turn.finish(1 if turn.state.given_up else 0)
 
 
-def _give_up_waiting(turn: Turn) -> None:
-    """Have those fail that wait for what has failed."""
-    for name, one in turn.state.tracked.items():
-        if one.state != "STOPPED" or not one.wanted or one.failed:
-            continue
-        for other, what in one.process.after.items():
-            if turn.state.tracked[other].failed and not _is_there(turn, other, what):
-                turn.failed(name, waits_in_vain(name, other, what))
-                break
-
-
 def _missing(plan: Plan, owner: str, edges: tuple[PlanEdge, ...]) -> Missing:
     return Missing(owner, edges[0].node, tuple(edge.name for edge in edges), len(plan.edges_of(owner)))
-
-
-def _may_start(turn: Turn, one: Tracked) -> bool:
-    return all(_is_there(turn, name, what) for name, what in one.process.after.items())
-
-
-def _is_there(turn: Turn, name: str, what: str) -> bool:
-    other = turn.state.tracked[name]
-    if what == "ready":
-        return other.ready
-    if what == "done":
-        return other.state == "EXITED" and not other.failed
-    return other.was_started or other.state == "EXPECTED"

@@ -134,6 +134,13 @@ def test_launcher_guard_and_publishers_do_not_know_each_other() -> None:
             assert not others & (groups - {group}), file
 
 
+def test_a_command_is_imported_by_nobody() -> None:
+    """What several commands share stands in ``cli`` itself."""
+    folder = "tfcompose.cli.commands."
+    for file in FILES:
+        assert not [name for name in imports_of(file) if name.startswith(folder)], file
+
+
 def test_nothing_is_imported_inside_a_function() -> None:
     """A circle would be broken that way; what is loaded late is named, through ``import_module``."""
     inside = [

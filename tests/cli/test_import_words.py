@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.cli.test_importing import PRESETS, built, imported, urdf_of
-from tfcompose.cli import importing, main
+from tfcompose.cli import main
+from tfcompose.cli.commands import importing
 from tfcompose.load import load
 
 if TYPE_CHECKING:

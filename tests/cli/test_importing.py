@@ -12,7 +12,8 @@ import pytest
 
 from tests.cli.same_urdf import same
 from tests.readers.family import spec as family
-from tfcompose.cli import importing, main
+from tfcompose.cli import main
+from tfcompose.cli.commands import importing
 from tfcompose.cli.disk import disk
 from tfcompose.cli.shelves import library
 from tfcompose.cli.terminal import read_text

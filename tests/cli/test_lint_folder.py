@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.lint import robots_in
+from tfcompose.cli.commands.lint import robots_in
 
 if TYPE_CHECKING:
     from pathlib import Path

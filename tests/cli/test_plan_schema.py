@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import jsonschema
 import pytest
 
-from tfcompose.cli.schema import schema_text
+from tfcompose.cli.commands.schema import schema_text
 from tfcompose.diagnostic import RejectedError
 from tfcompose.plan.file import read_plan
 

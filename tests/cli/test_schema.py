@@ -10,8 +10,8 @@ from typing import Any
 import jsonschema
 import pytest
 
+from tfcompose.cli.commands.schema import LANGUAGES, schema_text
 from tfcompose.cli.compiling import library
-from tfcompose.cli.schema import LANGUAGES, schema_text
 from tfcompose.compile import compile_robot
 from tfcompose.load import load
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import yaml
 
-from tfcompose.cli import presets as presets_command
 from tfcompose.cli import shelves
+from tfcompose.cli.commands import presets as presets_command
 from tfcompose.cli.parser import main
 from tfcompose.cli.shelves import library
 from tfcompose.cli.terminal import read_text

@@ -10,8 +10,8 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
+from tfcompose.cli.commands.diff import differences
 from tfcompose.cli.compiling import library
-from tfcompose.cli.diff import differences
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
 from tfcompose.plan.file import read_plan

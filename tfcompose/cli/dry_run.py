@@ -7,7 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.up import PLAN, as_asked, plan_in
+from tfcompose.cli.built_plan import PLAN, as_asked, plan_in
 from tfcompose.plan.file import read_plan
 from tfcompose.ros.environment import FASTDDS_PROFILE, child_environment
 from tfcompose.run.fenced import partition_of, private_topics

@@ -34,7 +34,7 @@ def expected(file: str, arguments: Namespace) -> tuple[Plan, dict[str, Span]] | 
         if arguments.profiles or arguments.overlays or arguments.settings:
             terminal.complain("a built plan takes no --profile, --overlay and --set: those are for building it")
             return 2
-        plan: Plan | int = import_module("tfcompose.cli.up").plan_in(path)
+        plan: Plan | int = import_module("tfcompose.cli.built_plan").plan_in(path)
         return plan if isinstance(plan, int) else (plan, {})
     robot = import_module("tfcompose.cli.compiling").robot_or_code(file, arguments)
     if isinstance(robot, int):

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, HelpFormatter
     from typing import TextIO
 
-#: Each command is the module of its name in this package (or of one in ``_MODULES``), with ``arguments`` and ``run``.
+#: Each command is the module of its name in ``commands`` (or of one in ``_MODULES``), with ``arguments`` and ``run``.
 COMMANDS = {
     "lint": "find everything that is wrong; starts nothing, needs no ROS",
     "build": "write the URDF and the plan: all of it, or nothing",
@@ -132,7 +132,7 @@ def _run(command: str, words: list[str]) -> int:
 
 
 def _run_command(command: str, words: list[str]) -> int:
-    module = import_module(f"tfcompose.cli.{_MODULES.get(command, command)}")
+    module = import_module(f"tfcompose.cli.commands.{_MODULES.get(command, command)}")
     parser = parser_of(command)
     if not {"-h", "--help"}.isdisjoint(words):  # argparse would say nothing of a reader that is gone
         sys.stdout.write(parser.format_help())
@@ -154,7 +154,7 @@ def _unwritten() -> int:
 def parser_of(command: str) -> ArgumentParser:
     """Return the parser of one command."""
     argparse = import_module("argparse")
-    module = import_module(f"tfcompose.cli.{_MODULES.get(command, command)}")
+    module = import_module(f"tfcompose.cli.commands.{_MODULES.get(command, command)}")
     width = _width()
 
     def formatter(prog: str) -> HelpFormatter:

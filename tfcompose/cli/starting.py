@@ -9,10 +9,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tfcompose.cli.built_plan import PLAN, as_asked, plan_in
 from tfcompose.cli.console import Console
 from tfcompose.cli.status import Status, columns_of
 from tfcompose.cli.terminal import UNREADABLE, coloured, complain, print_findings
-from tfcompose.cli.up import PLAN, as_asked, plan_in
 from tfcompose.diagnostic import finding
 from tfcompose.frozen import replace
 from tfcompose.ros.environment import child_environment, missing_ros
@@ -125,7 +125,7 @@ def _with_profile(found: Diagnostic, arguments: Namespace) -> Diagnostic:
 
 def _built(arguments: Namespace) -> Path | int:
     """Build the robot and return its plan's file; the compiler is loaded only here."""
-    built = import_module("tfcompose.cli.build").build(arguments)
+    built = import_module("tfcompose.cli.building").build(arguments)
     if isinstance(built, int):
         return built
     folder: Path = built[0]

@@ -13,10 +13,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tfcompose.cli.built_plan import PLAN, plan_in
 from tfcompose.cli.options import DEFAULT_FILE, add_variant
 from tfcompose.cli.output import write_all
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings, read_text
-from tfcompose.cli.up import PLAN, plan_in
 from tfcompose.diagnostic import RejectedError
 from tfcompose.emit.supervised import Machine, started
 from tfcompose.plan import Plan
@@ -67,7 +67,7 @@ def run(arguments: Namespace) -> int:
             return UNREADABLE
         file = Path(arguments.file)
     else:
-        built = import_module("tfcompose.cli.build").build(arguments)
+        built = import_module("tfcompose.cli.building").build(arguments)
         if isinstance(built, int):
             return built
         file = built[0] / PLAN

@@ -100,7 +100,7 @@ def _plan(arguments: Namespace) -> Plan | int | None:
             return UNREADABLE
         return None
     if file.endswith(".json"):
-        read: Plan | int = import_module("tfcompose.cli.up").plan_in(Path(file))
+        read: Plan | int = import_module("tfcompose.cli.built_plan").plan_in(Path(file))
         return read
     robot = import_module("tfcompose.cli.compiling").robot_or_code(file, arguments)
     if isinstance(robot, int):

@@ -1,53 +1,22 @@
-"""``tfcompose build``: the robot's files, all of them or nothing.
-
-Write plan.json, the URDF, xacro, tree.txt and tree.svg, and parameter files where there are any: all, or
-nothing.
-"""
+"""A robot's files, written all or none."""
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import robot_or_code
-from tfcompose.cli.options import add_file, add_variant
 from tfcompose.cli.output import write_all
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings
 from tfcompose.diagnostic import Diagnostic, finding
 from tfcompose.emit import Target, emit, unaddressed
 
 if TYPE_CHECKING:
-    from argparse import ArgumentParser, Namespace
+    from argparse import Namespace
 
     from tfcompose.emit import Form
     from tfcompose.model import Asset
-
-
-def arguments(parser: ArgumentParser) -> None:
-    """Add the command's arguments."""
-    add_file(parser)
-    add_variant(parser)
-    parser.add_argument("-o", "--output", metavar="DIR", help="default: build/ROBOT")
-    parser.add_argument(
-        "--mesh", choices=("package", "file", "relative"), default="as-written",
-        help="how meshes are addressed: package://…, file:///…, or relative to DIR; default: as they are written",
-    )  # fmt: skip
-    parser.add_argument(
-        "--read-back", action="store_true",
-        help="read the URDF again with another parser, and write only what is the robot, value by value",
-    )  # fmt: skip
-
-
-def run(arguments: Namespace) -> int:
-    """Build; exit code 0, 1 with errors in the robot, 2 where something cannot be read or written."""
-    built = build(arguments)
-    if isinstance(built, int):
-        return built
-    folder, names = built
-    sys.stdout.write(f"wrote {folder}: {', '.join(names)}\n")
-    return 0
 
 
 def build(arguments: Namespace) -> tuple[Path, list[str]] | int:

@@ -7,24 +7,14 @@ node's name. Where the robot runs already, a changed plan is followed: only what
 
 from __future__ import annotations
 
-import os
-import sys
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import DEFAULT_FILE, add_variant, not_negative, positive
-from tfcompose.cli.terminal import UNREADABLE, complain, print_findings, read_text, unreadable
-from tfcompose.diagnostic import RejectedError
-from tfcompose.frozen import replace
-from tfcompose.plan import Plan
-from tfcompose.plan.file import read_plan
-from tfcompose.run.hosts import share_of
+from tfcompose.cli.terminal import UNREADABLE, complain
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-    from pathlib import Path
-
-PLAN = "plan.json"
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -72,30 +62,3 @@ def run(arguments: Namespace) -> int:
     part, name = ("dry_run", "dry_run") if arguments.dry_run else ("starting", "start")
     code: int = getattr(import_module(f"tfcompose.cli.{part}"), name)(arguments)
     return code
-
-
-def plan_in(file: Path) -> Plan | int:
-    """Return the plan in the file, or the exit code after saying what is wrong with it."""
-    try:
-        return read_plan(read_text(str(file)), str(file))
-    except RejectedError as error:
-        print_findings(error.diagnostics, sys.stderr)
-        return UNREADABLE if unreadable(error.diagnostics) else 1
-
-
-def as_asked(plan: Plan, arguments: Namespace) -> Plan | int:
-    """Return this machine's share of the plan, with what the command line says about the guard; or an exit code."""
-    if arguments.guard:
-        plan = replace(plan, guard=replace(plan.guard, mode=arguments.guard))
-    share = share_of(plan, arguments.host, os.uname().nodename)
-    if not isinstance(share, Plan):
-        print_findings([share], sys.stderr)
-        return 1
-    plan = share
-    if arguments.settle is None:
-        return plan
-    env = {"TFCOMPOSE_SETTLE_S": str(arguments.settle)}
-    processes = tuple(
-        replace(process, env=process.env | env) if process.kind == "guard" else process for process in plan.processes
-    )
-    return replace(plan, processes=processes)

@@ -119,7 +119,7 @@ def test_nothing_is_written_that_is_not_the_robot(
         )
 
     work_emit = emit
-    monkeypatch.setattr("tfcompose.cli.commands.build.emit", wrong)
+    monkeypatch.setattr("tfcompose.cli.building.emit", wrong)
     words = ["build", str(ROBOTS / "rover.yaml"), "-o", str(tmp_path / "out")]
     assert main([*words, "--read-back"]) == 1
     assert "error[TF910] robot.full.urdf: the joint " in capsys.readouterr().err

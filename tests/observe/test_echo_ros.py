@@ -7,9 +7,12 @@ import math
 import signal
 import subprocess
 import sys
+import threading
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from builtin_interfaces.msg import Time
+from rosgraph_msgs.msg import Clock
 
 from tfcompose.plan import PlanProcess, Simulation
 from tfcompose.pose import Pose, quat_from_rpy
@@ -126,8 +129,8 @@ class Talker:
             for static, topic in ((False, "/tf"), (True, "/tf_static"))
         ]
 
-    def say(self, parent: str, child: str, x: float, stamp_ns: int = 0) -> None:
-        data = encode([Transform(stamp_ns, parent, child, (x, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
+    def say(self, parent: str, child: str, x: float, stamp_ns: int = 0, w: float = 1.0) -> None:
+        data = encode([Transform(stamp_ns, parent, child, (x, 0.0, 0.0), (0.0, 0.0, 0.0, w))])
         self._publishers[stamp_ns == 0].publish(data)
 
     def until_heard(self, until: Callable[..., bool]) -> None:
@@ -216,6 +219,46 @@ def test_when_the_time_starts_again_it_says_so(
         _, errors = process.communicate(timeout=20)
     assert process.returncode == 1
     assert "what came for base_link was too old to be taken: did a bag or a simulation start again?" in errors
+
+
+def test_when_simulated_time_starts_again_it_goes_on(
+    running: Callable[..., subprocess.Popen[str]], until: Callable[..., bool]
+) -> None:
+    """A bag that is played with its clock, again and again."""
+    process = running("odom", "base_link", "--timeout", "10", "--rate", "100", "--format", "json")
+    assert process.stdout
+    with open_node("talks", "") as node:
+        talker, clock, stop = Talker(node), node.create_publisher(Clock, "/clock", 1), threading.Event()
+        talker.until_heard(until)
+        second = 100
+
+        def play() -> None:
+            while not stop.wait(0.05):
+                clock.publish(Clock(clock=Time(sec=second)))
+                talker.say("odom", "base_link", float(second), second * 10**9)
+
+        thread = threading.Thread(target=play)
+        thread.start()
+        try:
+            assert json.loads(process.stdout.readline())["xyz"][0] == 100.0
+            second = 7
+            assert json.loads(process.stdout.readline())["xyz"][0] == 7.0
+        finally:
+            stop.set()
+            thread.join()
+
+
+def test_what_tf2_refuses_is_said_where_the_frame_is_missing(
+    running: Callable[..., subprocess.Popen[str]], until: Callable[..., bool]
+) -> None:
+    process = running("odom", "base_link", "--timeout", "3")
+    with open_node("talks", "") as node:
+        talker = Talker(node)
+        talker.until_heard(until)
+        talker.say("odom", "base_link", 0.0, 10**9, 1.1)
+        _, errors = process.communicate(timeout=20)
+    assert process.returncode == 1
+    assert "what came for base_link was refused: its quaternion is not of length 1" in errors
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from tfcompose.observe.asked import Asked, Missed
 from tfcompose.observe.buffer import Buffer, TransformException
 from tfcompose.observe.elsewhere import advice, tf_elsewhere
 from tfcompose.observe.refusal import Refusal
+from tfcompose.ros.clock import SimClock
 from tfcompose.ros.decoder import Decoder
 from tfcompose.ros.graph import topics as topics_of
 from tfcompose.ros.node import open_node
@@ -32,6 +33,7 @@ def echo(asked: Asked, say: Callable[[Pose, int | None], None], stop: Stop) -> M
     with open_node("tfcompose_echo", asked.namespace.strip("/")) as node:
         topics = [(True, f"{prefix}/tf_static"), (False, f"{prefix}/tf")]
         subscriptions = [(TFSubscription(node, static=static, topic=topic), static) for static, topic in topics]
+        clock = SimClock(node)
         begun = last = time.monotonic()
         next_at = begun
         said_ns: int | None = None
@@ -39,6 +41,7 @@ def echo(asked: Asked, say: Callable[[Pose, int | None], None], stop: Stop) -> M
             wait(node, [subscription for subscription, _ in subscriptions], 0.05, stop)
             for subscription, static in subscriptions:
                 ear.take(subscription, static=static)
+            ear.follow(clock.now_ns())
             now = time.monotonic()
             if now < next_at:
                 continue
@@ -70,7 +73,8 @@ class _Ear:
         self._asked = asked
         self._decoder = Decoder()
         self.messages = 0
-        self._too_old: str | None = None
+        self._clock_ns = 0
+        self._refused: tuple[str, Refusal] | None = None
 
     def take(self, subscription: TFSubscription, *, static: bool) -> None:
         for received in subscription.take():
@@ -79,7 +83,14 @@ class _Ear:
                 refused = self.buffer.insert(self._decoder.rows(received.data), static=static)
             except ValueError:
                 continue
-            self._too_old = next((child for child, why in refused if why is Refusal.OLD), self._too_old)
+            self._refused = next(iter(refused), self._refused)
+
+    def follow(self, clock_ns: int | None) -> None:
+        """Forget all moving edges when simulated time goes back, as tf2's buffers do in nodes with use_sim_time."""
+        if clock_ns is not None and clock_ns < self._clock_ns:
+            self.buffer.clear()
+            self._refused = None
+        self._clock_ns = clock_ns or self._clock_ns
 
     def pose(self) -> tuple[Pose, int | None]:
         a, b, at_ns = self._asked.a, self._asked.b, self._asked.at_ns
@@ -90,8 +101,11 @@ class _Ear:
 
     def why(self, reason: str) -> str:
         """Return the reason with what explains it."""
-        if self._too_old is None:
+        if self._refused is None:
             return reason
-        return (
-            f"{reason}; what came for {self._too_old} was too old to be taken: did a bag or a simulation start again?"
-        )
+        child, why = self._refused
+        if why is Refusal.OLD:
+            return f"{reason}; what came for {child} was too old to be taken: did a bag or a simulation start again?"
+        if child in self.buffer.frames:  # what came at other times was taken
+            return reason
+        return f"{reason}; what came for {child or 'a frame without name'} was refused: {why.text}"

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 if TYPE_CHECKING:
@@ -18,11 +18,29 @@ STORE = get_typestore(Stores.ROS2_JAZZY)
 START_S = 1_700_000_000
 
 
-def write_bag(folder: Path, sent: Iterable[Sent], *, mcap: bool = True) -> Path:
-    """Write a bag with one message for each transform; times count from START_S."""
+def write_bag(
+    folder: Path,
+    sent: Iterable[Sent],
+    *,
+    mcap: bool = True,
+    compressed: CompressionMode = CompressionMode.NONE,
+    beside: Iterable[tuple[str, float, str, Any]] = (),
+) -> Path:
+    """Write a bag with one message for each transform; times count from START_S.
+
+    ``beside`` are other messages: topic, seconds of the recording, type and message.
+    """
     types = STORE.types
     kind = "tf2_msgs/msg/TFMessage"
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP if mcap else StoragePlugin.SQLITE3) as writer:
+    bag = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP if mcap else StoragePlugin.SQLITE3)
+    if compressed is not CompressionMode.NONE:
+        bag.set_compression(compressed, CompressionFormat.ZSTD)
+    with bag as writer:
+        others = {}
+        for topic, at_s, other, message in beside:
+            if topic not in others:
+                others[topic] = writer.add_connection(topic, other, typestore=STORE)
+            writer.write(others[topic], round((START_S + at_s) * 1e9), STORE.serialize_cdr(message, other))
         connections = {}
         for topic, at_s, parent, child, stamp_s, xyz, quat_xyzw in sent:
             if topic not in connections:

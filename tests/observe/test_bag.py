@@ -8,8 +8,10 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from rosbags.rosbag2 import CompressionMode, StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from tests.observe.bags import START_S, write_bag
+from tests.observe.bags import START_S, STORE, write_bag
 from tfcompose.cli import main
 
 if TYPE_CHECKING:
@@ -69,7 +71,7 @@ def test_a_single_file_and_a_folder_without_metadata_are_read_too(tmp_path: Path
 def test_the_table_has_a_line_for_each_edge(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / "bag", [*FIXED, *drive()])
     lines = tfcompose("monitor", "--bag", str(bag)).stdout.splitlines()
-    assert lines[0] == "2 edges, 201 messages in 4.0 s"
+    assert lines[0] == "2 edges, 201 messages in 4.0 s, delays are from stamp to recording"
     assert lines[1].split() == ["edge", "publisher", "kind", "rate", "jitter", "gap", "age", "delay"]
     assert lines[3].split() == ["base_link", "→", "laser_link", "–", "static"]
     assert lines[2].split()[3:] == ["–", "dynamic", "50.0", "Hz", "0.0", "ms", "20.0", "ms", "4.0", "ms", "4.0", "ms"]
@@ -80,7 +82,7 @@ def test_a_namespace_is_looked_at_alone_and_where_tf_is_instead_is_said(tmp_path
     assert edges(tfcompose("monitor", "--bag", str(bag), "--namespace", "robot1", "--format", "json"))
     errors = tfcompose("monitor", "--bag", str(bag), code=2).stderr
     assert "has neither /tf nor /tf_static" in errors
-    assert "TF is on /robot1/tf: see --namespace" in errors
+    assert "TF is on /robot1/tf: --namespace /robot1" in errors
 
 
 def test_what_is_no_bag_is_said_in_one_sentence(tmp_path: Path) -> None:
@@ -90,6 +92,7 @@ def test_what_is_no_bag_is_said_in_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "old.bag").write_text("#ROSBAG V2.0\n")
     whole = write_bag(tmp_path / "whole", drive())
     [file] = whole.glob("*.mcap")
+    (tmp_path / "whole.zstd").write_bytes(b"")
     (tmp_path / "cut.mcap").write_bytes(file.read_bytes()[:2000])
     for name, why in [
         ("none", "there is no bag"),
@@ -97,7 +100,9 @@ def test_what_is_no_bag_is_said_in_one_sentence(tmp_path: Path) -> None:
         ("text.mcap", "cannot be read as a bag"),
         ("text.db3", "cannot be read as a bag"),
         ("old.bag", "a bag of ROS 1"),
-        ("cut.mcap", "cannot be read as a bag"),
+        ("cut.mcap", "it ends in the middle, as when the recorder was killed"),
+        ("cut.mcap", "help: mcap recover"),
+        ("whole.zstd", "compressed as a whole"),
     ]:
         done = tfcompose("monitor", "--bag", str(tmp_path / name), code=2)
         assert "error[TF907]" in done.stderr
@@ -150,3 +155,106 @@ def test_where_echo_finds_no_pose_in_a_bag_it_says_why(tmp_path: Path) -> None:
         assert "error[TF814]" in errors
         assert why in errors
     assert "there is no bag" in tfcompose("echo", "a", "b", "--bag", "none", code=2).stderr
+
+
+@pytest.mark.parametrize(
+    ("mcap", "compressed"),
+    [
+        (True, CompressionMode.FILE),
+        (True, CompressionMode.MESSAGE),
+        (True, CompressionMode.STORAGE),
+        (False, CompressionMode.FILE),
+        (False, CompressionMode.MESSAGE),
+    ],
+)
+def test_compressed_bags_are_read(tmp_path: Path, compressed: CompressionMode, *, mcap: bool) -> None:
+    bag = write_bag(tmp_path / "bag", [*FIXED, *drive()], mcap=mcap, compressed=compressed)
+    seen = edges(tfcompose("monitor", "--bag", str(bag), "--format", "json"))
+    assert (seen["base_link"]["count"], seen["laser_link"]["count"]) == (200, 1)
+
+
+@pytest.mark.parametrize("mcap", [True, False], ids=["mcap", "sqlite"])
+def test_a_bag_that_was_split_is_read_in_order_without_its_metadata_too(tmp_path: Path, *, mcap: bool) -> None:
+    """The recorder writes metadata.yaml when it ends, and numbers the files: 10 comes after 9."""
+    folder = tmp_path / "split"
+    folder.mkdir()
+    for part in range(11):
+        sent = [one for one in drive(11.0) if part <= one[1] < part + 1]
+        [file] = [f for f in write_bag(tmp_path / f"part_{part}", sent, mcap=mcap).iterdir() if f.suffix != ".yaml"]
+        file.rename(folder / f"run_{part}{file.suffix}")
+    base = edges(tfcompose("monitor", "--bag", str(folder), "--format", "json"))["base_link"]
+    assert (base["count"], base["stamps_back"]) == (550, 0)
+    assert base["longest_gap_s"] == pytest.approx(0.02, abs=1e-5)
+    stamps = [at for _, at in poses("odom", "base_link", "--bag", str(folder))]
+    assert stamps == pytest.approx(list(range(11)), abs=0.03)
+
+
+def test_a_bag_without_messages_and_one_of_another_type_are_told_apart(tmp_path: Path) -> None:
+    text = ("/tf", 0.0, "std_msgs/msg/String", STORE.types["std_msgs/msg/String"]("a"))
+    strange = write_bag(tmp_path / "strange", [], beside=[text])
+    errors = tfcompose("monitor", "--bag", str(strange), code=2).stderr
+    assert f"/tf in {strange} is std_msgs/msg/String, not tf2_msgs/msg/TFMessage" in errors
+    silent = tmp_path / "silent"
+    with Writer(silent, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        writer.add_connection("/tf", "tf2_msgs/msg/TFMessage", typestore=STORE)
+    errors = tfcompose("monitor", "--bag", str(silent), code=1).stderr
+    assert "error[TF811] no message was recorded on /tf and /tf_static" in errors
+
+
+def test_a_bag_with_another_definition_of_the_message_is_not_misread(tmp_path: Path) -> None:
+    """Somebody put a number behind the transforms."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    changed = "geometry_msgs/TransformStamped[] transforms\nint32 number\n"
+    other = get_typestore(Stores.EMPTY)
+    other.register({name: fields for name, fields in store.fielddefs.items() if name != "tf2_msgs/msg/TFMessage"})
+    other.register(get_types_from_msg(changed, "tf2_msgs/msg/TFMessage"))
+    bag = tmp_path / "bag"
+    with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection("/tf", "tf2_msgs/msg/TFMessage", typestore=other)
+        message = other.types["tf2_msgs/msg/TFMessage"]([], 7)
+        writer.write(connection, 1, other.serialize_cdr(message, "tf2_msgs/msg/TFMessage"))
+    errors = tfcompose("monitor", "--bag", str(bag), code=2).stderr
+    assert "error[TF907] /tf was recorded with another definition of tf2_msgs/msg/TFMessage than ROS 2 has" in errors
+
+
+def test_stamps_of_a_simulation_are_compared_with_the_clock_that_was_recorded(tmp_path: Path) -> None:
+    def clock(at_s: float) -> tuple[str, float, str, Any]:
+        seconds, nanoseconds = divmod(round(at_s * 1e9), 10**9)
+        time = STORE.types["builtin_interfaces/msg/Time"](seconds, nanoseconds)
+        return "/clock", at_s, "rosgraph_msgs/msg/Clock", STORE.types["rosgraph_msgs/msg/Clock"](time)
+
+    sent: list[Sent] = [(topic, at, a, b, stamp - START_S, xyz, q) for topic, at, a, b, stamp, xyz, q in drive()]
+    with_clock = write_bag(tmp_path / "sim", sent, beside=[clock(at / 100) for at in range(400)])
+    without = write_bag(tmp_path / "lost", sent)
+    base = edges(tfcompose("monitor", "--bag", str(with_clock), "--format", "json"))["base_link"]
+    assert base["delay_s"] == pytest.approx(0.0, abs=0.011)
+    assert "other clock" in tfcompose("monitor", "--bag", str(without)).stdout
+
+
+def test_what_ended_before_the_recording_did_is_silent(tmp_path: Path) -> None:
+    robot = tmp_path / "rover.yaml"
+    robot.write_text(
+        "{tfcompose: 1, robot: rover, frames: {odom: {}, base_link: {parent: odom, owner: drive, rate: 50 Hz}},"
+        " processes: {drive: {external: true, node: diff_drive}}}"
+    )
+    text = STORE.types["std_msgs/msg/String"]("a")
+    chatter = [("/chatter", float(at), "std_msgs/msg/String", text) for at in range(20)]
+    bag = write_bag(tmp_path / "bag", drive(4.0), beside=chatter)
+    output = tfcompose("verify", str(robot), "--bag", str(bag), code=1).stdout
+    assert "error[TF804] drive (/diff_drive) fell silent: nothing on odom → base_link for 15 s" in output
+
+
+def test_a_large_bag_takes_no_more_memory_than_a_small_one(tmp_path: Path) -> None:
+    """Messages are read one after the other; of MCAP a chunk at a time, and this writer makes one chunk of all."""
+
+    def most_kib(seconds: float) -> int:
+        bag = write_bag(tmp_path / f"bag_{seconds}", drive(seconds, 500.0), mcap=False)
+        program = (
+            "import sys; from tfcompose.cli import main; main(sys.argv[1:]); "
+            "sys.stderr.write(open('/proc/self/status').read().split('VmHWM:')[1].split()[0])"
+        )
+        command = [sys.executable, "-c", program, "monitor", "--bag", str(bag)]
+        return int(subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stderr)
+
+    small, large = most_kib(2.0), most_kib(100.0)
+    assert large < small + 5_000, (small, large)

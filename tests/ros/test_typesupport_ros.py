@@ -6,7 +6,7 @@ import pytest
 
 from tfcompose.ros import rosidl, typesupport
 from tfcompose.ros.environment import RosError
-from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.message import TF_MESSAGE_HASH, Transform, encode
 from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFPublisher
 
@@ -22,8 +22,8 @@ def _address() -> int:
 
 def test_the_hash_is_that_of_the_description() -> None:
     address = _address()
-    assert rosidl.hash_text(address) == typesupport.HASH
-    assert rosidl.type_hash(rosidl.description_json(address)) == typesupport.HASH
+    assert rosidl.hash_text(address) == TF_MESSAGE_HASH
+    assert rosidl.type_hash(rosidl.description_json(address)) == TF_MESSAGE_HASH
 
 
 def test_the_description_is_that_of_tf_message() -> None:
@@ -78,4 +78,4 @@ def test_another_process_sees_the_type_and_its_hash(python: Callable[[str], str]
         publisher.publish(encode([Transform(0, "a", "b", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))]))
         seen = python(SEES)
     assert "['tf2_msgs/msg/TFMessage'] tf2_msgs/msg/TFMessage" in seen
-    assert typesupport.HASH in seen
+    assert TF_MESSAGE_HASH in seen

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.observe.seen import counted
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -41,12 +43,13 @@ def _several(edges: Sequence[EdgeSeen]) -> set[str]:
 def _summary(edges: Sequence[EdgeSeen], census: Census, now_ns: int) -> str:
     seconds = max(0, now_ns - census.begun_ns) / 1e9 if census.begun_ns else 0.0
     names = {(seen.strand.parent, seen.strand.child) for seen in edges}
-    parts = [f"{len(names)} edge{'' if len(names) == 1 else 's'}", f"{census.messages} messages in {seconds:.1f} s"]
+    parts = [counted(len(names), "edge"), f"{counted(census.messages, 'message')} in {seconds:.1f} s"]
     senders = {seen.publisher for seen in edges if seen.publisher}
     if senders:
-        parts.insert(1, f"{len(senders)} publisher{'' if len(senders) == 1 else 's'}")
+        parts.insert(1, counted(len(senders), "publisher"))
     bad = sum(census.malformed.values())
     parts += [f"{bad} not readable"] if bad else []
+    parts += ["delays are from stamp to recording"] if census.end_ns else []
     parts += [f"{census.beyond} transforms of further edges not kept"] if census.beyond else []
     return ", ".join(parts)
 
@@ -100,6 +103,7 @@ def objects_of(edges: Sequence[EdgeSeen], census: Census, now_ns: int) -> str:
     data = {
         "time_ns": now_ns,
         "messages": census.messages,
+        "delay_until": "recording" if census.end_ns else "arrival",
         "malformed": sum(census.malformed.values()),
         "edges": [object_of(seen) for seen in edges],
     }

@@ -47,7 +47,7 @@ def graph_of_censuses(
 
     What the plan expects and nobody publishes is said to be missing.
     """
-    edges = [one for census in censuses for one in census.edges(census.last_ns)]
+    edges = [one for census in censuses for one in census.edges(census.end_ns or census.last_ns)]
     children = {one.strand.child for one in edges}
     missing = [edge for edge in plan.edges if edge.child not in children] if plan else []
     arrows = [_arrow(one, poses=poses) for one in edges]

@@ -41,7 +41,7 @@ def live_tree(arguments: Namespace) -> int:
     if code is not None:
         return code
     for pair, census in censuses.items():
-        now_ns = census.last_ns if arguments.bag else time.time_ns()
+        now_ns = census.end_ns if arguments.bag else time.time_ns()
         planned = {edge.child: edge for edge in parts[pair].edges} if pair in parts else None
         trees = forest(census.edges(now_ns), planned)
         if arguments.format == "json":

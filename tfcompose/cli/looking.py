@@ -56,8 +56,8 @@ def from_bag(path: str, censuses: Mapping[Topics, Census], *, may_be_silent: boo
 
     Return None, or the exit code after saying why not: nothing came is a reason, unless it ``may_be_silent``.
     """
-    code = reading(lambda: import_module("tfcompose.observe.bag").take_bag(path, censuses))
-    if code is None and not may_be_silent and not any(census.messages for census in censuses.values()):
+    code: int | None = reading(lambda: import_module("tfcompose.observe.bag").take_bag(path, censuses))
+    if code is None and not may_be_silent and not any(census.heard for census in censuses.values()):
         message = f"no message was recorded on {names_of(censuses)} in {path}"
         advice = "was the robot running? /tf_static comes once: who records it must ask for durability transient_local"
         print_findings([finding("TF811", message, None, help=advice)], sys.stderr)
@@ -104,7 +104,7 @@ def from_live(  # noqa: PLR0913 (all but two are named)
         except RosError as error:
             print_findings([finding("TF901", str(error), None)], sys.stderr)
             return 1
-        seconds, heard = time.monotonic() - begun, any(census.messages for census in censuses.values())
+        seconds, heard = time.monotonic() - begun, any(census.heard for census in censuses.values())
         code = ended_early(seconds, duration_s, heard=heard) if stop.requested else None
     return code if code or heard or may_be_silent else _nothing_came(list(censuses), seconds, elsewhere)
 

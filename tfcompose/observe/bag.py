@@ -6,9 +6,14 @@ from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from struct import Struct
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.observe.bag_files import BagError, damaged, files_at
+from tfcompose.observe.census import nearer_clock
+from tfcompose.observe.elsewhere import namespace_words
 from tfcompose.ros.decoder import Decoder
+from tfcompose.ros.message import TF_MESSAGE, TF_MESSAGE_HASH
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -16,17 +21,13 @@ if TYPE_CHECKING:
     from tfcompose.observe.census import Census
     from tfcompose.ros.decoder import Row
 
-TF_MESSAGE = "tf2_msgs/msg/TFMessage"
+    Topics = tuple[str, str]
+
+CLOCK = "rosgraph_msgs/msg/Clock"
+#: In CDR: four bytes of header, then seconds and nanoseconds.
+_CLOCK, _CLOCK_BYTES = Struct("<iI"), 12
 #: So many topics are named where those asked for are not there.
 _NAMED_AT_MOST = 12
-
-
-class BagError(Exception):
-    """Raised when a bag cannot be read; the message is one sentence for the user, ``help`` what to do."""
-
-    def __init__(self, message: str, advice: str = "") -> None:
-        super().__init__(message)
-        self.help = advice
 
 
 class NoTopicError(BagError):
@@ -35,11 +36,16 @@ class NoTopicError(BagError):
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """One TFMessage of a bag; ``rows`` is None where it cannot be decoded. ``received_ns`` is when it was recorded."""
+    """One TFMessage of a bag, on one of the ``topics`` (moving, fixed); ``rows`` is None where it cannot be decoded.
 
+    ``received_ns`` is when it was recorded, ``clock_ns`` the newest time on /clock then, None where none was recorded.
+    """
+
+    topics: Topics
     rows: Sequence[Row] | None
     static: bool
     received_ns: int
+    clock_ns: int | None = None
 
 
 def missing_rosbags() -> str | None:
@@ -49,47 +55,80 @@ def missing_rosbags() -> str | None:
     return "bags are read with the package rosbags, which is not there: install it with pip install 'tfcompose[bag]'"
 
 
-def recorded(path: str, topics: tuple[str, str]) -> Iterator[Recorded]:
-    """Yield the messages of the topics (moving, fixed), in the order in which they were recorded.
+class Recording:
+    """A bag: a folder, or a single .mcap or .db3 file; a folder without metadata.yaml is read file by file.
 
-    ``path`` is a bag's folder, or a single .mcap or .db3 file.
-
-    Raises:
-        NoTopicError: if it has neither of the topics.
-        BagError: if it is no bag, or is damaged.
-    """
-    library = import_module("rosbags.rosbag2")
-    bag = _bag_at(Path(path))
-    decoder = Decoder()
-    try:
-        with library.Reader(bag) as reader:
-            for connection, received_ns, data in reader.messages(connections=_of_tf(path, topics, reader.connections)):
-                yield Recorded(_rows(decoder, bytes(data)), connection.topic == topics[1], received_ns)
-    except BagError:
-        raise
-    except Exception as error:  # noqa: BLE001 (a damaged bag makes the library and its databases raise anything)
-        words = " ".join(str(error).split()) or type(error).__name__
-        raise BagError(f"{path} cannot be read as a bag: {words}") from None
-
-
-def take_bag(path: str, censuses: Mapping[tuple[str, str], Census]) -> None:
-    """Put the messages of a bag into the censuses of these topics (moving, fixed).
+    ``end_ns`` is when the last message of any topic was recorded, 0 before it was read.
 
     Raises:
-        BagError: as ``recorded`` does; topics may be missing as long as some are there.
+        BagError: if there is none.
     """
-    missing = None
-    for topics, census in censuses.items():
-        try:
-            for each in recorded(path, topics):
-                if each.rows is None:
-                    census.take_malformed(None)
-                else:
-                    census.take(each.rows, static=each.static, gid=None, received_ns=each.received_ns)
-        except NoTopicError as error:
-            missing = error
-    if missing is not None and not any(census.messages for census in censuses.values()):
-        raise missing
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+        self.end_ns = 0
+        self._files = files_at(Path(path))
+        self._clock_ns: int | None = None
+
+    def messages(self, *pairs: Topics) -> Iterator[Recorded]:
+        """Yield the messages of the pairs of topics (moving, fixed), in the order in which they were recorded.
+
+        Raises:
+            NoTopicError: if it has none of the topics.
+            BagError: if it is no bag, is damaged, or its messages are not TF's.
+        """
+        library = import_module("rosbags.rosbag2")
+        decoder = Decoder()
+        pair_of = {topic: pair for pair in pairs for topic in pair}
+        others: set[tuple[str, str]] = set()
+        found = False
+        for file in self._files:
+            try:
+                with library.Reader(file) as reader:
+                    wanted = [each for each in reader.connections if _is_tf(each, pair_of)]
+                    others |= {(each.topic, each.msgtype) for each in reader.connections}
+                    found = found or bool(wanted)
+                    self.end_ns = max(self.end_ns, reader.end_time) if reader.message_count else self.end_ns
+                    for connection, received_ns, data in self._timed(reader, wanted):
+                        pair = pair_of[connection.topic]
+                        rows = _rows(decoder, bytes(data))
+                        yield Recorded(pair, rows, connection.topic == pair[1], received_ns, self._clock_ns)
+            except BagError:
+                raise
+            except Exception as error:  # noqa: BLE001 (a damaged bag makes the library and its databases raise anything)
+                raise damaged(str(file), error) from None
+        if not found:
+            raise _no_topic(self.path, pairs, others)
+
+    def _timed(self, reader: Any, wanted: list[Any]) -> Iterator[tuple[Any, int, bytes]]:
+        """Yield the messages of these connections, and note what comes on /clock between them."""
+        clocks = [each for each in reader.connections if (each.topic, each.msgtype) == ("/clock", CLOCK)]
+        if not wanted:
+            return
+        for connection, received_ns, data in reader.messages(connections=[*wanted, *clocks]):
+            if connection not in clocks:
+                yield connection, received_ns, data
+            elif len(data) >= _CLOCK_BYTES:
+                seconds, nanoseconds = _CLOCK.unpack_from(data, 4)
+                self._clock_ns = seconds * 1_000_000_000 + nanoseconds
+
+
+def take_bag(path: str, censuses: Mapping[Topics, Census]) -> None:
+    """Put the messages of a bag into the censuses of these topics (moving, fixed), and note when it ends.
+
+    Raises:
+        BagError: as ``Recording`` does; topics may be missing as long as some are there.
+    """
+    recording = Recording(path)
+    for each in recording.messages(*censuses):
+        census = censuses[each.topics]
+        if each.rows is None:
+            census.take_malformed(None)
+        else:
+            clock_ns = nearer_clock(each.rows, each.received_ns, each.clock_ns, static=each.static)
+            census.take(each.rows, static=each.static, gid=None, received_ns=each.received_ns, clock_ns=clock_ns)
+    for census in censuses.values():
+        census.end_ns = recording.end_ns
 
 
 def _rows(decoder: Decoder, data: bytes) -> Sequence[Row] | None:
@@ -99,38 +138,33 @@ def _rows(decoder: Decoder, data: bytes) -> Sequence[Row] | None:
         return None
 
 
-def _bag_at(path: Path) -> Path:
-    """Return what the library opens.
+def _is_tf(connection: Any, wanted: Mapping[str, Topics]) -> bool:
+    """Whether the connection is a wanted topic with TF.
 
     Raises:
-        BagError: if there is nothing there, or nothing that is a bag.
+        BagError: if its messages are named as TF's and hold something else.
     """
-    if not path.exists():
-        raise BagError(f"there is no bag {path}")
-    if path.is_dir() and not (path / "metadata.yaml").exists():
-        files = sorted(file for file in path.iterdir() if file.suffix in {".mcap", ".db3"})
-        if len(files) != 1:
-            found = f"{len(files)} recordings" if files else "no recording"
-            advice = "name one of the files" if files else "ros2 bag record makes a folder with metadata.yaml"
-            raise BagError(f"{path} has no metadata.yaml and holds {found}", advice)
-        return files[0]
-    if path.is_file() and path.suffix == ".bag":
-        raise BagError(f"{path} is a bag of ROS 1", "rosbags-convert makes one of ROS 2 from it")
-    return path
+    if connection.topic not in wanted or connection.msgtype != TF_MESSAGE:
+        return False
+    if connection.digest.startswith("RIHS01_") and connection.digest != TF_MESSAGE_HASH:
+        message = f"{connection.topic} was recorded with another definition of {TF_MESSAGE} than ROS 2 has"
+        raise BagError(message, "was it recorded with a changed tf2_msgs or geometry_msgs? Only the common one is read")
+    return True
 
 
-def _of_tf(path: str, topics: tuple[str, str], connections: Sequence[Any]) -> list[Any]:
-    """Return the connections of the topics.
-
-    Raises:
-        NoTopicError: if there are none; it says which TF topics the bag has instead.
-    """
-    wanted = [each for each in connections if each.topic in topics and each.msgtype == TF_MESSAGE]
-    if wanted:
-        return wanted
-    others = sorted({each.topic for each in connections if each.msgtype == TF_MESSAGE})
+def _no_topic(path: str, pairs: Sequence[Topics], held: set[tuple[str, str]]) -> NoTopicError:
+    """Return what to say where none of the topics is: which TF topics the bag has instead."""
+    asked = [topic for pair in pairs for topic in pair]
+    for topic, type_ in sorted(held):
+        if topic in asked:
+            return NoTopicError(f"{topic} in {path} is {type_}, not {TF_MESSAGE}", _help_of(type_))
+    others = sorted(topic for topic, type_ in held if type_ == TF_MESSAGE)
     if others:
         names = ", ".join(others[:_NAMED_AT_MOST])
-        raise NoTopicError(f"{path} has neither {' nor '.join(topics)}", f"TF is on {names}: see --namespace")
-    held = ", ".join(sorted({each.topic for each in connections})[:_NAMED_AT_MOST])
-    raise NoTopicError(f"{path} holds no TF", f"it holds {held}" if held else "it holds nothing")
+        return NoTopicError(f"{path} has neither {' nor '.join(asked)}", f"TF is on {names}: {namespace_words(others)}")
+    names = ", ".join(sorted({topic for topic, _ in held})[:_NAMED_AT_MOST])
+    return NoTopicError(f"{path} holds no TF", f"it holds {names}" if names else "it holds nothing")
+
+
+def _help_of(type_: str) -> str:
+    return "rosbags-convert makes ROS 2's of ROS 1's" if type_.endswith("/tfMessage") or "/msg/" not in type_ else ""

@@ -32,6 +32,14 @@ def topics_below(namespace: str) -> tuple[str, str]:
     return f"{prefix}/tf", f"{prefix}/tf_static"
 
 
+def nearer_clock(rows: Sequence[Row], received_ns: int, clock_ns: int | None, *, static: bool) -> int | None:
+    """Return the time to compare stamps with: that of /clock where they are nearer to it, else None."""
+    if clock_ns is None or static or not rows:
+        return None
+    stamp_ns = rows[0][2] * _SECOND_NS + rows[0][3]
+    return clock_ns if abs(stamp_ns - clock_ns) < abs(stamp_ns - received_ns) else None
+
+
 @dataclass(frozen=True, slots=True)
 class Publisher:
     """One publisher on a TF topic, as the graph shows it.
@@ -155,7 +163,8 @@ class Census:
     """Everything that was seen of a TF tree.
 
     ``window_s`` is the stretch of time of which rates, jitter, gaps and delays are told (one to two of them); 0: all.
-    Of the first ``settle_s`` of each edge they tell nothing.
+    Of the first ``settle_s`` of each edge they tell nothing. ``end_ns`` is when a recording ended, of any topic; 0 for
+    a running tree.
     """
 
     window_s: float = 0.0
@@ -163,6 +172,7 @@ class Census:
     messages: int = 0
     begun_ns: int = 0
     last_ns: int = 0
+    end_ns: int = 0
     beyond: int = 0
     malformed: dict[bytes | None, int] = field(default_factory=dict)
     publishers: dict[bytes, Publisher] = field(default_factory=dict)
@@ -205,6 +215,11 @@ class Census:
                 self.publishers = {gid: one for gid, one in self.publishers.items() if gid in self.present}
             if known is None or each.node is not None:
                 self.publishers[each.gid] = each
+
+    @property
+    def heard(self) -> bool:
+        """Whether anything came, be it readable or not."""
+        return bool(self.messages or self.malformed)
 
     def is_known(self, gid: bytes | None) -> bool:
         """Whether the publisher's node has a name."""

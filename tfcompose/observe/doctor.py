@@ -124,6 +124,7 @@ class _Ear:
             topics=self.topics,
             edges=tuple(self.census.edges(wall_ns())),
             publishers=tuple(self.live.publishers()),
+            malformed=dict(self.census.malformed),
             clock_ns=self.live.clock_ns,
             clock_moves=len(self.clocks) > 1,
             skews_s=self.skews_s,

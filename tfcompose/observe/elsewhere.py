@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.observe.seen import listed
+from tfcompose.ros.message import TF_MESSAGE
 from tfcompose.ros.settings import DOMAIN, RANGE, RMW
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-TF_TYPE = "tf2_msgs/msg/TFMessage"
 #: The variables that decide who hears whom.
 VARIABLES = (DOMAIN, RANGE, "ROS_LOCALHOST_ONLY", RMW, "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER")
 
@@ -25,7 +25,7 @@ def said(settings: Mapping[str, str]) -> str:
 
 def tf_elsewhere(topics: Iterable[tuple[str, Sequence[str]]], own: Iterable[str]) -> tuple[str, ...]:
     """Return the names of topics with TF, of (name, types), that are none of our own."""
-    return tuple(name for name, types in topics if TF_TYPE in types and name not in set(own))
+    return tuple(name for name, types in topics if TF_MESSAGE in types and name not in set(own))
 
 
 def namespace_words(names: Iterable[str]) -> str:

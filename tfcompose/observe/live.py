@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.observe.census import Census, Publisher, topics_below
+from tfcompose.observe.census import Census, Publisher, nearer_clock, topics_below
 from tfcompose.ros.clock import SimClock, wall_ns
 from tfcompose.ros.decoder import Decoder
 from tfcompose.ros.graph import UNKNOWN_NODE, nodes, own_gid, writers
@@ -83,7 +83,7 @@ class Live:
                 came_ns = received.received_ns or now_ns
                 heard.append(Heard(rows, static, received.gid, came_ns, received.source_ns))
         for each in heard:
-            clock_ns = _clock_of(each, sim_ns)
+            clock_ns = nearer_clock(each.rows, each.received_ns, sim_ns, static=each.static)
             self.census.take(
                 each.rows, static=each.static, gid=each.gid, received_ns=each.received_ns, clock_ns=clock_ns
             )
@@ -120,11 +120,3 @@ class Live:
             self._own = self._own or own_gid(self.node, self.topics[0])
             self._where[gid] = origin(gid, self._own)
         return self._where[gid]
-
-
-def _clock_of(heard: Heard, sim_ns: int | None) -> int | None:
-    """Return the time to compare stamps with: that of /clock where they are nearer to it, else None."""
-    if sim_ns is None or heard.static or not heard.rows:
-        return None
-    stamp_ns = heard.rows[0][2] * 1_000_000_000 + heard.rows[0][3]
-    return sim_ns if abs(stamp_ns - sim_ns) < abs(stamp_ns - heard.received_ns) else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.observe.asked import Asked, Missed
-from tfcompose.observe.bag import recorded
+from tfcompose.observe.bag import Recording
 from tfcompose.observe.buffer import CACHE_NS, Buffer, TransformException
 from tfcompose.observe.census import topics_below
 
@@ -27,7 +27,7 @@ def echo_bag(asked: Asked, path: str, say: Callable[[Pose, int | None], None]) -
         BagError: if the bag cannot be read.
     """
     replay = _Replay(asked, say)
-    for each in recorded(path, topics_below(asked.namespace)):
+    for each in Recording(path).messages(topics_below(asked.namespace)):
         if each.rows is None:
             continue
         replay.buffer.insert(each.rows, static=each.static)

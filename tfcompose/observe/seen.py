@@ -79,6 +79,7 @@ class Seen:
         processes: other processes of this machine with ROS, as far as they can be looked at.
         skews_s: how far the clock of a publisher's machine is ahead of this one's, at least (negative: or its
             messages are that long under way), by id.
+        malformed: how many messages came that are no TFMessage, by their publisher's id.
         recorded: whether it is from a recording, which does not say who published.
     """
 
@@ -97,6 +98,7 @@ class Seen:
     settings: Mapping[str, str] = field(default_factory=dict)
     processes: tuple[RosProcess, ...] = ()
     skews_s: Mapping[bytes, float] = field(default_factory=dict)
+    malformed: Mapping[bytes | None, int] = field(default_factory=dict)
     plan: Plan | None = None
     recorded: bool = False
 

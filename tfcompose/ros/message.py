@@ -16,6 +16,10 @@ from tfcompose.pose import Pose, Quaternion, Vector
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+TF_MESSAGE = "tf2_msgs/msg/TFMessage"
+#: REP 2011's hash of its definition, and of what it is made of.
+TF_MESSAGE_HASH = "RIHS01_e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087"
+
 LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 BIG_ENDIAN = b"\x00\x00\x00\x00"
 

@@ -27,9 +27,7 @@ from rclpy.utilities import get_rmw_implementation_identifier
 
 from tfcompose.ros import rosidl
 from tfcompose.ros.environment import RosError
-
-NAME = "tf2_msgs/msg/TFMessage"
-HASH = "RIHS01_e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087"
+from tfcompose.ros.message import TF_MESSAGE, TF_MESSAGE_HASH
 
 _RMW = "rmw_fastrtps_cpp"
 _FASTRTPS = b"rosidl_typesupport_fastrtps_c"
@@ -78,7 +76,7 @@ def _build() -> tuple[rosidl.TypeSupport, list[Any]]:
     fast, introspection = _other(stamped, _FASTRTPS), _other(stamped, _INTROSPECTION)
     callbacks, members = _callbacks(fast), _members(introspection)
     description, described = _description(rosidl.described(fast, ctypes.addressof(fast)))
-    value = (ctypes.c_uint8 * 32).from_buffer_copy(bytes.fromhex(HASH.removeprefix("RIHS01_")))
+    value = (ctypes.c_uint8 * 32).from_buffer_copy(bytes.fromhex(TF_MESSAGE_HASH.removeprefix("RIHS01_")))
     hashed = rosidl.Hash(1, value)
     getters = [_getter(hashed), _getter(description)]
 
@@ -92,7 +90,7 @@ def _build() -> tuple[rosidl.TypeSupport, list[Any]]:
         made.get_hash, made.get_description = (ctypes.cast(getter, rosidl.Pointer) for getter in getters)
         answers[made.identifier] = ctypes.addressof(made)
         alive.append(made)
-    if rosidl.type_hash(rosidl.description_json(ctypes.addressof(made))) != HASH:
+    if rosidl.type_hash(rosidl.description_json(ctypes.addressof(made))) != TF_MESSAGE_HASH:
         raise ValueError("the description made for TFMessage is not TFMessage's")
     return made, alive
 
@@ -154,7 +152,9 @@ def _description(stamped: rosidl.Description) -> tuple[rosidl.Description, list[
     known.sort(key=lambda each: each.type_name.text)
     types = (rosidl.Type * len(known))(*known)
     fields = rosidl.Fields(ctypes.pointer(field), 1, 1)
-    made = rosidl.Description(rosidl.Type(rosidl.String.of(NAME), fields), rosidl.Types(types, len(known), len(known)))
+    made = rosidl.Description(
+        rosidl.Type(rosidl.String.of(TF_MESSAGE), fields), rosidl.Types(types, len(known), len(known))
+    )
     return made, [field, types]
 
 

@@ -45,7 +45,7 @@ def run(arguments: Namespace) -> int:
     if arguments.bag:
         code = from_bag(arguments.bag, {topics: census})
         if code is None:
-            _show(arguments, census, None, census.last_ns)
+            _show(arguments, census, None, census.end_ns)
         return code or 0
     redrawn = Redrawn(sys.stdout) if arguments.format == "text" and can_redraw(sys.stdout) else None
     show = None if arguments.duration and not redrawn else partial(_show, arguments, census, redrawn)
@@ -67,7 +67,7 @@ def _show(arguments: Namespace, census: Census, redrawn: Redrawn | None, now_ns:
         return
     width = redrawn.width if redrawn else None
     lines = lines_of(edges, census, now_ns, width=width)
-    if not census.messages:
+    if not census.heard:
         lines = [f"no TF yet on {names_of([topics_below(arguments.namespace)])}"]
     if redrawn is not None:
         redrawn.draw(lines)

@@ -74,7 +74,7 @@ def run(arguments: Namespace) -> int:
     if code is not None:
         return code
     seconds = time.monotonic() - begun
-    now_ns = max(census.last_ns for census in censuses.values()) if arguments.bag else time.time_ns()
+    now_ns = max(census.end_ns for census in censuses.values()) if arguments.bag else time.time_ns()
     return _told(arguments, plan, verify(plan, censuses, now_ns, arguments.tolerance, places), seconds)
 
 

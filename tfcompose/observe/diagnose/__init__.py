@@ -20,6 +20,7 @@ DIAGNOSES: tuple[Callable[[Seen], Iterator[Diagnostic]], ...] = (
     senders.volatile_static,
     senders.best_effort,
     senders.other_type,
+    senders.unreadable,
     senders.isolation_leak,
     senders.many_static,
     tree.self_transform,

@@ -7,7 +7,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, finding
-from tfcompose.observe.seen import GLOBAL, counted, listed, who
+from tfcompose.observe.seen import GLOBAL, NAMELESS, counted, listed, who
+from tfcompose.ros.message import TF_MESSAGE
 from tfcompose.ros.misfits import best_effort_writer, leak, volatile_writer
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from tfcompose.observe.census import EdgeSeen
     from tfcompose.observe.seen import Seen
 
-TF_TYPE = "tf2_msgs/msg/TFMessage"
 #: A listener keeps the last 100 messages on /tf_static, one of each publisher.
 MOST_STATIC = 100
 #: One that sends so long after the other began has not only replaced it.
@@ -63,7 +63,7 @@ def both_topics(seen: Seen) -> Iterator[Diagnostic]:
 def volatile_static(seen: Seen) -> Iterator[Diagnostic]:
     """Fixed frames are sent so that no listener can receive them."""
     for one in seen.publishers:
-        if one.static and not one.latched and one.node and one.type in {"", TF_TYPE}:
+        if one.static and not one.latched and one.node and one.type in {"", TF_MESSAGE}:
             owned = [edge.name for edge in seen.plan.edges if edge.node == one.node] if seen.plan else []
             yield volatile_writer(one.node, one.topic or seen.topics[1], owned)
 
@@ -71,18 +71,27 @@ def volatile_static(seen: Seen) -> Iterator[Diagnostic]:
 def best_effort(seen: Seen) -> Iterator[Diagnostic]:
     """Frames are sent best effort, and listeners ask for reliable."""
     for one in seen.publishers:
-        if not one.reliable and one.node and one.type in {"", TF_TYPE}:
+        if not one.reliable and one.node and one.type in {"", TF_MESSAGE}:
             yield best_effort_writer(one.node, one.topic or seen.topics[one.static])
 
 
 def other_type(seen: Seen) -> Iterator[Diagnostic]:
     """Something else than transforms is published on a topic of TF."""
     for topic in seen.graph:
-        if topic.name in seen.topics and topic.type != TF_TYPE and topic.publishers:
-            message = (
-                f"{listed(topic.publishers)} publishes {topic.type} on {topic.name}, where listeners ask for {TF_TYPE}"
-            )
-            yield finding("TF832", message, None, help=f"publish {TF_TYPE}, or give the topic another name")
+        if topic.name in seen.topics and topic.type != TF_MESSAGE and topic.publishers:
+            message = f"{listed(topic.publishers)} publishes {topic.type} on {topic.name}, and listeners ask for "
+            message += TF_MESSAGE
+            yield finding("TF832", message, None, help=f"publish {TF_MESSAGE}, or give the topic another name")
+
+
+def unreadable(seen: Seen) -> Iterator[Diagnostic]:
+    """Bytes come that are no TFMessage."""
+    named = {one.gid: one for one in seen.publishers}
+    for gid, number in seen.malformed.items():
+        one = named.get(gid) if gid is not None else None
+        node, topic = (one.node or NAMELESS, one.topic) if one else (NAMELESS, listed(seen.topics))
+        message = f"{counted(number, 'message')} on {topic} from {node} cannot be read as {TF_MESSAGE}"
+        yield finding("TF832", message, None, help="does it send bytes of its own making, or with another definition?")
 
 
 def many_static(seen: Seen) -> Iterator[Diagnostic]:
@@ -97,7 +106,7 @@ def many_static(seen: Seen) -> Iterator[Diagnostic]:
 
 def isolation_leak(seen: Seen) -> Iterator[Diagnostic]:
     """A node of a robot with TF topics of its own writes the global ones."""
-    topics = {topic.name: topic for topic in seen.typed(TF_TYPE)}
+    topics = {topic.name: topic for topic in seen.typed(TF_MESSAGE)}
     own = {node for process in seen.plan.processes for node in process.nodes} if seen.plan else set()
     for name in [name for name in topics if name not in GLOBAL and name.endswith(GLOBAL)]:
         word = "/tf_static" if name.endswith("/tf_static") else "/tf"

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, finding
-from tfcompose.observe.diagnose.senders import TF_TYPE
 from tfcompose.observe.elsewhere import namespace_words, said
 from tfcompose.observe.seen import counted, listed
+from tfcompose.ros.message import TF_MESSAGE
 from tfcompose.ros.settings import DOMAIN, RANGE, RMW
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ MOST_SETTINGS = 3
 
 def no_tf(seen: Seen) -> Iterator[Diagnostic]:
     """Nobody publishes TF here."""
-    if seen.publishers or seen.edges:
+    if seen.publishers or seen.edges or seen.malformed:
         return
     moving, fixed = seen.topics
     others = counted(len(seen.nodes), "other node") if seen.nodes else "no other node"
@@ -74,7 +74,7 @@ def other_settings(seen: Seen) -> Iterator[Diagnostic]:
 
 def _elsewhere(seen: Seen) -> list[str]:
     """Return the topics with TF that are not looked at."""
-    return [topic.name for topic in seen.typed(TF_TYPE) if topic.publishers and topic.name not in seen.topics]
+    return [topic.name for topic in seen.typed(TF_MESSAGE) if topic.publishers and topic.name not in seen.topics]
 
 
 def settings_contradict(seen: Seen) -> Iterator[Diagnostic]:

@@ -54,15 +54,31 @@ def test_units_name_where_things_are_on_the_robot(robot: Path) -> None:
     unit = (robot / "build" / "rover" / "systemd" / "rover-static.service").read_text("utf-8")
     assert "/opt/ros/jazzy/setup.bash /usr/bin/python3 -m tfcompose.run.process /opt/rover/plan.json static\n" in unit
     assert str(robot) not in unit
-    assert "Environment=" not in unit
+    assert "PATH" not in unit, "the setup file says it"
 
 
-def test_a_strict_plan_is_refused_because_nobody_would_fence_its_processes_off(
+STRICT = ["--set", "guard.mode=strict"]
+
+
+def test_a_strict_plan_has_no_launch_file_because_there_is_no_guard_in_it(
     robot: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["export", "compose", "--set", "guard.mode=strict"]) == 1
+    assert main(["export", "launch", *STRICT]) == 1
     assert "--set guard.mode=watch" in capsys.readouterr().err
-    assert not (robot / "build" / "rover" / "compose").exists()
+    assert not (robot / "build" / "rover" / "launch").exists()
+
+
+def test_a_strict_plan_is_exported_where_a_guard_runs_and_every_owner_can_be_fenced_off(
+    robot: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["export", "compose", *STRICT]) == 0
+    assert "not as tfcompose up: the fence is one of remappings" in capsys.readouterr().out
+    file = robot / "robot.yaml"
+    text = file.read_text("utf-8").replace("run: [slam, --now]", "run: slam | tee log, shell: true")
+    file.write_text(text, "utf-8")
+    assert main(["export", "systemd", *STRICT]) == 1
+    assert "slam takes no ROS arguments" in capsys.readouterr().err
+    assert not (robot / "build" / "rover" / "systemd").exists()
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+from dataclasses import replace
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
@@ -96,7 +97,9 @@ def test_a_users_own_profiles_stay_behind_the_fence(tmp_path: Path) -> None:
 
 
 def test_a_process_that_sends_on_topics_that_nobody_judges_is_left_alone(tmp_path: Path) -> None:
-    debug = PlanProcess("debug", "run", argv=("true",), nodes=("/debug",), remap={"/tf": "/x/tf", "/tf_static": "/x/s"})
+    debug = PlanProcess(
+        "debug", "run", argv=("true",), nodes=("/debug",), owns=(), remap={"/tf": "/x/tf", "/tf_static": "/x/s"}
+    )
     for fence in ("partition", "remap"):
         commands, found = look(tmp_path, SLAM, debug, GUARD, fence=fence)
         assert found == []
@@ -188,17 +191,25 @@ def test_a_launch_file_is_remapped_as_a_whole(tmp_path: Path) -> None:
 
 def test_owners_that_no_remapping_reaches_are_one_finding(tmp_path: Path) -> None:
     shell = PlanProcess("shell", "run", argv=("/bin/sh", "-c", "drive | tee log"), nodes=("/a",), owns=(("a", "b"),))
-    bare = PlanProcess("bare", "run", argv=("true",), owns=(("b", "c"),))
-    web = PlanProcess("web", "run", argv=("true",))
-    _, (found,) = look(tmp_path, shell, bare, web, SLAM, GUARD, fence="remap")
+    more = replace(shell, name="more", nodes=("/b",), owns=(("b", "c"),))
+    _, (found,) = look(tmp_path, shell, more, SLAM, GUARD, fence="remap")
     assert found.code == "TF902"
-    assert "shell, bare takes no ROS arguments" in found.message
-    assert "node: NAME" in found.help
+    assert "shell, more takes no ROS arguments" in found.message
+    assert "not in a shell" in found.help
+
+
+def test_a_command_that_may_be_no_node_gets_no_ros_arguments(tmp_path: Path) -> None:
+    web = PlanProcess("web", "run", argv=("true", "--port", "80"), nodes=("/web",))
+    play = PlanProcess("play", "run", argv=("true", "--ros-args", "-p", "a:=1"), nodes=("/play",))
+    commands, found = look(tmp_path, web, play, SLAM, GUARD, fence="remap")
+    assert found == []
+    assert commands["web"].argv[1:] == ("--port", "80")
+    assert moved(commands["play"])
 
 
 @given(st.lists(st.from_regex(r"[A-Za-z][A-Za-z0-9_]{0,6}(/[A-Za-z][A-Za-z0-9_]{0,6})?", fullmatch=True), unique=True))
 def test_every_process_has_topics_of_its_own_with_names_that_ros_takes(names: list[str]) -> None:
-    processes = (PlanProcess(name, "run", argv=("true",), nodes=(f"/{name}",)) for name in names)
+    processes = (PlanProcess(name, "run", argv=("true",), owns=(("map", name),)) for name in names)
     topics = private_topics(plan_of(*processes, GUARD)).values()
     each: list[Any] = list(chain(*topics))
     assert len(set(each)) == 2 * len(names)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.emit.emit import File
 from tfcompose.emit.params import mapping
-from tfcompose.emit.supervised import MAX_RESTARTS, STOP_S, command_of, plain_name, restart_of, started, unkept
+from tfcompose.emit.supervised import MAX_RESTARTS, STOP_S, after, command_of, plain_name, restart_of, started, unkept
 
 if TYPE_CHECKING:
     from tfcompose.emit.supervised import Machine
@@ -37,7 +37,7 @@ def compose(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
 
 def _service(plan: Plan, process: PlanProcess, machine: Machine) -> dict[str, Any]:
     edges = plan.edges_of(process.name)
-    after = {name: what for name, what in process.after.items() if plan.process(name).kind != "external"}
+    waits = after(plan, process)
     stop_s = STOP_S if process.stop.timeout_s is None else process.stop.timeout_s
     domain = "${ROS_DOMAIN_ID:-0}" if plan.ros.domain_id is None else str(plan.ros.domain_id)
     service: dict[str, Any] = {
@@ -53,13 +53,14 @@ def _service(plan: Plan, process: PlanProcess, machine: Machine) -> dict[str, An
         "stop_signal": process.stop.signal,
         "stop_grace_period": f"{round(stop_s * 1000)}ms",
     }
-    if after:
+    if waits:
         service["depends_on"] = {
             plain_name(name): {"condition": _MET[what if what != "ready" or plan.edges_of(name) else "started"]}
-            for name, what in after.items()
+            for name, what in waits.items()
         }
     if edges:
         words = ["python3", "-m", "tfcompose", "echo", edges[0].parent, edges[0].child, "--once", "--timeout", "5"]
+        words += _namespace(process)
         test = ["CMD", *(_kept(word) for word in words)]
         service["healthcheck"] = {"test": test, "interval": "10s", "timeout": "8s", "start_period": "30s", "retries": 3}
     return service
@@ -68,6 +69,12 @@ def _service(plan: Plan, process: PlanProcess, machine: Machine) -> dict[str, An
 def _discovery(plan: Plan) -> dict[str, str]:
     """Return what the health check needs; the process itself is told by the plan."""
     return {"ROS_AUTOMATIC_DISCOVERY_RANGE": plan.ros.discovery.upper()} if plan.ros.discovery else {}
+
+
+def _namespace(process: PlanProcess) -> list[str]:
+    """Return what tells the health check where a robot's own topics are."""
+    namespace = process.topics[0].removesuffix("/tf")
+    return ["--namespace", namespace] if namespace else []
 
 
 def _restart(process: PlanProcess) -> str:

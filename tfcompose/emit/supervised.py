@@ -51,15 +51,23 @@ def restart_of(process: PlanProcess) -> str:
     return process.restart if process.kind == "run" else "on-failure"
 
 
+def after(plan: Plan, process: PlanProcess) -> dict[str, str]:
+    """Return which processes come first here, and what of them is waited for; a strict guard is among them."""
+    waits = {name: what for name, what in process.after.items() if plan.process(name).kind != "external"}
+    guards = [one.name for one in started(plan) if one.kind == "guard" and plan.guard.mode == "strict"]
+    return dict.fromkeys(() if process.kind == "guard" else guards, "started") | waits
+
+
 def unkept(plan: Plan) -> list[str]:
     """Return what a supervisor without eyes on ROS does not do of the plan, one sentence each."""
     said = []
+    if plan.guard.on_violation != "report":
+        said.append(f"the guard reports: nobody here follows on_violation: {plan.guard.on_violation}")
+    if plan.guard.mode == "strict":
+        said.append("the fence is one of remappings; what a sender latched before its last message ends with the guard")
     for process in plan.processes:
         if process.kind == "external":
             said.append(f"{process.name} is expected, not started: somebody else does")
-        elif process.lifecycle:
-            states = ", ".join(f"{node} → {state}" for node, state in process.lifecycle.items())
-            said.append(f"{process.name}: nobody drives its lifecycle ({states}); ros2 lifecycle set, or tfcompose up")
         if process.required:
             said.append(f"{process.name} is required: its end does not end the others here")
     return said

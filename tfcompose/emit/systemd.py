@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.emit.emit import File
-from tfcompose.emit.supervised import MAX_RESTARTS, STOP_S, command_of, plain_name, restart_of, started, unkept
+from tfcompose.emit.supervised import MAX_RESTARTS, STOP_S, after, command_of, plain_name, restart_of, started, unkept
 
 if TYPE_CHECKING:
     from tfcompose.emit.supervised import Machine
@@ -50,7 +50,7 @@ def _target(plan: Plan, units: list[str]) -> str:
 
 
 def _service(plan: Plan, process: PlanProcess, machine: Machine, target: str, *, done: bool) -> str:
-    before = [_unit(plan, name) for name in process.after if plan.process(name).kind != "external"]
+    before = [_unit(plan, name) for name in after(plan, process)]
     most = MAX_RESTARTS if process.max_restarts is None else process.max_restarts
     kind = "oneshot" if done else "exec" if process.kind == "run" else "notify"
     restart = restart_of(process)
@@ -64,6 +64,7 @@ def _service(plan: Plan, process: PlanProcess, machine: Machine, target: str, *,
         f"Type={kind}",
         *(["NotifyAccess=all", "TimeoutStartSec=60"] if kind == "notify" else []),
         *(f"Environment={_quoted(f'{name}={value}')}" for name, value in sorted(machine.env.items())),
+        *_logs(plan, machine),
         f"WorkingDirectory={_plain(machine.folder)}",
         f"ExecStart={_exec(process, machine)}",
         f"Restart={'on-failure' if done and restart == 'always' else restart}",
@@ -75,6 +76,14 @@ def _service(plan: Plan, process: PlanProcess, machine: Machine, target: str, *,
     ]
     parts = (("Unit", unit), ("Service", service), ("Install", [f"WantedBy={target}"]))
     return "\n".join("\n".join([f"[{name}]", *lines, ""]) for name, lines in parts)
+
+
+def _logs(plan: Plan, machine: Machine) -> list[str]:
+    """Return where ROS logs to, unless that is said: no node starts without, and a system's service has no home."""
+    if {"ROS_LOG_DIR", "ROS_HOME"} & machine.env.keys():
+        return []
+    folder = f"tfcompose/{plain_name(plan.robot)}"
+    return [f"LogsDirectory={folder}", f"Environment=ROS_LOG_DIR=%L/{folder}"]
 
 
 def _exec(process: PlanProcess, machine: Machine) -> str:

@@ -24,8 +24,8 @@ def said(settings: Mapping[str, str]) -> str:
 
 
 def tf_elsewhere(topics: Iterable[tuple[str, Sequence[str]]], own: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of topics with TF, of (name, types), that are none of our own."""
-    return tuple(name for name, types in topics if TF_MESSAGE in types and name not in set(own))
+    """Return the names of topics with TF, of (name, types), that are none of our own, and not hidden (``/_…``)."""
+    return tuple(name for name, types in topics if TF_MESSAGE in types and name not in set(own) and "/_" not in name)
 
 
 def namespace_words(names: Iterable[str]) -> str:

@@ -36,7 +36,7 @@ class Lifecycle:
         self._node = node
         self._name = name
         self._wanted = state
-        self._drive = drive
+        self._drive = self._is_fresh = drive
         self._get: Any = node.create_client(GetState, f"{name}/get_state")
         self._change: Any = node.create_client(ChangeState, f"{name}/change_state")
         self._pending: tuple[Any, int, str] | None = None
@@ -49,6 +49,15 @@ class Lifecycle:
         """Take the clients away."""
         self._node.destroy_client(self._get)
         self._node.destroy_client(self._change)
+
+    @property
+    def answers(self) -> bool:
+        """Whether the node's state is known."""
+        return bool(self._state)
+
+    def ask_again(self) -> None:
+        """Ask for the state anew. A node that has begun anew is driven again, one that was deactivated is not."""
+        self._state, self._is_fresh = "", False
 
     def look(self, now: float) -> tuple[bool, str]:
         """Take what was answered, ask on, and return whether the node is in its state, and what is seen."""
@@ -63,7 +72,7 @@ class Lifecycle:
         return f"{self._name} is {self._state}{self._fault}"
 
     def _ask(self, now: float) -> None:
-        step = _NEXT.get((self._state, self._wanted)) if self._drive else None
+        step = self._step()
         client, request, what = self._get, GetState.Request(), "state"
         if step:
             client, request, what = self._change, ChangeState.Request(), step[1]
@@ -73,6 +82,11 @@ class Lifecycle:
         with client.handle:
             sequence = client.handle.send_request(request)
         self._pending, self._asked = (client, sequence, what), now
+
+    def _step(self) -> tuple[int, str] | None:
+        """Return the transition that is due: its number and name."""
+        self._is_fresh |= self._drive and self._state == "unconfigured"
+        return _NEXT.get((self._state, self._wanted)) if self._is_fresh else None
 
     def _take(self, now: float) -> None:
         if self._pending is None:
@@ -89,7 +103,7 @@ class Lifecycle:
         self._pending = None
         if what == "state":
             self._state = _NAMES.get(response.current_state.id, response.current_state.label)
-            self._not_before = now + ASK_EVERY_S if (self._state, self._wanted) not in _NEXT or not self._drive else now
+            self._not_before = now if self._step() else now + ASK_EVERY_S
         else:
             self._fault = "" if response.success else f", and does not {what}"
             self._state = "" if response.success else self._state

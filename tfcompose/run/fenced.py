@@ -47,17 +47,16 @@ def private_topics(plan: Plan) -> dict[str, Topics]:
 
 
 def takes_remappings(process: PlanProcess) -> bool:
-    """Return whether it is started by us, may send TF, and takes ROS arguments as far as anybody knows."""
+    """Return whether it is started by us, may send TF, and takes ROS arguments as far as anybody knows.
+
+    What is started by a plain command may be no ROS node at all, unless it owns an edge or is given ROS arguments. What
+    follows a text that a shell reads does not reach the program.
+    """
     if process.kind != "run":
         return process.kind in ("static", "joints", "simulate")
-    if not process.argv:
+    if not process.argv or process.argv[:2] == ("/bin/sh", "-c"):
         return False
-    return process.argv[0].startswith("${") or (bool(process.nodes) and not _is_shell(process))
-
-
-def _is_shell(process: PlanProcess) -> bool:
-    """Whether the command is a text that a shell reads: what follows it does not reach the program."""
-    return process.argv[:2] == ("/bin/sh", "-c")
+    return process.argv[0].startswith("${") or bool(process.owns) or "--ros-args" in process.argv
 
 
 def _plain(name: str) -> str:

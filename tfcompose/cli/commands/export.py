@@ -21,6 +21,7 @@ from tfcompose.diagnostic import RejectedError
 from tfcompose.emit.supervised import Machine, started
 from tfcompose.plan import Plan
 from tfcompose.run.hosts import share_of
+from tfcompose.run.launcher.fencing import not_remapped
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -78,8 +79,11 @@ def run(arguments: Namespace) -> int:
             print_findings([share], sys.stderr)
             return 1
         plan = share
-    if isinstance(plan, Plan) and plan.guard.mode == "strict":
-        complain("guard: strict needs tfcompose up, which fences its processes off: export with --set guard.mode=watch")
+    if isinstance(plan, Plan) and plan.guard.mode == "strict" and arguments.kind == "launch":
+        complain("guard: strict needs a guard, and a launch file has none: export with --set guard.mode=watch")
+        return 1
+    if isinstance(plan, Plan) and plan.guard.mode == "strict" and (missed := not_remapped(plan)):
+        print_findings(missed, sys.stderr)
         return 1
     return plan if isinstance(plan, int) else _export(plan, file, arguments)
 

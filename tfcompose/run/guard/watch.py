@@ -20,9 +20,10 @@ from tfcompose.run.guard.judge import Judge
 from tfcompose.run.guard.memory import Memory, SwitchMemory, recalled
 from tfcompose.run.guard.switches import Switches
 from tfcompose.run.guard.topics import plans_by_topics, together
+from tfcompose.run.guard.unattended import Unattended
 from tfcompose.run.guard.voice import Voice
 from tfcompose.run.notify import ready
-from tfcompose.run.orders import JOINS
+from tfcompose.run.orders import JOINS, ORDERS_FD
 from tfcompose.run.own import say
 
 if TYPE_CHECKING:
@@ -69,6 +70,7 @@ def guard(own: Own, stop: Stop) -> None:
         looks += [memory.look for memory in memories]
         looks += [voice.flush, lambda: bulletin.look(judged, held_back(watches))]
         looks += [switches.look] if switches else []
+        looks += [] if ORDERS_FD in os.environ else [Unattended(node, own.plan).look]
         looks += [ClockWatch(own, node).look, *(watch.report for watch in watches)]
         subscriptions = [each for watch in watches for each in watch.ear.subscriptions]
         while not stop.requested:

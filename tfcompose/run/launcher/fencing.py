@@ -3,7 +3,7 @@
 Where their rmw is Fast DDS, a profile file moves their writers into a DDS partition (``ros.fence``). Elsewhere, or
 where the plan says so, their TF topics are remapped to topics of their own: then their listeners are moved too, and
 the guard feeds the rest of the tree back to them. A remapping reaches every process that takes ROS arguments: one of a
-package, of a launch file, of tfcompose's own, and a command that names its node.
+package, of a launch file, of tfcompose's own, and a command that owns an edge.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def not_remapped(plan: Plan) -> list[Diagnostic]:
     if not missed:
         return []
     message = f"guard: strict fences off by remapping, and the command of {_all(missed)} takes no ROS arguments"
-    advice = "start it as {package, executable}, or as a list of words with node: NAME, and not in a shell"
+    advice = "start it as {package, executable}, or as a list of words, and not in a shell; or let the guard watch"
     return [finding("TF902", message, None, help=advice)]
 
 

@@ -1,0 +1,238 @@
+"""Exports on the real thing: what their files say is started, and the live tree compared with the plan.
+
+A stand-in does what systemd does with a unit, or docker compose with a service: order, environment, notification,
+health checks. The processes are real.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+import yaml
+
+from tests.waiting import until
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+pytestmark = pytest.mark.ros
+
+#: A lifecycle node that latches its edge when it is activated.
+ARM = """
+import sys
+import rclpy
+from rclpy.lifecycle import LifecycleNode
+from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.tf import TFPublisher
+
+class Arm(LifecycleNode):
+    def on_activate(self, state):
+        self.sent = TFPublisher(self, static=True)
+        self.sent.publish(encode([Transform(0, "base_link", "arm", (0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0))]))
+        return super().on_activate(state)
+
+rclpy.init(args=sys.argv)
+try:
+    rclpy.spin(Arm("arm"))
+except BaseException:
+    pass
+"""
+ROBOT = """
+tfcompose: 1
+robot: rover
+ros: {{discovery: localhost, domain_id: {domain}}}
+frames:
+  odom: {{}}
+  base_link: {{parent: odom, owner: drive, rate: 20 Hz}}
+  arm: {{parent: base_link, xyz: [0, 0, 1], owner: arm, static: true}}
+  lidar: {{parent: base_link, xyz: [0, 0, 0.3]}}
+processes:
+  drive: {{simulate: {{fixed: {{xyz: [0, 0, 0]}}, rate: 20 Hz}}, after: {{static: ready}}}}
+  arm: {{run: [{python}, {file}{words}], node: /arm, lifecycle: active, restart: on-failure}}
+guard: {{mode: {mode}}}
+"""
+REMAPS = ", --ros-args, -r, '/tf_static:=/robot1/tf_static'"
+ISOLATED = ", namespace: robot1, isolate: topics"
+
+
+@dataclass
+class Service:
+    """A unit or service, as a supervisor knows it."""
+
+    argv: list[str]
+    env: dict[str, str]
+    folder: Path
+    after: list[str] = field(default_factory=list)
+    notifies: bool = False
+    healthy: list[str] = field(default_factory=list)
+
+
+class Supervisor:
+    """Starts services in their order, with nothing in their environment but what they say."""
+
+    def __init__(self, services: dict[str, Service], output: Path) -> None:
+        self.services = services
+        self.running: dict[str, subprocess.Popen[bytes]] = {}
+        self._output = output
+        self._stack = ExitStack()
+
+    def start_all(self) -> None:
+        while missing := [name for name in self.services if name not in self.running]:
+            self.start(next(name for name in missing if not set(self.services[name].after) & {*missing}))
+
+    def start(self, name: str) -> None:
+        """Start a service, and wait until it is ready as far as that is known."""
+        one = self.services[name]
+        out = self._stack.enter_context((self._output / f"{name}.log").open("ab"))
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+            path = tempfile.mktemp(prefix="notify")  # noqa: S306 (an address, not a file)
+            manager.bind(path)
+            manager.settimeout(30)
+            env = one.env | ({"NOTIFY_SOCKET": path} if one.notifies else {})
+            self.running[name] = subprocess.Popen(one.argv, env=env, cwd=one.folder, stdout=out, stderr=out)
+            try:
+                if one.notifies:
+                    assert manager.recv(100) == b"READY=1", name
+            finally:
+                Path(path).unlink()
+        if one.healthy:
+            assert until(lambda: subprocess.run(one.healthy, env=one.env, check=False).returncode == 0), name
+
+    def log(self, name: str) -> str:
+        return (self._output / f"{name}.log").read_text("utf-8")
+
+    def end(self) -> list[int]:
+        for one in self.running.values():
+            one.send_signal(signal.SIGINT)
+        try:
+            return [one.wait(20) for one in self.running.values()]
+        finally:
+            for one in self.running.values():
+                one.kill()
+            self._stack.close()
+
+
+def units(folder: Path) -> dict[str, Service]:
+    """Read units as systemd does, as far as they are ours."""
+    found = {}
+    logs = folder / "log"
+    for file in sorted(folder.glob("*.service")):
+        said: dict[str, list[str]] = {}
+        for line in file.read_text("utf-8").splitlines():
+            key, _, value = line.partition("=")
+            said.setdefault(key, []).append(value.replace("%%", "%"))
+        env = dict(word.split("=", 1) for line in said["Environment"] for word in shlex.split(line))
+        (logs / said["LogsDirectory"][0]).mkdir(parents=True, exist_ok=True)
+        env = {name: value.replace("%L", str(logs)) for name, value in env.items()}
+        argv = [word.replace("$$", "$") for word in shlex.split(said["ExecStart"][0])]
+        after = [Path(unit).stem for line in said.get("After", []) for unit in line.split()]
+        found[file.stem] = Service(
+            argv, env, Path(said["WorkingDirectory"][0]), after, notifies=said["Type"] == ["notify"]
+        )
+    return found
+
+
+def services(folder: Path) -> dict[str, Service]:
+    """Read a compose file as docker compose does, with the image's Python and folder being this machine's."""
+    made = yaml.safe_load((folder / "compose.yaml").read_text("utf-8"))
+    image = {name: os.environ[name] for name in ("PATH", "PYTHONPATH") if name in os.environ} | {"HOME": str(folder)}
+
+    def here(words: list[str]) -> list[str]:
+        python = {"python3": sys.executable}
+        plain = [python.get(word, word).replace("$$", "$") for word in words]
+        return [word.replace("/robot/plan.json", str(folder.parent / "plan.json")) for word in plain]
+
+    return {
+        name: Service(
+            here(one["command"]),
+            image | one["environment"],
+            (folder / one["volumes"][0]["source"]).resolve(),
+            list(one.get("depends_on", ())),
+            healthy=here(one["healthcheck"]["test"][1:]) if _is_waited_for(name, made) else [],
+        )
+        for name, one in made["services"].items()
+    }
+
+
+def _is_waited_for(name: str, made: dict[str, Any]) -> bool:
+    waits = (one.get("depends_on", {}).get(name, {}) for one in made["services"].values())
+    return any(one.get("condition") == "service_healthy" for one in waits)
+
+
+@pytest.fixture
+def exported(domain: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Supervisor]]:
+    """Export a robot, and return who starts it."""
+    monkeypatch.delenv("ROS_LOG_DIR")
+    running: list[Supervisor] = []
+
+    def export(kind: str, mode: str, more: str = "") -> Supervisor:
+        (tmp_path / "arm.py").write_text(ARM, "utf-8")
+        text = ROBOT.format(
+            domain=domain.id, python=sys.executable, file=tmp_path / "arm.py", mode=mode, words=REMAPS if more else ""
+        )
+        (tmp_path / "robot.yaml").write_text(text.replace("localhost", f"localhost{more}", 1), "utf-8")
+        command = [sys.executable, "-m", "tfcompose", "export", kind, "robot.yaml", "-o", "build"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+        assert done.returncode == 0, done.stderr
+        folder = tmp_path / "build" / kind
+        running.append(Supervisor(units(folder) if kind == "systemd" else services(folder), tmp_path))
+        return running[0]
+
+    yield export
+    for one in running:
+        one.end()
+
+
+def verified(folder: Path) -> str:
+    """Compare the live tree with the plan, and return what is wrong; empty if nothing is."""
+    command = [sys.executable, "-m", "tfcompose", "verify", "build/plan.json", "--live", "--for", "3"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60, check=False)
+    return "" if done.returncode == 0 else done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    ("kind", "mode", "more"),
+    [
+        ("systemd", "watch", ""),
+        ("systemd", "strict", ""),
+        ("systemd", "watch", ISOLATED),
+        ("compose", "watch", ""),
+        ("compose", "strict", ISOLATED),
+    ],
+)
+def test_an_export_starts_the_tree_of_the_plan_and_drives_lifecycles(
+    exported: Callable[..., Supervisor], tmp_path: Path, kind: str, mode: str, more: str
+) -> None:
+    supervisor = exported(kind, mode, more)
+    supervisor.start_all()
+    guard = next(name for name in supervisor.services if name.endswith("guard"))
+    assert until(lambda: "Complete" in supervisor.log(guard), 30), supervisor.log(guard)
+    assert until(lambda: "/arm is active" in supervisor.log(guard)), supervisor.log(guard)
+    assert until(lambda: not verified(tmp_path), 20), verified(tmp_path)
+    assert '"code": "TF8' not in supervisor.log(guard)
+    assert set(supervisor.end()) == {0}
+
+
+def test_a_lifecycle_node_that_was_started_again_is_activated_again(exported: Callable[..., Supervisor]) -> None:
+    supervisor = exported("systemd", "watch")
+    supervisor.start_all()
+    assert until(lambda: "/arm is active" in supervisor.log("rover-guard"), 30)
+    arm = supervisor.running["rover-arm"]
+    arm.send_signal(signal.SIGINT)
+    arm.wait(20)
+    time.sleep(0.5)
+    supervisor.start("rover-arm")
+    assert until(lambda: len(re.findall("/arm is active", supervisor.log("rover-guard"))) == 2, 30)

@@ -149,6 +149,15 @@ def test_a_tensor_that_is_given_keeps_its_products_and_its_frame() -> None:
     assert found.pose.rpy == pytest.approx((0, 0, math.pi / 2))
 
 
+def test_computing_leaves_no_noise_in_products_that_are_nothing() -> None:
+    turned = [
+        {"box": [1, 2, 3], "rpy": ["90 deg", 0, "90 deg"]},
+        {"cylinder": {"radius": 0.3, "length": 1}, "xyz": [0, 0, 1]},
+    ]
+    assert inertial_of({"visual": turned, "inertial": {"mass": 7}}).tensor[1:5:3] == (0, 0)
+    assert inertial_of({"visual": turned, "inertial": {"mass": 7}}).tensor[2] == 0
+
+
 def test_collision_shapes_carry_the_mass_where_there_are_any() -> None:
     both = inertial_of({"visual": {"box": [9, 9, 9]}, "collision": {"box": [1, 1, 1]}, "inertial": {"density": 5}})
     assert both.mass == 5

@@ -226,8 +226,8 @@ It was looked for where packages: says, then in share/PACKAGE of each folder in 
 workspace's setup file first, or name the folder: packages: {my_robot_description: ../description}.""",
     "TF725": """A mass is to be spread over a mesh that has no volume.
 
-Only a closed mesh has one. Close it, give a closed collision shape (the tensor is computed from collision shapes where
-there are any), or give mass and inertia from CAD.""",
+Only a closed mesh has one, and only one that is found here. Close it, give a closed collision shape (the tensor is
+computed from collision shapes where there are any), or give mass and inertia from CAD.""",
     "TF726": """A mesh is to be addressed by package, and is in none.
 
 build --mesh package needs a package.xml in a folder above the file, or an address that begins with package://.""",

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from tfcompose.load import Path, Source
     from tfcompose.validate import bodies as said
 
+#: What computing leaves of a product of inertia that is 0, as a part of the trace.
+_NOISE = 1e-15
 FORMS = ("box", "cylinder", "sphere", "capsule", "mesh")
 
 
@@ -117,7 +119,12 @@ class Bodies:
                 parts.append(of_primitive(shape).at(shape.pose))
                 continue
             measure = self.packages.disk.moments if self.packages.disk else None
-            if measure is None or not shape.mesh.path or self._is_missing(shape.mesh.path):
+            if measure is None or (shape.mesh.path and self._is_missing(shape.mesh.path)):  # that has been said
+                return None
+            if not shape.mesh.path:
+                message = f"{shape.mesh.uri}: it is not found here, and has no volume"
+                advice = "say where it is, give a collision shape, or give mass and inertia"
+                self.found.append(finding("TF725", message, at, help=advice))
                 return None
             try:
                 x, y, z = shape.size
@@ -176,7 +183,8 @@ def inertial_of(mass: float, shapes: tuple[Shape, ...]) -> Inertial:
 
 
 def _of_density(whole: Moments, density: float, mass: float | None) -> Inertial:
-    xx, xy, xz, yy, yz, zz = (density * value for value in whole.tensor)
+    noise = _NOISE * _trace(whole.tensor)
+    xx, xy, xz, yy, yz, zz = (density * value if abs(value) > noise else 0.0 for value in whole.tensor)
     return Inertial(mass or density * whole.volume, Pose(whole.centre), (xx, xy, xz, yy, yz, zz))
 
 

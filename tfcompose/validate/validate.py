@@ -8,6 +8,7 @@ from tfcompose.diagnostic import Diagnostic, Edit, Note, RejectedError, finding
 from tfcompose.frozen import dataclass, field
 from tfcompose.load.choices import CHOICES
 from tfcompose.validate.claims import NodePresetSpec
+from tfcompose.validate.joint_units import refuse_units_of_others
 from tfcompose.validate.preset import PresetSpec
 from tfcompose.validate.preset_names import check_names
 from tfcompose.validate.schema import BROKEN, Model, Problem, Problems, record
@@ -44,6 +45,7 @@ def validate(source: Source, aside: Any = None) -> Validated:
     data = compute(source.data, problems)
     spec = _read(RobotSpec, data, problems)
     _exclusive(source.data, _FORKS, (), problems)
+    refuse_units_of_others(data, problems)
     said_once = [problem for problem in _once(problems.all) if not _in_a_copy(problem, source.data)]
     found = (*source.found, *(_finding(problem, source) for problem in said_once))
     if spec is BROKEN:

@@ -279,16 +279,17 @@ def test_what_would_be_computed_wrongly_or_ignored_is_refused(text: str, codes: 
 
 
 @pytest.mark.parametrize(
-    ("limit", "velocity", "effort"),
+    ("kind", "limit", "velocity", "effort"),
     [
-        ("{lower: 0, upper: 1, velocity: 180 deg/s, effort: 2 Nm}", math.pi, 2.0),
-        ("{lower: 0, upper: 1, velocity: 0.5 m/s, effort: 20 N}", 0.5, 20.0),
-        ("{lower: 0, upper: 1, velocity: 3, effort: 4}", 3.0, 4.0),
+        ("revolute", "{lower: 0, upper: 1, velocity: 180 deg/s, effort: 2 Nm}", math.pi, 2.0),
+        ("prismatic", "{lower: 0, upper: 1, velocity: 0.5 m/s, effort: 20 N}", 0.5, 20.0),
+        ("revolute", "{lower: 0, upper: 1, velocity: 3, effort: 4}", 3.0, 4.0),
+        ("prismatic", "{lower: 0, upper: 1, velocity: 3, effort: 4}", 3.0, 4.0),
     ],
 )
-def test_a_joint_limit_takes_units_of_turning_and_of_sliding(limit: str, velocity: float, effort: float) -> None:
-    text = "tfcompose: 1\nrobot: r\njoints: {j: {type: revolute, parent: a, child: b, limit: LIMIT}}\n"
-    validated = validate(composed(load(text.replace("LIMIT", limit), "f")))
+def test_a_joint_limit_takes_the_units_of_its_motion(kind: str, limit: str, velocity: float, effort: float) -> None:
+    text = f"tfcompose: 1\nrobot: r\njoints: {{j: {{type: {kind}, parent: a, child: b, limit: {limit}}}}}\n"
+    validated = validate(composed(load(text, "f")))
     said = validated.spec.joints["j"].limit
     assert said
     assert not validated.found

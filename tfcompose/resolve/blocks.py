@@ -112,6 +112,21 @@ def _misplaced(root: Element, frames: Collection[str], joints: Collection[str]) 
                 "TF719", f"unknown element <{element.tag}>", element.at, help=did_you_mean(element.tag, ALLOWED)
             )
         yield from references(element, frames, joints)
+        yield from _undeclared(element)
+
+
+def _undeclared(top: Element) -> Iterator[Diagnostic]:
+    """Yield a finding for each prefix that no element around it declares: xacro, and other readers, stop there."""
+    waiting = [(top, frozenset({"xml", "xmlns"}))]
+    while waiting:
+        element, known = waiting.pop()
+        known |= {name[6:] for name in element.attributes if name.startswith("xmlns:")}
+        for name in (element.tag, *element.attributes):
+            prefix, colon, _ = name.partition(":")
+            if colon and prefix not in known:
+                advice = f'<{element.tag} xmlns:{prefix}="http://…">'
+                yield finding("TF719", f"nothing declares the prefix {prefix} of {name}", element.at, help=advice)
+        waiting += [(child, known) for child in element.children]
 
 
 def references(element: Element, frames: Collection[str], joints: Collection[str]) -> Iterator[Diagnostic]:

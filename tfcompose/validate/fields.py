@@ -29,6 +29,7 @@ from tfcompose.validate.quantity import (
     example,
     quantity,
     respelt,
+    with_article,
 )
 from tfcompose.validate.schema import BROKEN, Problems, Type, listing, shown, then
 
@@ -97,11 +98,11 @@ def read_quantity(value: Any, path: Path, problems: Problems, dimension: Dimensi
         except UnitError as error:
             code = "TF104" if error.unit else "TF103"
             instead = respelt(value, error.unit, dimension) if error.unit else None
-            message = f"{error}; {_wanted(dimension)} is expected"
+            message = f"{error}; {with_article(dimension)} is expected"
             return problems.refuse(code, path, message, error.advice, instead=instead)
     if isinstance(value, Quantity):
         if value.dimension not in {NUMBER, dimension}:
-            message = f"{_wanted(dimension)} is expected; this is of the kind {dimension_name(value.dimension)}"
+            message = f"{with_article(dimension)} is expected; this is of the kind {dimension_name(value.dimension)}"
             return problems.refuse("TF104", path, message, f"for example {example(dimension)}")
         value = value.value
     elif isinstance(value, bool) or not isinstance(value, (int, float)):
@@ -110,11 +111,6 @@ def read_quantity(value: Any, path: Path, problems: Problems, dimension: Dimensi
     if -LARGEST <= value <= LARGEST:
         return float(value)
     return problems.refuse("TF106", path, f"{shown(float(value))} is beyond what can be computed with")
-
-
-def _wanted(dimension: Dimension) -> str:
-    name = dimension_name(dimension)
-    return f"an {name}" if name[0] in "aeiou" else f"a {name}"
 
 
 #: Beyond this, and for sizes and masses below its inverse, products of four such numbers leave the range of floats.

@@ -138,8 +138,9 @@ The process has nodes of which it is known what they publish, or several nodes, 
 The guard blames whoever sends it. Name another owner, or say which node does: publishes: [{parent, child, off}].""",
     "TF402": """A quaternion does not have length 1.
 
-tf2 drops transforms whose quaternion is off, and the frame never appears. Write the digits that are missing, or check
-the order: x, y, z, w.""",
+It is no rotation. A few digits that are missing change the angle by as much; a length far from 1 says that an order is
+wrong (it is x, y, z, w) or a number is. tf2 on Jazzy brings it to length 1 and says nothing; stricter readers drop
+it.""",
     "TF403": """A matrix is no rotation.
 
 Its rows are not orthonormal, or it mirrors. It holds three rows; column i is the child's axis i in the parent.""",
@@ -327,8 +328,9 @@ parameter. Somebody else started the node, or a launch file overrides it, or thi
 node publishes is then not what the plan says.""",
     "TF831": """tf2 refuses a transform that is published.
 
-A value is not a finite number, the quaternion is not of length 1, a name is empty, or the frame is its own parent. The
-frame is not there for any listener.""",
+A value is not a finite number, the quaternion is zero, a name is empty, or the frame is its own parent: the frame is
+not there for any listener. Or the quaternion is not of length 1: tf2 on Jazzy brings it to that length when it takes
+it, so that RViz shows the frame, and its angle is a guess; stricter readers, and tfcompose's buffer, drop it.""",
     "TF846": """A frame is not where the robot's file says.
 
 verify compares what is fixed: millimetres and degrees beyond --tolerance are told. A build that is older than the file,

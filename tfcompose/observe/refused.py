@@ -13,17 +13,26 @@ if TYPE_CHECKING:
 
     from tfcompose.observe.census import EdgeSeen
 
+_ZERO = 1e-9
+_MEND = "mend what the node computes it from; until then the frame is not there"
+_NORMALISE = (
+    "bring it to length 1 in the node: RViz shows the frame all the same, since tf2 on Jazzy does so when it takes it, "
+    "but stricter readers drop it"
+)
+
 
 def refused_transform(edge: EdgeSeen) -> Iterator[Diagnostic]:
     """Give the finding for an edge of which tf2 drops transforms, unless it is a frame in itself."""
     strand = edge.strand
     if strand.refused is None or strand.refused is Refusal.SELF:
         return
-    why = strand.refused.text
+    what, why, advice = "which tf2 drops", strand.refused.text, _MEND
+    length = sum(part * part for part in strand.pose.quat_xyzw) ** 0.5
     if strand.refused is Refusal.DENORMALISED:
-        length = sum(part * part for part in strand.pose.quat_xyzw) ** 0.5
         why = f"its quaternion has length {length:.3f}"
+        if length > _ZERO:
+            what, advice = "which is no rotation", _NORMALISE
     name = f"{strand.parent or '(no frame)'} → {strand.child or '(no frame)'}"
     often = "" if strand.static else f" ({strand.refusals} of {strand.tally.count})"
-    message = f"{who(edge)} publishes {name}, which tf2 drops: {why}{often}"
-    yield finding("TF831", message, None, help="mend what the node computes it from; until then the frame is not there")
+    message = f"{who(edge)} publishes {name}, {what}: {why}{often}"
+    yield finding("TF831", message, None, help=advice)

@@ -21,8 +21,7 @@ from tfcompose.validate.schema import BROKEN, Model, Problems, Type, key, listin
 if TYPE_CHECKING:
     from tfcompose.load import Path
 
-#: How far a quaternion's or a matrix row's length may be from 1: what four written decimals can do. tf2 drops a
-#: quaternion whose squared length is off by 0.01.
+#: How far a quaternion's or a matrix row's length may be from 1: what four written decimals can do.
 UNIT_TOLERANCE = 1e-3
 
 DIRECTIONS: dict[str, Vector] = {

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from functools import singledispatchmethod
 from typing import TYPE_CHECKING, Protocol
 
+from tfcompose.cli.printable import coloured_only, head_of, plain, width_of
 from tfcompose.cli.start_table import table_of
 from tfcompose.cli.terminal import line_of
 from tfcompose.render.text import BOLD, GREEN, PLAIN, RED, YELLOW, render_text
@@ -38,7 +38,6 @@ OURS = "tfcompose"
 NAMED_AT_MOST = 4
 #: States that need no line of their own: the edges say more.
 QUIET = frozenset({"STARTING", "STOPPED"})
-_PAINT = re.compile(r"\033\[[0-9;]*m")
 
 
 def _counted(number: int, word: str) -> str:
@@ -76,7 +75,7 @@ class Console:
         self._keep = keep
         self._status = status
         self._colour = colour
-        self._width = max(len(name) for name in [*names, OURS])
+        self._width = width_of([*names, OURS])
         self._colours = {name: COLOURS[index % len(COLOURS)] for index, name in enumerate(names)}
         self._nodes = {process.name: process.nodes for process in plan.processes}
         self._hosts = {process.name: f"host {process.host}" for process in plan.processes if process.host}
@@ -195,13 +194,13 @@ class Console:
         self._line(OURS, text, BOLD)
 
     def _line(self, name: str, text: str, colour: str, *, log: bool = False) -> None:
-        printable = "".join(c if c.isprintable() or c in "\t\033" else "\N{REPLACEMENT CHARACTER}" for c in text)
-        fault = self._keep(name, _PAINT.sub("", printable)) if self._keep else None
+        fault = self._keep(name, plain(text)) if self._keep else None
         clear = self._status.cleared() if self._status else ""
-        head = self._paint(f"{name:<{self._width}} |", colour)
-        self._output.write(f"{clear}{head} {printable}\n", log=log)
+        shown = coloured_only(text) if self._colour else plain(text)
+        self._output.write(f"{clear}{self._paint(head_of(name, self._width), colour)} {shown}\n", log=log)
         if fault:
-            self._output.write(f"{self._paint(f'{OURS:<{self._width}} |', BOLD)} {self._paint(fault, YELLOW)}\n")
+            head = self._paint(head_of(OURS, self._width), BOLD)
+            self._output.write(f"{head} {self._paint(fault, YELLOW)}\n")
 
     def _paint(self, text: str, *codes: str) -> str:
         return f"{''.join(codes)}{text}{PLAIN}" if self._colour else text

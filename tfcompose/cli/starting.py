@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.built_plan import PLAN, as_asked, plan_in
 from tfcompose.cli.console import Console
 from tfcompose.cli.status import Status, columns_of
-from tfcompose.cli.terminal import UNREADABLE, coloured, complain, print_findings
+from tfcompose.cli.terminal import UNREADABLE, coloured, complain, draws, print_findings
 from tfcompose.diagnostic import finding
 from tfcompose.frozen import replace
 from tfcompose.ros.environment import child_environment, missing_ros
@@ -87,8 +87,7 @@ def _start(plan: Plan, file: Path, arguments: Namespace) -> int:
             return _in_the_background(plan, place, lock, session, arguments)
         output = Outlet(sys.stdout.fileno())
         stack.callback(output.close)
-        colour = coloured(sys.stdout)
-        status = Status(plan, lambda: columns_of(output.fd)) if colour else None
+        status = Status(plan, lambda: columns_of(output.fd)) if draws(sys.stdout) else None
         return _attached(plan, place, session, output, status, arguments.duration)
 
 
@@ -96,7 +95,7 @@ def _attached(  # noqa: PLR0913, PLR0917 (called in one place)
     plan: Plan, place: Place, session: Session, output: Outlet, status: Status | None, duration_s: float | None
 ) -> int:
     logs = Logs(place.logs)
-    console = Console(plan, output, colour=status is not None, keep=logs.write, status=status)
+    console = Console(plan, output, colour=coloured(sys.stdout), keep=logs.write, status=status)
     session.outlet, session.refresh = output, console.refresh if status else None
     for line in import_module("tfcompose.cli.keeping").left_behind(place, session.run_id):
         complain(line)

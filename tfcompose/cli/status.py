@@ -6,7 +6,15 @@ import os
 import time
 from typing import TYPE_CHECKING
 
-from tfcompose.run.launcher.notice import AllReady, Ended, FindingShown, OwnerLive, ProcessState, Stopping, TreeComplete
+from tfcompose.run.launcher.notice import (
+    AllReady,
+    Ended,
+    FindingShown,
+    OwnerLive,
+    ProcessState,
+    Stopping,
+    TreeComplete,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,6 +24,10 @@ if TYPE_CHECKING:
 
 #: The line is drawn at most so often, in seconds.
 EVERY_S = 0.2
+#: Columns that stay free: the terminal writes ``^C`` there, and must not begin a new line.
+FREE = 3
+NAMED_AT_MOST = 3
+_CLEAR = "\r\033[K"
 
 
 class Status:
@@ -27,19 +39,18 @@ class Status:
         self._columns = columns
         self._clock = clock
         self._begun = clock()
-        self._running: set[str] = set()
+        self._states: dict[str, str] = {}
         self._live: dict[str, int] = {}
         self._findings = {"error": 0, "warning": 0}
-        self._stopping = self._ready = self._ended = False
+        self._stopping = self._ready = self._ended = self._drawn = False
         self._shown = ""
         self._at = 0.0
 
     def take(self, notice: Notice) -> None:
         """Count what the notice says."""
         if isinstance(notice, ProcessState):
-            alive = notice.state in ("RUNNING", "EXPECTED", "STOPPING")
-            (self._running.add if alive else self._running.discard)(notice.process)
-            if not alive:
+            self._states[notice.process] = notice.state
+            if notice.state not in ("RUNNING", "EXPECTED", "STOPPING"):
                 self._live.pop(notice.process, None)
         elif isinstance(notice, OwnerLive):
             self._live[notice.owner] = len(notice.edges)
@@ -54,30 +65,55 @@ class Status:
 
     def cleared(self) -> str:
         """Return what takes the line away, so that others can be written in its place."""
-        shown, self._shown = self._shown, ""
-        return "\r\033[K" if shown else ""
+        self._shown = ""
+        return _CLEAR if self._drawn else ""
 
     def drawn(self) -> str:
         """Return what draws the line anew; nothing where that would change nothing, or was done a moment ago."""
-        text = "" if self._ended else self._text()
+        text = "" if self._ended else self._fitting(max(self._columns() - FREE, 1))
         now = self._clock()
         if text == self._shown or (self._shown and now - self._at < EVERY_S):
             return ""
-        before, self._shown, self._at = self._shown, text, now
-        return f"{chr(13)}\033[K{text}" if before else text
+        before, self._shown, self._at, self._drawn = self._shown, text, now, True
+        return f"{_CLEAR}{text}" if before else text
 
-    def _text(self) -> str:
+    def _fitting(self, columns: int) -> str:
+        """Return the longest way to say it that fits."""
         seconds = int(self._clock() - self._begun)
-        live = sum(self._live.values())
-        parts = [f"{len(self._running)} of {len(self._owned)} processes", f"{live} of {self._edges} edges live"]
-        parts += [f"{count} {what}{'s' * (count > 1)}" for what, count in self._findings.items() if count]
-        waits = [name for name, owned in self._owned.items() if owned and name not in self._live]
+        clock = f"[{seconds // 60:02d}:{seconds % 60:02d}]"
+        long, short = self._parts("processes", "edges live", " of "), self._parts("proc", "edges", "/")
+        for parts in (long, long[:-1], short, short[:-1]):
+            text = f"{clock} {' · '.join(part for part in parts if part)}"
+            if len(text) <= columns:
+                return text
+        return text if len(text) <= columns else f"{text[: columns - 1]}…"
+
+    def _parts(self, processes: str, edges: str, of: str) -> list[str]:
+        """Return what is wrong, how many processes run, how many edges are live, and what is missing."""
+        wrong = [f"{count} {what}{'s' * (count > 1)}" for what, count in self._findings.items() if count]
+        running = sum(self._runs(name) for name in self._owned)
+        counted = [f"{running}{of}{len(self._owned)} {processes}"]
+        counted += [f"{sum(self._live.values())}{of}{self._edges} {edges}"] if self._edges else []
+        return [*wrong, *counted, self._missing()]
+
+    def _runs(self, name: str) -> bool:
+        """Return whether the process runs; one that others start does when its edges are live, as far as is known."""
+        state = self._states.get(name)
+        return state in ("RUNNING", "STOPPING") or (
+            state == "EXPECTED" and (not self._owned[name] or name in self._live)
+        )
+
+    def _missing(self) -> str:
         if self._stopping:
-            parts.append("stopping")
-        elif waits and not self._ready:
-            parts.append(f"waiting for {', '.join(waits[:3])}{' …' * (len(waits) > 3)}")  # noqa: PLR2004 (what fits)
-        text = f"[{seconds // 60:02d}:{seconds % 60:02d}] {' · '.join(parts)}"
-        return text[: max(self._columns() - 1, 10)]
+            alive = [name for name, state in self._states.items() if state in ("RUNNING", "STOPPING")]
+            return f"stopping {_named(alive)}" if alive else "stopping"
+        waits = [name for name, owned in self._owned.items() if owned and name not in self._live]
+        return f"waiting for {_named(waits)}" if waits and not self._ready else ""
+
+
+def _named(names: list[str]) -> str:
+    more = f" and {len(names) - NAMED_AT_MOST} more" if len(names) > NAMED_AT_MOST else ""
+    return f"{', '.join(names[:NAMED_AT_MOST])}{more}"
 
 
 def columns_of(fd: int) -> int:

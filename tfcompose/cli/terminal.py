@@ -73,7 +73,12 @@ def print_findings(found: Sequence[Diagnostic], stream: TextIO) -> None:
 
 def coloured(stream: TextIO) -> bool:
     """Return whether to colour: on a terminal, unless NO_COLOR is set (no-color.org)."""
-    return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    return draws(stream) and not os.environ.get("NO_COLOR")
+
+
+def draws(stream: TextIO) -> bool:
+    """Return whether lines can be drawn again in their place: on a terminal that can do more than print."""
+    return stream.isatty() and os.environ.get("TERM") != "dumb"
 
 
 @cache

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.console import COLOURS
 from tfcompose.cli.options import counted
+from tfcompose.cli.printable import head_of, width_of
 from tfcompose.cli.running import add_robot, chosen, running
 from tfcompose.cli.terminal import coloured, complain
 from tfcompose.diagnostic import did_you_mean
@@ -77,7 +78,7 @@ def _place(robot: str | None) -> Place | int:
 
 class _Printer:
     def __init__(self, names: list[str], *, times: bool) -> None:
-        self._width = max((len(name) for name in names), default=0)
+        self._width = width_of(names)
         colours = COLOURS if coloured(sys.stdout) else ("",)
         self._colours = {name: colours[index % len(colours)] for index, name in enumerate(names)}
         self._times = times
@@ -86,5 +87,5 @@ class _Printer:
         for at, name, text in lines:
             colour = self._colours[name]
             stamp = f"{at} " if self._times else ""
-            sys.stdout.write(f"{colour}{name:<{self._width}} |{PLAIN if colour else ''} {stamp}{text}\n")
+            sys.stdout.write(f"{colour}{head_of(name, self._width)}{PLAIN if colour else ''} {stamp}{text}\n")
         sys.stdout.flush()

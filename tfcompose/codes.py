@@ -184,6 +184,7 @@ CODES = {
     "TF846": "wrong_live_pose",
     "TF847": "needed_but_optional",
     "TF848": "gate_never_opens",
+    "TF849": "volatile_static_reader",
     # the environment
     "TF901": "no_ros",
     "TF902": "bad_plan",

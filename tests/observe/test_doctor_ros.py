@@ -25,6 +25,7 @@ from tests.observe.stage import doctor, doctor_finds, finds_nothing, message, sa
 from tests.waiting import until
 from tfcompose.ros.node import LATCHED, open_node, qos
 from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.typesupport import tf_message_type
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -153,6 +154,11 @@ def best_effort(stage: Stage) -> None:
     stage.odd(stage.node("drive"), "odom base_link", topic="/tf", profile=qos(10, VOLATILE, BEST_EFFORT))
 
 
+def volatile_listener(stage: Stage) -> None:
+    sound(stage)
+    stage.keep(stage.node("viewer").create_subscription(tf_message_type(), "/tf_static", lambda _: None, 10, raw=True))
+
+
 def wrong_type(stage: Stage) -> None:
     sound(stage)
     stage.typed(stage.node("old"), String, "/tf", lambda _: String(data="a b"))
@@ -267,6 +273,7 @@ SCENES: dict[Callable[[Stage], Any], tuple[str, list[str]]] = {
     ahead: ("TF835", ["/amcl stamps map → odom ", " s ahead of time"]),
     volatile: ("TF806", ["/cam writes /tf_static with durability volatile"]),
     best_effort: ("TF826", ["/drive writes /tf best effort"]),
+    volatile_listener: ("TF849", ["/viewer listens to /tf_static with durability volatile", "transient_local"]),
     wrong_type: ("TF832", ["/old publishes std_msgs/msg/String on /tf"]),
     both_topics: ("TF809", ["base_link comes on /tf from /drive and on /tf_static from /old"]),
     leak: ("TF827", ["/robot1/ekf writes the global /tf", "/robot1/tf"]),
@@ -303,8 +310,6 @@ def test_what_is_wrong_is_found_with_the_node_and_the_numbers(stage: Stage, scen
 
 #: What else is found there, since it follows.
 ALSO: dict[Callable[[Stage], Any], set[str]] = {
-    future_stamps: {"TF833"},
-    both_topics: {"TF822"},
     clocks: {"TF825"},
     two_writers: {"TF824"},
 }
@@ -339,6 +344,21 @@ def test_one_that_leaves_is_missed(stage: Stage, until: Callable[..., bool]) -> 
     text = said(json.loads(output), "TF804")
     assert "base_link → arm: nothing for" in text
     assert "/arm, which has left" in text
+
+
+def test_fixed_frames_whose_publisher_leaves_are_missed(stage: Stage) -> None:
+    sound(stage)
+    with ExitStack() as leave:
+        publisher = TFPublisher(leave.enter_context(open_node("calibration", "")), static=True)
+        publisher.publish(message(0, ("base_link camera",)))
+        command = [sys.executable, "-m", "tfcompose", "doctor", "--for", "6", "--format", "json"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            assert until(publisher.publisher.get_subscription_count)
+            time.sleep(1.0)  # it is to be heard, and named
+            leave.close()
+            output, _ = process.communicate(timeout=30)
+    text = said(json.loads(output), "TF804")
+    assert "/calibration is gone: nobody latches base_link → camera any more" in text
 
 
 @pytest.mark.usefixtures("stage")

@@ -72,6 +72,11 @@ ROS_AUTOMATIC_DISCOVERY_RANGE, or a network that does not pass multicast.""",
 Processes hear each other with the same ROS_DOMAIN_ID, where neither has ROS_AUTOMATIC_DISCOVERY_RANGE=OFF, and surely
 only with the same RMW_IMPLEMENTATION. What a process was started with is read from /proc, for one's own processes; of
 other machines, and of containers, it cannot be seen.""",
+    "TF849": """A node listens to /tf_static with durability volatile, and misses what was sent before it came.
+
+Fixed frames are sent once and kept for those who come later, who get them only if they ask for durability
+transient_local. tf2's own listeners do; a subscription of one's own has durability volatile unless it says otherwise,
+and so has ros2 topic echo: ros2 topic echo --qos-durability transient_local --qos-reliability reliable /tf_static.""",
     "TF909": """Variables that set up ROS contradict each other, leave nobody to be heard, or say what cannot be.
 
 A domain is a whole number from 0 to 232. RMW_IMPLEMENTATION names a middleware that has to be installed: ROS ends a

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 
 from tfcompose.observe.census import SETTLE_S, Census
 from tfcompose.observe.diagnose import diagnose
+from tfcompose.observe.diagnose.tree import trees_of
 from tfcompose.observe.live import Live
 from tfcompose.observe.seen import GLOBAL, RosProcess, Seen, Topic
 from tfcompose.observe.sideline import Sideline
 from tfcompose.ros.clock import wall_ns
-from tfcompose.ros.graph import ends, nodes, topics
+from tfcompose.ros.graph import ends, nodes, topics, volatile_readers
 from tfcompose.ros.node import middleware, open_node
 from tfcompose.ros.processes import ros_processes, settings_in
 from tfcompose.ros.settings import RMW
@@ -38,12 +39,13 @@ INTERESTING = ("tf2_msgs/msg/TFMessage", "rosgraph_msgs/msg/Clock", "sensor_msgs
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What was found: the findings, and what was looked at: edges, publishing nodes, seconds."""
+    """What was found: the findings, and what was looked at: edges, publishing nodes, seconds, and the trees' roots."""
 
     findings: list[Diagnostic]
     edges: int
     nodes: int
     seconds: float
+    roots: tuple[str, ...] = ()
 
 
 def examine(expected: dict[Topics, Plan | None], seconds: float, stop: Stop) -> Found:
@@ -84,7 +86,8 @@ def _judged(pictures: list[Seen], seconds: float) -> Found:
     findings = list(dict.fromkeys(one for seen in pictures for one in diagnose(seen)))
     edges = {(edge.strand.parent, edge.strand.child) for seen in pictures for edge in seen.taken}
     names = {name for seen in pictures for edge in seen.taken for name in edge.nodes}
-    return Found(sorted(findings, key=lambda one: one.severity), len(edges), len(names), seconds)
+    roots = tuple(dict.fromkeys(root for seen in pictures for root in trees_of(seen)))
+    return Found(sorted(findings, key=lambda one: one.severity), len(edges), len(names), seconds, roots)
 
 
 @dataclass(slots=True)
@@ -124,6 +127,7 @@ class _Ear:
             topics=self.topics,
             edges=tuple(self.census.edges(wall_ns())),
             publishers=tuple(self.live.publishers()),
+            forgetful=tuple(name for name in volatile_readers(self.node, self.topics[1]) if not name.startswith(TOOLS)),
             malformed=dict(self.census.malformed),
             clock_ns=self.live.clock_ns,
             clock_moves=len(self.clocks) > 1,

@@ -67,6 +67,7 @@ class Seen:
     Attributes:
         edges: each edge of each publisher.
         publishers: who is on the two topics.
+        forgetful: the nodes that listen to the topic of fixed edges, and do not ask for what was sent before they came.
         nodes: the full names of other nodes, of this robot or not.
         graph: the topics, those of TF among them.
         clock_ns: the newest time on /clock, None where nothing came.
@@ -87,6 +88,7 @@ class Seen:
     topics: tuple[str, str] = GLOBAL
     edges: tuple[EdgeSeen, ...] = ()
     publishers: tuple[Publisher, ...] = ()
+    forgetful: tuple[str, ...] = ()
     nodes: tuple[str, ...] = ()
     graph: tuple[Topic, ...] = ()
     clock_ns: int | None = None

@@ -54,6 +54,14 @@ def _sorted(infos: Iterable[TopicEndpointInfo]) -> list[Writer]:
     return sorted(map(_writer, infos), key=lambda writer: (writer.node, writer.gid))
 
 
+def volatile_readers(node: Node, topic: str) -> list[str]:
+    """Return the names of other nodes that listen to the topic and do not ask for what was sent before they came."""
+    own = _full_name(node.get_namespace(), node.get_name())
+    infos = node.get_subscriptions_info_by_topic(topic)
+    volatile = [info for info in infos if info.qos_profile.durability == DurabilityPolicy.VOLATILE]
+    return sorted({_full_name(info.node_namespace, info.node_name) for info in volatile} - {own, UNKNOWN_NODE})
+
+
 def own_gid(node: Node, topic: str) -> bytes:
     """Return the id of the node's own subscription to the topic, empty where the graph does not show it."""
     infos = node.get_subscriptions_info_by_topic(topic)

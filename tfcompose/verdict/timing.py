@@ -17,16 +17,21 @@ NAMED_AT_MOST = 6
 
 def named(edges: Sequence[PlanEdge]) -> str:
     """Return the edges by name, the first few of them if they are many."""
-    names = [edge.name for edge in edges[:NAMED_AT_MOST]]
-    more = len(edges) - len(names)
-    return ", ".join(names) + (f" and {more} more" if more else "")
+    return first_of([edge.name for edge in edges])
+
+
+def first_of(names: Sequence[str]) -> str:
+    """Return the first few names, and how many more there are."""
+    more = len(names) - NAMED_AT_MOST
+    return ", ".join(names[:NAMED_AT_MOST]) + (f" and {more} more" if more > 0 else "")
 
 
 def never_seen(edges: Sequence[PlanEdge], advice: str, place: Span | None = None) -> Diagnostic:
     """Return the finding for edges of one owner that did not come; ``place`` is where the first stands."""
     first = edges[0]
-    was, whose = ("was", "its") if len(edges) == 1 else ("were", "their")
-    message = f"{named(edges)} {was} never seen; {whose} owner is {_owner(first)}"
+    more = f" and {len(edges) - 1} more edge{'s' if len(edges) > 2 else ''}" if len(edges) > 1 else ""  # noqa: PLR2004 (one, or several)
+    was, whose = ("were", "their") if more else ("was", "its")
+    message = f"{first.name}{more} {was} never seen; {whose} owner is {_owner(first)}"
     return finding("TF811", message, place, notes=[] if place else _declared(edges), help=advice)
 
 
@@ -50,7 +55,12 @@ def silent(
 
 def left(edges: Sequence[PlanEdge], place: Span | None = None) -> Diagnostic:
     """Return the finding for fixed edges whose owner has left."""
-    message = f"{_owner(edges[0])} is gone: nobody latches {named(edges)} any more"
+    return gone(_owner(edges[0]), [edge.name for edge in edges], place)
+
+
+def gone(publisher: str, names: Sequence[str], place: Span | None = None) -> Diagnostic:
+    """Return the finding for fixed edges, by name, whose publisher has left."""
+    message = f"{publisher} is gone: nobody latches {first_of(names)} any more"
     advice = "listeners that are there keep these frames; those that join later do not get them"
     return finding("TF804", message, place, help=advice)
 
@@ -80,4 +90,6 @@ def _rated(edge: PlanEdge, place: Span | None) -> list[Note]:
 
 
 def _declared(edges: Sequence[PlanEdge]) -> list[Note]:
-    return [Note(f"{edge.name} is declared in {edge.source[0]}:{edge.source[1]}") for edge in edges[:NAMED_AT_MOST]]
+    notes = [Note(f"{edge.name} is declared in {edge.source[0]}:{edge.source[1]}") for edge in edges[:NAMED_AT_MOST]]
+    more = len(edges) - len(notes)
+    return [*notes, Note(f"and {more} more")] if more else notes

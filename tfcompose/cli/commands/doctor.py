@@ -15,6 +15,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tfcompose.cli.edge_table import printable
 from tfcompose.cli.looking import ended_early
 from tfcompose.cli.options import add_variant, namespace, positive
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings
@@ -31,6 +32,9 @@ if TYPE_CHECKING:
 
     from tfcompose.diagnostic import Diagnostic
     from tfcompose.plan import Plan
+
+#: So many trees are named by their roots.
+MOST_ROOTS = 6
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -67,6 +71,7 @@ def run(arguments: Namespace) -> int:
     if code is not None:
         return code
     seen = f"{_counted(found.edges, 'edge')} from {_counted(found.nodes, 'node')}"
+    seen += f" below {printable(', '.join(found.roots[:MOST_ROOTS]))}" if found.roots else ""
     return _say(found.findings, arguments, f"looked for {found.seconds:.1f} s at {seen}")
 
 

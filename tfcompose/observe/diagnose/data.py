@@ -47,13 +47,8 @@ def data_frame_unknown(seen: Seen) -> Iterator[Diagnostic]:
 def data_beyond_tf(seen: Seen) -> Iterator[Diagnostic]:
     """The stamps of data and of the tree do not meet: every lookup for them extrapolates."""
     for each in seen.stamped:
-        if len(each.delays_s) < FEWEST:
-            continue
-        age_s = median(each.delays_s)
-        ways = [(_delay_s(edge), edge) for edge in _moving_above(seen, each.frame)]
         sender = listed(each.nodes) or "somebody"
-        for late_s, edge in sorted(ways, key=lambda way: -way[0])[:1]:
-            lack_s = late_s - age_s
+        for lack_s, age_s, edge in _latest_above(seen, each):
             if lack_s > LACK_S:
                 message = f"{each.topic} from {sender} is stamped {seconds(lack_s)} after the newest {edge.name}"
                 message += f" from {who(edge)}"
@@ -66,6 +61,21 @@ def data_beyond_tf(seen: Seen) -> Iterator[Diagnostic]:
                     "stamp with the time of the measurement, by the same clock; or give listeners a longer cache_time"
                 )
                 yield finding("TF841", f"{message}: extrapolation into the past", None, help=advice)
+
+
+def _latest_above(seen: Seen, each: Stamped) -> list[tuple[float, float, EdgeSeen]]:
+    """Return of the edge above the data that is behind the others: how far it is behind the data, and their age."""
+    if len(each.delays_s) < FEWEST:
+        return []
+    age_s = median(each.delays_s)
+    ways = [(_delay_s(edge) - age_s, age_s, edge) for edge in _moving_above(seen, each.frame)]
+    return sorted(ways, key=lambda way: -way[0])[:1]
+
+
+def keeps_data_waiting(seen: Seen) -> set[tuple[str, str]]:
+    """Return the edges, parent and child, whose stamps are behind data that need them: they are told with the data."""
+    found = [way for each in seen.stamped for way in _latest_above(seen, each)]
+    return {(edge.strand.parent, edge.strand.child) for lack_s, _, edge in found if lack_s > LACK_S}
 
 
 def _ahead_help(each: Stamped, age_s: float) -> str:

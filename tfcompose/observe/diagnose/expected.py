@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 def differs_from_plan(seen: Seen) -> Iterator[Diagnostic]:
     """What comes is not what the plan says."""
-    if seen.plan is None:
-        return
+    if seen.plan is None or not (seen.edges or seen.publishers):
+        return  # nobody publishes at all, which is said
     found = [one for one in differences(seen, seen.plan) if one.code != SELF]  # told of every edge, planned or not
     for group in grouped(found):
         yield told(group, seen, seen.plan)

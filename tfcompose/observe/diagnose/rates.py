@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, finding
 from tfcompose.observe.seen import seconds, who
+from tfcompose.verdict.timing import gone
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -64,6 +65,18 @@ def fell_silent(seen: Seen) -> Iterator[Diagnostic]:
         message = f"{edge.name}: nothing for {seconds(edge.age_s)} from {who(edge)}{gone}"
         advice = "start it again, and look why it ended" if edge.present is False else "what does it wait for?"
         yield finding("TF804", message, None, help=advice)
+
+
+def fixed_left(seen: Seen) -> Iterator[Diagnostic]:
+    """Fixed edges were there, and the publisher that held them for those who come later has left."""
+    held = {edge.strand.child for edge in seen.taken if edge.strand.static and edge.present is not False}
+    lost: dict[str, list[EdgeSeen]] = {}
+    for edge in seen.taken:
+        child = edge.strand.child
+        if edge.strand.static and edge.present is False and child not in held | seen.planned:
+            lost.setdefault(who(edge), []).append(edge)
+    for publisher, edges in lost.items():
+        yield gone(publisher, [edge.name for edge in edges])
 
 
 def least_of(edge: EdgeSeen, inside: set[str]) -> float:

@@ -32,6 +32,8 @@ def two_writers(seen: Seen) -> Iterator[Diagnostic]:
     for (_, child), edges in same.items():
         rivals = [edge for edge in edges if edge.strand.gid is not None and edge.present is not False]
         distinct = {edge.strand.gid for edge in rivals}
+        if len({edge.strand.static for edge in rivals}) > 1:
+            continue  # it comes on both topics, which is a finding of its own
         if len(distinct) > 1 and child not in seen.planned and _together(rivals):
             groups.setdefault(tuple(sorted(distinct, key=str)), []).append(rivals)
     for found in groups.values():
@@ -66,6 +68,18 @@ def volatile_static(seen: Seen) -> Iterator[Diagnostic]:
         if one.static and not one.latched and one.node and one.type in {"", TF_MESSAGE}:
             owned = [edge.name for edge in seen.plan.edges if edge.node == one.node] if seen.plan else []
             yield volatile_writer(one.node, one.topic or seen.topics[1], owned)
+
+
+def volatile_reader(seen: Seen) -> Iterator[Diagnostic]:
+    """A node listens to fixed frames so that it misses those that were sent before it came."""
+    if seen.forgetful and any(one.static for one in seen.publishers):
+        listen = "listens" if len(seen.forgetful) == 1 else "listen"
+        message = (
+            f"{listed(seen.forgetful)} {listen} to {seen.topics[1]} with durability volatile: what was sent before "
+        )
+        message += "is missed"
+        advice = "subscribe with durability transient_local, reliable, depth 100, as tf2_ros's TransformListener does"
+        yield finding("TF849", message, None, severity="warning", help=advice)
 
 
 def best_effort(seen: Seen) -> Iterator[Diagnostic]:

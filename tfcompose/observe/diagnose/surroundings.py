@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 LOCALHOST_ONLY = "ROS_LOCALHOST_ONLY"
 #: What decides who hears whom, with what holds where it is not set.
 DEFAULTS = {DOMAIN: "0", RANGE: "SUBNET", LOCALHOST_ONLY: "0", RMW: ""}
-#: Of processes with other settings, those of so many settings are named.
-MOST_SETTINGS = 3
+#: Of processes with other settings, those of so many settings are named, so many of each.
+MOST_SETTINGS = MOST_PROCESSES = 3
 
 
 def no_tf(seen: Seen) -> Iterator[Diagnostic]:
@@ -32,10 +32,14 @@ def no_tf(seen: Seen) -> Iterator[Diagnostic]:
     message += "was seen" if len(seen.nodes) < 2 else "were seen"  # noqa: PLR2004 (one, or none)
     notes = [Note(f"seen: {listed(seen.nodes)}")] if seen.nodes else []
     notes.append(Note(f"looked with {said(seen.settings)}"))
+    if seen.plan:
+        notes.append(Note(f"{counted(len(seen.plan.edges), 'edge')} of {seen.plan.robot} should be there"))
     elsewhere = _elsewhere(seen)
     if elsewhere:
         notes.append(Note(f"there is TF on {listed(elsewhere)}"))
         advice = f"look there: tfcompose doctor {namespace_words(elsewhere)}"
+    elif seen.plan and not seen.nodes:
+        advice = f"is {seen.plan.robot} up, and with these settings? tfcompose ps says which robots run"
     elif seen.nodes:
         advice = "start robot_state_publisher, or tfcompose up; tfcompose doctor --for 20 looks longer"
     else:
@@ -63,7 +67,7 @@ def other_settings(seen: Seen) -> Iterator[Diagnostic]:
         here = [f"{name} is {seen.settings.get(name) or DEFAULTS[name]}" for name, _ in apart_items]
         message = f"{number} on this machine cannot be heard from here: started with {', '.join(settings)}, "
         message += f"and here {' and '.join(here)}"
-        notes = [Note(f"pid {one.pid}: {one.command}") for one in processes[:6]]
+        notes = [Note(f"pid {one.pid}: {one.command}") for one in processes[:MOST_PROCESSES]]
         more = len(processes) - len(notes)
         notes += [Note(f"and {more} more")] if more else []
         advice = (

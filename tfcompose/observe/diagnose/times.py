@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.observe.diagnose.data import keeps_data_waiting
 from tfcompose.observe.seen import counted, listed, seconds, who
 
 if TYPE_CHECKING:
@@ -90,7 +91,12 @@ def host_clock_off(seen: Seen) -> Iterator[Diagnostic]:
 
 def late_stamps(seen: Seen) -> Iterator[Diagnostic]:
     """An edge's stamps are old when they come: lookups of new data extrapolate into the future."""
-    for edges in _by_publisher(seen, lambda edge: LATE_S <= _least_s(edge) <= KEPT_S):
+    told = keeps_data_waiting(seen)
+
+    def late(edge: EdgeSeen) -> bool:
+        return LATE_S <= _least_s(edge) <= KEPT_S and (edge.strand.parent, edge.strand.child) not in told
+
+    for edges in _by_publisher(seen, late):
         late_s = _least_s(edges[0])
         message = f"{_names(edges)} from {who(edges[0])} is stamped {seconds(late_s)} ago when it comes"
         notes = [

@@ -12,8 +12,10 @@ from tests.planned import compiled_plan
 from tfcompose.diagnostic import Diagnostic
 from tfcompose.plan import Plan, Ready
 from tfcompose.plan.file import read_plan, write_plan
+from tfcompose.run.fenced import partition_of
 from tfcompose.run.hosts import hosts_of, share_of, told
 from tfcompose.run.place import place_of
+from tfcompose.verdict.offence import relays_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -102,12 +104,25 @@ def test_a_host_that_the_plan_does_not_know_is_a_finding(
     assert advice in found.help
 
 
-def test_strict_holds_back_on_one_machine_only_and_says_so() -> None:
-    """Two guards that pass on would each pass on what the other does."""
-    plan = compiled_plan(TWO + "guard: {mode: strict}\n")
-    found = share_of(plan, "jetson", "x")
+STRICT = "guard: {mode: strict}\n"
+
+
+def test_behind_a_strict_guard_each_machine_hears_the_others_guard_and_has_a_fence_of_its_own() -> None:
+    plan = compiled_plan(TWO + STRICT)
+    shares = [share for asked in ("jetson", None) if isinstance(share := share_of(plan, asked, "x"), Plan)]
+    assert [{edge.child: edge.node for edge in share.edges} for share in shares] == [
+        {"base_link": "/tfcompose_guard", "lidar": "/tfcompose_guard", "arm": "/arm_drive"},
+        {"base_link": "/drive", "lidar": "/tfcompose_static", "arm": "/tfcompose_guard_jetson"},
+    ]
+    assert [partition_of(share) for share in shares] == ["tfc_rover.jetson", "tfc_rover"]
+    for one in (plan, *shares):
+        assert relays_of(one) == {"/tfcompose_guard", "/tfcompose_guard_jetson"}
+
+
+def test_a_strict_guard_on_one_of_several_machines_passes_nothing_on_of_the_others() -> None:
+    found = share_of(compiled_plan(TWO + "  guard: {host: jetson}\n" + STRICT), "jetson", "x")
     assert isinstance(found, Diagnostic)
-    assert (found.code, found.help) == ("TF819", "watch on each: --guard watch, or guard: {mode: watch}")
+    assert (found.code, found.help) == ("TF819", "remove the guard's host, or watch: guard: {mode: watch}")
 
 
 def test_a_share_is_written_and_read_and_has_a_place_of_its_own(tmp_path: Path) -> None:

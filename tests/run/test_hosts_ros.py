@@ -54,19 +54,57 @@ def test_two_hosts_start_their_shares_and_each_sees_the_whole_tree(
     assert main.end()[0] == 0
 
 
-def test_a_share_that_is_live_on_another_machine_is_refused(
-    start: Callable[..., Started], tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+#: A node that sends its own edge, and another machine's.
+LIAR = """
+import signal, sys, time
+from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.node import open_node
+from tfcompose.ros.tf import TFPublisher
+signal.signal(signal.SIGINT, lambda *_: sys.exit())
+with open_node("arm_drive", "/", args=sys.argv[2:]) as node:
+    publisher = TFPublisher(node, static=False)
+    while True:
+        for ends in (("base_link", "arm"), ("odom", "base_link")):
+            publisher.publish(encode([Transform(time.time_ns(), *ends, (0.0, 0.0, 5.0), (0.0, 0.0, 0.0, 1.0))]))
+        time.sleep(0.05)
+"""
+
+
+@pytest.mark.parametrize("fence", ["partition", "remap"])
+def test_each_of_two_strict_guards_holds_back_on_its_machine_and_passes_on_to_all(
+    start: Callable[..., Started], tmp_path: Path, fence: str
 ) -> None:
+    (tmp_path / "liar.py").write_text(LIAR, "utf-8")
     file = tmp_path / "rover.yaml"
-    file.write_text(TWO, "utf-8")
-    first = start("tfcompose", "up", file, "-o", tmp_path / "a")
-    first.until_says("live  drive")
-    other_machine = tmp_path_factory.mktemp("runtime")
-    other_machine.chmod(0o700)
-    second = start("tfcompose", "up", file, "-o", tmp_path / "b", XDG_RUNTIME_DIR=str(other_machine))
-    assert second.process.wait(30) == 1
-    assert until(lambda: "ended with exit code 1" in second.output)
-    assert "TF807" in second.output
-    assert "/drive" in second.output or "/tfcompose_static" in second.output, "whoever is seen first"
-    assert "started static" not in second.output
-    assert first.end()[0] == 0
+    run = f"run: [{sys.executable}, {tmp_path / 'liar.py'}]"
+    text = TWO.replace("simulate: {fixed: {xyz: [0, 0, 1]}, rate: 20 Hz}, host", f"{run}, node: arm_drive, host")
+    text = text.replace("robot: rover", "robot: rover\nros: {discovery: localhost}")
+    file.write_text(f"{text}guard: {{mode: strict, fence: {fence}}}\n", "utf-8")
+    main = start("tfcompose", "up", file, "-o", tmp_path / "a")
+    main.until_says("live  drive")
+    jetson = start("tfcompose", "up", file, "--host", "jetson", "-o", tmp_path / "b")
+    assert until(lambda: "tree complete: 3 edges" in main.output and "tree complete: 3 edges" in jetson.output), (
+        main.output + jetson.output
+    )
+    jetson.until_says("error[TF801] odom → base_link is published by /arm_drive; the owner is drive")
+    words = [sys.executable, "-m", "tfcompose", "verify", str(file), "--live", "--for", "3"]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stdout
+    assert "TF8" not in main.output, "it was held back"
+    assert "held back: no listener gets it" in jetson.output
+    assert (jetson.end()[0], main.end()[0]) == (0, 0)
+
+
+def test_a_share_that_is_live_on_another_machine_is_refused(start: Callable[..., Started], tmp_path: Path) -> None:
+    """Started by another supervisor, as nothing of another machine's launcher is seen here but its nodes."""
+    file = tmp_path / "rover.yaml"
+    file.write_text(TWO.replace("robot: rover", "robot: rover\nros: {discovery: localhost}"), "utf-8")
+    assert start("tfcompose", "build", file, "-o", tmp_path / "a").process.wait(30) == 0
+    elsewhere = start("tfcompose.run.process", tmp_path / "a" / "plan.json", "drive")
+    elsewhere.until_says("simulated at")
+    up = start("tfcompose", "up", file, "-o", tmp_path / "b")
+    assert up.process.wait(30) == 1
+    assert until(lambda: "ended with exit code 1" in up.output)
+    assert "error[TF807] odom → base_link: published by another /drive before the start" in up.output
+    assert "started static" not in up.output
+    assert elsewhere.end()[0] == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from fnmatch import fnmatchcase
 
 from tfcompose.frozen import dataclass, field
@@ -13,6 +14,8 @@ VERSION = 1
 
 #: The file beside the plan that holds the whole robot's description.
 DESCRIPTION = "robot.full.urdf"
+#: What no name of a node may hold.
+_NO_NAME = re.compile(r"\W")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +49,12 @@ class Plan:
                 return process
         raise KeyError(name)
 
+    def guards_of(self, host: str | None) -> tuple[str, ...]:
+        """Return the nodes of the guard of a host's share; None or empty: of the machine that has no name here."""
+        own = [node for process in self.processes if process.kind == "guard" for node in process.nodes]
+        # No two nodes have one name.
+        return tuple(node.removesuffix(_name_end(self.host)) + _name_end(host) for node in own)
+
     def claim_on(self, nodes: tuple[str, ...], parent: str, child: str) -> Claim | None:
         """Return what is known of one of the nodes publishing the edge by default, or None."""
         ends = (parent, child)
@@ -63,3 +72,7 @@ class Plan:
     def edges_of(self, owner: str) -> tuple[PlanEdge, ...]:
         """Return the edges that the process publishes, in the plan's order."""
         return tuple(edge for edge in self.edges if edge.owner == owner)
+
+
+def _name_end(host: str | None) -> str:
+    return f"_{_NO_NAME.sub('_', host)}" if host else ""

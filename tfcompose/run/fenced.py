@@ -23,8 +23,8 @@ _UNDERSCORES = re.compile(r"__+|_(?=/|$)")
 
 
 def partition_of(plan: Plan) -> str:
-    """Return the partition that the plan's processes send TF in."""
-    return f"tfc_{plan.robot}"
+    """Return the partition that the plan's processes send TF in: those of one host, where it runs on several."""
+    return f"tfc_{plan.robot}.{re.sub(r'[^A-Za-z0-9.-]', '_', plan.host)}" if plan.host else f"tfc_{plan.robot}"
 
 
 def judged_topics(plan: Plan) -> set[Topics]:

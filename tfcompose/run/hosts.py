@@ -6,7 +6,6 @@ A process runs on the host that it names. What names none runs on the machine th
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -14,11 +13,10 @@ from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
 from tfcompose.plan import PlanProcess, Ready
 
 if TYPE_CHECKING:
-    from tfcompose.plan import Plan
+    from tfcompose.plan import Plan, PlanEdge
 
 #: What a launcher cannot see of a process on another machine: its output and its end.
 _UNSEEN = ("log", "exit")
-_NO_NAME = re.compile(r"\W")
 
 
 def hosts_of(plan: Plan) -> tuple[str, ...]:
@@ -46,9 +44,10 @@ def share_of(plan: Plan, asked: str | None, machine: str) -> Plan | Diagnostic:
         return finding("TF819", message, None, help=f"{did_you_mean(asked, hosts, known)}")
     if not hosts:
         return plan
-    if plan.guard.mode == "strict":
-        message = f"guard: strict holds back on one machine, and {plan.robot} runs on several: {', '.join(hosts)}"
-        return finding("TF819", message, None, help="watch on each: --guard watch, or guard: {mode: watch}")
+    watched = next((one.host for one in plan.processes if one.kind == "guard"), None)
+    if plan.guard.mode == "strict" and watched is not None:
+        message = f"guard: strict passes on by each machine's guard, and that of {plan.robot} is on {watched} only"
+        return finding("TF819", message, None, help="remove the guard's host, or watch: guard: {mode: watch}")
     host = asked or next((name for name in (machine, machine.partition(".")[0]) if name in hosts), None)
     if host is None and not without_host(plan):
         message = f"this machine is {machine}, and every process of {plan.robot} runs on another: {', '.join(hosts)}"
@@ -70,16 +69,24 @@ def told(plan: Plan) -> tuple[str, ...]:
 
 
 def _share(plan: Plan, host: str | None) -> Plan:
-    processes = tuple(_here(process, host) for process in plan.processes)
+    processes = tuple(_here(plan, process, host) for process in plan.processes)
     watched = next((one.host for one in plan.processes if one.kind == "guard"), None)
     guard = replace(plan.guard, mode="off") if watched not in (None, host) else plan.guard
-    return replace(plan, processes=processes, guard=guard, host=host or "")
+    edges = tuple(_seen_from(plan, edge, host) for edge in plan.edges) if guard.mode == "strict" else plan.edges
+    return replace(plan, edges=edges, processes=processes, guard=guard, host=host or "")
 
 
-def _here(process: PlanProcess, host: str | None) -> PlanProcess:
+def _seen_from(plan: Plan, edge: PlanEdge, host: str | None) -> PlanEdge:
+    """Return the edge as it is seen on a host: what another machine's process sends, its strict guard passes on."""
+    owner = plan.process(edge.owner)
+    if owner.kind == "external" or owner.host == host:
+        return edge
+    return replace(edge, node=next(iter(plan.guards_of(owner.host)), edge.node))
+
+
+def _here(plan: Plan, process: PlanProcess, host: str | None) -> PlanProcess:
     if process.kind == "guard":
-        end = f"_{_NO_NAME.sub('_', host)}" if host else ""  # no two nodes of one name
-        return replace(process, nodes=tuple(f"{node}{end}" for node in process.nodes))
+        return replace(process, nodes=plan.guards_of(host))
     return process if process.kind == "external" or process.host == host else _elsewhere(process)
 
 

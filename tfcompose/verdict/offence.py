@@ -85,8 +85,9 @@ def code_of(edge: PlanEdge, parent: str, *, static: bool, owner: bool, sure: boo
 
 
 def relays_of(plan: Plan) -> frozenset[str]:
-    """Return the nodes that may pass on what others own: the guard's, which does so where it is strict."""
-    return frozenset(node for process in plan.processes if process.kind == "guard" for node in process.nodes)
+    """Return the nodes that may pass on what others own: the guards of all hosts, where they are strict."""
+    hosts = {None, *(process.host for process in plan.processes)}
+    return frozenset(node for host in hosts for node in plan.guards_of(host))
 
 
 def may_be_owners(edge: PlanEdge, nodes: Sequence[str], relays: frozenset[str] = frozenset()) -> bool:

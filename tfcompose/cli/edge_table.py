@@ -58,7 +58,7 @@ def _row(seen: EdgeSeen, several: set[str]) -> tuple[str, ...]:
     strand, timing = seen.strand, seen.timing
     remarks = []
     if strand.refused is not None:
-        remarks.append(f"tf2 refuses it: {strand.refused.text}")
+        remarks.append(f"refused: {strand.refused.text}")
     if strand.child in several and seen.present is not False:
         remarks.append("not the only one")
     if seen.present is False:

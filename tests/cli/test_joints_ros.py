@@ -1,0 +1,116 @@
+"""A robot with moving joints and no hardware: up moves it, and up again gives it another description while it runs."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
+
+import pytest
+import yourdfpy
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from tests.waiting import until
+from tfcompose.observe import Buffer, Listener
+from tfcompose.ros.node import JOINT_STATES, LATCHED, open_node
+from tfcompose.ros.tf import Subscription
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+pytestmark = pytest.mark.ros
+
+#: The chain is written from its end, and its names sort the other way, too.
+ARM = """
+tfcompose: 1
+robot: arm
+ros: {frame_prefix: "r1/"}
+links: {base_link: {}, a: {}, b: {}, c: {}, d: {}, e: {}}
+joints:
+  a_last: {type: prismatic, parent: b, child: c, axis: [0, 1, 0], mimic: {joint: m_mid, multiplier: 0.5, offset: 0.1}, limit: {lower: -1, upper: 1, velocity: 1, effort: 1}}
+  m_mid:  {type: revolute, parent: a, child: b, xyz: [0, 0, 0.2], axis: [0, 1, 0], mimic: {joint: z_first, multiplier: -2}, limit: {lower: -3, upper: 3, velocity: 1, effort: 1}}
+  z_first: {type: revolute, parent: base_link, child: a, rpy: [0.3, 0, 0], limit: {lower: -1, upper: 1, velocity: 1, effort: 1}}
+  lift: {type: prismatic, parent: base_link, child: d, axis: [0, 0, 1], limit: {lower: 0.1, upper: 0.5, velocity: 0.1, effort: 1}}
+  wheel: {type: continuous, parent: base_link, child: e, xyz: [0, 0.3, 0], axis: [0, 1, 0]}
+rules: {TF708: off}
+processes: {states: {simulate: {joints: {z_first: 0.4, wheel: 100 deg}, rate: 50 Hz}}}
+"""  # noqa: E501 (flow style is shorter to read here)
+
+
+@pytest.fixture
+def tfc(domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., str]]:
+    """Run a command to its end in the test's folder, and end the robot with the test."""
+    assert domain
+    (tmp_path / "runtime").mkdir(mode=0o700)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "runtime"))
+    (tmp_path / "robot.yaml").write_text(ARM, encoding="utf-8")
+
+    def run(*words: str) -> str:
+        command = [sys.executable, "-m", "tfcompose", *words]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    yield run
+    run("down")
+
+
+def test_simulated_joints_move_the_robot_and_a_new_description_comes_while_it_runs(
+    tfc: Callable[..., str], tmp_path: Path
+) -> None:
+    """Positions are those of yourdfpy, from the description that was heard."""
+    tfc("up", "--wait")
+    with open_node("ears", "") as node, Listener(buffer := Buffer()):
+        states = Subscription(node, JointState, "/joint_states", JOINT_STATES)
+        texts = Subscription(node, String, "/robot_description", LATCHED)
+        heard: list[str] = []
+
+        def told(count: int) -> bool:
+            heard.extend(deserialize_message(each.data, String).data for each in texts.take())
+            return len(heard) == count
+
+        assert until(lambda: told(1))
+        agrees(buffer, heard[0], _positions(states))
+        (tmp_path / "robot.yaml").write_text(ARM.replace("xyz: [0, 0.3, 0]", "xyz: [0, 0.3, 0.7]"), encoding="utf-8")
+        assert "restarted: joints" in tfc("up", "--wait")
+        assert until(lambda: told(2)), "who listens gets the new one"
+        assert until(lambda: _z(buffer) == pytest.approx(0.7))
+        agrees(buffer, heard[1], _positions(states))
+
+
+def agrees(buffer: Buffer, description: str, positions: dict[str, float]) -> None:
+    expected = {"z_first": 0.4, "m_mid": -0.8, "a_last": -0.3, "lift": 0.3, "wheel": 1.7453292519943295}
+    assert positions == pytest.approx(expected), "mimics are sent, too; where 0 is out of the limits the middle counts"
+    model: Any = yourdfpy.URDF.load(BytesIO(description.encode()), load_meshes=False, build_scene_graph=True)
+    model.update_cfg({name: positions[name] for name in ("z_first", "lift", "wheel")})
+    frames = [f"r1/{name}" for name in "abde"]
+    assert until(lambda: all(buffer.can_transform("r1/base_link", frame, 0) for frame in frames))
+    for frame in frames:
+        found = buffer.lookup_many("r1/base_link", frame, [0]).matrices()[0]
+        assert found == pytest.approx(model.get_transform(frame.removeprefix("r1/")), abs=1e-9)
+    # yourdfpy follows one step of a mimic only.
+    slid = buffer.lookup("r1/b", "r1/c")[0]
+    assert slid.xyz == pytest.approx((0.0, -0.3, 0.0))
+
+
+def _z(buffer: Buffer) -> float:
+    z: float = buffer.lookup("r1/base_link", "r1/e")[0].xyz[2]
+    return z
+
+
+def _positions(states: Subscription) -> dict[str, float]:
+    found: dict[str, float] = {}
+
+    def come() -> bool:
+        for received in states.take():
+            message = deserialize_message(received.data, JointState)
+            found.update(zip(message.name, message.position, strict=True))
+        return bool(found)
+
+    assert until(come)
+    return found

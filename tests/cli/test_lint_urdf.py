@@ -223,6 +223,9 @@ LEVELS = {
         + JOINT.format("j", "fixed", ""), "warning"),
     "a body of less": ('<link name="a"><collision><geometry><sphere radius="-1"/></geometry></collision></link>'
         + JOINT.format("j", "fixed", ""), "error"),
+    "a tab between numbers": (
+        '<link name="a"/>' + JOINT.format("j", "fixed", '<origin xyz="1\t0 0" rpy=" 0 0 0 "/>'), "warning"),
+    "a line break": ('<link name="a"/>' + JOINT.format("j", "fixed", "<origin xyz='1 0 0\n'/>"), "warning"),
     "a block about nothing": ('<gazebo reference="gone"/>', "warning"),
     "a transmission of nothing": ('<transmission name="t"><joint name="gone"/></transmission>', "warning"),
 }  # fmt: skip

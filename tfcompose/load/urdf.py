@@ -24,6 +24,7 @@ DEEPEST = 100
 MOST_CHARACTERS = 16_000_000
 
 _ATTRIBUTE = re.compile(r"""([^\s=/>"']+)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
+_BROKEN = re.compile(r"""=\s*(?:"[^"<>]*[\t\r\n]|'[^'<>]*[\t\r\n])""")
 _BREAK = re.compile("\r\n|\r|\n")
 #: The bytes that begin no character in UTF-8.
 _INSIDE = bytes(range(0x80, 0xC0))
@@ -37,6 +38,7 @@ class _Text:
         self.text, self.file = text, file
         self.data = text.encode()
         self.starts = [0, *(found.end() for found in _BREAK.finditer(text))]
+        self.has_broken_values = _BROKEN.search(text) is not None
         self.before: list[int] = []  # the characters before each block of bytes; none where each byte is a character
         if len(self.data) != len(text):
             lengths = (_characters(self.data[at : at + _BLOCK]) for at in range(0, len(self.data), _BLOCK))
@@ -108,6 +110,15 @@ class Element:
                 group = 2 if written[2] is not None else 3
                 return self._source.span(written.start(group), len(written[group]) or 1)
         return self.at
+
+    def written(self, name: str) -> str:
+        """Return an attribute's value as it is written: XML makes spaces of tabs and line breaks in it."""
+        return next((found[2] or found[3] or "" for found in self._written() if found[1] == name), "")
+
+    @property
+    def has_broken_values(self) -> bool:
+        """Whether in the file a value of some attribute holds a tab or a line break."""
+        return self._source.has_broken_values
 
     def _written(self) -> Iterator[re.Match[str]]:
         """Yield the attributes as they are written."""

@@ -85,6 +85,8 @@ class Drafts:
         first, more = taken[0], f" and {len(taken) - 1} more" if taken[1:] else ""
         notes = [Note(f"{first} stands here", self.frames[first]), Note("and here", part.robot.frames[first])]
         advice = f"a prefix of its own, prefix: {part.name}/; or ros: {{shared_frames: [{first}]}}"
+        if not part.said.prefix and len(taken) == 1 and first != part.root and part.said.root is None:
+            advice = f"root: {first}, if the part begins there; or {advice}"
         message = f"the part {part.name} brings the frame {first}{more}, which is there already"
         place = self.source.at_key(("parts", part.name))
         self.found.append(finding("TF505", message, place, notes=notes, help=advice))

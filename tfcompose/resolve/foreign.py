@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _MACRO = re.compile(r"""<xacro:macro\s[^>]*?\bname\s*=\s*["'](?:xacro:)?([^"']+)""")
 _PARAMS = re.compile(r"""\bparams\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 _WORD = re.compile(r"""["']?(\w+)["']?""")
-_PACKAGE = re.compile(r"(?:package://|\$\(find(?:-pkg-share)?\s+)([A-Za-z][A-Za-z0-9_]*)\)?/(.+)")
+_PACKAGE = re.compile(r"(?:package://|\$\(find(?:-pkg-share)?\s+)([A-Za-z][A-Za-z0-9_.-]*)\)?/(.+)")
 
 
 @dataclass(frozen=True, slots=True)

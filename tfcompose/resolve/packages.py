@@ -63,6 +63,7 @@ class Packages:
     disk: Disk | None = None
     named: Mapping[str, tuple[str, Span]] = field(default_factory=dict)
     _above: dict[str, tuple[str, str]] = field(default_factory=dict)
+    _missed: set[tuple[str, str]] = field(default_factory=set)
 
     def places(self, name: str) -> list[str]:
         """Return where a package of that name would be, in the order of looking."""
@@ -109,7 +110,9 @@ class Packages:
             return Asset(uri, at), finding("TF723", f"{uri} is no address of a file", at, help=advice)
         folder = self.folder(name)
         if folder is None:
-            return Asset(uri, at, "", name, inside), self.not_found(name, at) if self.disk else None
+            is_new = self.disk is not None and (name, at.file) not in self._missed
+            self._missed.add((name, at.file))  # that a package is missing is said once of a file
+            return Asset(uri, at, "", name, inside), self.not_found(name, at) if is_new else None
         path = posixpath.join(folder, inside)
         return Asset(uri, at, path, name, inside), self._missing(path, f"no file {inside} in {name}", at)
 

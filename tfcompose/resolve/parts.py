@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 #: How many parts a robot may have, those of its parts counted.
 MOST_PARTS = 100
-#: Warnings about somebody else's file that its holder is told: something of the robot is left out, or not found.
-_TELLING = frozenset({"TF721", "TF723", "TF724"})
+#: Warnings about somebody else's file that its holder is told: what is not found here may be elsewhere.
+_TELLING = frozenset({"TF723", "TF724"})
 
 
 @dataclass(slots=True)

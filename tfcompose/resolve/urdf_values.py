@@ -47,6 +47,9 @@ class Values:
             text = element.attributes[name]
             self.refuse(f"{name}={text!r} is not {count}", element.place(name), _advice(text, len(default)))
             return default
+        if element.has_broken_values and re.search(r"[\t\r\n]", element.written(name).lstrip()):
+            message = f"a tab or a line break in the numbers of {name}"
+            self.refuse(message, element.place(name), "a space: readers of ROS refuse the robot for it", "warning")
         return values
 
     def number(self, element: Element | None, name: str, default: Any = None) -> Any:

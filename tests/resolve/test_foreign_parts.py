@@ -151,6 +151,34 @@ def test_names_that_are_beyond_letters_are_taken_from_others_and_renamed_everywh
     assert joint == root.find("joint/mimic").get("joint") == "left_shoulder-joint 1.0"  # type: ignore[union-attr]
 
 
+def test_a_package_of_the_robot_is_found_in_xacro_where_everything_is_relative(
+    cell: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert cell  # writes the package
+    (tmp_path / "robots").mkdir()
+    text = HEAD.replace("third/arm", "../third/arm") + '  slide: {xacro: "$(find arm)/slide.xacro", parent: table}\n'
+    (tmp_path / "robots/cell.yaml").write_text(text, "utf-8")
+    monkeypatch.chdir(tmp_path)
+    compiled = compile_robot(text, "robots/cell.yaml", library(), read=read_text, disk=disk())
+    assert sound(compiled).parent_edge("tool").pose.xyz == (0.5, 0, 0.25)
+
+
+@pytest.mark.parametrize(
+    ("find", "code", "message"),
+    [
+        ("$(find amr)/sizes.xacro", "TF724", "no package amr"),
+        ("$(find arm)/none.xacro", "TF018", "No such file or directory: "),
+        ("$(find arm)/base.stl", "TF018", "no element found: line 1, column 0 (in "),
+    ],
+)
+def test_what_xacro_cannot_find_is_said_once(cell: Any, tmp_path: Path, find: str, code: str, message: str) -> None:
+    slide = tmp_path / "third/arm/slide.xacro"
+    slide.write_text(XACRO.replace("$(find arm)/sizes.xacro", find), "utf-8")
+    (found,) = cell("slide: {xacro: third/arm/slide.xacro, parent: table}").errors
+    assert (found.code, found.message.count(message), found.message.count("Error")) == (code, 1, 0)
+    assert found.span.file.endswith("cell.yaml")
+
+
 def test_each_number_of_the_urdf_is_still_there(cell: Any) -> None:
     root = ET.fromstring(files(cell(LEFT))["robot.full.urdf"])  # noqa: S314 (our own text)
     joint = next(one for one in root.findall("joint") if one.get("name") == "left_shoulder")

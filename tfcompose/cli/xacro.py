@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import re
 from importlib import import_module
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.terminal import read_text
 from tfcompose.diagnostic import Diagnostic, RejectedError, Span, did_you_mean, finding
+from tfcompose.frozen import replace
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -44,9 +46,39 @@ def expanded(file: str, packages: Packages, arguments: Mapping[str, str] | None 
     except RejectedError:
         raise
     except Exception as error:  # noqa: BLE001 (xacro evaluates Python: anything can come out of it)
-        said = " ".join(str(error).split()) or type(error).__name__
-        raise RejectedError([finding("TF018", f"xacro: {said}", Span(file))]) from None
+        raise RejectedError([_refused(error, file, list(xacro.filestack or ()))]) from None
     return result
+
+
+class _MissingError(LookupError):
+    """A package is not to be found; ``found`` says where it was looked for."""
+
+    def __init__(self, found: Diagnostic) -> None:
+        super().__init__(found.message)
+        self.found = found
+
+
+def _refused(error: Exception, file: str, files: list[str]) -> Diagnostic:
+    """Return what xacro, or something that it called, did not like, with the macro and the file in which that is."""
+    chain: list[Any] = [error]
+    while getattr(chain[-1], "exc", None) is not None:  # xacro wraps what it calls, again and again
+        chain.append(chain[-1].exc)
+    root = chain[-1]
+    if isinstance(root, _MissingError):
+        return replace(root.found, severity="error", span=Span(file))
+    if isinstance(root, OSError):
+        words = [f"{root.strerror}: {root.filename}"]
+    else:
+        heads = [str(one.args[0]) for one in chain[:-1] if one.args and one.args[0]]
+        own = str(root) if hasattr(root, "suffix") or "line" in str(root) else f"{type(root).__name__}: {root}"
+        words = [*(head for head in heads if str(root) not in head), own]
+        words += [str(one.suffix) for one in reversed(chain[:-1]) if getattr(one, "suffix", None)]
+    said = " ".join(" ".join(words).split()) or type(error).__name__
+    macros = [str(getattr(one, "name", one)) for one in getattr(error, "macros", ())]
+    where = [f"in the macro {name}" for name in macros[:1]]
+    others = [name for name in files[-1:] if name and Path(name).absolute() != Path(file).absolute()]
+    where += [f"in {os.path.relpath(name)}" for name in others]
+    return finding("TF018", f"xacro: {said}{f' ({chr(44).join(where)})' if where else ''}", Span(file))
 
 
 def _document(xacro: Any, file: str, text: str | None, arguments: dict[str, str]) -> Any:
@@ -83,9 +115,8 @@ def _finding(packages: Packages) -> Iterator[None]:
     def find(name: str) -> str:
         folder = packages.folder(name)
         if folder is None:
-            missing = packages.not_found(name, None)
-            raise LookupError(f"{missing.message}: {missing.help}")
-        return folder
+            raise _MissingError(packages.not_found(name, None))
+        return str(Path(folder).absolute())  # relative paths in xacro begin at the file that includes
 
     substitution._eval_find = find  # noqa: SLF001 (as above)
     try:

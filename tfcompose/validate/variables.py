@@ -65,6 +65,10 @@ def _filled(value: Any, path: Path, variables: _Variables) -> Any:
 LATER = re.compile(r"\$\{\s*(?:(?:frame|file)\([^(){}]*\)|params_file|build_dir)\s*\}")
 
 
+#: A block may hold what is for another program to fill in.
+_LITERALLY = """what others fill in: ${dollar}{…}, with vars: {dollar: "$"}"""
+
+
 def _is_of_a_process(path: Path) -> bool:
     return path[0] == "processes" or (path[0] == "sensors" and path[2:3] == ("driver",))
 
@@ -116,7 +120,8 @@ class _Variables:
 
     def _refuse(self, error: ExpressionError, path: Path) -> Any:
         if not isinstance(error, _NothingNewError):
-            self.problems.refuse("TF105", path, str(error), error.advice)
+            advice = f"{error.advice}; {_LITERALLY}" if path[0] == "xml" else error.advice
+            self.problems.refuse("TF105", path, str(error), advice)
         return BROKEN
 
     def lookup(self, name: str) -> Value:

@@ -56,6 +56,20 @@ def echo(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.usefixtures("rover")
+def test_a_time_before_it_listened_is_looked_for_in_recordings() -> None:
+    done = echo("odom", "camera", "--at", "1000000000.5", "--timeout", "3")
+    assert done.returncode == 1
+    assert "would be extrapolation into the past" in done.stderr
+    assert "look into a recording: --bag" in done.stderr
+
+
+@pytest.mark.usefixtures("rover")
+def test_names_are_tf2s_without_a_slash_before_them() -> None:
+    pose = json.loads(echo("/odom", "/camera", "--once", "--format", "json").stdout)
+    assert (pose["parent"], pose["child"]) == ("odom", "camera")
+
+
+@pytest.mark.usefixtures("rover")
 def test_once_prints_the_pose_in_metres_quaternion_radians_and_degrees() -> None:
     done = echo("odom", "camera", "--once")
     assert done.returncode == 0, done.stderr

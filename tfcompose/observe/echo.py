@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from tfcompose.pose import Pose
     from tfcompose.ros.stop import Stop
 
+TOO_EARLY = "echo hears the tree from its own start on; for a time before, look into a recording: --bag"
+
 
 def echo(asked: Asked, say: Callable[[Pose, int | None], None], stop: Stop) -> Missed | None:
     """Give each pose, with its time in nanoseconds (None: all edges are fixed), to ``say``.
@@ -59,7 +61,7 @@ def echo(asked: Asked, say: Callable[[Pose, int | None], None], stop: Stop) -> M
                 reason = f"nothing new came on {ear.buffer.behind(asked.a, asked.b)} for {now - last:.1f} s"
             if now - last > asked.timeout_s:
                 if ear.messages:
-                    return Missed(ear.why(reason))
+                    return Missed(ear.why(reason), TOO_EARLY if asked.at_ns > 0 and "into the past" in reason else "")
                 elsewhere = tf_elsewhere(topics_of(node), [topic for _, topic in topics])
                 return Missed(f"no TF message came for {now - begun:.1f} s", advice(elsewhere))
     return None

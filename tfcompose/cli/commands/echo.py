@@ -66,10 +66,11 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Echo until a signal comes; exit code 1 if there was no pose."""
+    # tf2 takes a name with a slash before it for the name.
+    arguments.a, arguments.b = (name.removeprefix("/") for name in (arguments.a, arguments.b))
     asked = Asked(
-        arguments.a.removeprefix("/"), arguments.b.removeprefix("/"), arguments.once, arguments.rate,
-        arguments.timeout, arguments.namespace, arguments.at,
-    )  # fmt: skip
+        arguments.a, arguments.b, arguments.once, arguments.rate, arguments.timeout, arguments.namespace, arguments.at
+    )
 
     def say(pose: Pose, stamp_ns: int | None) -> None:
         sys.stdout.write(_written(arguments, clean(pose), stamp_ns))

@@ -59,8 +59,8 @@ def other_settings(seen: Seen) -> Iterator[Diagnostic]:
         apart = differences(process.settings, seen.settings)
         if apart:
             found.setdefault(tuple(apart.items()), []).append(process)
-    # Those of this domain first: they are of this robot.
-    order = sorted(found.items(), key=lambda item: (DOMAIN in dict(item[0]), -len(item[1])))
+    # Those of this domain first: they are of this robot. Else who was started last, as robots are that one looks for.
+    order = sorted(found.items(), key=lambda item: (DOMAIN in dict(item[0]), -max(one.pid for one in item[1])))
     for apart_items, processes in order[:MOST_SETTINGS]:
         number = "a ROS process" if len(processes) == 1 else f"{len(processes)} ROS processes"
         settings = [f"{name}={value}" for name, value in apart_items]

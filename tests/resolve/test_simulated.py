@@ -104,7 +104,7 @@ def test_a_slide_without_limits_cannot_sweep() -> None:
         ("{bend: swep}", "TF106", "did you mean sweep?"),
         ("{bend: 3 kg}", "TF104", ""),
         ("{bent: sweep}", "TF703", "did you mean bend?"),
-        ("{follow: sweep}", "TF703", ""),
+        ("{follow: sweep}", "TF703", "say the position of bend"),
         ("[1, 2]", "TF103", ""),
     ],
 )

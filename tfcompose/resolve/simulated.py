@@ -33,9 +33,10 @@ def with_positions(
     wanted = said.simulate.joints if said and said.simulate else None
     if process.simulate is None or process.simulate.kind != "joints" or wanted is None:
         return process
-    joints = {edge.joint.name: edge.joint for edge in edges if edge.joint and _has_position(edge.joint)}
+    all_joints = {edge.joint.name: edge.joint for edge in edges if edge.joint}
+    joints = {name: joint for name, joint in all_joints.items() if _has_position(joint)}
     if isinstance(wanted, dict):
-        found += _findings(wanted, joints, process, source)
+        found += _findings(wanted, all_joints, process, source)
     each = {name: wanted.get(name, None) if isinstance(wanted, dict) else wanted for name in joints}
     positions = {
         name: _rest(joints[name]) if what is None or isinstance(what, str) else what for name, what in each.items()
@@ -49,12 +50,17 @@ def _findings(
     wanted: dict[str, Any], joints: dict[str, Joint], process: Process, source: Source
 ) -> Iterator[Diagnostic]:
     """Give a finding for each joint that is not there, or cannot move as it should."""
+    movable = [name for name, joint in joints.items() if _has_position(joint)]
     for name, what in wanted.items():
         place = source.at_key(("processes", process.name, "simulate", "joints", name))
-        if name not in joints:
-            advice = did_you_mean(name, joints, f"there is {', '.join(joints)}" if joints else "no joint moves")
+        joint = joints.get(name)
+        if joint and joint.mimic:
+            advice = f"say the position of {joint.mimic}"
+            yield finding("TF703", f"{name} has no position of its own: it mimics {joint.mimic}", place, help=advice)
+        elif name not in movable:
+            advice = did_you_mean(name, movable, f"there is {', '.join(movable)}" if movable else "no joint moves")
             yield finding("TF703", f"no moving joint {name}", place, help=advice)
-        elif what == SWEEP and _sweep(joints[name]) is None:
+        elif joint and what == SWEEP and _sweep(joint) is None:
             advice = f"give {name} a limit: {{lower, upper}}, or say a position here"
             yield finding("TF106", f"{name} slides and has no limits to sweep between", place, help=advice)
 

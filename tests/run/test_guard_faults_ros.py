@@ -15,6 +15,7 @@ import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
+from tests.run.nameless import nameless_guard
 from tests.waiting import until
 
 if TYPE_CHECKING:
@@ -235,6 +236,21 @@ def test_a_guard_that_is_killed_is_back_with_what_it_knew_and_tells_nothing_twic
     assert robot.count("TF801", "/rogue;") == 1
     assert (robot.count("| live "), robot.count("complete"), robot.count("watching 2 edges again")) == (2, 1, 1)
     assert robot.count("fell silent", "slam") == 0
+
+
+def test_where_ids_do_not_say_whose_they_are_two_on_an_edge_are_named_as_one_of_all_on_the_topic(
+    up: Callable[[str], Running], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in nameless_guard(tmp_path).items():
+        monkeypatch.setenv(name, value)
+    robot = up(ROBOT)
+    robot.joins("/drive", "odom base_link")
+    robot.says("complete")
+    robot.says("guard", "this rmw does not say with a message who sent it")
+    robot.joins("/rogue", "map odom")
+    robot.says("error[TF801] map → odom is published by one of /drive, /rogue, /slam; the owner is slam (/slam)")
+    assert robot.count("error[") == 1
+    assert robot.count("fell silent") == 0
 
 
 #: A child that owns an edge, and from a while after its start sends that of another.

@@ -67,6 +67,7 @@ class History:
     clock: str = "wall"
     settle_s: float = SETTLE_S
     gids: bool = True
+    says_who: bool = True
     edges: tuple[PlanEdge, ...] = EDGES
     claims: tuple[Claim, ...] = ()
     now: float = 1000.0
@@ -79,7 +80,7 @@ class History:
     def __post_init__(self) -> None:
         settings = RosSettings(clock=self.clock)
         plan = Plan("rover", "0", "base", settings, self.edges, self.processes, self.guard, self.claims)
-        self.judge = Judge(plan, self.settle_s, self.now, self.wall_ns())
+        self.judge = Judge(plan, self.settle_s, self.now, self.wall_ns(), says_who=self.says_who)
         self.looked = self.now
 
     def wall_ns(self) -> int:
@@ -111,7 +112,7 @@ class History:
         publisher.sent += 1
         pairs = tuple((names.split()[0], names.split()[1]) for names in edges.split(", "))
         kind = publisher.static if static is None else static
-        gid = publisher.gid if self.gids else None
+        gid = (publisher.gid if self.says_who else publisher.gid[:8] + bytes(8)) if self.gids else None
         sent_ns = self.wall_ns() - round(ago * 1e9)
         stamps = () if stamp_s is None else (round(stamp_s * 1e9),) * len(pairs)
         message = Message(pairs, kind, gid, sent_ns, publisher.sent, stamps, self.wall_ns())
@@ -579,6 +580,44 @@ def test_without_ids_one_of_those_that_may_have_sent_it_is_blamed_once_and_nobod
     running.repeat(rogue, "map odom", 20)
     assert running.said() == ["TF801 map → odom is published by one of /drive, /rogue; the owner is slam (/slam)"]
     assert running.all(Taken) == []
+
+
+def test_ids_that_do_not_say_whose_they_are_tell_two_that_take_turns_apart() -> None:
+    running = History(says_who=False).clear()
+    slam, rogue = running.joins("/slam"), running.joins("/rogue")
+    running.repeat(slam, "map odom", 5)
+    for _ in range(20):
+        running.send(slam, "map odom").send(rogue, "map odom").wait(0.1)
+    assert running.said() == ["TF801 map → odom is published by one of /rogue, /slam; the owner is slam (/slam)"]
+    running.leaves(rogue)
+    running.repeat(slam, "map odom", 400)
+    assert len(running.all(Recovered)) == 1
+
+
+def test_ids_that_do_not_say_whose_they_are_blame_no_owner_and_nobody_who_was_started_anew() -> None:
+    running = History(says_who=False).clear()
+    slam, drive = running.joins("/slam"), running.joins("/drive")
+    static = running.joins("/static", static=True)
+    running.send(static, "base lidar", static=True)
+    for _ in range(30):
+        running.send(slam, "map odom").send(drive, "odom base").wait(0.1)
+    running.leaves(slam)
+    again = running.joins("/slam")
+    for _ in range(30):
+        running.send(again, "map odom").send(drive, "odom base").wait(0.1)
+    assert running.said() == []
+    assert {one.child for one in running.all(Live) if isinstance(one, Live)} >= {"odom", "base"}
+
+
+def test_ids_that_do_not_say_whose_they_are_name_all_who_may_have_sent_what_nobody_there_owns() -> None:
+    running = History(says_who=False).clear()
+    drive, rogue = running.joins("/drive"), running.joins("/rogue")
+    for _ in range(30):
+        running.send(drive, "odom base").send(rogue, "map odom, base cup").wait(0.1)
+    assert running.said() == [
+        "TF801 map → odom is published by one of /drive, /rogue; the owner is slam (/slam)",
+        "TF803 base → cup is published by one of /drive, /rogue, and nobody declared it",
+    ]
 
 
 def test_a_name_that_is_part_of_the_owners_does_not_pass_for_it() -> None:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import psutil
 import pytest
 
+from tests.run.nameless import nameless_guard
 from tests.waiting import until
 from tfcompose.ros.graph import writers
 from tfcompose.ros.message import Transform, decode, encode
@@ -79,13 +80,6 @@ processes:
   rogue: {rogue}
 guard: {{mode: strict, fence: {fence}}}
 """
-#: Read by each Python that starts: the guard's rmw does not say with a message who sent it, as that of Cyclone DDS.
-NAMELESS = """
-import sys
-if "tfcompose.run.guard" in sys.orig_argv:
-    import tfcompose.ros.identity
-    tfcompose.ros.identity.ids_say_who = lambda node: False
-"""
 FRAMES = {"odom", "base_link", "laser", "arm", "tool", "hand"}
 FIXED = {"laser", "arm", "tool"}
 
@@ -98,7 +92,7 @@ def child(name: str, fixed: list[str], moving: list[str], folder: Path) -> str:
 class Fenced:
     """A robot under a strict guard."""
 
-    def __init__(self, folder: Path, fence: str) -> None:
+    def __init__(self, folder: Path, fence: str, env: dict[str, str]) -> None:
         (folder / "child.py").write_text(CHILD, encoding="utf-8")
         text = ROBOT.format(
             fence=fence,
@@ -108,10 +102,9 @@ class Fenced:
         )
         (folder / "robot.yaml").write_text(text, encoding="utf-8")
         self.output = folder / "output.txt"
-        env = os.environ | {"PYTHONPATH": os.pathsep.join([str(folder / "site"), *sys.path])}
         with self.output.open("wb") as out:
             command = [sys.executable, "-m", "tfcompose", "up"]
-            self.popen = subprocess.Popen(command, cwd=folder, stdout=out, stderr=out, env=env)
+            self.popen = subprocess.Popen(command, cwd=folder, stdout=out, stderr=out, env=os.environ | env)
 
     @property
     def text(self) -> str:
@@ -136,10 +129,7 @@ class Fenced:
 def robot(request: pytest.FixtureRequest, domain: object, tmp_path: Path) -> Iterator[Fenced]:
     assert domain
     fence, _, nameless = request.param.partition(" ")
-    if nameless:
-        (tmp_path / "site").mkdir()
-        (tmp_path / "site" / "sitecustomize.py").write_text(NAMELESS, encoding="utf-8")
-    running = Fenced(tmp_path, fence)
+    running = Fenced(tmp_path, fence, nameless_guard(tmp_path) if nameless else {})
     try:
         running.says("tree complete")
         yield running

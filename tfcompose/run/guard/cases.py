@@ -76,13 +76,17 @@ class Cases:
 
     def note(self, offence: Offence, gid: bytes | None, now: float) -> Case:
         """Note that the offence was seen now."""
-        # Without ids, who may have done it changes from message to message.
-        key = (offence.code, offence.parent, offence.child, "" if gid is None else offence.who)
+        key = self._key(offence, gid)
         case = self.open.setdefault(key, Case(offence, gid, now))
         case.gid, case.last = gid, now
         if offence.nodes:  # what was blamed on nobody has a name now
             self.open.pop((offence.code, offence.parent, offence.child, NAMELESS), None)
         return case
+
+    def _key(self, offence: Offence, gid: bytes | None) -> Key:
+        """Return what the case is known by; where ids do not say whose, who may have done it changes all the time."""
+        who = offence.who if self._senders.is_sure(gid) else ""
+        return (offence.code, offence.parent, offence.child, who)
 
     @property
     def untold(self) -> bool:
@@ -152,8 +156,7 @@ class Cases:
         planned = {edge.child: edge for edge in self._plan.edges}
         for one in memory:
             case = _from_json(one, planned, until)
-            key = (case.offence.code, case.offence.parent, case.offence.child, case.offence.who if case.gid else "")
-            self.open[key] = case
+            self.open[self._key(case.offence, case.gid)] = case
 
     def over(self, now: float) -> list[GuardEvent]:
         """Forget offences that have ended, and say so; the next of their kind is a new case."""

@@ -46,13 +46,12 @@ class Ear:
     def take(self) -> Iterator[Heard]:
         """Yield what has come, but from oneself.
 
-        What comes on a process's own topic is of that process, also where the rmw does not say whose it is.
+        What comes on a process's own topic is of that process, also where the rmw does not say whose it is. On others
+        the id that it has instead stands for its sender.
         """
         for subscription, static, process in self._subscriptions:
             for received in subscription.take():
                 if received.raw_gid in self.own and received.raw_gid is not None:
                     continue
-                if process and received.gid is None:
-                    yield Heard(replace(received, gid=id_of_topic(subscription.topic)), static, process)
-                else:
-                    yield Heard(received, static, process)
+                gid = received.gid or (id_of_topic(subscription.topic) if process else received.raw_gid)
+                yield Heard(received if gid == received.gid else replace(received, gid=gid), static, process)

@@ -38,6 +38,7 @@ FINDING_S = 5.0
 class Judge:
     """The state of one watch over one plan. ``settle_s`` is how long it looks before it says that all is clear.
 
+    ``says_who`` says whether the ids of messages are those of the graph; where they are not, they tell senders apart.
     ``admitted`` are the edges of the last message that may pass in a strict plan; None: all.
     """
 
@@ -45,11 +46,12 @@ class Judge:
     settle_s: float
     begun: float
     begun_ns: int
+    says_who: bool = True
     live: Liveness = field(init=False)
     clocks: Clocks = field(init=False)
     cases: Cases = field(init=False)
     _start: Start = field(init=False)
-    _senders: Senders = field(default_factory=Senders)
+    _senders: Senders = field(init=False)
     _law: Law = field(init=False)
     _streams: Streams = field(init=False)
     _endpoints: Endpoints = field(init=False)
@@ -61,6 +63,7 @@ class Judge:
         self.live = Liveness(self.plan)
         self.clocks = Clocks(self.plan.ros.clock == "sim")
         self._start = Start(self.begun, self.begun_ns)
+        self._senders = Senders(says_who=self.says_who)
         self.cases = Cases(self.plan, self._senders, self._start)
         self._law = Law(self.plan, self._senders, self._start)
         self._streams = Streams(self._law, self._senders, self.cases, self._start)

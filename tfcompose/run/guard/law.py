@@ -76,7 +76,8 @@ class Law:
         if not (current != sight.gid == before and self._senders.is_present(current)):
             return None
         named = self._senders.nodes(current, static=static)
-        return Offence(TWO_WRITERS, parent, child, nodes, static, None, detail=f"by {named[0] if named else 'another'}")
+        other = named[0] if len(named) == 1 else "another"
+        return Offence(TWO_WRITERS, parent, child, nodes, static, None, detail=f"by {other}")
 
     def _is_namesake(self, edge: PlanEdge, sight: Sight) -> bool:
         """Whether a publisher has the owner's name and is not the owner.

@@ -91,9 +91,14 @@ class Sender:
 
 
 class Senders:
-    """All publishers that were heard, or that the graph shows."""
+    """All publishers that were heard, or that the graph shows.
 
-    def __init__(self) -> None:
+    Where the rmw does not say who sent a message (``says_who``), its id tells senders apart, and any node on the topic
+    may be the one.
+    """
+
+    def __init__(self, *, says_who: bool = True) -> None:
+        self._says_who = says_who
         self.writers: dict[bytes, Writer] = {}
         self._names: dict[bytes, tuple[str, ...]] = {}
         self._where: dict[bytes, str] = {}
@@ -159,18 +164,22 @@ class Senders:
         """Return what is known of that publisher's messages."""
         return None if gid is None else self._heard.get(gid)
 
+    def is_sure(self, gid: bytes | None) -> bool:
+        """Whether the id says whose it is: by the graph, once it shows the publisher."""
+        return gid is not None and (self._says_who or gid in self._names)
+
     def nodes(self, gid: bytes | None, *, static: bool) -> tuple[str, ...]:
-        """Return the publisher's node; where the rmw gives no id, all on the topic; nothing while none is known.
+        """Return the publisher's node, nothing while it is not known; all on the topic where ids do not say whose.
 
         One that sends behind a fence of remappings has an id in any case.
         """
-        if gid is not None:
+        if gid is not None and self.is_sure(gid):
             return self._names.get(gid, ())
         return tuple(sorted({w.node for w in self.writers.values() if w.static == static and w.node and not w.fenced}))
 
     def is_present(self, gid: bytes | None) -> bool:
-        """Whether the publisher is in the graph; one without an id is while anybody is."""
-        return bool(self.writers) if gid is None else gid in self.writers
+        """Whether the publisher is in the graph; one whose id does not say whose it is, is while anybody is."""
+        return gid in self.writers if self.is_sure(gid) else bool(self.writers)
 
 
 def _to_json(one: Sender) -> list[Any]:

@@ -59,7 +59,7 @@ class SentPoses:
             nodes = self._senders.nodes(sent.gid, static=sent.static)
             if not nodes:
                 waiting.append(sent)
-            elif sent.expected.edge.node in nodes and is_off(sent.expected, sent.pose):
+            elif nodes == (sent.expected.edge.node,) and is_off(sent.expected, sent.pose):
                 wrong.setdefault((nodes[0], sent.expected.driven.sensor), []).append((sent.expected, sent.pose))
         self._waiting = waiting
         return [Found(driver_pose_differs(node, off)) for (node, _), off in wrong.items()]

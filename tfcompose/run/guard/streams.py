@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from tfcompose.run.guard.cases import Case, Cases, Start
     from tfcompose.run.guard.law import Law
     from tfcompose.run.guard.senders import Message, Senders
+    from tfcompose.verdict.offence import Offence
 
 #: How long a publisher may stay without a name before it is judged all the same; longer if it may be the owner.
 NAMELESS_S = 0.7
@@ -83,16 +84,18 @@ class Streams:
     def judge(self, stream: Stream, message: Message, now: float) -> None:
         """Judge the edges of a message whose sender has a name; the verdict holds if all is certain."""
         nodes = self._senders.nodes(message.gid, static=message.static)
-        epoch, certain = self._law.changes, message.gid is not None
+        sure = self._senders.is_sure(message.gid)
+        epoch, certain = self._law.changes, sure
         cases, children, admitted = [], [], []
         for parent, child in dict.fromkeys(message.edges):
             sight = Sight(message.gid, parent, child, message.static)
-            # Without ids, the sender may be one that the graph does not show yet.
-            if not nodes or (message.gid is None and self._law.offence(sight, nodes, now)):
+            offence = self._law.offence(sight, nodes, now) if nodes else None
+            # Where ids do not say whose they are, the sender may be one that the graph does not show yet.
+            if not nodes or (offence and not sure and not offence.namesake):
                 self._pending.setdefault(sight, now)
                 certain = False
                 continue
-            case, arrived = self._judge(sight, nodes, now)
+            case, arrived = self._note(offence, sight, now)
             if case:
                 cases.append(case)
                 certain = certain and not case.offence.namesake
@@ -111,9 +114,9 @@ class Streams:
         arrived: dict[bytes | None, list[str]] = {}
         for sight, since in list(self._pending.items()):
             nodes = self._senders.nodes(sight.gid, static=sight.static)
-            if (nodes and sight.gid is not None) or now - since >= self._patience_s(sight, nodes):
+            if (nodes and self._senders.is_sure(sight.gid)) or now - since >= self._patience_s(sight, nodes):
                 del self._pending[sight]
-                if self._judge(sight, nodes, now)[1]:
+                if self._note(self._law.offence(sight, nodes, now), sight, now)[1]:
                     arrived.setdefault(sight.gid, []).append(sight.child)
         return [tuple(children) for children in arrived.values()]
 
@@ -128,9 +131,8 @@ class Streams:
         early = self._start.cleared is None and self._law.started.get(edge.owner, False)
         return NAMELESS_S if known or early else NAMELESS_OWNER_S
 
-    def _judge(self, sight: Sight, nodes: tuple[str, ...], now: float) -> tuple[Case | None, bool]:
-        """Return the case that the sight is, if it is one, and whether the owner's edge has come."""
-        offence = self._law.offence(sight, nodes, now)
+    def _note(self, offence: Offence | None, sight: Sight, now: float) -> tuple[Case | None, bool]:
+        """Return the case that the offence is, if there is one, and whether the owner's edge has come."""
         case = self._cases.note(offence, sight.gid, now) if offence else None
         planned = sight.child in self._law.planned
         # Of two that take turns either may be the owner; its edge is not silent.

@@ -89,10 +89,11 @@ def _watches(
     settle_s = float(os.environ.get(SETTLE, DEFAULT_SETTLE_S)) if judges and not joins else 0.0
     private = private_topics(own.plan) if REMAPPED in os.environ else None
     now = time.monotonic()
+    says_who = ids_say_who(node)
     watches = []
     for topics, plan in plans.items():
         # One that judges nobody, or joins, takes every owner as the plan's, whenever it began.
-        judge = Judge(plan, settle_s, now, 0 if joins or not judges else time.time_ns())
+        judge = Judge(plan, settle_s, now, 0 if joins or not judges else time.time_ns(), says_who=says_who)
         watches.append(Eyes(node, topics, judge, emit, _of(private, own.plan, topics)))
         if joins or not judges:
             watches[-1].begin(now, left.get(" ".join(topics)))

@@ -34,6 +34,17 @@ def test_lines_of_several_processes_come_in_the_order_in_which_they_were_written
     ]
 
 
+def test_processes_of_parts_have_logs_too(tmp_path: Path) -> None:
+    logs = Logs(tmp_path / "logs", file_bytes=100)
+    for number in range(10):
+        for name in ("static", "arm/static", "arm/tool/static"):
+            assert logs.write(name, f"line {number} of {name}") is None
+    logs.close()
+    assert logged(tmp_path / "logs") == ["arm/static", "arm/tool/static", "static"]
+    for name in logged(tmp_path / "logs"):
+        assert [text for _, _, text in read_logs(tmp_path / "logs", [name])][-1] == f"line 9 of {name}"
+
+
 def test_a_file_that_is_full_is_turned_over_and_the_oldest_lines_go(tmp_path: Path) -> None:
     logs = Logs(tmp_path, file_bytes=1000)
     for number in range(1000):

@@ -71,8 +71,8 @@ class Logs:
         self._open.clear()
 
     def _begin(self, process: str) -> _Log:
-        self.folder.mkdir(parents=True, exist_ok=True)
-        path = self.folder / f"{process}.log"
+        path = self.folder / f"{process}.log"  # of a part in a folder: arm/driver
+        path.parent.mkdir(parents=True, exist_ok=True)
         fd = os.open(path, os.O_CREAT | os.O_WRONLY | os.O_APPEND | os.O_NOFOLLOW, 0o640)
         log = self._open[process] = _Log(path, fd, os.fstat(fd).st_size)
         return log
@@ -97,7 +97,7 @@ class Logs:
 
 def logged(folder: Path) -> list[str]:
     """Return the names of the processes that have a log, the launcher's among them."""
-    return sorted(file.name.removesuffix(".log") for file in folder.glob("*.log"))
+    return sorted(file.relative_to(folder).as_posix().removesuffix(".log") for file in folder.rglob("*.log"))
 
 
 def read_logs(folder: Path, names: list[str]) -> Iterator[tuple[str, str, str]]:

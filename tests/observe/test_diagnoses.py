@@ -279,3 +279,13 @@ def test_a_description_gives_its_moving_joints_and_nothing_where_it_is_none() ->
 
 def test_times_are_said_as_people_say_them() -> None:
     assert [seconds(value) for value in (0.12, 3.21, 7200, 864000)] == ["120 ms", "3.21 s", "2 h", "10 days"]
+
+
+def test_joint_states_of_a_robot_beside_are_not_this_ones() -> None:
+    tf, states = "tf2_msgs/msg/TFMessage", "sensor_msgs/msg/JointState"
+    heard = Topic("/robot1/joint_states", states, ("/robot1/wheels",), ("/robot1/joints",))
+    beside = (Topic("/tf", tf, ("/drive",)), Topic("/robot1/tf", tf, ("/robot1/joints",)), heard)
+    history = History().moving("odom base_link")
+    assert "TF842" not in {one.code for one in diagnose(history.seen(graph=beside))}
+    alone = (Topic("/tf", tf, ("/drive",)), heard)  # nobody below /robot1 publishes TF: they are meant for this tree
+    assert "TF842" in {one.code for one in diagnose(history.seen(graph=alone))}

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, finding
 from tfcompose.observe.seen import listed
+from tfcompose.ros.message import TF_MESSAGE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -63,8 +64,19 @@ def _missing(seen: Seen) -> list[Movable]:
 
 
 def _joint_topics(seen: Seen) -> list[Topic]:
-    """Return the topics of joint states that are meant: those named ``joint_states``."""
-    return [topic for topic in seen.typed(JOINT_STATE) if topic.name.endswith("/joint_states")]
+    """Return the topics of joint states that are meant: those named ``joint_states``, but for robots beside this one.
+
+    A robot beside has TF topics of its own, in a namespace below this one's.
+    """
+    own = _namespace(seen.topics[0])
+    spaces = {_namespace(topic.name) for topic in seen.typed(TF_MESSAGE) if topic.publishers}
+    beside = tuple(f"{space}/" for space in spaces if space != own and space.startswith(f"{own}/"))
+    named = [topic for topic in seen.typed(JOINT_STATE) if topic.name.endswith("/joint_states")]
+    return [topic for topic in named if topic.name.startswith(f"{own}/") and not topic.name.startswith(beside)]
+
+
+def _namespace(topic: str) -> str:
+    return topic.rpartition("/")[0]
 
 
 def _transformers(seen: Seen, topic: Topic) -> list[str]:

@@ -508,6 +508,32 @@ def test_ctrl_c_before_anything_came_is_no_finding(start: Callable[..., Started]
         assert all(line.startswith("tfcompose: ended by a signal after 0.") for line in process.errors)
 
 
+def test_a_node_that_asks_a_discovery_server_is_named(domain: Any) -> None:
+    """It announces itself to its server only, and hears of nobody else."""
+    environment = {**domain.environment, "ROS_DISCOVERY_SERVER": "127.0.0.1:11811"}
+    with subprocess.Popen([sys.executable, "-c", FAR], stdout=subprocess.PIPE, text=True, env=environment) as process:
+        try:
+            assert process.stdout
+            assert process.stdout.readline() == "up\n"
+            _, found = doctor(seconds=2.0)
+        finally:
+            process.kill()
+    assert "no other node was seen" in said(found, "TF845")
+    assert "ROS_DISCOVERY_SERVER=127.0.0.1:11811, and here ROS_DISCOVERY_SERVER is unset" in said(found, "TF908")
+
+
+def test_where_other_robots_are_beside_is_said(stage: Stage) -> None:
+    sound(stage)
+    stage.moving(stage.node("drive", "robot2"), "odom base_link", topic="/robot2/tf")
+    command = [sys.executable, "-m", "tfcompose", "doctor", "--for", "3"]
+
+    def is_said() -> bool:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=40, check=False)
+        return done.stdout.endswith("there is TF on /robot2/tf too: --namespace /robot2\n")
+
+    assert any(is_said() for _ in range(LOOKS))
+
+
 OTHER_RMW = """
 import mmap, sys, time
 with open(sys.argv[1], "rb") as file:

@@ -109,9 +109,45 @@ def test_junit_has_a_case_for_each_edge(tmp_path: Path, robot: str) -> None:
     assert cases["rover.static", "base_link → mast_link"].find("failure") is None
 
 
+@pytest.mark.parametrize(
+    ("sent", "code", "message"),
+    [
+        (
+            [fixed("mast_link"), ("/tf_static", 0.0, "odom", "laser_link", 0.0, (0.0, 0.0, 0.3), UP), *drive()],
+            "TF802",
+            "laser_link hangs on odom, and belongs on base_link",
+        ),
+        (
+            [fixed("mast_link"), ("/tf", 0.0, "base_link", "laser_link", 0.0, (0.0, 0.0, 0.3), UP), *drive()],
+            "TF809",
+            "base_link → laser_link is published on /tf, declared for /tf_static",
+        ),
+        (
+            [*RIGHT[:2], *drive(2.0), (*fixed("laser_link", 0.3)[:1], 9.0, *fixed("laser_link", 0.3)[2:])],
+            "TF804",
+            "drive (/diff_drive) fell silent: nothing on odom → base_link for 7.02 s",
+        ),
+        (
+            [*RIGHT[:2], *(one for one in drive() if not 1.0 < one[1] < 2.0)],
+            "TF804",
+            "drive (/diff_drive) was silent: nothing on odom → base_link for 1.02 s",
+        ),
+    ],
+    ids=["parent", "topic", "silent", "gap"],
+)
+def test_each_difference_is_told_of_a_bag_without_a_publisher(
+    tmp_path: Path, robot: str, sent: list[Sent], code: str, message: str
+) -> None:
+    bag = write_bag(tmp_path / "bag", sent)
+    [found] = json.loads(tfcompose("verify", robot, "--bag", str(bag), "--format", "json", code=1).stdout)
+    assert (found["code"], found["message"]) == (code, message)
+
+
 def test_wrong_use_and_what_cannot_be_read_is_exit_code_2(tmp_path: Path, robot: str) -> None:
     bag = write_bag(tmp_path / "bag", RIGHT)
     tfcompose("verify", robot, "--bag", str(bag), "--live", code=2)
+    tfcompose("tree", "--bag", str(bag), "--live", code=2)
+    tfcompose("monitor", "--bag", str(bag), "--for", "3", code=2)
     tfcompose("verify", str(tmp_path / "none.yaml"), "--bag", str(bag), code=2)
     tfcompose("verify", robot, "--bag", str(tmp_path / "none"), code=2)
     tfcompose("verify", str(tmp_path / "bag"), "--bag", str(bag), code=2)
@@ -133,6 +169,18 @@ def test_the_tree_of_a_bag_says_what_is_expected_unexpected_and_missing(tmp_path
     assert rows[2].endswith("expected")
     assert rows[3].endswith("missing: owner static")
     assert rows[4].endswith("unexpected")
+
+
+def test_the_tree_of_a_file_for_programs_has_the_shape_of_the_published_one(tmp_path: Path, robot: str) -> None:
+    bag = write_bag(tmp_path / "bag", RIGHT)
+    planned = json.loads(tfcompose("tree", robot, "--format", "json").stdout)
+    published = json.loads(tfcompose("tree", robot, "--bag", str(bag), "--format", "json").stdout)
+    [of_file], [of_bag] = planned["trees"], published["trees"]
+    assert of_file["root"] == of_bag["root"] == "odom"
+    names = [[(edge["parent"], edge["child"]) for edge in tree["edges"]] for tree in (of_file, of_bag)]
+    assert names[0] == names[1]
+    rates = [(edge["owner"], edge["rate"]) for edge in of_file["edges"]]
+    assert rates == [("drive", 50), ("static", None), ("static", None)]
 
 
 def test_trees_that_do_not_hang_together_and_loops_are_shown_as_such(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from tfcompose.observe.census import SETTLE_S, Census
 from tfcompose.observe.diagnose import diagnose
 from tfcompose.observe.diagnose.tree import trees_of
+from tfcompose.observe.elsewhere import tf_elsewhere
 from tfcompose.observe.live import Live
 from tfcompose.observe.seen import GLOBAL, RosProcess, Seen, Topic
 from tfcompose.observe.sideline import Sideline
@@ -39,13 +40,17 @@ INTERESTING = ("tf2_msgs/msg/TFMessage", "rosgraph_msgs/msg/Clock", "sensor_msgs
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What was found: the findings, and what was looked at: edges, publishing nodes, seconds, and the trees' roots."""
+    """What was found, and what was looked at: edges, publishing nodes, seconds, the trees' roots.
+
+    ``elsewhere`` are topics with TF that were not looked at.
+    """
 
     findings: list[Diagnostic]
     edges: int
     nodes: int
     seconds: float
     roots: tuple[str, ...] = ()
+    elsewhere: tuple[str, ...] = ()
 
 
 def examine(expected: dict[Topics, Plan | None], seconds: float, stop: Stop) -> Found:
@@ -87,7 +92,12 @@ def _judged(pictures: list[Seen], seconds: float) -> Found:
     edges = {(edge.strand.parent, edge.strand.child) for seen in pictures for edge in seen.taken}
     names = {name for seen in pictures for edge in seen.taken for name in edge.nodes}
     roots = tuple(dict.fromkeys(root for seen in pictures for root in trees_of(seen)))
-    return Found(sorted(findings, key=lambda one: one.severity), len(edges), len(names), seconds, roots)
+    own = {topic for seen in pictures for topic in seen.topics}
+    graph = [(topic.name, (topic.type,)) for topic in pictures[0].graph if topic.publishers] if pictures else []
+    return Found(
+        sorted(findings, key=lambda one: one.severity), len(edges), len(names), seconds, roots,
+        tf_elsewhere(graph, own),
+    )  # fmt: skip
 
 
 @dataclass(slots=True)

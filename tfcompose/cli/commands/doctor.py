@@ -72,7 +72,11 @@ def run(arguments: Namespace) -> int:
         return code
     seen = f"{_counted(found.edges, 'edge')} from {_counted(found.nodes, 'node')}"
     seen += f" below {printable(', '.join(found.roots[:MOST_ROOTS]))}" if found.roots else ""
-    return _say(found.findings, arguments, f"looked for {found.seconds:.1f} s at {seen}")
+    code = _say(found.findings, arguments, f"looked for {found.seconds:.1f} s at {seen}")
+    if found.edges and found.elsewhere and arguments.format == "text":
+        words = import_module("tfcompose.observe.elsewhere").namespace_words(found.elsewhere)
+        sys.stdout.write(f"there is TF on {', '.join(found.elsewhere[:MOST_ROOTS])} too: {words}\n")
+    return code
 
 
 def _say(found: list[Diagnostic], arguments: Namespace, looked: str) -> int:

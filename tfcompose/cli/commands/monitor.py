@@ -17,6 +17,7 @@ from tfcompose.cli.edge_table import lines_of, objects_of
 from tfcompose.cli.looking import add_bag, add_for, add_namespace, from_bag, from_live, names_of
 from tfcompose.cli.options import positive
 from tfcompose.cli.redrawn import Redrawn, can_redraw
+from tfcompose.cli.terminal import UNREADABLE, complain
 from tfcompose.observe.census import SETTLE_S, Census, topics_below
 
 if TYPE_CHECKING:
@@ -39,6 +40,9 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Monitor until a signal comes; exit code 1 if no TF came at all, 2 if a bag cannot be read."""
+    if arguments.bag and arguments.duration:
+        complain("a recording is read to its end: leave out --for")
+        return UNREADABLE
     topics = topics_below(arguments.namespace)
     whole = arguments.bag or arguments.duration
     census = Census(0.0 if whole else WINDOW_S, 0.0 if arguments.bag else SETTLE_S)

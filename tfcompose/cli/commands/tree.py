@@ -32,7 +32,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--namespace", type=namespace, default="", metavar="NS", help="/NS/tf and /NS/tf_static instead, without FILE"
     )
-    parser.add_argument("--format", choices=("text", "json"), default="text", help="json with --live or --bag")
+    parser.add_argument("--format", choices=("text", "json"), default="text", help="default: text")
 
 
 def run(arguments: Namespace) -> int:
@@ -43,5 +43,9 @@ def run(arguments: Namespace) -> int:
     robot = robot_or_code(arguments.file or DEFAULT_FILE, arguments)
     if isinstance(robot, int):
         return robot
-    sys.stdout.write(tree(with_final_names(robot)))
+    final = with_final_names(robot)
+    if arguments.format == "json":
+        sys.stdout.write(import_module("tfcompose.cli.tree_json").planned_json(final))
+        return 0
+    sys.stdout.write(tree(final))
     return 0

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
     from tfcompose.observe.seen import RosProcess, Seen
 
-LOCALHOST_ONLY = "ROS_LOCALHOST_ONLY"
+LOCALHOST_ONLY, SERVER = "ROS_LOCALHOST_ONLY", "ROS_DISCOVERY_SERVER"
 #: What decides who hears whom, with what holds where it is not set.
-DEFAULTS = {DOMAIN: "0", RANGE: "SUBNET", LOCALHOST_ONLY: "0", RMW: ""}
+DEFAULTS = {DOMAIN: "0", RANGE: "SUBNET", LOCALHOST_ONLY: "0", RMW: "", SERVER: ""}
 #: Of processes with other settings, those of so many settings are named, so many of each.
 MOST_SETTINGS = MOST_PROCESSES = 3
 
@@ -64,7 +64,7 @@ def other_settings(seen: Seen) -> Iterator[Diagnostic]:
     for apart_items, processes in order[:MOST_SETTINGS]:
         number = "a ROS process" if len(processes) == 1 else f"{len(processes)} ROS processes"
         settings = [f"{name}={value}" for name, value in apart_items]
-        here = [f"{name} is {seen.settings.get(name) or DEFAULTS[name]}" for name, _ in apart_items]
+        here = [f"{name} is {seen.settings.get(name) or DEFAULTS[name] or 'unset'}" for name, _ in apart_items]
         message = f"{number} on this machine cannot be heard from here: started with {', '.join(settings)}, "
         message += f"and here {' and '.join(here)}"
         notes = [Note(f"pid {one.pid}: {one.command}") for one in processes[:MOST_PROCESSES]]

@@ -264,6 +264,13 @@ def test_a_rotation_as_a_quaternion_is_taken_and_said(version: str, origin: str,
         assert robot.edges[0].pose.quat_xyzw == pytest.approx((0, 0, 0.5**0.5, 0.5**0.5))
 
 
+def test_of_a_file_that_only_defines_macros_these_are_named(tmp_path: Path) -> None:
+    file = tmp_path / "r.urdf.xacro"
+    file.write_text(XACRO.replace('<link name="base_link"/>', "").replace('<xacro:leg n="1"/>', ""))
+    (found,) = lint_urdf(str(file))
+    assert (found.code, found.message.endswith("defines macros, and no links: leg")) == ("TF206", True)
+
+
 def test_without_xacro_that_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "xacro", None)
     (tmp_path / "r.xacro").write_text(XACRO)

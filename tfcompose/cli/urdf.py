@@ -9,10 +9,10 @@ from tfcompose.check import apply, check, idle
 from tfcompose.cli.disk import disk
 from tfcompose.cli.terminal import read_text
 from tfcompose.cli.xacro import expanded
-from tfcompose.diagnostic import Diagnostic, RejectedError
+from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
 from tfcompose.frozen import dataclass, replace
 from tfcompose.load.comments import allows_in_xml
-from tfcompose.load.urdf import load_xml
+from tfcompose.load.urdf import MACRO, load_xml
 from tfcompose.resolve.packages import Packages
 from tfcompose.resolve.urdf import robot_of_urdf
 
@@ -80,7 +80,13 @@ def read_urdf(file: str, packages: Packages, arguments: Mapping[str, str] | None
     is_xacro = file.endswith(".xacro")
     name, text = (f"{file} (expanded)", expanded(file, packages, arguments)) if is_xacro else (file, read_text(file))
     root = load_xml(text, name)
-    return Read(name, text, root, *robot_of_urdf(root, name, packages.asset))
+    robot, found = robot_of_urdf(root, name, packages.asset)
+    macros = MACRO.findall(read_text(file)) if is_xacro and not robot.frames else []
+    if macros:
+        advice = f"a part can call one: parts: {{NAME: {{xacro: {file}, macro: {macros[0]}, …}}}}"
+        message = f"{file} defines macros, and no links: {', '.join(dict.fromkeys(macros))}"
+        raise RejectedError([finding("TF206", message, Span(file), help=advice)])
+    return Read(name, text, root, robot, found)
 
 
 def _said(found: Diagnostic) -> Diagnostic:

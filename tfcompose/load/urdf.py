@@ -24,6 +24,8 @@ DEEPEST = 100
 MOST_CHARACTERS = 16_000_000
 
 _ATTRIBUTE = re.compile(r"""([^\s=/>"']+)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
+#: How a xacro file defines a macro, up to its name.
+MACRO = re.compile(r"""<xacro:macro\s[^>]*?\bname\s*=\s*["'](?:xacro:)?([^"']+)""")
 _BROKEN = re.compile(r"""=\s*(?:"[^"<>]*[\t\r\n]|'[^'<>]*[\t\r\n])""")
 _BREAK = re.compile("\r\n|\r|\n")
 #: The bytes that begin no character in UTF-8.

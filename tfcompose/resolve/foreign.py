@@ -9,7 +9,7 @@ from xml.sax.saxutils import quoteattr
 
 from tfcompose.diagnostic import Diagnostic, RejectedError, did_you_mean, finding
 from tfcompose.frozen import dataclass, replace
-from tfcompose.load.urdf import load_xml
+from tfcompose.load.urdf import MACRO, load_xml
 from tfcompose.model import BUILT_IN, Node, Process, Robot
 from tfcompose.resolve.beside import beside
 from tfcompose.resolve.isolation import topics_below
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from tfcompose.resolve.packages import Packages
     from tfcompose.resolve.part import PartEntry
 
-_MACRO = re.compile(r"""<xacro:macro\s[^>]*?\bname\s*=\s*["'](?:xacro:)?([^"']+)""")
 _PARAMS = re.compile(r"""\bparams\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 _WORD = re.compile(r"""["']?(\w+)["']?""")
 _PACKAGE = re.compile(r"(?:package://|\$\(find(?:-pkg-share)?\s+)([A-Za-z][A-Za-z0-9_.-]*)\)?/(.+)")
@@ -60,7 +59,7 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
         name, text = f"{file} (expanded)", _expanded(part, file, at, packages)
     robot, found = robot_of_urdf(load_xml(text, name), name, packages.asset)
     if not robot.frames:
-        macros = dict.fromkeys(_MACRO.findall(read(file)))
+        macros = dict.fromkeys(MACRO.findall(read(file)))
         advice = f"it defines macros; name one, as xacro: and macro: {', '.join(macros)}" if macros else ""
         raise RejectedError([finding("TF206", f"{file} has no links", at, help=advice)])
     parents = {edge.parent for edge in robot.edges}
@@ -110,7 +109,7 @@ def _in_call(part: PartEntry, file: str, found: Diagnostic, read: Callable[[str]
         return _at(place, found)
     named = [word for word in _WORD.findall(found.message) if word in said.params]
     text = read(file)
-    macros = {one[1]: text[one.start() : text.find(">", one.end())] for one in _MACRO.finditer(text)}
+    macros = {one[1]: text[one.start() : text.find(">", one.end())] for one in MACRO.finditer(text)}
     if macro in macros:
         takes = _PARAMS.search(macros[macro])
         names = " ".join((takes[1] or takes[2] or "").split()) if takes else ""

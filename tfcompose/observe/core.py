@@ -231,7 +231,7 @@ class BufferCore:
         if not frame or frame[0] == "/":
             raise InvalidArgumentException(reasons.unusable_name(frame))
         if frame not in self._names:
-            raise LookupException(reasons.unknown_frame(frame, self._names))
+            raise LookupException(reasons.UnknownFrame(frame, self._names))
 
     def _new_history(self, child: str, *, static: bool) -> History:
         """Return the samples of a frame that is new, or fixed from now on, or moving from now on."""

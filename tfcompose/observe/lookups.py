@@ -59,8 +59,8 @@ class Lookups(BufferCore):
     ) -> Any:  # fmt: skip
         """Return whether ``lookup_transform`` would answer; with ``return_debug_tuple`` also why not."""
         time_ns = nanoseconds(time)
-        reason = self._reason(lambda: self._pose(target_frame, source_frame, time_ns), timeout)
-        return (not reason, reason) if return_debug_tuple else not reason
+        error = self._error(lambda: self._pose(target_frame, source_frame, time_ns), timeout)
+        return (error is None, str(error or "")) if return_debug_tuple else error is None
 
     def can_transform_full(  # noqa: PLR0913, PLR0917 (tf2's arguments)
         self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str,
@@ -68,10 +68,10 @@ class Lookups(BufferCore):
     ) -> Any:  # fmt: skip
         """Return whether ``lookup_transform_full`` would answer; with ``return_debug_tuple`` also why not."""
         times = nanoseconds(target_time), nanoseconds(source_time)
-        reason = self._reason(
+        error = self._error(
             lambda: self._full_pose(target_frame, times[0], source_frame, times[1], fixed_frame), timeout
         )
-        return (not reason, reason) if return_debug_tuple else not reason
+        return (error is None, str(error or "")) if return_debug_tuple else error is None
 
     def lookup_transform_core(self, target_frame: str, source_frame: str, time: Any) -> Any:
         """Return what ``lookup_transform`` does, without waiting."""
@@ -111,12 +111,12 @@ class Lookups(BufferCore):
             second, stamp_ns = self._pose(target, fixed, target_ns)
         return unit(product(second, first)), stamp_ns
 
-    def _reason(self, attempt: Callable[[], object], timeout: Any) -> str:
+    def _error(self, attempt: Callable[[], object], timeout: Any) -> TransformException | None:
         try:
             self._wait(attempt, timeout)
         except TransformException as error:
-            return str(error)
-        return ""
+            return error
+        return None
 
     def _wait(self, attempt: Callable[[], _Answer], timeout: Any) -> _Answer:
         """Return the answer as soon as there is one; raise what it raised last when the time is over.

@@ -12,10 +12,28 @@ if TYPE_CHECKING:
     from tfcompose.observe.history import History
 
 
-def unknown_frame(frame: str, known: Collection[str]) -> str:
-    """Return that there is no such frame, and the nearest name that there is."""
-    near = nearest(frame, sorted(known))
-    return f"no frame {frame}; did you mean {near}?" if near else f"no frame {frame} among {len(known)} frames"
+class UnknownFrame:
+    """That there is no such frame, with the nearest name that there is.
+
+    It is worked out when it is read: among thousands of names that takes longer than all lookups of a second, and who
+    waits for a frame asks for it with every message.
+    """
+
+    __slots__ = ("_frame", "_known")
+
+    def __init__(self, frame: str, known: Collection[str]) -> None:
+        self._frame = frame
+        self._known = tuple(known)
+
+    def __str__(self) -> str:
+        near = nearest(self._frame, sorted(self._known))
+        return f"no frame {self._frame}; did you mean {near}?" if near else self._among()
+
+    def __repr__(self) -> str:
+        return repr(str(self))
+
+    def _among(self) -> str:
+        return f"no frame {self._frame} among {len(self._known)} frames"
 
 
 def unusable_name(frame: str) -> str:

@@ -151,6 +151,15 @@ def test_names_that_are_beyond_letters_are_taken_from_others_and_renamed_everywh
     assert joint == root.find("joint/mimic").get("joint") == "left_shoulder-joint 1.0"  # type: ignore[union-attr]
 
 
+def test_a_block_of_a_macro_is_a_pose_as_everywhere(cell: Any) -> None:
+    pose = "{xyz: [10 cm, 0, 2], look: {down: 30 deg}}"
+    params = f"{{name: front, parent_link: table, origin: {pose}}}"
+    robot = sound(cell(f"mast: {{xacro: third/arm/mast.xacro, macro: mast, params: {params}}}"))
+    found = robot.parent_edge("front_mast").pose
+    assert found.xyz == (0.1, 0, 2)
+    assert found.rpy == pytest.approx((0, np.pi / 6, 0), abs=1e-15)
+
+
 def test_a_package_of_the_robot_is_found_in_xacro_where_everything_is_relative(
     cell: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -302,6 +311,20 @@ def test_warnings_about_somebody_elses_file_are_left_to_its_own_lint(cell: Any, 
             "TF018",
             "parameter",
             "mast takes name parent_link tall:=false *origin",
+            "cell.yaml",
+        ),
+        (
+            'a: {xacro: third/arm/mast.xacro, macro: mast, params: {origin: "<origin>"}}',
+            "TF018",
+            "the block origin: ",
+            "",
+            "cell.yaml",
+        ),
+        (
+            "a: {xacro: third/arm/mast.xacro, macro: mast, params: {origin: {xzy: 1}}}",
+            "TF101",
+            "xzy",
+            "mean xyz?",
             "cell.yaml",
         ),
         ("a: {urdf: third/arm/arm.urdf, root: bse, parent: table}", "TF203", "bse", "did you mean base?", "cell.yaml"),

@@ -11,11 +11,14 @@ from tfcompose.diagnostic import Diagnostic, RejectedError, did_you_mean, findin
 from tfcompose.frozen import dataclass, replace
 from tfcompose.load.urdf import MACRO, load_xml
 from tfcompose.model import BUILT_IN, Node, Process, Robot
+from tfcompose.pose import rpy_from_quat
 from tfcompose.resolve.beside import beside
 from tfcompose.resolve.isolation import topics_below
 from tfcompose.resolve.nodes import full_name
+from tfcompose.resolve.poses import pose_of
 from tfcompose.resolve.stock import with_stock
 from tfcompose.resolve.urdf import robot_of_urdf
+from tfcompose.validate.part import Block
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -92,8 +95,9 @@ def _expanded(part: PartEntry, file: str, at: Span, packages: Packages) -> str:
     disk, said = packages.disk, part.said
     if disk is None or disk.expand is None:
         raise RejectedError([finding("TF904", f"{file}: xacro files cannot be expanded here", at)])
+    document = _document(part, file, packages, disk.absolute)
     try:
-        return disk.expand(file, packages, said.args, _document(part, file, packages, disk.absolute))
+        return disk.expand(file, packages, said.args, document)
     except RejectedError as error:
         if said.macro is None:
             place = part.source.at((*part.at, "xacro"))
@@ -135,7 +139,22 @@ def _document(part: PartEntry, file: str, packages: Packages, absolute: Callable
         return None
     places = (part.source.at((*part.at, "include", index)) for index in range(len(said.include)))
     files = [*(_address(one, place, packages) for one, place in zip(said.include, places, strict=True)), file]
+    for name, value in said.params.items():
+        if _is_markup(value):
+            _refuse_broken(name, value, part.source.at((*part.at, "params", name)))
     return _call(said.macro, said.params, files, absolute)
+
+
+def _is_markup(value: Any) -> bool:
+    return isinstance(value, str) and value.lstrip().startswith("<")
+
+
+def _refuse_broken(name: str, text: str, at: Span) -> None:
+    try:
+        load_xml(f"<block>{text}</block>", at.file)
+    except RejectedError as error:
+        found = (replace(one, span=at, message=f"the block {name}: {one.message}") for one in error.diagnostics)
+        raise RejectedError(found) from None
 
 
 def _call(macro: str, params: dict[str, Any], files: list[str], absolute: Callable[[str], str]) -> str:
@@ -150,12 +169,11 @@ def _call(macro: str, params: dict[str, Any], files: list[str], absolute: Callab
 
 def _block(value: Any) -> str | None:
     """Return the element that a parameter is, or None for one that is a word."""
-    if isinstance(value, str) and value.lstrip().startswith("<"):
-        return value
-    if isinstance(value, dict):
-        xyz, rpy = (" ".join(map(_word, value.get(key, (0, 0, 0)))) for key in ("xyz", "rpy"))
+    if isinstance(value, Block):
+        pose = pose_of(value)
+        xyz, rpy = (" ".join(map(repr, numbers)) for numbers in (pose.xyz, rpy_from_quat(pose.quat_xyzw)))
         return f'<origin xyz="{xyz}" rpy="{rpy}"/>'
-    return None
+    return value if _is_markup(value) else None
 
 
 def _word(value: Any) -> str:

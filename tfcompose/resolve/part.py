@@ -46,6 +46,7 @@ class PartEntry:
     spec: RobotSpec
     source: Source
     outer_prefix: str
+    is_broken: bool = False
     found: list[Diagnostic] = field(default_factory=list)
 
     @property

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from tfcompose.resolve.packages import Disk, Packages
     from tfcompose.resolve.resolve import Resolved
     from tfcompose.validate import Validated
-    from tfcompose.validate.spec import RobotSpec
 
     Reader = Callable[[str], str]
 
@@ -49,11 +48,11 @@ class Parts:
     found: list[Diagnostic] = field(default_factory=list)
     missing: list[tuple[str, str]] = field(default_factory=list)
 
-    def join(self, spec: RobotSpec, source: Source, prefix: str, packages: Packages) -> list[Joined]:
+    def join(self, validated: Validated, prefix: str, packages: Packages) -> list[Joined]:
         """Return the parts of a robot whose own frames have the prefix; those that cannot be had are findings."""
-        joined = []
+        spec, source, joined = validated.spec, validated.source, []
         for name, said in spec.parts.items():
-            part = PartEntry(name, said, spec, source, prefix)
+            part = PartEntry(name, said, spec, source, prefix, ("parts", name) in validated.broken)
             try:
                 joined.append(part.joined(*self._robot(part, packages)))
                 self.found += part.found
@@ -70,6 +69,8 @@ class Parts:
             raise RejectedError([finding("TF008", message, part.place)])
         if part.said.spec is part.said.urdf is part.said.xacro is None:
             raise RejectedError([])  # it was refused already
+        if part.said.xacro is not None and part.is_broken:
+            raise RejectedError([])  # and so were arguments, which xacro would miss
         try:
             if part.said.spec is not None:
                 return self._resolved(part, part.said.spec, self.read), frozenset()

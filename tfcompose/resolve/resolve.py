@@ -133,7 +133,7 @@ class _Work:
         parts = self.holder or import_module("tfcompose.resolve.parts").Parts(
             self.library, self.read, self.disk, resolve, (self.source.file,), self.whole
         )
-        self.joined = parts.join(self.spec, self.source, settings_of(self.spec.ros).frame_prefix, packages)
+        self.joined = parts.join(self.validated, settings_of(self.spec.ros).frame_prefix, packages)
         self.found += parts.found
         self.broken |= {*parts.missing, *(entry for part in self.joined for entry in part.robot.broken)}
 

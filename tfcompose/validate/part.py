@@ -6,12 +6,25 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.validate.edges import MountKeys
 from tfcompose.validate.fields import ANYTHING, NAMESPACE, TEXT
+from tfcompose.validate.posed import Posed
 from tfcompose.validate.schema import Problems, Type, key, listing, mapping, record
 
 if TYPE_CHECKING:
     from tfcompose.load import Path
 
 _WHERE = "relative to the file that names it, package://NAME/PATH or $(find NAME)/PATH"
+
+
+class Block(Posed):
+    """What a macro takes as an origin."""
+
+
+def _param(value: Any, path: Path, problems: Problems) -> Any:
+    """Read a macro's parameter: a pose is one, with units and all; everything else is passed on as it is."""
+    return (record(Block) if isinstance(value, dict) else ANYTHING).read(value, path, problems)
+
+
+PARAM = Type(_param, {"anyOf": [Block, {"type": ["string", "number", "boolean", "array"]}]})
 
 
 class PartSpec(MountKeys):
@@ -25,9 +38,9 @@ class PartSpec(MountKeys):
     )
     macro: str | None = key(TEXT, None, "a macro that the xacro file defines, and that is called", ("hokuyo_ust10",))
     params: dict[str, Any] = key(
-        mapping(ANYTHING),
+        mapping(PARAM),
         {},
-        "the macro's parameters; {xyz, rpy}, or text that begins with <, for one that takes a block",
+        "the macro's parameters; a pose, or text that begins with <, for one that takes a block",
         ({"name": "front", "parent_link": "base_link", "origin": {"xyz": [0.3, 0, 0.1]}},),
     )
     include: tuple[str, ...] = key(listing(TEXT, single=True), (), "further xacro files that the macro needs")

@@ -23,7 +23,7 @@ from tfcompose.ros.stop import Stop
 from tfcompose.ros.tf import TFSubscription, wait
 
 EDGES, HERTZ = 50, 200.0
-ROUNDS, ROUND_S, BEFORE_S = 3, 4.0, 1.0
+ROUNDS, ROUND_S, BEFORE_S = 5, 2.5, 1.0
 MEDIAN_MS, P99_MS = 0.4, 1.0
 DOMAIN = "94"
 #: What is measured: the guard's mode, and its fence.

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 import shlex
-import signal
-import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -17,7 +15,7 @@ from tests.rover import ROVER
 from tests.waiting import until
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from tests.conftest import Started
 
@@ -37,49 +35,12 @@ def units(domain: object, tmp_path: Path) -> Path:
     return tmp_path / "systemd"
 
 
-@pytest.fixture
-def manager(tmp_path: Path) -> Iterator[socket.socket]:
-    """What systemd listens at."""
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listening:
-        listening.bind(str(tmp_path / "notify"))
-        listening.settimeout(20)
-        yield listening
-
-
 def module_of(unit: Path) -> list[str]:
     """Return what follows ``python -m`` in the unit's command."""
     (line,) = re.findall(r"^ExecStart=(.*)$", unit.read_text("utf-8"), re.MULTILINE)
     words = shlex.split(line)
     assert words[:2] == [sys.executable, "-m"]
     return words[2:]
-
-
-def test_the_units_commands_start_the_tree_and_say_when_they_are_ready(
-    units: Path, tmp_path: Path, manager: socket.socket, start: Callable[..., Started]
-) -> None:
-    running = []
-    for name in ("static", "drive", "guard"):
-        running.append(start(*module_of(units / f"rover-{name}.service"), NOTIFY_SOCKET=str(tmp_path / "notify")))
-        assert manager.recv(100) == b"READY=1", name
-    words = [
-        sys.executable,
-        "-m",
-        "tfcompose",
-        "echo",
-        "odom",
-        "lidar",
-        "--once",
-        "--timeout",
-        "15",
-        "--format",
-        "json",
-    ]
-    said = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
-    assert said.returncode == 0, said.stderr
-    assert '"xyz": [1.0, 0.0, 0.3]' in said.stdout
-    guard = running[-1]
-    assert until(lambda: "Complete" in guard.output), "the guard that watches sees the whole tree"
-    assert [one.end(signal.SIGINT)[0] for one in running] == [0, 0, 0]
 
 
 def test_a_foreign_process_is_its_own_supervised_process_with_the_plans_environment(

@@ -60,5 +60,12 @@ def test_a_fence_is_put_up_when_a_process_starts_so_strict_concerns_everybody(tm
     assert changed(tmp_path, strict).changed == {"static", "slam", "guard"}
 
 
+def test_another_fence_concerns_everybody_and_one_that_nobody_puts_up_only_the_guard(tmp_path: Path) -> None:
+    for mode, concerned in (("strict", {"static", "slam", "guard"}), ("watch", {"guard"})):
+        old = replace(PLAN, guard=GuardPolicy(mode=mode))  # type: ignore[arg-type]
+        new = replace(PLAN, guard=GuardPolicy(mode=mode, fence="remap"))  # type: ignore[arg-type]
+        assert change(old, tmp_path, new, tmp_path).changed == concerned
+
+
 def test_a_fixed_frame_that_vanished_is_held_by_listeners_and_a_moving_one_is_not(tmp_path: Path) -> None:
     assert changed(tmp_path, replace(PLAN, edges=())).held == ("base → laser",)

@@ -45,9 +45,9 @@ def _data(plan: Plan, process: PlanProcess, folder: Path) -> tuple[object, ...]:
     return (tuple(replace(edge, source=("", 0)) for edge in edges), policy, _bytes(folder, process.params_file))
 
 
-def _fence(plan: Plan) -> str | None:
+def _fence(plan: Plan) -> tuple[str, str] | None:
     """Return behind which fence the plan's processes send, if there is one: it is put up when they start."""
-    return plan.robot if plan.guard.mode == "strict" else None
+    return (plan.robot, plan.guard.fence) if plan.guard.mode == "strict" else None
 
 
 def _bytes(folder: Path, name: str | None) -> bytes | None:

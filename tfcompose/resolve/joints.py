@@ -8,7 +8,10 @@ from tfcompose.model import Dynamics, Joint, Limit, ReferencePositions, SafetyCo
 from tfcompose.pose import norm
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from tfcompose.diagnostic import Span
+    from tfcompose.validate import Validated
     from tfcompose.validate.joints import JointSpec
 
 #: Types of which joint states say nothing: they have more than one position.
@@ -40,3 +43,13 @@ def joint_of(name: str, written: JointSpec, at: Span) -> Joint | None:
         else None,
         reference=ReferencePositions(reference.rising, reference.falling) if reference else None,
     )
+
+
+def unjoined(validated: Validated) -> Iterator[tuple[str, str]]:
+    """Yield the links, as entries, that hang on nothing only because their joints were refused already."""
+    joints = validated.source.data.get("joints")
+    for section, name in validated.broken:
+        said = joints.get(name) if section == "joints" and isinstance(joints, dict) else None
+        child = said.get("child") if isinstance(said, dict) else None
+        if isinstance(child, str):
+            yield ("links", child)

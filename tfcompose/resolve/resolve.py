@@ -15,6 +15,7 @@ from tfcompose.resolve.built_in import built_in
 from tfcompose.resolve.completed import completed
 from tfcompose.resolve.edges import Drafts
 from tfcompose.resolve.isolation import settings_of
+from tfcompose.resolve.joints import unjoined
 from tfcompose.resolve.nodes import names_files
 from tfcompose.resolve.packages import Packages
 from tfcompose.resolve.poses import Solver
@@ -26,7 +27,7 @@ from tfcompose.resolve.whole import Whole
 from tfcompose.resolve.written import as_written
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from tfcompose.load import Source
     from tfcompose.plan import FenceWay, GuardMode, OnViolation, UnknownEdges
@@ -87,7 +88,7 @@ class _Work:
 
     def resolved(self) -> Resolved:
         """Return the robot and what was found; each step knows what the ones before it refused."""
-        self.broken.update(self.validated.broken, self._unjoined())
+        self.broken.update(self.validated.broken, unjoined(self.validated))
         own = _processes(self.spec, self.source, self.found)
         packages = self._packages()
         self._join_parts(packages)
@@ -107,15 +108,6 @@ class _Work:
             robot = self._take(work.with_param_files(robot, self.source, self.read))
         robot = self._take(completed(robot, self.spec, self.source, self.disk))
         return Resolved(robot, tuple(self.found), self.whole)
-
-    def _unjoined(self) -> Iterator[tuple[str, str]]:
-        """Yield the links that hang on nothing only because their joints were refused already."""
-        joints = self.source.data.get("joints")
-        for section, name in self.validated.broken:
-            said = joints.get(name) if section == "joints" and isinstance(joints, dict) else None
-            child = said.get("child") if isinstance(said, dict) else None
-            if isinstance(child, str):
-                yield ("links", child)
 
     def _take(self, done: tuple[Robot, list[Diagnostic]]) -> Robot:
         robot, found = done

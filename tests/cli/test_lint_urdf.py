@@ -226,6 +226,9 @@ LEVELS = {
     "a tab between numbers": (
         '<link name="a"/>' + JOINT.format("j", "fixed", '<origin xyz="1\t0 0" rpy=" 0 0 0 "/>'), "warning"),
     "a line break": ('<link name="a"/>' + JOINT.format("j", "fixed", "<origin xyz='1 0 0\n'/>"), "warning"),
+    "xacro without its prefix": (
+        '<link name="a"/>' + JOINT.format("j", "fixed", '<insert_block name="origin"/>'), "error"),
+    "xacro that was not expanded": ('<xacro:wheel n="1" xmlns:xacro="http://www.ros.org/wiki/xacro"/>', "error"),
     "a block about nothing": ('<gazebo reference="gone"/>', "warning"),
     "a transmission of nothing": ('<transmission name="t"><joint name="gone"/></transmission>', "warning"),
 }  # fmt: skip

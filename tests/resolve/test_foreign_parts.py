@@ -346,5 +346,6 @@ def test_what_cannot_be_a_part_is_said_with_its_place(  # noqa: PLR0913, PLR0917
     errors = cell(part).errors
     assert [one.code for one in errors] == [code], [one.message for one in errors]
     assert message in errors[0].message
+    assert " object at 0x" not in errors[0].message
     assert advice in errors[0].help
     assert errors[0].span.file.endswith(place)

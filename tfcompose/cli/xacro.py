@@ -59,7 +59,7 @@ class _MissingError(LookupError):
 
 
 def _refused(error: Exception, file: str, files: list[str]) -> Diagnostic:
-    """Return what xacro, or something that it called, did not like, with the macro and the file in which that is."""
+    """Return what xacro, or something that it called, did not like, and in which other file."""
     chain: list[Any] = [error]
     while getattr(chain[-1], "exc", None) is not None:  # xacro wraps what it calls, again and again
         chain.append(chain[-1].exc)
@@ -74,11 +74,9 @@ def _refused(error: Exception, file: str, files: list[str]) -> Diagnostic:
         words = [*(head for head in heads if str(root) not in head), own]
         words += [str(one.suffix) for one in reversed(chain[:-1]) if getattr(one, "suffix", None)]
     said = " ".join(" ".join(words).split()) or type(error).__name__
-    macros = [str(getattr(one, "name", one)) for one in getattr(error, "macros", ())]
-    where = [f"in the macro {name}" for name in macros[:1]]
     others = [name for name in files[-1:] if name and Path(name).absolute() != Path(file).absolute()]
-    where += [f"in {os.path.relpath(name)}" for name in others]
-    return finding("TF018", f"xacro: {said}{f' ({chr(44).join(where)})' if where else ''}", Span(file))
+    where = f" (in {os.path.relpath(others[0])})" if others else ""
+    return finding("TF018", f"xacro: {said}{where}", Span(file))
 
 
 def _document(xacro: Any, file: str, text: str | None, arguments: dict[str, str]) -> Any:

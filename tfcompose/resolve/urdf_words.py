@@ -46,6 +46,8 @@ WORDS: dict[str, tuple[str, str]] = {
 }
 #: A word that is so near to a known one is a misspelt one.
 _MISSPELT = 0.8
+#: Words of xacro that URDF does not have.
+_XACRO = frozenset({"insert_block", "include", "property", "if", "unless", "macro"})
 OPAQUE = frozenset({"transmission", "gazebo", "ros2_control", "sensor"})
 
 
@@ -62,10 +64,21 @@ def unknown_words(root: Element) -> Iterator[Diagnostic]:
             if name not in attributes and ":" not in name and name != "xmlns":
                 yield _unknown(f"attribute {name} of <{element.tag}>", name, attributes, element, name)
         for child in element.children:
-            if child.tag in inside:
+            if child.tag in _XACRO or child.tag.startswith("xacro:"):
+                yield _unexpanded(child)
+            elif child.tag in inside:
                 waiting += [child] if child.tag not in OPAQUE else []
             elif ":" not in child.tag and (element is not root or nearest(child.tag, inside)):
                 yield _unknown(f"element <{child.tag}> in <{element.tag}>", child.tag, inside, child)
+
+
+def _unexpanded(element: Element) -> Diagnostic:
+    """Return the finding about what xacro should have replaced, and what readers pass over."""
+    if element.tag in _XACRO:
+        message = f"<{element.tag}> is xacro's, and without its prefix nobody expands it"
+        return finding("TF720", message, element.at, help=f"<xacro:{element.tag} …>")
+    advice = "a file that is named .xacro is expanded"
+    return finding("TF720", f"<{element.tag}> was not expanded", element.at, help=advice)
 
 
 def _unknown(what: str, word: str, known: list[str], at: Element, attribute: str = "") -> Diagnostic:

@@ -217,6 +217,16 @@ def test_a_bag_with_another_definition_of_the_message_is_not_misread(tmp_path: P
     assert "error[TF907] /tf was recorded with another definition of tf2_msgs/msg/TFMessage than ROS 2 has" in errors
 
 
+def test_messages_that_cannot_be_read_are_counted(tmp_path: Path) -> None:
+    bag = tmp_path / "bag"
+    with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection("/tf", "tf2_msgs/msg/TFMessage", typestore=STORE)
+        for at in range(3):
+            writer.write(connection, at, b"\x00\x01\x00\x00\xff\xff\xff\x7f none")
+    output = tfcompose("monitor", "--bag", str(bag)).stdout
+    assert output.startswith("0 edges, 0 messages in 0.0 s, 3 not readable")
+
+
 def test_stamps_of_a_simulation_are_compared_with_the_clock_that_was_recorded(tmp_path: Path) -> None:
     def clock(at_s: float) -> tuple[str, float, str, Any]:
         seconds, nanoseconds = divmod(round(at_s * 1e9), 10**9)

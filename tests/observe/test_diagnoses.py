@@ -225,6 +225,29 @@ def test_what_a_strict_guard_passes_on_is_its_owners() -> None:
     assert set(messages(history.seen(plan=plan()))) == {"TF801"}
 
 
+def test_where_nobody_publishes_no_owner_is_missed_by_name() -> None:
+    assert set(messages(Seen(SECONDS, plan=plan()))) == {"TF845"}
+
+
+def test_an_edge_that_is_late_for_data_is_told_once() -> None:
+    history = History().moving("odom base_link", stamp=lambda now: now - SECOND_NS)
+    data = Stamped("/scan", "base_link", ("/lidar",), (0.0,) * 5)
+    assert set(messages(history.seen(stamped=(data,)))) == {"TF841"}
+    assert set(messages(history.seen())) == {"TF833"}
+
+
+def test_an_edge_on_both_topics_is_told_once() -> None:
+    assert set(messages(robot().fixed("odom base_link", b"x").seen())) == {"TF809"}
+
+
+def test_processes_with_other_settings_are_not_looked_for_where_there_is_tf_below_a_namespace() -> None:
+    other = RosProcess(9, "nav", {"ROS_DOMAIN_ID": "8"})
+    seen = Seen(SECONDS, processes=(other,))
+    assert set(messages(seen)) == {"TF845", "TF908"}
+    below = (Topic("/robot1/tf", "tf2_msgs/msg/TFMessage", ("/robot1/drive",)),)
+    assert set(messages(replace(seen, graph=below))) == {"TF845"}
+
+
 def test_edges_that_a_plan_allows_or_that_are_another_robots_are_no_finding() -> None:
     seen = robot().moving("base_link tag_1", b"x").seen(plan=plan(guard=GuardPolicy(allow=(("*", "tag_*"),))))
     assert messages(seen) == {}

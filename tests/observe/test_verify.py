@@ -262,6 +262,67 @@ def test_what_tf2_refuses_is_told(plan: Plan, tree: Tree) -> None:
     assert message.endswith("its quaternion has length 0.000")
 
 
+def test_a_planned_frame_that_is_published_in_itself_is_missing(plan: Plan, tree: Tree) -> None:
+    tree.sent["laser"]["parent"] = "laser"
+    assert [one.code for one in tree.told(plan)] == ["TF821", "TF811"]
+
+
+def test_a_publisher_that_stays_without_a_name_is_blamed_and_one_that_has_just_come_is_not(
+    plan: Plan, tree: Tree
+) -> None:
+    tree.send("laser", "base", "", LASER, gid=b"raw")
+    [found] = tree.told(plan)
+    assert found.message == (
+        "base → laser is published by a publisher without a node name; the owner is static (/rover/static)"
+    )
+    fresh = Tree()
+    row = ("base", "laser", 109, 0, *LASER.xyz, *LASER.quat_xyzw)
+    fresh.census.take([row], static=True, gid=b"raw", received_ns=110 * S - S // 2)
+    assert fresh.told(plan) == []
+
+
+def test_where_publishers_have_no_ids_nobody_is_blamed_who_may_be_innocent(plan: Plan) -> None:
+    """One of those on the topic sent it, and the owner is among them."""
+    tree = Tree()
+    tree.sent["laser"] |= {"rate": 1.0, "static": False}
+    for words in tree.sent.values():
+        words["gid"] = None
+    publishers = [Publisher(words["node"].encode(), words["node"], static=False) for words in tree.sent.values()]
+    for child, words in tree.sent.items():
+        tree.send(child, **words)
+    tree.census.graph([*publishers, *(replace(one, static=True, gid=one.gid + b"s") for one in publishers)])
+    verdicts = verify(plan, {TOPICS: tree.census}, 110 * S, TOLERANCE)
+    assert [found.code for verdict in verdicts for found in verdict.found] == []
+
+
+def test_a_frame_that_a_driver_sends_far_from_its_preset_is_told_and_a_strangers_is_not_compared(
+    plan: Plan, tree: Tree
+) -> None:
+    driven = replace(plan.process("camera").drives[0], frames={"lens": "nominal"})
+    camera = replace(plan.process("camera"), drives=(driven,))
+    plan = replace(plan, processes=tuple(camera if each.name == "camera" else each for each in plan.processes))
+    assert tree.told(plan) == [], "calibrated"
+    tree = Tree()
+    tree.sent["lens"]["pose"] = Pose((0.0, 0.06, 0.0))
+    code, message = only(tree.told(plan))
+    assert code == "TF828"
+    assert message.startswith(
+        f"the pose of lens in camera from the driver {CAMERA} is 45 mm off preset realsense/d435i"
+    )
+    tree = Tree()
+    tree.send("lens", "camera", OTHER, Pose((0.0, 0.06, 0.0)))
+    assert [one.code for one in tree.told(plan)] == ["TF801"]
+
+
+def test_of_a_recording_nothing_is_advised_that_only_a_running_robot_can_do(plan: Plan, tree: Tree) -> None:
+    del tree.sent["laser"]
+    tree.sent["base"]["until"] = 5.0
+    for words in tree.sent.values():
+        words["gid"] = None
+    found = {one.code: one.help for one in tree.told(plan, graph=False)}
+    assert found == {"TF804": "", "TF811": ""}
+
+
 def test_a_bag_knows_no_publishers_and_blames_none(plan: Plan, tree: Tree) -> None:
     for words in tree.sent.values():
         words["gid"] = None

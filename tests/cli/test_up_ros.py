@@ -287,8 +287,8 @@ def test_without_ros_it_says_in_one_sentence_what_to_install_and_writes_nothing(
     robot = up(ROVER, **first_on_the_path(stubs))
     assert robot.ends() == 1
     (line, *rest) = robot.text.splitlines()
-    assert line.startswith("error[TF901] rclpy cannot be imported: ")
-    assert rest == []
+    assert line == "error[TF901] rclpy cannot be imported"
+    assert [word.split(":")[0].strip() for word in rest] == ["help"]
     assert not any((tmp_path / "runtime").iterdir())
     assert sorted(path.name for path in tmp_path.iterdir()) == ["output0.txt", "rover.yaml", "runtime", "stubs"]
 

@@ -154,8 +154,19 @@ def test_wrong_use_and_what_cannot_be_read_is_exit_code_2(tmp_path: Path, robot:
 
 
 def test_without_ros_the_running_tree_is_no_traceback(robot: str) -> None:
-    for words in (("verify", robot), ("monitor",), ("tree", "--live")):
-        assert "error[TF901] rclpy cannot be imported" in tfcompose(*words, code=1).stderr
+    looking = (
+        ("monitor",),
+        ("tree", "--live"),
+        ("graph", "--live"),
+        ("echo", "a", "b"),
+        ("doctor",),
+        ("doctor", robot),
+    )
+    for words in (("verify", robot), *looking):
+        done = tfcompose(*words, code=1)
+        first, advice = (done.stdout + done.stderr).splitlines()
+        assert first == "error[TF901] rclpy cannot be imported"
+        assert "pip install 'tfcompose[ros]'" in advice
 
 
 def test_the_tree_of_a_bag_says_what_is_expected_unexpected_and_missing(tmp_path: Path, robot: str) -> None:

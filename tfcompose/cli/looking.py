@@ -70,7 +70,8 @@ def reading(read: Callable[[], T]) -> T | int:
     bag = import_module("tfcompose.observe.bag")
     missing = bag.missing_rosbags()
     if missing:
-        print_findings([finding("TF906", missing, None)], sys.stderr)
+        message, _, advice = missing.partition(": ")
+        print_findings([finding("TF906", message, None, help=advice)], sys.stderr)
         return 1
     try:
         return read()

@@ -13,10 +13,9 @@ from tfcompose.cli.built_plan import PLAN, as_asked, plan_in
 from tfcompose.cli.console import Console
 from tfcompose.cli.status import Status, columns_of
 from tfcompose.cli.terminal import UNREADABLE, coloured, complain, draws, print_findings
-from tfcompose.diagnostic import finding
 from tfcompose.frozen import replace
-from tfcompose.ros.environment import child_environment, missing_ros
-from tfcompose.ros.settings import ros_trouble
+from tfcompose.ros.environment import child_environment
+from tfcompose.ros.settings import no_ros, ros_trouble
 from tfcompose.run.launcher.control import listen
 from tfcompose.run.launcher.logs import Logs
 from tfcompose.run.launcher.outlet import Outlet
@@ -35,9 +34,9 @@ if TYPE_CHECKING:
 
 def start(arguments: Namespace) -> int:
     """Build where that is needed, look at everything, and start; return the exit code as ``up`` does."""
-    missing = missing_ros()
+    missing = no_ros()
     if missing:
-        print_findings([finding("TF901", missing, None)], sys.stderr)
+        print_findings([missing], sys.stderr)
         return 1
     file = Path(arguments.file) if arguments.file.endswith(".json") else _built(arguments)
     if isinstance(file, int):

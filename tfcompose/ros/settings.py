@@ -23,10 +23,16 @@ LAST_DOMAIN = 232
 
 def ros_trouble(environment: Mapping[str, str]) -> Diagnostic | None:
     """Return what keeps a process with this environment from starting a node, or None."""
+    return no_ros() or _domain(environment.get(DOMAIN, "")) or _middleware(environment.get(RMW, ""))
+
+
+def no_ros() -> Diagnostic | None:
+    """Return the finding that there is no ROS, with what to install, or None."""
     missing = missing_ros()
-    if missing:
-        return finding("TF901", missing, None)
-    return _domain(environment.get(DOMAIN, "")) or _middleware(environment.get(RMW, ""))
+    if not missing:
+        return None
+    message, _, advice = missing.partition(": ")
+    return finding("TF901", message, None, help=advice)
 
 
 def _domain(domain: str) -> Diagnostic | None:

@@ -22,8 +22,8 @@ from tfcompose.cli.terminal import UNREADABLE, complain, print_findings
 from tfcompose.diagnostic import finding
 from tfcompose.observe.census import topics_below
 from tfcompose.plan import RosSettings
-from tfcompose.ros.environment import RosError, child_environment, missing_ros
-from tfcompose.ros.settings import ros_trouble
+from tfcompose.ros.environment import RosError, child_environment
+from tfcompose.ros.settings import no_ros, ros_trouble
 from tfcompose.ros.stop import Stop
 from tfcompose.ros.topics import parts_of
 
@@ -50,9 +50,9 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Look and print the findings; exit code 0 where nothing is wrong, 1 with findings, 2 for wrong use."""
-    missing = missing_ros()
+    missing = no_ros()
     if missing:
-        return _say([finding("TF901", missing, None)], arguments, "")
+        return _say([missing], arguments, "")
     plan = _plan(arguments)
     if isinstance(plan, int):
         return plan

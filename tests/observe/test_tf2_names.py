@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import inspect
 import pickle
+import sys
 import threading
 from dataclasses import dataclass
 from timeit import repeat
@@ -28,11 +29,21 @@ from tfcompose.observe import (
     TransformRegistration,
     TypeException,
     convert,
+    stamped,
 )
 from tfcompose.observe.stamped import Header, Time, Vector3
 from tfcompose.pose import Pose, quat_from_rpy
 
 S = 1_000_000_000
+
+
+@pytest.fixture(autouse=True)
+def _without_ros(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have nothing of ROS loaded, whatever ran before in this process."""
+    for name in ("rclpy.task", "rclpy.time", "std_msgs.msg", "geometry_msgs.msg"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    monkeypatch.setattr(stamped, "_makers", {})
+
 
 # As geometry2 for Jazzy has them; of keyword-only arguments the names, since their order does not matter.
 METHODS = {

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from tfcompose.observe.trajectory import Trajectory
+    from tfcompose.pose import Pose
 
 __all__ = ["CACHE_NS", "Buffer", "BufferCore", "FrameInfo", "Refusal", "Row"]
 __all__ += ["ConnectivityException", "ExtrapolationException", "InvalidArgumentException", "LookupException"]
@@ -86,6 +87,25 @@ class Buffer(Awaits, BufferInterface):
     def set_transform_static(self, transform: Any, authority: str = "default_authority") -> bool:
         """Take a TransformStamped of a fixed edge; return False if it was refused."""
         return not self.insert([_row(transform)], static=True, authority=authority)
+
+    def latest(self, target: str, source: str) -> tuple[Pose, int | None]:
+        """Return what ``lookup`` does for time 0; the time is None where only fixed edges are on the way."""
+        pose, stamp_ns = self.lookup(target, source)
+        return pose, stamp_ns or None
+
+    def behind(self, target: str, source: str) -> str | None:
+        """Return the moving edge between the two whose newest sample is the oldest, as "parent → child", or None.
+
+        Raises:
+            LookupException: if a frame is not known.
+            ConnectivityException: if they are in two trees.
+        """
+        with self._lock:
+            moving = self._chain(target, source).moving if target != source else []
+            if not moving:
+                return None
+            last = min(moving, key=lambda history: history.newest_ns)
+            return f"{last.parent} → {last.child}"
 
     def transform_points(self, cloud: ArrayLike, target: str, source: str, stamp: Any = 0) -> NDArray[Any]:
         """Return points given in ``source`` in ``target``, at a time (0: the newest common one). Needs numpy.

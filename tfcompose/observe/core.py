@@ -15,8 +15,8 @@ from tfcompose.observe.exceptions import (
     LookupException,
     TransformException,
 )
-from tfcompose.observe.history import History
-from tfcompose.observe.refusal import DENORMALISED, Refusal, refusal
+from tfcompose.observe.history import History, pack_pose
+from tfcompose.observe.refusal import Refusal, refusal
 from tfcompose.observe.rotation import IDENTITY, Seven
 from tfcompose.observe.walk import newest_ways, ways_at
 from tfcompose.pose import Pose
@@ -72,9 +72,7 @@ class BufferCore:
         row = (parent, child, 0, stamp_ns, *pose.xyz, *pose.quat_xyzw)
         return not self.insert([row], static=static, authority=authority)
 
-    def insert(  # noqa: C901, PLR0912 (fifty thousand times a second: a call for each step would cost as much as the step)
-        self, rows: Iterable[Row], *, static: bool, authority: str = ""
-    ) -> list[tuple[str, Refusal]]:
+    def insert(self, rows: Iterable[Row], *, static: bool, authority: str = "") -> list[tuple[str, Refusal]]:
         """Take transforms in order; return the child and the reason of each that was refused.
 
         A leading slash is dropped from names. Not taken is what ``Refusal`` lists, as tf2 says it in its log; infinite
@@ -82,42 +80,52 @@ class BufferCore:
         """
         refused: list[tuple[str, Refusal]] = []
         with self._lock:
-            for parent, child, sec, nsec, x, y, z, qx, qy, qz, qw in rows:
-                if parent[:1] == "/":
-                    parent = parent[1:]  # noqa: PLW2901 (tf2 strips it as well)
-                if child[:1] == "/":
-                    child = child[1:]  # noqa: PLW2901 (the same)
-                squared = qx * qx + qy * qy + qz * qz + qw * qw
-                off = squared - 1.0
-                if not (
-                    -DENORMALISED < off < DENORMALISED and isfinite(x + y + z) and parent and child and child != parent
-                ):
-                    reason = refusal(parent, child, (x, y, z, qx, qy, qz, qw))
-                    if reason:
-                        refused.append((child, reason))
-                        continue
-                if not -_ROUNDING < off < _ROUNDING:
-                    scale = 1 / sqrt(squared)
-                    qx, qy, qz, qw = qx * scale, qy * scale, qz * scale, qw * scale  # noqa: PLW2901 (to unit length)
-                history = self._histories.get(child)
-                if history is None or history.static is not static:
-                    history = self._new_history(child, static=static)
-                outcome = history.insert(sec * _SECOND_NS + nsec, parent, (x, y, z, qx, qy, qz, qw), self.cache_ns)
-                if outcome != "taken" or history.mixed:
-                    self._names.setdefault(child)
-                    self._names.setdefault(parent)
-                if outcome == "old":
-                    refused.append((child, Refusal.OLD))
-                    continue
-                if outcome == "changed":
-                    self._changed(history)
-                history.authority = authority
+            histories, cache_ns = self._histories, self.cache_ns
+            for row in rows:
+                # What comes fifty thousand times a second: the next sample of an edge that stays as it is.
+                parent, child, sec, nsec, x, y, z, qx, qy, qz, qw = row
+                history = histories.get(child)
+                if history is not None and history.parent == parent and history.static is static:
+                    squared = qx * qx + qy * qy + qz * qz + qw * qw
+                    if -_ROUNDING < squared - 1.0 < _ROUNDING and isfinite(x + y + z):
+                        pose = pack_pose(x, y, z, qx, qy, qz, qw)
+                        if history.append(sec * _SECOND_NS + nsec, pose, cache_ns):
+                            history.authority = authority
+                            continue
+                reason = self._take(row, static=static, authority=authority)
+                if reason:
+                    refused.append((child.removeprefix("/"), reason))
             if self._waiting:
                 self._news.notify_all()
         if self.on_news:
             for tell in tuple(self.on_news):
                 tell()
         return refused
+
+    def _take(self, row: Row, *, static: bool, authority: str) -> Refusal | None:
+        """Take any transform; return why it was refused."""
+        # tf2 strips one slash.
+        parent, child = row[0].removeprefix("/"), row[1].removeprefix("/")
+        x, y, z, qx, qy, qz, qw = row[4:]
+        reason = refusal(parent, child, (x, y, z, qx, qy, qz, qw))
+        if reason:
+            return reason
+        squared = qx * qx + qy * qy + qz * qz + qw * qw
+        scale = 1.0 if -_ROUNDING < squared - 1.0 < _ROUNDING else 1 / sqrt(squared)
+        history = self._histories.get(child)
+        if history is None or history.static is not static:
+            history = self._new_history(child, static=static)
+        pose = (x, y, z, qx * scale, qy * scale, qz * scale, qw * scale)
+        outcome = history.insert(row[2] * _SECOND_NS + row[3], parent, pose, self.cache_ns)
+        if outcome != "taken" or history.mixed:
+            self._names.setdefault(child)
+            self._names.setdefault(parent)
+        if outcome == "old":
+            return Refusal.OLD
+        if outcome == "changed":
+            self._changed(history)
+        history.authority = authority
+        return None
 
     def lookup(self, target: str, source: str, stamp_ns: int = 0) -> tuple[Pose, int]:
         """Return the pose of ``source`` in ``target`` at a time, and that time, both in nanoseconds since the epoch.
@@ -133,25 +141,6 @@ class BufferCore:
         """
         (x, y, z, *quat), stamp_ns = self._pose(target, source, stamp_ns)
         return Pose((x, y, z), (quat[0], quat[1], quat[2], quat[3])), stamp_ns
-
-    def latest(self, target: str, source: str) -> tuple[Pose, int | None]:
-        """Return what ``lookup`` does for time 0; the time is None where only fixed edges are on the way."""
-        pose, stamp_ns = self.lookup(target, source)
-        return pose, stamp_ns or None
-
-    def behind(self, target: str, source: str) -> str | None:
-        """Return the moving edge between the two whose newest sample is the oldest, as "parent → child", or None.
-
-        Raises:
-            LookupException: if a frame is not known.
-            ConnectivityException: if they are in two trees.
-        """
-        with self._lock:
-            moving = self._chain(target, source).moving if target != source else []
-            if not moving:
-                return None
-            last = min(moving, key=lambda history: history.newest_ns)
-            return f"{last.parent} → {last.child}"
 
     def clear(self) -> None:
         """Forget all samples of moving edges; fixed ones and the names stay, as in tf2."""

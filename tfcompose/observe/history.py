@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from array import array
 from bisect import bisect_right
 from typing import Literal
@@ -10,6 +11,9 @@ from tfcompose.observe.rotation import Seven, between
 
 #: What became of a sample: it was too old; taken; taken, and it changed a fixed pose or a parent.
 Outcome = Literal["old", "taken", "changed"]
+
+#: Seven doubles as an array holds them.
+pack_pose = struct.Struct("7d").pack
 
 # Samples that are over are removed so many at a time.
 _COMPACT = 256
@@ -52,6 +56,21 @@ class History:
     def newest_ns(self) -> int:
         """The time of the newest sample, in nanoseconds."""
         return self.stamps[-1]
+
+    def append(self, stamp_ns: int, pose: bytes, cache_ns: int) -> bool:
+        """Take the next sample of a moving edge that has one parent, and return True; else do nothing.
+
+        ``pose`` is what ``pack_pose`` gives: an array takes it in a third of the time of seven numbers.
+        """
+        stamps = self.stamps
+        if self.static or self.mixed or not stamps or stamp_ns <= stamps[-1]:
+            return False
+        if stamps[self.start] < stamps[-1] - cache_ns:
+            self._prune(stamps[-1] - cache_ns)
+        stamps.append(stamp_ns)
+        self.poses.frombytes(pose)
+        self.parents.append(self.parent)
+        return True
 
     def insert(self, stamp_ns: int, parent: str, pose: Seven, cache_ns: int) -> Outcome:
         """Take a sample, as tf2 does: first drop what is older than ``cache_ns`` before the newest so far."""

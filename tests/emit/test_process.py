@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from tfcompose.diagnostic import Diagnostic
 
-HEAD = "tfcompose: 1\nrobot: r\nros: {namespace: r1}\nframes: {map: {}}\nrules: {TF818: off}\nprocesses:\n"
+HEAD = "tfcompose: 1\nrobot: r\nros: {namespace: r1}\nframes: {map: {}}\nrules: {TF818: off, TF848: off}\nprocesses:\n"
 EXE = "run: {package: p, executable: e}"
 
 
@@ -80,12 +80,30 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "run: {launch: p/l.launch.py, args: ['x:=1']}": ("${launch:p/l.launch.py}", "x:=1"),
     "run: 'a | b', shell: true": ("/bin/sh", "-c", "a | b"),
     "run: [a, '|', b]": ("a", "|", "b"),
+    "run: [a], env: {B: c}, restart: always, node: n": ("a",),
+    "run: [a, --now], log_level: debug": ("a", "--now", "--ros-args", "--log-level", "debug"),
+    "run: [a], remap: {/scan: /front}": ("a", "--ros-args", "-r", "/scan:=/front"),
+    "run: [a], params: {x: 1}": ("a", "--ros-args", "--params-file", "${params_file}"),
+    "run: [a, '${params_file}'], params: {x: 1}": ("a", "${params_file}"),
+    "run: [a, --ros-args, -p, 'y:=2'], remap: {b: c}": (
+        "a", "--ros-args", "-p", "y:=2", "--ros-args", "-r", "b:=c",
+    ),
+    "run: 'a | b', shell: true, remap: {/scan: /front}": ("/bin/sh", "-c", "a | b"),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("keys", COMMANDS)
 def test_how_it_is_run_becomes_words_that_the_launcher_can_follow(keys: str) -> None:
     assert process_of(keys).argv == COMMANDS[keys]
+
+
+def test_a_command_that_owns_an_edge_is_told_what_all_nodes_are_and_one_that_may_be_no_node_is_not() -> None:
+    head = HEAD.replace("namespace: r1", "namespace: r1, isolate: topics, clock: sim")
+    head = head.replace("{map: {}}", "{map: {}, odom: {parent: map, owner: drive}}")
+    plan = read_plan(files_of("drive: {run: [drive]}\n  web: {run: [serve, --port, '80']}", head)["plan.json"], "p")
+    remaps = ("-r", "/tf:=/r1/tf", "-r", "/tf_static:=/r1/tf_static")
+    assert plan.process("drive").argv == ("drive", "--ros-args", *remaps, "-p", "use_sim_time:=true")
+    assert plan.process("web").argv == ("serve", "--port", "80")
 
 
 def test_each_node_of_a_process_has_its_own_parameters_under_its_full_name() -> None:

@@ -61,10 +61,9 @@ frames:
   lidar: {{parent: base_link, xyz: [0, 0, 0.3]}}
 processes:
   drive: {{simulate: {{fixed: {{xyz: [0, 0, 0]}}, rate: 20 Hz}}, after: {{static: ready}}}}
-  arm: {{run: [{python}, {file}{words}], node: /arm, lifecycle: active, restart: on-failure}}
+  arm: {{run: [{python}, {file}], node: /arm, lifecycle: active, restart: on-failure}}
 guard: {{mode: {mode}}}
 """
-REMAPS = ", --ros-args, -r, '/tf_static:=/robot1/tf_static'"
 ISOLATED = ", namespace: robot1, isolate: topics"
 
 
@@ -180,9 +179,7 @@ def exported(domain: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> It
 
     def export(kind: str, mode: str, more: str = "") -> Supervisor:
         (tmp_path / "arm.py").write_text(ARM, "utf-8")
-        text = ROBOT.format(
-            domain=domain.id, python=sys.executable, file=tmp_path / "arm.py", mode=mode, words=REMAPS if more else ""
-        )
+        text = ROBOT.format(domain=domain.id, python=sys.executable, file=tmp_path / "arm.py", mode=mode)
         (tmp_path / "robot.yaml").write_text(text.replace("localhost", f"localhost{more}", 1), "utf-8")
         command = [sys.executable, "-m", "tfcompose", "export", kind, "robot.yaml", "-o", "build"]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)

@@ -7,14 +7,15 @@ import json
 import posixpath
 import re
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from tfcompose.emit.argv import argv_of
 from tfcompose.emit.driven import driven_of, switches_of
 from tfcompose.emit.numbers import clean
 from tfcompose.emit.params import written_params
 from tfcompose.emit.target import AS_WRITTEN, Target
 from tfcompose.model import JOINTS, STATIC
-from tfcompose.plan import DESCRIPTION, Claim, Joint, Plan, PlanEdge, PlanProcess, switch_text, told_at_start
+from tfcompose.plan import DESCRIPTION, Claim, Joint, Plan, PlanEdge, PlanProcess, switch_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,15 +23,6 @@ if TYPE_CHECKING:
     from tfcompose.model import Edge, Process, Robot
 
 _FILE = re.compile(r"\$\{file:([^{}]*)\}")
-
-#: The modules behind tfcompose's own processes.
-MODULES = {
-    "static": "tfcompose.run.static",
-    "joints": "tfcompose.run.joints",
-    "simulate": "tfcompose.run.simulate",
-    "guard": "tfcompose.run.guard",
-}
-
 
 _PUBLISHERS = frozenset({"static", "joints"})
 
@@ -133,7 +125,7 @@ def _process(process: Process, robot: Robot, owned: list[tuple[str, str]], names
     return PlanProcess(
         name=process.name,
         kind=process.kind,
-        argv=_argv(process, robot, has_params=has_params),
+        argv=argv_of(process, robot, has_params=has_params, owns=bool(owned)),
         env=process.env,
         cwd=process.cwd,
         params_file=f"params/{process.name}.yaml" if has_params else None,
@@ -156,46 +148,6 @@ def _process(process: Process, robot: Robot, owned: list[tuple[str, str]], names
     )
 
 
-def _argv(process: Process, robot: Robot, *, has_params: bool) -> tuple[str, ...]:
-    if process.kind == "external":
-        return ()
-    if process.kind != "run":
-        told = [word for name, value in _own_params(process) for word in ("-p", f"{name}:={json.dumps(value)}")]
-        own = ("${python}", "-m", MODULES[process.kind], "${plan}", process.name)
-        return (*own, "--ros-args", *told) if told else own
-    if process.launch is not None:
-        return (f"${{launch:{process.launch}}}", *process.argv)
-    if process.package is None:
-        return process.argv
-    remaps = [word for old, new in process.remap.items() for word in ("-r", f"{old}:={new}")]
-    ros_args = ["--ros-args", *_names(process, robot), *remaps]
-    if process.log_level is not None:
-        ros_args += ["--log-level", process.log_level]
-    if robot.ros.clock == "sim":
-        ros_args += ["-p", "use_sim_time:=true"]
-    if has_params:
-        ros_args += ["--params-file", "${params_file}"]
-    for name, value in _told(process.params):
-        ros_args += ["-p", f"{name}:={json.dumps(value, ensure_ascii=False)}"]
-    return (f"${{executable:{process.package}/{process.executable}}}", *process.argv, *ros_args)
-
-
-def _own_params(process: Process) -> list[tuple[str, Any]]:
-    """Return the parameters of one of tfcompose's own processes; a number is a double, as its parameter is."""
-    return [
-        (name, value if isinstance(value, bool) else float(value)) for name, value in sorted(process.params.items())
-    ]
-
-
-def _told(params: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the parameters, by their full names, with paths that only the launcher knows."""
-    for key, value in params.items():
-        if isinstance(value, dict):
-            yield from _told(value, f"{above}{key}.")
-        elif told_at_start(value):
-            yield f"{above}{key}", value
-
-
 def _at(target: Target, process: PlanProcess) -> PlanProcess:
     """Return the process with each file's place seen from the plan's folder."""
 
@@ -211,11 +163,3 @@ def _on(main: str | None, process: PlanProcess) -> PlanProcess:
     if process.host or process.kind in ("external", "guard"):
         return process
     return replace(process, host=main)
-
-
-def _names(process: Process, robot: Robot) -> list[str]:
-    """Return what gives the node its name and namespace; several nodes have names of their own."""
-    if len(process.nodes) > 1:
-        return ["-r", f"__ns:=/{robot.ros.namespace}"]
-    namespace, _, node = process.node.rpartition("/")
-    return ["-r", f"__node:={node}", "-r", f"__ns:={namespace or '/'}"]

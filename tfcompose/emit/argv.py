@@ -1,0 +1,97 @@
+"""The words that start a process, with what ROS nodes are told by arguments."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.emit.params import written_params
+from tfcompose.plan import told_at_start
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.model import Process, Robot
+
+#: The modules behind tfcompose's own processes.
+MODULES = {
+    "static": "tfcompose.run.static",
+    "joints": "tfcompose.run.joints",
+    "simulate": "tfcompose.run.simulate",
+    "guard": "tfcompose.run.guard",
+}
+#: What a shell reads; and the file of parameters, which is named once.
+_SHELL = ("/bin/sh", "-c")
+_PARAMS_FILE = "${params_file}"
+_TF_TOPICS = frozenset({"/tf", "/tf_static"})
+
+
+def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> tuple[str, ...]:
+    """Return the process's command.
+
+    ``owns`` says that it has edges, ``has_params`` that a file of parameters is written for it.
+    """
+    if process.kind == "external":
+        return ()
+    if process.kind != "run":
+        told = [word for name, value in _own_params(process) for word in ("-p", f"{name}:={json.dumps(value)}")]
+        own = ("${python}", "-m", MODULES[process.kind], "${plan}", process.name)
+        return (*own, "--ros-args", *told) if told else own
+    if process.launch is not None:
+        return (f"${{launch:{process.launch}}}", *process.argv)
+    if process.package is None and not _is_node(process, owns=owns):
+        return process.argv
+    told = _told_to_node(process, robot, has_params=has_params)
+    if process.package is None:
+        return (*process.argv, "--ros-args", *told) if told else process.argv
+    program = f"${{executable:{process.package}/{process.executable}}}"
+    return (program, *process.argv, "--ros-args", *_names(process, robot), *told)
+
+
+def _is_node(process: Process, *, owns: bool) -> bool:
+    """Whether a plain command is surely a ROS node: it owns an edge, or is told what only nodes are.
+
+    What follows a text that a shell reads does not reach the program.
+    """
+    if process.argv[:2] == _SHELL:
+        return False
+    is_told = process.log_level is not None or bool(written_params(process)) or bool(process.remap.keys() - _TF_TOPICS)
+    return owns or is_told or "--ros-args" in process.argv
+
+
+def _told_to_node(process: Process, robot: Robot, *, has_params: bool) -> list[str]:
+    """Return the ROS arguments but for names; a parameter file is named once."""
+    ros_args = [word for old, new in process.remap.items() for word in ("-r", f"{old}:={new}")]
+    if process.log_level is not None:
+        ros_args += ["--log-level", process.log_level]
+    if robot.ros.clock == "sim":
+        ros_args += ["-p", "use_sim_time:=true"]
+    if has_params and not any(_PARAMS_FILE in word for word in (*process.argv, *process.env.values())):
+        ros_args += ["--params-file", _PARAMS_FILE]
+    for name, value in _told(process.params):
+        ros_args += ["-p", f"{name}:={json.dumps(value, ensure_ascii=False)}"]
+    return ros_args
+
+
+def _own_params(process: Process) -> list[tuple[str, Any]]:
+    """Return the parameters of one of tfcompose's own processes; a number is a double, as its parameter is."""
+    return [
+        (name, value if isinstance(value, bool) else float(value)) for name, value in sorted(process.params.items())
+    ]
+
+
+def _told(params: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the parameters, by their full names, with paths that only the launcher knows."""
+    for key, value in params.items():
+        if isinstance(value, dict):
+            yield from _told(value, f"{above}{key}.")
+        elif told_at_start(value):
+            yield f"{above}{key}", value
+
+
+def _names(process: Process, robot: Robot) -> list[str]:
+    """Return what gives the node its name and namespace; several nodes have names of their own."""
+    if len(process.nodes) > 1:
+        return ["-r", f"__ns:=/{robot.ros.namespace}"]
+    namespace, _, node = process.node.rpartition("/")
+    return ["-r", f"__node:={node}", "-r", f"__ns:={namespace or '/'}"]

@@ -83,7 +83,8 @@ def cell(tmp_path: Path) -> Any:
     """Compile these parts on a table, beside the package arm."""
     package = tmp_path / "third" / "arm"
     package.mkdir(parents=True)
-    texts = {"arm.urdf": ARM, "slide.xacro": XACRO, "mast.xacro": MACRO, "base.stl": ""}
+    bare = XACRO.replace("$(arg reach)", "$(arg side)")
+    texts = {"bare.xacro": bare, "arm.urdf": ARM, "slide.xacro": XACRO, "mast.xacro": MACRO, "base.stl": ""}
     sizes = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="height" value="0.25"/></robot>'
     for name, text in (texts | {"sizes.xacro": sizes}).items():
         (package / name).write_text(text, encoding="utf-8")
@@ -325,6 +326,13 @@ def test_warnings_about_somebody_elses_file_are_left_to_its_own_lint(cell: Any, 
             "TF101",
             "xzy",
             "mean xyz?",
+            "cell.yaml",
+        ),
+        (
+            "a: {xacro: third/arm/bare.xacro, parent: table}",
+            "TF106",
+            "the argument side has no value",
+            "args: {side: …}",
             "cell.yaml",
         ),
         ("a: {urdf: third/arm/arm.urdf, root: bse, parent: table}", "TF203", "bse", "did you mean base?", "cell.yaml"),

@@ -66,6 +66,9 @@ def _refused(error: Exception, file: str, files: list[str]) -> Diagnostic:
     root = chain[-1]
     if isinstance(root, _MissingError):
         return replace(root.found, severity="error", span=Span(file))
+    if type(root).__name__ == "ArgException":
+        message = f"the argument {root} has no value: the file gives it none"
+        return finding("TF106", message, Span(file), help=f"{root}:=…; of a part, args: {{{root}: …}}")
     if isinstance(root, OSError):
         words = [f"{root.strerror}: {root.filename}"]
     else:

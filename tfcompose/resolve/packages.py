@@ -10,7 +10,7 @@ import re
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, Span, did_you_mean, finding
+from tfcompose.diagnostic import Diagnostic, Span, finding, nearest, slip_of
 from tfcompose.frozen import dataclass, field
 from tfcompose.model import Asset
 from tfcompose.resolve.beside import beside
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 _PACKAGE_NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://")
+_NEAR = 0.8  # many packages end in _description
 _HIGHEST = 12  # so many folders above a file its package.xml is looked for
 
 
@@ -81,7 +82,8 @@ class Packages:
         places = self.places(name)
         looked = f"looked in {', '.join(places)}" if places else "AMENT_PREFIX_PATH is empty"
         otherwise = f"packages: {{{name}: FOLDER}}, or source the workspace's setup file"
-        advice = f"{looked}; {did_you_mean(name, self.named, otherwise)}"
+        near = slip_of(name, self.named) or nearest(name, self.named, _NEAR)
+        advice = f"{looked}; {f'did you mean {near}?' if near else otherwise}"
         return finding("TF724", f"no package {name}", at, help=advice, severity="warning")
 
     def asset(self, uri: str, at: Span) -> tuple[Asset, Diagnostic | None]:

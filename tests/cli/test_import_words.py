@@ -238,6 +238,8 @@ def test_a_xacro_file_is_expanded_with_arguments(tmp_path: Path) -> None:
     assert main(["import", str(file), "high:=0.5", "-o", str(out)]) == 0
     assert data(out.read_text("utf-8"))["frames"]["mast"]["xyz"] == [0, 0, 0.5]
     assert main(["import", str(file), "hgh:=0.5", "-o", str(out), "--force"]) == 1
+    (tmp_path / "plain.urdf").write_text(f"{HEAD}</robot>")
+    assert main(["import", str(tmp_path / "plain.urdf"), "high:=0.5"]) == 1
 
 
 def test_a_source_with_errors_is_refused_whole_unless_that_is_wanted(

@@ -267,6 +267,15 @@ def test_a_rotation_as_a_quaternion_is_taken_and_said(version: str, origin: str,
         assert robot.edges[0].pose.quat_xyzw == pytest.approx((0, 0, 0.5**0.5, 0.5**0.5))
 
 
+def test_xacro_in_a_file_that_is_named_as_a_urdf_is_expanded_too(tmp_path: Path) -> None:
+    """As those of TurtleBot 3 are named."""
+    file = tmp_path / "r.urdf"
+    file.write_text(XACRO.replace("base_lnk", "base_link"))
+    assert lint_urdf(str(file)) == []
+    file.write_text(XACRO)
+    assert [one.code for one in lint_urdf(str(file))] == ["TF203"]
+
+
 def test_of_a_file_that_only_defines_macros_these_are_named(tmp_path: Path) -> None:
     file = tmp_path / "r.urdf.xacro"
     file.write_text(XACRO.replace('<link name="base_link"/>', "").replace('<xacro:leg n="1"/>', ""))

@@ -72,16 +72,20 @@ class Read:
 
 
 def read_urdf(file: str, packages: Packages, arguments: Mapping[str, str] | None = None) -> Read:
-    """Return what the file says; a xacro file is expanded, with arguments.
+    """Return what the file says; a xacro file, by its name or by what is in it, is expanded, with arguments.
 
     Raises:
-        RejectedError: if it cannot be read, or is no URDF.
+        RejectedError: if it cannot be read, or is no URDF; or takes no arguments, and is given some.
     """
-    is_xacro = file.endswith(".xacro")
-    name, text = (f"{file} (expanded)", expanded(file, packages, arguments)) if is_xacro else (file, read_text(file))
+    written = read_text(file)
+    is_xacro = file.endswith(".xacro") or "<xacro:" in written
+    if arguments and not is_xacro:
+        advice = "xacro files take arguments"
+        raise RejectedError([finding("TF106", f"no argument {next(iter(arguments))}", Span(file), help=advice)])
+    name, text = (f"{file} (expanded)", expanded(file, packages, arguments)) if is_xacro else (file, written)
     root = load_xml(text, name)
     robot, found = robot_of_urdf(root, name, packages.asset)
-    macros = MACRO.findall(read_text(file)) if is_xacro and not robot.frames else []
+    macros = MACRO.findall(written) if is_xacro and not robot.frames else []
     if macros:
         advice = f"a part can call one: parts: {{NAME: {{xacro: {file}, macro: {macros[0]}, …}}}}"
         message = f"{file} defines macros, and no links: {', '.join(dict.fromkeys(macros))}"

@@ -77,7 +77,7 @@ def _unexpanded(element: Element) -> Diagnostic:
     if element.tag in _XACRO:
         message = f"<{element.tag}> is xacro's, and without its prefix nobody expands it"
         return finding("TF720", message, element.at, help=f"<xacro:{element.tag} …>")
-    advice = "a file that is named .xacro is expanded"
+    advice = "as a part: xacro: instead of urdf:"
     return finding("TF720", f"<{element.tag}> was not expanded", element.at, help=advice)
 
 

@@ -98,8 +98,6 @@ def _refusal(arguments: Namespace) -> str:
     """Return what is wrong with how the command is used, or an empty text."""
     if not arguments.file.endswith((".urdf", ".xacro")):
         return f"{arguments.file}: a .urdf or .xacro file can be imported"
-    if arguments.args and not arguments.file.endswith(".xacro"):
-        return f"{arguments.file} takes no arguments: it is no xacro file"
     if arguments.robot and not _ROBOT.fullmatch(arguments.robot):
         return f"--robot {arguments.robot}: lower case letters, digits and _, a letter first"
     if arguments.output and Path(arguments.output).exists() and not arguments.force:

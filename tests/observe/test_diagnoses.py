@@ -11,10 +11,11 @@ from tfcompose.observe.census import Census, Publisher
 from tfcompose.observe.diagnose import diagnose
 from tfcompose.observe.diagnose.surroundings import differences
 from tfcompose.observe.joint_list import joints_of
-from tfcompose.observe.seen import RosProcess, Seen, Stamped, Topic, seconds
+from tfcompose.observe.seen import RosProcess, Seen, Stamped, Topic
 from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.pose import Pose
 from tfcompose.ros.settings import RANGE
+from tfcompose.verdict.clock import seconds
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -811,7 +811,7 @@ def test_an_owner_that_stamps_with_another_clock_is_reported_and_when_it_is_righ
     ("off", "said"),
     [
         (-60.0, "60 s behind the system's time"),
-        (3600.0, "3.6e+03 s ahead of"),
+        (3600.0, "1 h ahead of"),
         (-9.0, ""),
         (9.0, ""),
         (None, "without"),

@@ -148,13 +148,3 @@ def listed(names: object) -> str:
     some = [str(name) for name in names] if isinstance(names, (list, tuple, set, frozenset, dict)) else [str(names)]
     more = f" and {len(some) - LISTED} more" if len(some) > LISTED else ""
     return ", ".join(some[:LISTED]) + more
-
-
-def seconds(value: float) -> str:
-    """Return a time as people say it: 120 ms, 3.2 s, 2.5 h."""
-    size = abs(value)
-    if size < 1:
-        return f"{size * 1000:.0f} ms"
-    if size < 600:  # noqa: PLR2004 (ten minutes)
-        return f"{size:.3g} s"
-    return f"{size / 3600:.3g} h" if size < 48 * 3600 else f"{size / 86400:,.0f} days"

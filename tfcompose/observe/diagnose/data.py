@@ -6,7 +6,8 @@ from statistics import median
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
-from tfcompose.observe.seen import listed, seconds, who
+from tfcompose.observe.seen import listed, who
+from tfcompose.verdict.clock import seconds
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, finding
-from tfcompose.observe.seen import seconds, who
+from tfcompose.observe.seen import who
+from tfcompose.verdict.clock import seconds
 from tfcompose.verdict.timing import gone
 
 if TYPE_CHECKING:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, finding
 from tfcompose.observe.diagnose.data import keeps_data_waiting
-from tfcompose.observe.seen import counted, listed, seconds, who
+from tfcompose.observe.seen import counted, listed, who
+from tfcompose.verdict.clock import WRONG_BY_NS, other_clock, seconds
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -15,8 +16,7 @@ if TYPE_CHECKING:
     from tfcompose.observe.seen import Seen
 
 _SECOND_NS = 1_000_000_000
-#: tf2's buffers keep 10 s: what is farther off than that cannot be looked up together with the rest.
-KEPT_S = 10.0
+KEPT_S = WRONG_BY_NS / _SECOND_NS
 #: Stamps that are older on arrival make lookups of "now", and of new sensor data, fail for so long.
 LATE_S = 0.5
 #: AMCL and others date map → odom forward by up to a second, so that lookups of "now" do not fail.
@@ -29,8 +29,6 @@ SLOW_S = 0.25
 FEWEST, PART = 5, 0.3
 #: A single step back by so much is enough.
 LARGE_STEP_S = 1.0
-#: Before 2001: no time of day.
-NO_DATE_NS = 10**9 * _SECOND_NS
 
 
 def stamp_repeated(seen: Seen) -> Iterator[Diagnostic]:
@@ -197,24 +195,9 @@ def _mostly_simulated(seen: Seen) -> bool:
 def _clock_said(seen: Seen, edge: EdgeSeen, *, simulated: bool) -> str:
     """Return how the stamps are not of the clock that the others have, or nothing."""
     strand = edge.strand
-    if strand.stamp_ns == 0:
-        return "without a stamp"
-    near_sim = seen.clock_ns is not None and abs(strand.stamp_ns - seen.clock_ns) <= KEPT_S * 1e9
-    off_s = (strand.tally.last_ns - strand.stamp_ns) / 1e9
-    if simulated:
-        if near_sim or seen.clock_ns is None:
-            return ""
-        if abs(off_s) <= KEPT_S:
-            return f"with the system's time, and /clock says {seen.clock_ns / 1e9:.1f} s"
-        off_s, clock = (seen.clock_ns - strand.stamp_ns) / 1e9, "/clock"
-        return f"with {strand.stamp_ns / 1e9:.1f} s, {seconds(off_s)} {'behind' if off_s > 0 else 'ahead of'} {clock}"
-    if near_sim:
-        return f"with simulated time ({strand.stamp_ns / 1e9:.1f} s), and others with the system's"
-    if abs(off_s) <= KEPT_S or _many(edge, strand.stamps_repeated):
-        return ""
-    if strand.stamp_ns < NO_DATE_NS:
-        return f"with {strand.stamp_ns / 1e9:.1f} s, which is simulated time, or time since a start"
-    return f"{seconds(off_s)} {'behind' if off_s > 0 else 'ahead of'} the system's time"
+    if strand.stamp_ns and _many(edge, strand.stamps_repeated):
+        return ""  # it is off at last, which follows
+    return other_clock(strand.stamp_ns, strand.tally.last_ns, seen.clock_ns, simulated=simulated)
 
 
 def _clock_help(said: str) -> str:

@@ -8,14 +8,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tfcompose.verdict.clock import WRONG_BY_NS, other_clock
 from tfcompose.verdict.offence import BACK, REPEATED, WRONG_CLOCK
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 _SECOND_NS = 1_000_000_000
-#: tf2's buffers keep 10 s: what is farther off than that cannot be looked up together with the rest.
-WRONG_BY_NS = 10 * _SECOND_NS
 #: So many in a row are no accident; so many that are right end it.
 WRONG_IN_A_ROW = 3
 #: Each fault counts up by so many, each right message down by one; at so many the fault is reported.
@@ -81,18 +80,6 @@ class Stamps:
             self.wrong = 0
             return ""
         self.wrong = min(self.wrong + 1, WRONG_IN_A_ROW)
-        return _said(worst, reference, received_ns, clocks) if self.wrong >= WRONG_IN_A_ROW else ""
-
-
-def _said(stamp_ns: int, reference_ns: int, received_ns: int, clocks: Clocks) -> str:
-    off = abs(stamp_ns - reference_ns) / 1e9
-    way = "ahead of" if stamp_ns > reference_ns else "behind"
-    if stamp_ns == 0:
-        return "without a stamp"
-    if clocks.simulated:
-        if received_ns and abs(stamp_ns - received_ns) <= WRONG_BY_NS:
-            return f"with the system's time, and /clock says {reference_ns / 1e9:.1f} s"
-        return f"with {stamp_ns / 1e9:.1f} s, {off:.3g} s {way} /clock"
-    if stamp_ns < _SECOND_NS * 10**9:  # before 2001: no time of day
-        return f"with {stamp_ns / 1e9:.1f} s, which is simulated time, or time since a start"
-    return f"{off:.3g} s {way} the system's time"
+        if self.wrong < WRONG_IN_A_ROW:
+            return ""
+        return other_clock(worst, received_ns, clocks.sim_ns, simulated=clocks.simulated)

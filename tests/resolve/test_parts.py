@@ -220,6 +220,20 @@ def test_only_what_is_below_the_root_is_taken() -> None:
     assert "r1/odom" not in robot.frames
 
 
+def test_drivers_of_sensors_that_are_cut_off_are_cut_off_and_others_stay() -> None:
+    cameras = """sensors:
+  low: {preset: realsense/d435i, parent: foot, options: {serial: "1"}}
+  high: {preset: realsense/d435i, parent: upper, options: {serial: "2"}}
+"""
+    hardware = "ros2_control: {h: {plugin: a/B, joints: {shoulder: {command: [position]}}}}\n"
+    arm = ARM.replace("processes:", f"{cameras}{hardware}processes:")
+    whole, cut = (sound(CELL.replace("EXTRA", extra), arm_yaml=arm) for extra in ("", "root: upper"))
+    drivers = [{process.name for process in robot.processes if process.kind == "run"} for robot in (whole, cut)]
+    assert drivers == [{"left/low", "left/high"}, {"left/high"}]
+    assert [[one.name for one in robot.hardware] for robot in (whole, cut)] == [["left_h"], []]
+    assert "left_low_link" not in cut.frames
+
+
 def test_one_owner_takes_every_edge_of_the_part_and_not_its_mount() -> None:
     text = CELL.replace("EXTRA", "owner: ur") + "processes: {ur: {external: true}}\n"
     owners = {edge.child: edge.owner for edge in sound(text).edges}

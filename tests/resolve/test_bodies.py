@@ -158,6 +158,10 @@ def test_computing_leaves_no_noise_in_products_that_are_nothing() -> None:
     assert inertial_of({"visual": turned, "inertial": {"mass": 7}}).tensor[2] == 0
 
 
+def test_a_moment_that_is_small_beside_the_others_is_none_the_less_there() -> None:
+    assert inertial_of({"visual": {"box": [1e-6, 1e6, 0.1]}, "inertial": {"mass": 12}}).tensor[3] == pytest.approx(0.01)
+
+
 def test_collision_shapes_carry_the_mass_where_there_are_any() -> None:
     both = inertial_of({"visual": {"box": [9, 9, 9]}, "collision": {"box": [1, 1, 1]}, "inertial": {"density": 5}})
     assert both.mass == 5

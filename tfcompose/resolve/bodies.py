@@ -183,8 +183,9 @@ def inertial_of(mass: float, shapes: tuple[Shape, ...]) -> Inertial:
 
 
 def _of_density(whole: Moments, density: float, mass: float | None) -> Inertial:
-    noise = _NOISE * _trace(whole.tensor)
-    xx, xy, xz, yy, yz, zz = (density * value if abs(value) > noise else 0.0 for value in whole.tensor)
+    noise = density * _NOISE * _trace(whole.tensor)
+    xx, xy, xz, yy, yz, zz = (density * value for value in whole.tensor)
+    xy, xz, yz = (value if abs(value) > noise else 0.0 for value in (xy, xz, yz))
     return Inertial(mass or density * whole.volume, Pose(whole.centre), (xx, xy, xz, yy, yz, zz))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, did_you_mean, finding
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from tfcompose.validate.part import PartSpec
     from tfcompose.validate.spec import RobotSpec
 
+#: What may stand in front of names so that they can be looked up.
+_PREFIX = re.compile(r"([\w.:+@-]+/)*[\w.:+@-]*")
 #: What all processes of a plan share; a part cannot have its own.
 _SHARED_SETTINGS = ("clock", "domain_id", "discovery")
 
@@ -118,13 +121,17 @@ class PartEntry:
 
     def joined(self, robot: Robot, implied: frozenset[str] = frozenset()) -> Joined:
         """Return the part under the names that it has in the holder; ``implied`` are frames that only that has."""
+        if not _PREFIX.fullmatch(self.prefix):
+            at, advice = self.source.at((*self.at, "prefix")), "letters, digits and _: left_, or left/"
+            raise RejectedError([finding("TF501", f"{self.prefix!r} is no good prefix", at, help=advice)])
         shared = frozenset(robot.ros.shared_frames) & robot.frames.keys() | implied
         if self.said.root is not None:
             robot = self._cut(robot, self.said.root)
         names = Names(self.name, self.prefix, shared, self.alone)
         again = renamed(robot, names)
         if self.said.owner is not None:
-            again = replace(again, edges=tuple(_owned(edge, self.said.owner) for edge in again.edges))
+            at = self.source.at((*self.at, "owner"))
+            again = replace(again, edges=tuple(_owned(edge, self.said.owner, at) for edge in again.edges))
         if self.alone:
             again = replace(again, parts=(Part(self.name, self.prefix, robot), *again.parts))
         return Joined(self.name, self.said, again, self._root(robot, names), shared)
@@ -147,9 +154,9 @@ class PartEntry:
         raise RejectedError([finding("TF313", f"the part {self.name} has {what}", at, help=advice)])
 
 
-def _owned(edge: Edge, owner: str) -> Edge:
+def _owned(edge: Edge, owner: str, at: Span) -> Edge:
     """Return the edge of another owner, who sends what is fixed on /tf_static and what moves on /tf."""
-    return replace(edge, owner=owner, kind="static" if edge.kind == "static" else "dynamic")
+    return replace(edge, owner=owner, owner_at=at, kind="static" if edge.kind == "static" else "dynamic")
 
 
 def _named_in(data: dict[str, Any]) -> set[str]:

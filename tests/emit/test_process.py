@@ -65,7 +65,8 @@ REACH: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("keys", REACH)
 def test_a_key_of_a_process_reaches_the_plan(keys: str) -> None:
-    process = process_of(f"{EXE}, {keys}".rstrip(", "))
+    head = HEAD.replace("map: {}", "map: {}, odom: {parent: map, owner: a}") if "edges" in keys else HEAD
+    process = process_of(f"{EXE}, {keys}".rstrip(", "), head)
     assert {name: getattr(process, name) for name in REACH[keys]} == REACH[keys]
 
 

@@ -32,7 +32,7 @@ def program(run: Run, *, shell: bool) -> dict[str, Any]:
     return {"package": run.package, "executable": run.executable, "launch": run.launch, "argv": argv}
 
 
-def _ready(said: ReadySpec, namespace: str) -> Ready:
+def _ready(said: ReadySpec, namespace: str) -> Ready | None:
     timeout_s = said.timeout
     if said.topic is not None:
         return Ready("topic", full_name(namespace, said.topic), timeout_s=timeout_s)
@@ -46,4 +46,4 @@ def _ready(said: ReadySpec, namespace: str) -> Ready:
         return Ready("exit", number=float(said.exit), timeout_s=timeout_s)
     if said.time is not None:
         return Ready("time", number=said.time, timeout_s=timeout_s)
-    return Ready("edges", timeout_s=timeout_s)
+    return Ready("edges", timeout_s=timeout_s) if said.edges else None  # what else was said was refused

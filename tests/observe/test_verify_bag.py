@@ -178,7 +178,7 @@ def test_the_tree_of_a_bag_says_what_is_expected_unexpected_and_missing(tmp_path
     ]  # fmt: skip
     assert "50.0 Hz" in rows[1]
     assert rows[2].endswith("expected")
-    assert rows[3].endswith("missing: owner static")
+    assert rows[3].endswith("missing: owner static (/tfcompose_static)")
     assert rows[4].endswith("unexpected")
 
 

@@ -78,12 +78,16 @@ def test_the_live_tree_names_nodes_and_what_is_unexpected(running: Path) -> None
             tfcompose("tree", str(running), "--live", "--for", "5", "--format", "json")
         )["trees"]
     assert [tree["root"] for tree in rows] == ["odom", "world"]
-    told = {edge["child"]: (edge["status"], edge["seen"][0]["publisher"]) for tree in rows for edge in tree["edges"]}
+    edges = [edge for tree in rows for edge in tree["edges"]]
+    told = {edge["child"]: (edge["status"], edge["owner"], edge["seen"][0]["publisher"]) for edge in edges}
     assert told == {
-        "base_link": ("expected", "/rover/drive"),
-        "laser": ("expected", "/rover/static"),
-        "tag_1": ("unexpected", "/tags"),
+        "base_link": ("expected", "drive", "/rover/drive"),
+        "laser": ("expected", "static", "/rover/static"),
+        "tag_1": ("unexpected", None, "/tags"),
     }
+    drawn = tfcompose("tree", str(running), "--live").splitlines()
+    assert drawn[0] == "odom"
+    assert [word in drawn[1] for word in ("base_link", "drive (/rover/drive)", "Hz", "ms", "expected")] == [True] * 5
 
 
 @pytest.mark.usefixtures("domain")

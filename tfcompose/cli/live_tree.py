@@ -81,7 +81,7 @@ def _row(branch: Branch, *, plan: Plan | None) -> tuple[str, ...]:
         planned = branch.planned
         if planned is None:
             return (name, "", "", "", "", "")
-        return (name, planned.kind, planned.node, "", "", f"missing: owner {planned.owner}")
+        return (name, planned.kind, "", "", "", f"missing: owner {planned.owner} ({planned.node})")
     one = branch.seen[0]
     others = [
         f"also {printable(other.name)} from {printable(other.publisher) or 'somebody'}" for other in branch.seen[1:]
@@ -90,7 +90,16 @@ def _row(branch: Branch, *, plan: Plan | None) -> tuple[str, ...]:
     rate = "" if one.strand.static else f"{one.timing.rate:.1f} Hz" if one.timing.rate is not None else "–"
     age = "" if one.data_age_s is None else duration(one.data_age_s)
     kind = "static" if one.strand.static else "dynamic"
-    return (name, kind, printable(one.publisher) or "–", rate, age, "; ".join([*remarks, *others]))
+    return (name, kind, printable(_owner(branch, plan)) or "–", rate, age, "; ".join([*remarks, *others]))
+
+
+def _owner(branch: Branch, plan: Plan | None) -> str:
+    """Return who publishes the frame: the owner with its node where it is the owner, else the node."""
+    planned, one = branch.planned, branch.seen[0]
+    if plan is None or planned is None or not may_be_owners(planned, one.nodes, relays_of(plan)):
+        return one.publisher
+    through = "" if planned.node in one.nodes else "through "
+    return f"{planned.owner} ({through}{one.publisher})"
 
 
 def _status(branch: Branch, plan: Plan) -> str:
@@ -129,7 +138,7 @@ def _objects(pair: Topics, trees: list[Tree], *, plan: Plan | None) -> str:
 
 
 def _object(branch: Branch, *, plan: Plan | None) -> dict[str, Any]:
-    status = {"status": _status(branch, plan)} if plan else {}
+    status = {"status": _status(branch, plan), "owner": branch.planned and branch.planned.owner} if plan else {}
     return {
         "parent": branch.parent,
         "child": branch.frame,

@@ -1,8 +1,8 @@
 """``tfcompose tree``: the tree of a robot file, on the terminal, or the one that is published.
 
 Print the tree: each frame with the kind, owner, rate and pose of its edge. With --live or --bag it is the published
-one: each frame with the kind, the publishing node, rate and age of the newest stamp; with FILE also what is expected,
-unexpected or missing. Trees that do not hang together are shown one after the other.
+one: each frame with the kind, the publishing node, rate and age of the newest stamp; with FILE the owner, and what is
+expected, unexpected or missing. Trees that do not hang together are shown one after the other.
 """
 
 from __future__ import annotations

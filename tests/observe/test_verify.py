@@ -202,6 +202,18 @@ def test_another_publisher_is_told_with_both_names(plan: Plan, tree: Tree) -> No
     assert (code, message) == ("TF801", "odom → base is published by /ekf; the owner is drive (/rover/drive)")
 
 
+def test_how_far_another_publishers_pose_is_off_is_told_with_who_it_is(plan: Plan, tree: Tree) -> None:
+    tree.send("laser", "base", OTHER, Pose((0.25, 0.0, 0.3)))
+    [found] = tree.told(plan)
+    assert found.code == "TF801"
+    assert "its pose of laser in base is off by 250 mm" in [note.message for note in found.notes]
+
+
+@pytest.mark.parametrize(("metres", "said"), [(0.0125, "12.5 mm"), (0.9, "900 mm"), (1.0, "1 m"), (12.34, "12.3 m")])
+def test_a_distance_is_told_as_people_say_it(metres: float, said: str) -> None:
+    assert Offset(metres, 0.0).text == said
+
+
 def test_two_nodes_of_the_owners_name_are_one_too_many(plan: Plan, tree: Tree) -> None:
     tree.send("base", "odom", DRIVE, rate=10.0, gid=b"twin")
     for child, words in tree.sent.items():

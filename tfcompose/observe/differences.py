@@ -7,7 +7,7 @@ may be calibrated: they are compared as far as the preset says how well it knows
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -37,8 +37,8 @@ class Difference:
     """One thing that is wrong with one edge.
 
     ``edge`` is the planned one, None where nobody declared it, ``seen`` what came, None where nothing did. What else
-    there is depends on the code: an ``offence``; a ``driver``'s frame that is elsewhere; how far a pose is ``off``; the
-    ``quiet_s`` in which nothing came, which are ``over`` or not.
+    there is depends on the code: an ``offence``; a ``driver``'s frame that is elsewhere; how far a pose is ``off``,
+    whoever sent it; the ``quiet_s`` in which nothing came, which are ``over`` or not.
     """
 
     code: str
@@ -113,7 +113,9 @@ class _Comparison:
         owner, sure = unknown or self._may_own(edge, one), unknown or len(one.nodes) == 1
         code = code_of(edge, strand.parent, static=strand.static, owner=owner, sure=sure)
         if code:
-            yield self._told(code, edge, one)
+            off = self._off(edge, strand.pose) if code == "TF801" and strand.refused is None else None
+            found = self._told(code, edge, one)
+            yield replace(found, off=off) if off is not None and off.beyond(self.tolerance) else found
 
     def _told(self, code: str, edge: PlanEdge | None, one: EdgeSeen, *, namesake: bool = False) -> Difference:
         strand = one.strand
@@ -142,9 +144,11 @@ class _Comparison:
         strand = one.strand
         if strand.refused is not None or not edge.may_hang_on(strand.parent):
             return
+        if one.nodes and not self._may_own(edge, one):
+            return  # somebody else's value is told with who it is
         driver = self.drivers.get(edge.child)
         if driver is not None:
-            if is_off(driver, strand.pose) and (not one.nodes or edge.node in one.nodes):
+            if is_off(driver, strand.pose):
                 yield Difference("TF828", edge, one, driver=driver)
             return
         off = self._off(edge, strand.pose)

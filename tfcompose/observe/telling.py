@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
     Group = Sequence[Difference]
 
+#: Of poses that are off so many are told.
+MOST_POSES = 6
+
 
 def grouped(found: Iterable[Difference]) -> list[list[Difference]]:
     """Return those that are told together, in the order in which the first of each came."""
@@ -75,12 +78,20 @@ def _offences(group: Group, seen: Seen, plan: Plan, place: Span | None) -> Diagn
     first = group[0]
     where = seen.where(first.seen) if first.seen else ""
     found = violation(offences, plan, where, sensor_of(offences[0], drives_of(plan)), place)
+    found = replace(found, notes=(*found.notes, *_elsewhere(group)))
     if not offences[0].namesake:
         return found
     gid = first.seen.strand.gid if first.seen else None
     others = [one for one in seen.publishers if one.node in offences[0].nodes and one.gid != gid and one.where]
     notes = [Note(f"{one.node} runs {one.where}") for one in others]
     return replace(found, notes=(*found.notes, *dict.fromkeys(notes)))
+
+
+def _elsewhere(group: Group) -> list[Note]:
+    """Return how far the poses are off that came from somebody who is not the owner."""
+    off = [(one.offence, one.off) for one in group if one.offence and one.off]
+    notes = [Note(f"its pose of {what.child} in {what.parent} is off by {far.text}") for what, far in off[:MOST_POSES]]
+    return [*notes, Note(f"and {len(off) - len(notes)} more are off")] if len(off) > len(notes) else notes
 
 
 def _poses(group: Group, place: Span | None) -> Diagnostic:

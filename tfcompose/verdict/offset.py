@@ -17,7 +17,8 @@ class Offset(NamedTuple):
     @property
     def text(self) -> str:
         """Both in millimetres and degrees, without what is nothing."""
-        parts = [f"{self.xyz_m * 1e3:.3g} mm"] if self.xyz_m >= _NO_MM else []
+        distance = f"{self.xyz_m * 1e3:.3g} mm" if self.xyz_m < 1 else f"{self.xyz_m:.3g} m"
+        parts = [distance] if self.xyz_m >= _NO_MM else []
         parts += [f"{math.degrees(self.rot_rad):.3g} deg"] if self.rot_rad >= _NO_RAD else []
         return " and ".join(parts) or "nothing"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -10,6 +9,7 @@ from tfcompose.diagnostic import Diagnostic, Note, finding
 from tfcompose.observe.seen import GLOBAL, NAMELESS, counted, listed, who
 from tfcompose.ros.message import TF_MESSAGE
 from tfcompose.ros.misfits import best_effort_writer, leak, volatile_writer
+from tfcompose.verdict.offset import Offset, offset_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 #: A listener keeps the last 100 messages on /tf_static, one of each publisher.
 MOST_STATIC = 100
+#: A micrometre, a millidegree.
+_SAME = Offset(1e-6, 2e-5)
 #: One that sends so long after the other began has not only replaced it.
 TOGETHER_S = 0.3
 
@@ -140,13 +142,8 @@ def _together(edges: Sequence[EdgeSeen]) -> bool:
 
 def _difference(edges: Sequence[EdgeSeen]) -> str:
     """Return how far apart the newest poses are."""
-    first, second = edges[0].strand.pose, edges[1].strand.pose
-    metres = math.dist(first.xyz, second.xyz)
-    dot = abs(sum(a * b for a, b in zip(first.quat_xyzw, second.quat_xyzw, strict=True)))
-    degrees = math.degrees(2 * math.acos(min(1.0, dot)))
-    if metres < 1e-6 and degrees < 1e-3:  # noqa: PLR2004 (a micrometre, a millidegree)
-        return "both with the same value"
-    return f"their newest values are {metres * 1000:.3g} mm and {degrees:.3g} deg apart"
+    off = offset_of(edges[0].strand.pose, edges[1].strand.pose)
+    return f"their newest values are {off.text} apart" if off.beyond(_SAME) else "both with the same value"
 
 
 def _where(seen: Seen, edge: EdgeSeen) -> str:

@@ -6,6 +6,7 @@ that it needs, is loaded when the command is used.
 
 from __future__ import annotations
 
+import atexit
 import errno
 import gc
 import os
@@ -125,6 +126,8 @@ def _run(command: str, words: list[str]) -> int:
     gc.set_threshold(200_000, 50, 1000)
     if command not in LASTING:
         gc.disable()
+        atexit.unregister(gc.freeze)
+        atexit.register(gc.freeze)  # nor does the interpreter when it ends
     try:
         return _run_command(command, words)
     finally:

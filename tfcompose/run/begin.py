@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from tfcompose.diagnostic import RejectedError
 from tfcompose.ros.environment import RosError, child_environment, missing_ros
 from tfcompose.ros.stop import Stop
+from tfcompose.run.hold import wait_for_go
 from tfcompose.run.own import read_own
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ def start(argv: Sequence[str], kind: str) -> int:
         try:
             module, name = ROLES[kind]
             role = getattr(import_module(module), name)
+            wait_for_go(stop)
             if not stop.requested:
                 role(own, stop)
         except RosError as error:

@@ -45,7 +45,7 @@ def arguments(parser: ArgumentParser) -> None:
         "--settle",
         type=not_negative,
         metavar="S",
-        help="look for other publishers so long before the start; default: 1",
+        help="look for other publishers so long before the start; default: 0.5",
     )
     parser.add_argument(
         "--for", dest="duration", type=positive, metavar="S",

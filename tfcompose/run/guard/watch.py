@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     Topics = tuple[str, str]
 
 SETTLE = "TFCOMPOSE_SETTLE_S"
-DEFAULT_SETTLE_S = 1.0
+DEFAULT_SETTLE_S = 0.5
 
 
 def guard(own: Own, stop: Stop) -> None:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import re
 import signal
 import subprocess
 from dataclasses import replace
+from io import FileIO
 from selectors import EVENT_READ
 from typing import TYPE_CHECKING
 
 from tfcompose.run.events import from_line
+from tfcompose.run.hold import GO, HOLD_FD
 from tfcompose.run.launcher.child import LAST_LINE_LENGTH, Child, Pipe, bury_adopted, has_ended, kill_group, spawn
 from tfcompose.run.launcher.happening import Exited, LogSeen, Started, StartFailed
 from tfcompose.run.launcher.keeper import Keeper
@@ -49,6 +53,7 @@ class Children:
         self._happened = happened
         self._tell = tell
         self._children: dict[str, Child] = {}
+        self._held: dict[str, int] = {}
         self._guard = ""
         self._guard_pipes: GuardPipes | None = None
         self._marks = {RUN_ID: run_id, LAUNCHER: launcher_mark()} if run_id else {}
@@ -56,6 +61,8 @@ class Children:
 
     def start(self, process: PlanProcess, command: Command, guard: GuardPipes | None = None) -> Event:
         """Start the process, with the pipes of a guard if it is one, and return what came of it."""
+        if process.name in self._held:
+            return self._let_go(process.name)
         try:
             if command.missing:
                 return StartFailed(process.name, command.missing)
@@ -72,6 +79,25 @@ class Children:
             self._guard, self._guard_pipes = process.name, guard
             self._watch(child, Pipe(guard.events, lambda line: self._guard_said(process.name, line), EVENT_LIMIT))
         return Started(process.name, child.popen.pid)
+
+    def prepare(self, process: PlanProcess, command: Command) -> None:
+        """Have one of tfcompose's own load what it needs; it joins ROS when it is started, without that delay."""
+        theirs, ours = os.pipe()
+        try:
+            self._spawn(process, replace(command, env=command.env | {HOLD_FD: str(theirs)}), None, (theirs,))
+            self._held[process.name] = ours
+        except (OSError, subprocess.SubprocessError, ValueError):
+            os.close(ours)  # its start will say why
+        finally:
+            os.close(theirs)
+
+    def dismiss(self) -> None:
+        """End those that are held: they will not be started, or in another way."""
+        for name in list(self._held):
+            os.close(self._held.pop(name))
+            child = self._children.pop(name)
+            self._bury(child)
+        self._keep()
 
     def kill(self, name: str, number: int) -> None:
         """Send the signal to the child's group, if it runs."""
@@ -90,17 +116,16 @@ class Children:
     def bury(self) -> None:
         """Take leave of those that have ended."""
         for child in [child for child in self._children.values() if has_ended(child.popen.pid)]:
-            self._ended(child)
+            if child.name not in self._held:
+                self._ended(child)
         if self._run_id:
             bury_adopted({child.popen.pid for child in self._children.values()} | {self._keeper.pid})
 
     def close(self) -> None:
         """Kill what is left: something, only if an error in the launcher itself ends it."""
+        self.dismiss()
         for child in self._children.values():
-            kill_group(child.popen.pid, signal.SIGKILL)
-            child.popen.wait()
-            for pipe in child.pipes:
-                pipe.file.close()
+            self._bury(child)
         self._children.clear()
         self._close_guard_pipes()
         self._keep()
@@ -110,12 +135,26 @@ class Children:
 
     # A process's life.
 
-    def _spawn(self, process: PlanProcess, command: Command, guard: GuardPipes | None) -> Child:
+    def _let_go(self, name: str) -> Event:
+        with FileIO(self._held.pop(name), "wb") as hold, contextlib.suppress(BrokenPipeError):
+            hold.write(GO)  # one that has ended meanwhile is seen to have ended
+        return Started(name, self._children[name].popen.pid)
+
+    def _bury(self, child: Child) -> None:
+        kill_group(child.popen.pid, signal.SIGKILL)
+        child.popen.wait()
+        for pipe in child.pipes:
+            self._selector.unregister(pipe.file)
+            pipe.file.close()
+
+    def _spawn(
+        self, process: PlanProcess, command: Command, guard: GuardPipes | None, pass_fds: tuple[int, ...] = ()
+    ) -> Child:
         more = (guard.env if guard else {}) | self._marks
         if command.fence:
             command.fence[0].parent.mkdir(exist_ok=True)
             command.fence[0].write_text(command.fence[1], encoding="utf-8")
-        popen = spawn(replace(command, env=command.env | more), guard.theirs if guard else ())
+        popen = spawn(replace(command, env=command.env | more), guard.theirs if guard else pass_fds)
         child = Child(process.name, popen)
         self._children[process.name] = child
         self._keep()

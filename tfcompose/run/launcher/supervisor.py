@@ -49,6 +49,9 @@ if TYPE_CHECKING:
 #: The loop looks at its children at least this often, whatever signals say; seconds.
 LONGEST_SLEEP_S = 1.0
 
+#: Processes that can be held before they join ROS.
+_PREPARED = ("static", "joints", "simulate")
+
 #: The answer, what it means for the machine, and another plan's file and commands.
 Answer = tuple[dict[str, Any], "Event | None", "tuple[Path, dict[str, Command]] | None"]
 
@@ -120,6 +123,7 @@ class _Supervisor:
 
     def run(self, duration_s: float | None) -> int:
         self._handle(Begin())
+        self._prepare()
         while self._exit_code is None:
             end = self._end(duration_s)
             self._teller.keep_up()
@@ -136,9 +140,18 @@ class _Supervisor:
                 self._handle(Tick())
         return self._exit_code
 
+    def _prepare(self) -> None:
+        """While the guard looks whether an edge is taken, have as many publishers load Python as there are cores."""
+        if self._state.clear is not None or self._state.stop:
+            return
+        own = [one.process for one in self._state.tracked.values() if one.process.kind in _PREPARED]
+        for process in [process for process in own if not process.after][: os.cpu_count() or 1]:
+            self._children.prepare(process, self._commands[process.name])
+
     def _answer(self, request: dict[str, Any]) -> dict[str, Any]:
         said, event, planned = self._ask(request, self._state, self._session.plan_file)
         if planned:
+            self._children.dismiss()
             self._session.plan_file, self._commands = planned
         if event:
             self._handle(event)
@@ -161,6 +174,8 @@ class _Supervisor:
             self._state, actions = step(self._state, self._events.popleft(), time.monotonic())
             for action in actions:
                 self._do(action)
+        if self._state.stop:
+            self._children.dismiss()
         self._due = wake_time(self._state)
 
     def _do(self, action: Action) -> None:

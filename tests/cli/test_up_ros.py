@@ -176,6 +176,20 @@ def test_a_signal_while_processes_of_its_own_start_leaves_no_traceback(up: Calla
     assert "KeyboardInterrupt" not in robot.text
 
 
+@pytest.mark.parametrize("seconds", [0.02, 0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 1.7, 2.4])
+def test_ctrl_c_at_any_moment_of_the_start_leaves_no_process_and_no_traceback(
+    up: Callable[..., Up], seconds: float
+) -> None:
+    """0 is a clean stop; 130 before anything was started."""
+    robot = up(ROVER)
+    time.sleep(seconds)
+    below = robot.below()
+    robot.popen.send_signal(signal.SIGINT)
+    assert robot.ends() in ((0,) if below else (0, 130))
+    assert until(lambda: all(map(gone, below)))
+    assert "Traceback" not in robot.text
+
+
 def test_sigkill_of_the_launcher_ends_everything_within_2_s(up: Callable[..., Up]) -> None:
     robot = up(ROVER)
     robot.says("tree complete")

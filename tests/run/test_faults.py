@@ -48,6 +48,12 @@ code = supervise(plan, file, report=Console(plan, output, colour=False, keep=log
 output.close()
 sys.exit(code)
 """
+#: Stands before the launcher: from its first second on the clock is an hour behind.
+CLOCK_GOES_BACK = """
+import time
+right, began = time.time, time.monotonic()
+time.time = lambda: right() - 3600 * (time.monotonic() - began > 1)
+"""
 #: The robot of this run of the tests alone: what it leaves behind is ended, and what others run is not.
 NAME = f"rover{os.getpid()}@0"
 PYTHON = ("${python}", "-I", "-S", "-c")
@@ -76,11 +82,13 @@ if os.fork() == 0:
 class Run:
     """A launcher that runs in a folder, and who can be asked there."""
 
-    def __init__(self, folder: Path, processes: tuple[PlanProcess, ...], stdout: int, *words: str) -> None:
+    def __init__(
+        self, folder: Path, processes: tuple[PlanProcess, ...], stdout: int, *words: str, clock: str = ""
+    ) -> None:
         file = folder / "plan.json"
         file.write_text(write_plan(Plan("rover", "", None, RosSettings(), (), processes)))
         self.place = Place(NAME, folder / "place", folder / "log")
-        command = [sys.executable, "-c", LAUNCHER, str(file), NAME, *words]
+        command = [sys.executable, "-c", clock + LAUNCHER, str(file), NAME, *words]
         self.popen = subprocess.Popen(command, stdout=stdout, cwd=folder)
 
     def ps(self) -> dict[str, dict[str, Any]]:
@@ -101,8 +109,10 @@ class Run:
 def launch(tmp_path: Path) -> Iterator[Callable[..., Run]]:
     runs: list[Run] = []
 
-    def start(*processes: PlanProcess, stdout: int = subprocess.DEVNULL, words: tuple[str, ...] = ()) -> Run:
-        runs.append(Run(tmp_path, processes, stdout, *words))
+    def start(
+        *processes: PlanProcess, stdout: int = subprocess.DEVNULL, words: tuple[str, ...] = (), clock: str = ""
+    ) -> Run:
+        runs.append(Run(tmp_path, processes, stdout, *words, clock=clock))
         return runs[-1]
 
     yield start
@@ -208,24 +218,42 @@ def test_200_processes_are_started_listed_and_stopped_and_all_are_gone(launch: C
     assert all(map(gone, pids))
 
 
-def test_40_restarts_leave_no_process_and_no_descriptor(launch: Callable[..., Run]) -> None:
-    """A part of the 500 that were tried by hand."""
+def test_500_stops_and_starts_leave_no_process_no_descriptor_and_no_memory(launch: Callable[..., Run]) -> None:
     run = launch(PlanProcess("a", "run", argv=("sleep", "60")), PlanProcess("b", "run", argv=("sleep", "60")))
     assert until(run.is_up)
     launcher = psutil.Process(run.popen.pid)
 
-    def restart(count: int) -> None:
+    def cycle(count: int) -> None:
         for _ in range(count):
-            before = run.ps()["a"]["restarts"]
-            assert ask(run.place, do="restart", name="a") == {"ok": True}
-            assert until(lambda before=before: run.ps()["a"]["restarts"] == before + 1 and run.is_up())  # type: ignore[misc]
+            for verb, state in (("stop", "STOPPED"), ("start", "RUNNING")):
+                assert ask(run.place, do=verb, name="a") == {"ok": True}
+                assert until(lambda state=state: run.ps()["a"]["state"] == state)  # type: ignore[misc]
 
-    restart(3)
-    fds, children = launcher.num_fds(), len(launcher.children(recursive=True))
-    restart(40)
+    cycle(5)
+    fds, children, memory = launcher.num_fds(), len(launcher.children(recursive=True)), launcher.memory_info().rss
+    cycle(500)
     assert until(lambda: launcher.num_fds() <= fds)
     assert len(launcher.children(recursive=True)) == children
+    assert launcher.memory_info().rss < memory + 3e6
+    assert run.ps()["a"]["restarts"] == 505
     assert run.down() == 0
+
+
+def test_a_clock_that_goes_back_an_hour_stops_nothing_and_delays_nothing(
+    launch: Callable[..., Run], tmp_path: Path
+) -> None:
+    failing = program("failing", "raise SystemExit(3)", restart="always", max_restarts=2, required=False)
+    run = launch(program("a", SLEEPER), failing, clock=CLOCK_GOES_BACK)
+    began = time.monotonic()
+    assert until(lambda: (run.place.folder / "lock").exists() and run.place.holder())
+    assert until(lambda: run.ps()["failing"]["state"] == "FATAL"), "1 s and 2 s of waiting are over"
+    assert time.monotonic() - began < 10
+    assert run.ps()["a"]["uptime"] > 2
+    assert ask(run.place, do="restart", name="a") == {"ok": True}
+    assert until(lambda: run.ps()["a"]["restarts"] == 1)
+    assert run.down() == 0
+    said = [line.split()[0] for line in (tmp_path / "log" / "tfcompose.log").read_text().splitlines()]
+    assert said != sorted(said), "the clock did go back"
 
 
 def test_a_socket_that_was_left_there_by_a_killed_launcher_is_not_in_the_way(launch: Callable[..., Run]) -> None:

@@ -88,6 +88,7 @@ CLAIMS: dict[str, tuple[str, str, dict[str, Any]]] = {
     "  a: {run: {package: p, executable: e}, publishes: [{parent: odom, child: base_link, off: {x.y: 0}}]}\n": (
         "a", "/r1/a", {"x.y": 0},
     ),
+    "  a: {run: [a], node: {preset: amcl}}\n": ("a", "/r1/a", {"tf_broadcast": False}),
     "  a: {run: [a, '${params_file}'], params: {b: 1}, node: {preset: create3}}\n": (
         "a", "/r1/robot_state", {"b": 1, "publish_odom_tfs": False},
     ),
@@ -122,7 +123,7 @@ FINDINGS = {
         "TF330 a publishes map → odom by default, which slam owns",
         "set tf_broadcast: false where a is started, or name it as the owner",
     ),
-    "  a: {run: [a], node: {preset: diff_drive_controller}}\n": (
+    "  a: {run: a, shell: true, node: {preset: diff_drive_controller}}\n": (
         "TF330 a publishes odom → base_link by default, which ekf owns",
         "set enable_odom_tf: false where a is started, or name it as the owner",
     ),

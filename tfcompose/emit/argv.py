@@ -6,6 +6,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.emit.params import written_params
+from tfcompose.model import SHELL
 from tfcompose.plan import told_at_start
 
 if TYPE_CHECKING:
@@ -20,8 +21,7 @@ MODULES = {
     "simulate": "tfcompose.run.simulate",
     "guard": "tfcompose.run.guard",
 }
-#: What a shell reads; and the file of parameters, which is named once.
-_SHELL = ("/bin/sh", "-c")
+#: The file of parameters, which is named once.
 _PARAMS_FILE = "${params_file}"
 _TF_TOPICS = frozenset({"/tf", "/tf_static"})
 
@@ -53,7 +53,7 @@ def _is_node(process: Process, *, owns: bool) -> bool:
 
     What follows a text that a shell reads does not reach the program.
     """
-    if process.argv[:2] == _SHELL:
+    if process.argv[:2] == SHELL:
         return False
     is_told = process.log_level is not None or bool(written_params(process)) or bool(process.remap.keys() - _TF_TOPICS)
     return owns or is_told or "--ros-args" in process.argv

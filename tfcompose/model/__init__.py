@@ -8,7 +8,7 @@ from tfcompose.model.body import Asset, Inertial, Link, Material, Shape
 from tfcompose.model.edge import Calibration, Edge
 from tfcompose.model.hardware import Block, Component, Hardware, Interface
 from tfcompose.model.joint import Dynamics, Joint, Limit, ReferencePositions, SafetyController
-from tfcompose.model.process import BUILT_IN, GUARD, JOINTS, STATIC, AsInFile, Claim, Node, Process
+from tfcompose.model.process import BUILT_IN, GUARD, JOINTS, SHELL, STATIC, AsInFile, Claim, Node, Process
 from tfcompose.model.robot import AsWritten, Part, Robot
 from tfcompose.model.sensor import OPTICAL_ENDINGS, MountedSensor, is_optical
 
@@ -17,6 +17,7 @@ __all__ = [
     "GUARD",
     "JOINTS",
     "OPTICAL_ENDINGS",
+    "SHELL",
     "STATIC",
     "AsInFile",
     "AsWritten",

@@ -9,6 +9,8 @@ from tfcompose.plan import ProcessKind, Ready, Simulation, StopRule
 
 STATIC, JOINTS, GUARD = "static", "joints", "guard"
 BUILT_IN = (STATIC, JOINTS, GUARD)
+#: How a command begins that a shell reads.
+SHELL = ("/bin/sh", "-c")
 
 if TYPE_CHECKING:
     from tfcompose.diagnostic import Span

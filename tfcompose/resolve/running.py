@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.model import SHELL
 from tfcompose.plan import Ready, StopRule
 from tfcompose.resolve.nodes import full_name
 
@@ -28,7 +29,7 @@ def how(said: Started, namespace: str, keys: tuple[str, ...] = _KEYS) -> dict[st
 
 def program(run: Run, *, shell: bool) -> dict[str, Any]:
     """Return what is started: a package's program, a launch file, or a command; a shell's command is one text."""
-    argv = ("/bin/sh", "-c", *run.argv) if shell and run.argv else run.argv or run.args
+    argv = (*SHELL, *run.argv) if shell and run.argv else run.argv or run.args
     return {"package": run.package, "executable": run.executable, "launch": run.launch, "argv": argv}
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.frozen import dataclass, field
-from tfcompose.model import AsInFile, Node, Process
+from tfcompose.model import SHELL, AsInFile, Node, Process
 
 if TYPE_CHECKING:
     from tfcompose.resolve.roles import Roles
@@ -55,6 +55,9 @@ class Told:
 
     @property
     def can_be_told(self) -> bool:
-        """Return whether parameters that tfcompose writes reach the node."""
+        """Return whether parameters that tfcompose writes reach the node: launch files and shells have to pass them."""
         process = self.process
-        return process.kind == "run" and (process.package is not None or "${params_file}" in " ".join(process.argv))
+        if process.kind != "run":
+            return False
+        is_node = process.launch is None and process.argv[:2] != SHELL
+        return is_node or "${params_file}" in " ".join(process.argv)

@@ -88,7 +88,7 @@ CLAIMS: dict[str, tuple[str, str, dict[str, Any]]] = {
     "  a: {run: {package: p, executable: e}, publishes: [{parent: odom, child: base_link, off: {x.y: 0}}]}\n": (
         "a", "/r1/a", {"x.y": 0},
     ),
-    "  a: {run: [a], node: {preset: amcl}}\n": ("a", "/r1/a", {"tf_broadcast": False}),
+    "  a: {run: [a], node: {preset: amcl}}\n": ("a", "/r1/amcl", {"tf_broadcast": False}),
     "  a: {run: [a, '${params_file}'], params: {b: 1}, node: {preset: create3}}\n": (
         "a", "/r1/robot_state", {"b": 1, "publish_odom_tfs": False},
     ),

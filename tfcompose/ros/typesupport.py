@@ -22,8 +22,8 @@ from functools import cache
 from importlib.util import find_spec
 from typing import Any
 
-from geometry_msgs.msg import TransformStamped
 from rclpy.utilities import get_rmw_implementation_identifier
+from rosidl_generator_py import import_type_support
 
 from tfcompose.ros import rosidl
 from tfcompose.ros.environment import RosError
@@ -131,11 +131,14 @@ def _getter(structure: ctypes.Structure) -> Any:
 
 
 def _stamped() -> int:
-    """Return the address of TransformStamped's type support, after looking whether it is laid out as expected."""
-    meta = TransformStamped.__class__
-    if meta._TYPE_SUPPORT is None:  # noqa: SLF001 (rosidl's Python classes have no public name for it)
-        meta.__import_type_support__()
-    stamped = rosidl.capsule_address(meta._TYPE_SUPPORT)  # noqa: SLF001 (the same)
+    """Return the address of TransformStamped's type support, after looking whether it is laid out as expected.
+
+    It is taken as ``geometry_msgs.msg`` takes it, but without that, which imports numpy for its covariances.
+    """
+    capsule = getattr(import_type_support("geometry_msgs"), "type_support_msg__msg__transform_stamped", None)
+    if capsule is None:
+        raise ValueError("geometry_msgs has no type support of TransformStamped")
+    stamped = rosidl.capsule_address(capsule)
     described = rosidl.description_json(stamped)
     if described["type_description"]["type_name"] != _STAMPED or rosidl.type_hash(described) != rosidl.hash_text(
         stamped

@@ -7,7 +7,6 @@ import time
 from typing import TYPE_CHECKING
 
 from tfcompose.ros.clock import SimClock
-from tfcompose.ros.joint_states import JointStatePublisher
 from tfcompose.ros.message import Template
 from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFPublisher, wait

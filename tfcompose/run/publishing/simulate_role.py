@@ -67,7 +67,8 @@ def _body(own: Own, node: Node, simulation: Simulation) -> tuple[Callable[[float
 
 def _joint_states(own: Own, node: Node, simulation: Simulation) -> tuple[Callable[[float, int], None], str]:
     source = JointSource(simulation, [edge.joint for edge in own.plan.edges if edge.joint])
-    publisher = JointStatePublisher(node, source.names)
+    joint_states = import_module("tfcompose.ros.joint_states")  # which loads numpy: most stand-ins do without
+    publisher = joint_states.JointStatePublisher(node, source.names)
 
     def publish(time_s: float, stamp_ns: int) -> None:
         publisher.publish(stamp_ns, source.positions(time_s))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.ros.clock import SimClock

@@ -2,12 +2,22 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
 import pytest
 
 from tfcompose.plan import RosSettings
-from tfcompose.ros.environment import FASTDDS_PROFILE, RosError, child_environment, missing_ros
+from tfcompose.ros.environment import (
+    FASTDDS_PROFILE,
+    FASTDDS_PROFILE_LOCALHOST,
+    RosError,
+    child_environment,
+    missing_ros,
+)
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 SPACE = "{http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles}"
 
@@ -30,6 +40,12 @@ def test_what_the_plan_leaves_open_stays_as_it_is() -> None:
 def test_own_processes_announce_themselves_by_the_packaged_profile() -> None:
     found = child_environment({}, RosSettings(), own=True)
     assert found["FASTRTPS_DEFAULT_PROFILES_FILE"] == str(FASTDDS_PROFILE)
+    for base, ros in (
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, RosSettings()),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, RosSettings(discovery="localhost")),
+    ):
+        found = child_environment(base, ros, own=True)
+        assert found["FASTRTPS_DEFAULT_PROFILES_FILE"] == str(FASTDDS_PROFILE_LOCALHOST)
 
 
 @pytest.mark.parametrize("name", ["FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE"])
@@ -43,13 +59,16 @@ def test_an_unknown_discovery_is_refused() -> None:
         child_environment({}, RosSettings(discovery="everywhere"), own=True)
 
 
-def test_the_profile_announces_four_times_a_second() -> None:
-    config = next(ET.parse(FASTDDS_PROFILE).iter(f"{SPACE}discovery_config"))  # noqa: S314 (a file of ours)
+@pytest.mark.parametrize(
+    ("file", "period_ns"), [(FASTDDS_PROFILE, 250_000_000), (FASTDDS_PROFILE_LOCALHOST, 100_000_000)]
+)
+def test_the_profile_announces_four_times_a_second_and_on_one_machine_ten_times(file: Path, period_ns: int) -> None:
+    config = next(ET.parse(file).iter(f"{SPACE}discovery_config"))  # noqa: S314 (a file of ours)
     values = {element.tag.removeprefix(SPACE): element.text for element in config.iter()}
     announced = config.find(f"{SPACE}leaseAnnouncement/{SPACE}nanosec")
     assert values["count"] == "20"
     assert announced is not None
-    assert announced.text == "250000000"
+    assert announced.text == str(period_ns)
 
 
 def test_without_rclpy_one_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -122,8 +122,8 @@ def _environment(plan: Plan, process: PlanProcess) -> dict[str, str]:
     if process.kind == "external":
         return {}
     env = child_environment({}, plan.ros, own=process.kind != "run") | process.env
-    profile = str(FASTDDS_PROFILE)
-    return {name: value.replace(profile, "${tfcompose}/ros/fastdds.xml") for name, value in sorted(env.items())}
+    folder = str(FASTDDS_PROFILE.parent)
+    return {name: value.replace(folder, "${tfcompose}/ros") for name, value in sorted(env.items())}
 
 
 def _quoted(word: str) -> str:

@@ -14,8 +14,9 @@ if TYPE_CHECKING:
 
     from tfcompose.plan import RosSettings
 
-#: The profile of tfcompose's own processes; the file says what for.
+#: The profile of tfcompose's own processes, and the one where they hear this machine alone; the files say what for.
 FASTDDS_PROFILE = Path(__file__).with_name("fastdds.xml")
+FASTDDS_PROFILE_LOCALHOST = Path(__file__).with_name("fastdds_localhost.xml")
 
 # Fast DDS 2 reads the first, Fast DDS 3 the second. A user who sets either has decided.
 PROFILE_VARIABLES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
@@ -42,7 +43,8 @@ def child_environment(base: Mapping[str, str], ros: RosSettings, *, own: bool) -
     """Return ``base`` with what the plan says about ROS.
 
     What the plan leaves open stays as it is in ``base``. With ``own`` the process is one of tfcompose's and announces
-    itself by ``FASTDDS_PROFILE``, unless ``base`` names a profile file already; other processes keep their profile.
+    itself by ``FASTDDS_PROFILE``, or the one for this machine alone, unless ``base`` names a profile file already; other
+    processes keep their profile.
 
     Raises:
         RosError: if the plan's ``discovery`` is none of localhost, subnet, off.
@@ -55,5 +57,6 @@ def child_environment(base: Mapping[str, str], ros: RosSettings, *, own: bool) -
             raise RosError(f"ros: discovery is {ros.discovery!r}, not one of {', '.join(_DISCOVERY)}")
         environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = _DISCOVERY[ros.discovery]
     if own and not any(base.get(name) for name in PROFILE_VARIABLES):
-        environment[PROFILE_VARIABLES[0]] = str(FASTDDS_PROFILE)
+        alone = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "LOCALHOST"
+        environment[PROFILE_VARIABLES[0]] = str(FASTDDS_PROFILE_LOCALHOST if alone else FASTDDS_PROFILE)
     return environment

@@ -43,8 +43,8 @@ def child_environment(base: Mapping[str, str], ros: RosSettings, *, own: bool) -
     """Return ``base`` with what the plan says about ROS.
 
     What the plan leaves open stays as it is in ``base``. With ``own`` the process is one of tfcompose's and announces
-    itself by ``FASTDDS_PROFILE``, or the one for this machine alone, unless ``base`` names a profile file already; other
-    processes keep their profile.
+    itself by ``FASTDDS_PROFILE``, or the one for this machine alone, unless ``base`` names a profile file already.
+    Other processes keep their profile.
 
     Raises:
         RosError: if the plan's ``discovery`` is none of localhost, subnet, off.

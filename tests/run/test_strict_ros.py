@@ -40,14 +40,19 @@ name, fixed, moving = sys.argv[1], json.loads(sys.argv[2]), json.loads(sys.argv[
 signal.signal(signal.SIGINT, lambda *_: sys.exit())
 def message(edges):
     return encode([Transform(time.time_ns(), *edge.split(), (0.1, 0.2, 0.3), (0.0, 0.0, 0.6, 0.8)) for edge in edges])
+def wait_until_passed_on(edge):
+    # A latched topic keeps the last message only, and subscribers that are counted may be one's own.
+    with open_node(name, "/outside") as node:
+        reader, wanted = TFSubscription(node, static=True), edge.split()[1]
+        while wanted not in {t.child for one in reader.take() for t in decode(one.data)}:
+            time.sleep(0.01)
 with open_node(name, "/", args=sys.argv[5:]) as node:
     readers = [TFSubscription(node, static=static) for static in (False, True)]
     latched, sent, heard = TFPublisher(node, static=True), TFPublisher(node, static=False), set()
-    while not latched.publisher.get_subscription_count():  # only the last is there for who comes later
-        time.sleep(0.01)
-    for edge in fixed:  # one after the other, as some nodes do
+    for before, edge in zip([None, *fixed], fixed):  # one after the other, as some nodes do
+        if before:
+            wait_until_passed_on(before)
         latched.publish(message([edge]))
-        time.sleep(0.3)
     while True:
         data = message(moving)
         if moving:

@@ -185,6 +185,7 @@ CODES = {
     "TF847": "needed_but_optional",
     "TF848": "gate_never_opens",
     "TF849": "volatile_static_reader",
+    "TF850": "latched_edge_replaced",
     # the environment
     "TF901": "no_ros",
     "TF902": "bad_plan",

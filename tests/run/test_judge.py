@@ -360,6 +360,34 @@ def test_a_volatile_writer_of_static_edges_is_reported_once_with_what_it_owns(ru
     assert "base → lidar" in found.notes[0].message
 
 
+@pytest.mark.parametrize("late", [0.0, 5.0])
+def test_an_owner_that_replaced_a_latched_edge_before_it_was_heard_is_told_once_with_what_is_lost(late: float) -> None:
+    running = History().clear().wait(late)
+    static = running.joins("/static", static=True)
+    static.sent = 1  # with base → lidar, before the guard had found it
+    running.send(static, "base camera").wait(1)
+    assert running.said() == []
+    running.wait(5)
+    (found,) = running.found()
+    assert (found.code, found.severity) == ("TF850", "warning")
+    assert found.message == (
+        "/static sent 1 message on /tf_static before anybody heard it, and none since holds base → lidar"
+    )
+    running.dies()
+    running.wait(10)
+    assert running.found() == []
+
+
+@pytest.mark.parametrize("edges", ["base lidar, base camera", "base camera"])
+def test_an_owner_whose_latched_messages_were_all_heard_or_hold_all_replaced_nothing(edges: str) -> None:
+    running = History().clear()
+    static = running.joins("/static", static=True)
+    static.sent = 0 if edges == "base camera" else 3
+    running.send(static, edges).wait(5)
+    running.send(static, FIXED).wait(5)
+    assert running.said() == []
+
+
 # Names that come late, or never.
 
 

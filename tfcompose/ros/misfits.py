@@ -25,6 +25,15 @@ def leak(node: str, topic: str, own: str) -> Diagnostic:
     return finding("TF827", message, None, help=advice)
 
 
+def replaced_latched(node: str, sent_before: int, missing: Sequence[str]) -> Diagnostic:
+    """Return the finding for a publisher whose latched messages before the first that was heard held these edges."""
+    lost = f"{sent_before} message{'s' if sent_before > 1 else ''}"
+    named = ", ".join(missing[:LISTED_AT_MOST])
+    message = f"{node} sent {lost} on /tf_static before anybody heard it, and none since holds {named}"
+    advice = "send all fixed edges in each message: a latched topic keeps the last one only"
+    return finding("TF850", message, None, severity="warning", help=advice)
+
+
 def volatile_writer(node: str, topic: str, owned: Sequence[str]) -> Diagnostic:
     """Return the finding for a publisher of fixed edges that no TF listener accepts; ``owned`` are its edges."""
     notes = [Note(f"it owns {', '.join(owned[:LISTED_AT_MOST])}")] if owned else []

@@ -175,4 +175,9 @@ another calibration, or a driver with values of its own are the usual reasons.""
 Fixed frames are sent once and kept for those who come later, who get them only if they ask for durability
 transient_local. tf2's own listeners do; a subscription of one's own has durability volatile unless it says otherwise,
 and so has ros2 topic echo: ros2 topic echo --qos-durability transient_local --qos-reliability reliable /tf_static.""",
+    "TF850": """An owner replaced a latched edge with its next message before anybody heard it.
+
+A publisher on /tf_static keeps its last message for those that find it later, and to be found takes a moment. What it
+sent before that one, in messages of their own, nobody gets any more. A subscriber that is counted before sending may
+be a listener of the node's own. Send all fixed edges in each message, as tf2's StaticTransformBroadcaster does.""",
 }

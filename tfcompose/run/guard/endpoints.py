@@ -1,4 +1,4 @@
-"""Publishers that do wrong by being there: no listener hears them, or they are where they do not belong.
+"""Publishers that nobody hears, or not wholly, because of how they publish, or that are where they do not belong.
 
 Each is told once, for as long as guards follow each other.
 """
@@ -7,15 +7,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.ros.misfits import best_effort_writer, leak, volatile_writer
+from tfcompose.ros.misfits import best_effort_writer, leak, replaced_latched, volatile_writer
 from tfcompose.run.events import Found
+from tfcompose.run.guard.senders import UNCOUNTED
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from tfcompose.diagnostic import Diagnostic
     from tfcompose.plan import Plan
-    from tfcompose.run.guard.senders import Writer
+    from tfcompose.run.guard.senders import Senders, Writer
+
+#: So long after it was first heard, an owner's latched message is surely all that is left of those before, in seconds.
+ALL_HEARD_S = 2.0
 
 
 class Endpoints:
@@ -60,6 +64,21 @@ class Endpoints:
                 "TF827", one, leak(one.node, "/tf_static" if one.static else "/tf", topics[one.static])
             )
         ]
+
+    def replaced(self, senders: Senders, missing: Mapping[str, Sequence[str]], now: float) -> list[Found]:
+        """Return the findings for nodes that sent latched messages before they were first heard.
+
+        ``missing`` are names of fixed edges that did not come, by the node, of which others came.
+        """
+        found = []
+        for writer in senders.writers.values() if missing else ():
+            edges, sender = missing.get(writer.node or ""), senders.sender(writer.gid)
+            if not (writer.node and writer.static and edges and sender):
+                continue
+            first = sender.first_sequence
+            if 1 < first < UNCOUNTED and now - sender.first_seen >= ALL_HEARD_S:
+                found += self._once("TF850", writer, replaced_latched(writer.node, first - 1, edges))
+        return found
 
     def memory(self) -> list[list[str]]:
         """Return what was told, as values of JSON."""

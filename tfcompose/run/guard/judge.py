@@ -115,7 +115,8 @@ class Judge:
         if self._start.cleared is not None:
             over = self.cases.over(now)
             self._law.changes += bool(over)
-            return [*events, *self.live.judge(now), *over]
+            replaced = self._endpoints.replaced(self._senders, self.live.partly_missing(), now)
+            return [*events, *self.live.judge(now), *replaced, *over]
         self.live.look(now)
         if now - self.begun >= self.settle_s and not self._streams.waits and not self.cases.untold:
             self._start.clear(now)

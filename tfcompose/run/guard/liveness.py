@@ -155,6 +155,18 @@ class Liveness:
         """Return tracks by their first edge's place in the plan."""
         return sorted(tracks, key=lambda track: self._order[track.edge.child])
 
+    def partly_missing(self) -> dict[str, list[str]]:
+        """Return the fixed edges, by name, that never came from a node of which others came."""
+        if not any(self._waiting.values()):
+            return {}
+        fixed = [t for t in self._in_order(self.tracks) if t.edge.kind == "static" and t.edge.owner not in self._absent]
+        heard = {track.edge.node for track in fixed if track.live}
+        missing: dict[str, list[str]] = {}
+        for track in fixed:
+            if not track.live and track.edge.node in heard:
+                missing.setdefault(track.edge.node, []).extend(edge.name for edge in track.edges)
+        return missing
+
     def static_writers(self, nodes: Collection[str]) -> list[GuardEvent]:
         """Take the nodes that write /tf_static now; an owner whose edges were live and that is gone is silent."""
         lost: dict[str, list[Track]] = {}

@@ -176,12 +176,13 @@ def test_a_signal_while_processes_of_its_own_start_leaves_no_traceback(up: Calla
     assert "KeyboardInterrupt" not in robot.text
 
 
-@pytest.mark.parametrize("seconds", [0.02, 0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 1.7, 2.4])
+@pytest.mark.parametrize("seconds", [0.0, 0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 1.7, 2.4])
 def test_ctrl_c_at_any_moment_of_the_start_leaves_no_process_and_no_traceback(
     up: Callable[..., Up], seconds: float
 ) -> None:
-    """0 is a clean stop; 130 before anything was started."""
+    """0 is a clean stop; 130 before anything was started. Before tfcompose runs at all, Python answers by itself."""
     robot = up(ROVER)
+    assert until(lambda: any("yaml" in part.path for part in psutil.Process(robot.popen.pid).memory_maps()))
     time.sleep(seconds)
     below = robot.below()
     robot.popen.send_signal(signal.SIGINT)

@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from itertools import count
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import geometry_msgs.msg  # noqa: F401 (a program that listens gets its messages: stamped looks whether it is loaded)
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration

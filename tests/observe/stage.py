@@ -16,7 +16,7 @@ from tfcompose.ros.tf import TFPublisher
 from tfcompose.ros.typesupport import tf_message_type
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
 #: So often it is looked again: where much else runs, publishers are found late, and late in truth.
@@ -96,13 +96,19 @@ def doctor(*words: str, seconds: float = 3.0) -> tuple[int, list[dict[str, Any]]
     return done.returncode, json.loads(done.stdout)
 
 
-def doctor_finds(code: str, *words: str, seconds: float = 3.0) -> tuple[int, list[dict[str, Any]]]:
-    """Run it until that code is found, a few times."""
+def doctor_finds(code: str, words: Sequence[str], others: set[str]) -> tuple[int, list[dict[str, Any]]]:
+    """Run it until it finds that code in those words, and no codes but the others; a few times: names may come late."""
     for _ in range(LOOKS):
-        done = doctor(*words, seconds=seconds)
-        if code in {one["code"] for one in done[1]}:
+        done = doctor(seconds=3.0)
+        if says(done[1], code, words, others):
             break
     return done
+
+
+def says(found: list[dict[str, Any]], code: str, words: Sequence[str], others: set[str]) -> bool:
+    """Return whether that code was found, said in all these words, and no codes but the others."""
+    codes = {one["code"] for one in found}
+    return code in codes and codes <= {code, *others} and all(word in said(found, code) for word in words)
 
 
 def finds_nothing(*words: str, seconds: float = 3.0) -> bool:

@@ -307,12 +307,13 @@ LATE = {"TF805", "TF833", "TF838", "TF839"}
 def test_what_is_wrong_is_found_with_the_node_and_the_numbers(stage: Stage, scene: Callable[[Stage], Any]) -> None:
     scene(stage)
     expected, words = SCENES[scene]
-    code, found = doctor_finds(expected)
+    others = {*LATE, *ALSO.get(scene, set())}
+    code, found = doctor_finds(expected, words, others)
     text = said(found, expected)
     assert code == 1
     for word in words:
         assert word in text
-    assert {one["code"] for one in found} <= {expected, *LATE, *ALSO.get(scene, set())}, found
+    assert {one["code"] for one in found} <= {expected, *others}, found
 
 
 #: What else is found there, since it follows.

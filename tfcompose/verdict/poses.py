@@ -74,12 +74,13 @@ def pose_differs(off: Sequence[tuple[PlanEdge, str, Pose]], publisher: str, plac
 
 
 def driver_pose_differs(node: str, off: Sequence[tuple[Expected, Pose]], place: Span | None = None) -> Diagnostic:
-    """Return the finding for frames of one sensor that its driver ``node`` sends elsewhere."""
+    """Return the finding for frames of one sensor that its driver ``node``, empty if not known, sends elsewhere."""
     (expected, sent), *others = off
     driven, edge = expected.driven, expected.edge
     more = f", and {len(others)} more frame{'s' if len(others) > 1 else ''} elsewhere" if others else ""
+    sender = f"the driver {node}" if node else f"the driver of {driven.sensor}"
     message = (
-        f"the pose of {edge.child} in {edge.parent} from the driver {node} is {offset_of(edge.pose, sent).text} off "
+        f"the pose of {edge.child} in {edge.parent} from {sender} is {offset_of(edge.pose, sent).text} off "
         f"preset {driven.preset}{more}: {compared(edge.pose, sent)}"
     )
     notes = [Note(f"{one.edge.child} in {one.edge.parent}: {compared(one.edge.pose, pose)}") for one, pose in others]

@@ -6,21 +6,7 @@ import json
 from typing import Any
 
 from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
-from tfcompose.plan import (
-    VERSION,
-    Claim,
-    Driven,
-    GuardPolicy,
-    Joint,
-    Plan,
-    PlanEdge,
-    PlanProcess,
-    Ready,
-    RosSettings,
-    Simulation,
-    StopRule,
-    Sweep,
-)
+from tfcompose.plan import VERSION, GuardPolicy, Plan, PlanEdge, PlanProcess
 from tfcompose.plan.reading import plan_from_json
 
 
@@ -79,9 +65,8 @@ def _block(key: str, rows: list[dict[str, Any]]) -> str:
     return f'  "{key}": [\n' + ",\n".join(f"    {_json(row)}" for row in rows) + "\n  ]"
 
 
-def _fields(
-    value: Claim | Joint | Driven | GuardPolicy | PlanProcess | Ready | RosSettings | Simulation | StopRule | Sweep,
-) -> dict[str, Any]:
+def _fields(value: Any) -> dict[str, Any]:
+    """Return the fields of one of the plan's objects as they are held."""
     return {name: getattr(value, name) for name in value.__slots__}
 
 

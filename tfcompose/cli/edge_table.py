@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.observe.seen import counted
@@ -36,8 +37,8 @@ def lines_of(edges: Sequence[EdgeSeen], census: Census, now_ns: int, width: int 
 
 def _several(edges: Sequence[EdgeSeen]) -> set[str]:
     """Return the children that more than one publisher sends, or that have more than one parent."""
-    children = [seen.strand.child for seen in edges if seen.present is not False]
-    return {child for child in children if children.count(child) > 1} if len(set(children)) < len(children) else set()
+    counts = Counter(seen.strand.child for seen in edges if seen.present is not False)
+    return {child for child, number in counts.items() if number > 1}
 
 
 def _summary(edges: Sequence[EdgeSeen], census: Census, now_ns: int) -> str:

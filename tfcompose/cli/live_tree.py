@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import json
 import sys
 import time
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
 
 def live_tree(arguments: Namespace) -> int:
     """Print the published tree; exit code 1 if nothing is published, 2 if a file or a bag cannot be read."""
-    gc.enable()  # it may last
     known = where_to_look(arguments)
     if isinstance(known, int):
         return known

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import time
@@ -97,6 +98,7 @@ def from_live(  # noqa: PLR0913 (all but two are named)
     """
     if not ready_for_ros(ros):
         return 1
+    gc.enable()  # it may last
     with Stop() as stop:
         watch = import_module("tfcompose.observe.watching").watch
         begun = time.monotonic()

@@ -65,7 +65,8 @@ class Sideline:
                 times = [received_ns] if clock_ns is None else [received_ns, clock_ns]
                 delay_ns = min((time - stamp_ns for time in times), key=abs)
                 self._delays.setdefault((topic, frame), []).append(delay_ns / 1e9)
-            if subscription and sum(len(some) for (name, _), some in self._delays.items() if name == topic) >= ENOUGH:
+            heard = sum(len(some) for (name, _), some in self._delays.items() if name == topic) if taken else 0
+            if subscription and heard >= ENOUGH:
                 self._end(subscription)
                 self._headers[topic] = None
         for joints in self._joints.values():

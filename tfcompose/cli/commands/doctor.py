@@ -12,15 +12,16 @@ import gc
 import os
 import sys
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.edge_table import printable
+from tfcompose.cli.expected import expected
 from tfcompose.cli.looking import ended_early
 from tfcompose.cli.options import add_variant, namespace, positive
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings
 from tfcompose.diagnostic import finding
 from tfcompose.observe.census import topics_below
+from tfcompose.observe.seen import counted
 from tfcompose.plan import RosSettings
 from tfcompose.ros.environment import RosError, child_environment
 from tfcompose.ros.settings import no_ros, ros_trouble
@@ -70,7 +71,7 @@ def run(arguments: Namespace) -> int:
         code = ended_early(found.seconds, arguments.duration, heard=bool(found.edges)) if stop.requested else None
     if code is not None:
         return code
-    seen = f"{_counted(found.edges, 'edge')} from {_counted(found.nodes, 'node')}"
+    seen = f"{counted(found.edges, 'edge')} from {counted(found.nodes, 'node')}"
     seen += f" below {printable(', '.join(found.roots[:MOST_ROOTS]))}" if found.roots else ""
     code = _say(found.findings, arguments, f"looked for {found.seconds:.1f} s at {seen}")
     if found.edges and found.elsewhere and arguments.format == "text":
@@ -93,11 +94,7 @@ def _say(found: list[Diagnostic], arguments: Namespace, looked: str) -> int:
 def _summary(found: list[Diagnostic]) -> str:
     errors = sum(one.severity == "error" for one in found)
     counts = ((errors, "error"), (len(found) - errors, "warning"))
-    return " and ".join(_counted(n, word) for n, word in counts if n) or "nothing is wrong"
-
-
-def _counted(number: int, word: str) -> str:
-    return f"{number} {word}{'' if number == 1 else 's'}"
+    return " and ".join(counted(n, word) for n, word in counts if n) or "nothing is wrong"
 
 
 def _plan(arguments: Namespace) -> Plan | int | None:
@@ -108,14 +105,8 @@ def _plan(arguments: Namespace) -> Plan | int | None:
             complain("--profile, --overlay and --set are laid over a robot file: name one")
             return UNREADABLE
         return None
-    if file.endswith(".json"):
-        read: Plan | int = import_module("tfcompose.cli.built_plan").plan_in(Path(file))
-        return read
-    robot = import_module("tfcompose.cli.compiling").robot_or_code(file, arguments)
-    if isinstance(robot, int):
-        return robot
-    plan: Plan = import_module("tfcompose.emit.plan").plan_of(robot)
-    return plan
+    known = expected(file, arguments)
+    return known if isinstance(known, int) else known[0]
 
 
 def _expected(plan: Plan | None, below: str | None) -> dict[tuple[str, str], Plan | None]:

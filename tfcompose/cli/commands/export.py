@@ -73,19 +73,21 @@ def run(arguments: Namespace) -> int:
             return built
         file = built[0] / PLAN
     plan = plan_in(file)
-    if isinstance(plan, Plan) and arguments.host is not None:
+    if isinstance(plan, int):
+        return plan
+    if arguments.host is not None:
         share = share_of(plan, arguments.host or None, "")
         if not isinstance(share, Plan):
             print_findings([share], sys.stderr)
             return 1
         plan = share
-    if isinstance(plan, Plan) and plan.guard.mode == "strict" and arguments.kind == "launch":
+    if plan.guard.mode == "strict" and arguments.kind == "launch":
         complain("guard: strict needs a guard, and a launch file has none: export with --set guard.mode=watch")
         return 1
-    if isinstance(plan, Plan) and plan.guard.mode == "strict" and (missed := not_remapped(plan)):
+    if plan.guard.mode == "strict" and (missed := not_remapped(plan)):
         print_findings(missed, sys.stderr)
         return 1
-    return plan if isinstance(plan, int) else _export(plan, file, arguments)
+    return _export(plan, file, arguments)
 
 
 def _export(plan: Plan, file: Path, arguments: Namespace) -> int:

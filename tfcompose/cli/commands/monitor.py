@@ -2,7 +2,7 @@
 
 Print each edge of the running tree, or of a bag, with its publisher's node, rate, jitter (the standard deviation of the
 time between two messages), longest gap, age of the newest stamp, and delay (arrival minus stamp). Rates, jitter, gaps
-and delays are those of the last 10 s; with --for or --bag of all. On a terminal the table is drawn again and again
+and delays are those of the last 5 to 10 s; with --for or --bag of all. On a terminal the table is drawn again and again
 until Ctrl-C; into a pipe each table follows the last.
 """
 

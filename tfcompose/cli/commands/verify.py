@@ -2,8 +2,8 @@
 
 Compare each edge of FILE (a robot, or a built plan.json) with the running tree, or with a bag: missing, not declared,
 under another parent, with another value, on the wrong topic, silent, too slow, from another publisher. Exit code 0 if
-all is as expected, 1 if not, 2 if a file or a bag cannot be read. Frames inside a sensor that its driver publishes are
-looked for, and their values are not compared: each unit is calibrated.
+all is as expected, 1 if not, 2 if a file or a bag cannot be read. Frames inside a sensor that its driver publishes may
+be as far off as a calibration moves them; more is a warning.
 """
 
 from __future__ import annotations

@@ -31,10 +31,10 @@ PERIODS, SILENT_S = 4.0, 0.6
 
 def low_rate(seen: Seen) -> Iterator[Diagnostic]:
     """An edge comes so seldom that lookups fail between two messages, and frames jump."""
-    inside = {edge.strand.parent for edge in seen.taken}
+    inside, rated = {edge.strand.parent for edge in seen.taken}, seen.rated
     for edge in seen.moving:
         rate, least = edge.timing.rate, least_of(edge, inside)
-        if edge.strand.child in seen.rated or rate is None or rate >= least or is_silent(edge) or _has_gap(edge):
+        if edge.strand.child in rated or rate is None or rate >= least or is_silent(edge) or _has_gap(edge):
             continue
         if edge.strand.tally.count < FEWEST and seen.seconds < 2 * SURE_S:
             continue
@@ -47,8 +47,9 @@ def low_rate(seen: Seen) -> Iterator[Diagnostic]:
 
 def gap(seen: Seen) -> Iterator[Diagnostic]:
     """An edge comes often, and then not at all for a while."""
+    rated = seen.rated
     for edge in seen.moving:
-        if not _has_gap(edge) or edge.strand.child in seen.rated:
+        if not _has_gap(edge) or edge.strand.child in rated:
             continue
         rate, longest = edge.timing.rate or 0.0, edge.timing.longest_gap_s or 0.0
         message = f"{edge.name} from {who(edge)} stayed away for {seconds(longest)}, and comes with {rate:.3g} Hz else"
@@ -59,8 +60,9 @@ def gap(seen: Seen) -> Iterator[Diagnostic]:
 def fell_silent(seen: Seen) -> Iterator[Diagnostic]:
     """An edge came, and does not come any more."""
     alive = {(edge.strand.parent, edge.strand.child) for edge in seen.moving if not is_silent(edge)}
+    rated = seen.rated
     for edge in seen.moving:
-        if not is_silent(edge) or edge.strand.child in seen.rated or (edge.strand.parent, edge.strand.child) in alive:
+        if not is_silent(edge) or edge.strand.child in rated or (edge.strand.parent, edge.strand.child) in alive:
             continue
         gone = ", which has left" if edge.present is False else ", which is still there"
         message = f"{edge.name}: nothing for {seconds(edge.age_s)} from {who(edge)}{gone}"
@@ -71,10 +73,11 @@ def fell_silent(seen: Seen) -> Iterator[Diagnostic]:
 def fixed_left(seen: Seen) -> Iterator[Diagnostic]:
     """Fixed edges were there, and the publisher that held them for those who come later has left."""
     held = {edge.strand.child for edge in seen.taken if edge.strand.static and edge.present is not False}
+    held |= seen.planned
     lost: dict[str, list[EdgeSeen]] = {}
     for edge in seen.taken:
         child = edge.strand.child
-        if edge.strand.static and edge.present is False and child not in held | seen.planned:
+        if edge.strand.static and edge.present is False and child not in held:
             lost.setdefault(who(edge), []).append(edge)
     for publisher, edges in lost.items():
         yield gone(publisher, [edge.name for edge in edges])

@@ -31,12 +31,13 @@ def two_writers(seen: Seen) -> Iterator[Diagnostic]:
     for edge in seen.taken:
         same.setdefault((edge.strand.parent, edge.strand.child), []).append(edge)
     groups: dict[tuple[bytes | None, ...], list[list[EdgeSeen]]] = {}
+    planned = seen.planned
     for (_, child), edges in same.items():
         rivals = [edge for edge in edges if edge.strand.gid is not None and edge.present is not False]
         distinct = {edge.strand.gid for edge in rivals}
         if len({edge.strand.static for edge in rivals}) > 1:
             continue  # it comes on both topics, which is a finding of its own
-        if len(distinct) > 1 and child not in seen.planned and _together(rivals):
+        if len(distinct) > 1 and child not in planned and _together(rivals):
             groups.setdefault(tuple(sorted(distinct, key=str)), []).append(rivals)
     for found in groups.values():
         rivals = sorted(found[0], key=who)
@@ -55,8 +56,9 @@ def both_topics(seen: Seen) -> Iterator[Diagnostic]:
     kinds: dict[str, dict[bool, EdgeSeen]] = {}
     for edge in seen.taken:
         kinds.setdefault(edge.strand.child, {})[edge.strand.static] = edge
+    planned = seen.planned
     for child, found in kinds.items():
-        if len(found) == 1 or child in seen.planned:
+        if len(found) == 1 or child in planned:
             continue
         moving, fixed = found[False], found[True]
         message = f"{child} comes on {seen.topics[0]} from {who(moving)} and on {seen.topics[1]} from {who(fixed)}"

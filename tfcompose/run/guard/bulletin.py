@@ -10,7 +10,7 @@ from tfcompose.run.guard.health import held_status, statuses
 from tfcompose.run.own import say
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from rclpy.node import Node
 
@@ -29,8 +29,8 @@ class Bulletin:
         if self._publisher is None:
             say("nothing on /diagnostics: the package diagnostic_msgs is not installed")
 
-    def look(self, judges: Sequence[Judge], held: Mapping[tuple[str, str, str], int] | None) -> None:
-        """Publish if it is time to, and somebody listens; ``held`` is what a strict guard held back."""
+    def look(self, judges: Sequence[Judge], held: Callable[[], Mapping[tuple[str, str, str], int] | None]) -> None:
+        """Publish if it is time to, and somebody listens; ``held`` says what a strict guard held back."""
         now = time.monotonic()
         if self._publisher is None or now < self._due:
             return
@@ -39,6 +39,6 @@ class Bulletin:
             edges = [edge for judge in judges for edge in judge.health(now)]
             wrong = [one for judge in judges for one in judge.wrong()]
             page = statuses(self._robot, edges, wrong)
-            if held is not None:
-                page.append(held_status(self._robot, held))
+            if (counts := held()) is not None:
+                page.append(held_status(self._robot, counts))
             self._publisher.publish(page, time.time_ns())

@@ -22,8 +22,6 @@ FILE_BYTES = 8_000_000
 KEPT = 2
 #: After a failure the disk is left alone for so long, in seconds.
 LEFT_ALONE_S = 5.0
-#: The launcher's own lines.
-LAUNCHER = "tfcompose"
 
 
 @dataclass(slots=True)

@@ -53,6 +53,7 @@ def test_it_holds_compares_shows_and_replaces_as_a_dataclass_does(thing: Any) ->
     assert dataclasses.is_dataclass(type(one))
     assert dataclasses.asdict(one) == {"name": "a", "size": 2, "parts": [], "place": "here"}
     assert [item.name for item in fields(thing)] == ["name", "size", "parts", "place"]
+    assert fields(thing)[0] is fields(thing)[0], "made once"
     match one:
         case thing("a", size):
             assert size == 2

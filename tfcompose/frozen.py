@@ -23,9 +23,8 @@ else:
         """Return what makes a class a dataclass: slotted, frozen or not, equal by its fields or by identity."""
         if not slots:
             raise TypeError("slots=True: these classes have slots")
-        methods = (_FROZEN if frozen else _OPEN) | (_EQUAL | ({} if frozen else {"__hash__": None}) if eq else {})
-        if frozen and eq:
-            methods["__hash__"] = _hash
+        equal = {"__eq__": _equal, "__hash__": _hash if frozen else None}
+        methods = (_FROZEN if frozen else _OPEN) | (equal if eq else {})
         return lambda cls: _made(cls, methods)
 
     def field(**how: Any) -> _Field:
@@ -77,7 +76,9 @@ class _Late:
             given = {key: getattr(said, key) for key in ("default", "default_factory", "init", "repr", "compare")}
             body[name] = real.field(**{key: value for key, value in given.items() if value is not _MISSING})
         frozen = cls.__setattr__ is _refuse
-        return getattr(real.dataclass(repr=False, eq=False, frozen=frozen)(type(cls.__name__, (), body)), self.name)
+        made = getattr(real.dataclass(repr=False, eq=False, frozen=frozen)(type(cls.__name__, (), body)), self.name)
+        setattr(cls, self.name, made)  # from now on it is found without this
+        return made
 
 
 def _made(cls: type, methods: dict[str, Any]) -> type:
@@ -196,7 +197,6 @@ def _set_state(self: Any, state: list[Any]) -> None:
 
 
 _OPEN: dict[str, Any] = {"__repr__": _shown}
-_EQUAL: dict[str, Any] = {"__eq__": _equal}
 _FROZEN: dict[str, Any] = {
     "__repr__": _shown,
     "__setattr__": _refuse,

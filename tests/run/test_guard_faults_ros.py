@@ -182,6 +182,34 @@ def test_an_owner_whose_stamps_are_wrong_is_named(
     robot.says("complete")
 
 
+#: A node that latches its edges one message each, before anybody can have found it.
+LATCHES = """
+import signal, sys, time
+from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.node import open_node
+from tfcompose.ros.tf import TFPublisher
+signal.signal(signal.SIGTERM, lambda *_: sys.exit())
+with open_node("mounts", "/") as node:
+    publisher = TFPublisher(node, static=True)
+    for child in ("camera", "lidar"):
+        publisher.publish(encode([Transform(time.time_ns(), "base_link", child, (1., 0., 0.), (0., 0., 0., 1.))]))
+    print("ready", flush=True)
+    while True:
+        time.sleep(1)
+"""
+
+
+def test_an_owner_that_replaced_a_latched_edge_before_it_was_heard_is_named(up: Callable[[str], Running]) -> None:
+    mounts = "  camera: {parent: base_link, owner: mounts, static: true}\n"
+    mounts += "  lidar: {parent: base_link, owner: mounts, static: true}\nprocesses:\n"
+    robot = up(ROBOT.replace("processes:\n", mounts + "  mounts: {external: true, node: /mounts}\n"))
+    robot.joins("/drive", "odom base_link")
+    robot.starts(LATCHES)
+    said = robot.says("warning[TF850]", "/mounts sent 1 message on /tf_static before anybody heard it")
+    assert "none since holds base_link → camera" in said
+    assert robot.count("TF850") == 1
+
+
 def test_a_node_of_an_isolated_plan_that_writes_the_global_topic_is_named(up: Callable[[str], Running]) -> None:
     robot = up(ISOLATED)
     robot.joins("/other_robot/drive", "odom base_link")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.draw.letters import shown, width_of
+from tfcompose.draw.style import STYLES
 from tfcompose.frozen import dataclass
 
 if TYPE_CHECKING:
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
 
     from tfcompose.draw.graph import Forest, Graph
 
-LABEL_SIZE = 10.5
+LABEL_SIZE = STYLES["label"].size
 PAD = 8.0  # between a text and its box, and between a group and its frames
 
 

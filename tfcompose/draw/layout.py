@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 
 from tfcompose.draw.areas import PAD, Area, Place, areas_of
 from tfcompose.draw.letters import shown, width_of
+from tfcompose.draw.style import STYLES
 from tfcompose.frozen import dataclass
 
 if TYPE_CHECKING:
     from tfcompose.draw.graph import Forest, Graph
 
-NAME_SIZE, MORE_SIZE = 12.0, 10.0
+NAME_SIZE, MORE_SIZE = STYLES["name"].size, STYLES["more"].size
 BOX_HEIGHT, POSE_HEIGHT = 24.0, 14.0
 ROW_GAP = 8.0
 BADGE_WIDTH = 18.0

@@ -164,11 +164,12 @@ def _started(process: PlanProcess) -> list[str]:
     again = "" if process.restart == "no" else ", respawn=True, respawn_delay=1.0"
     ends = ", on_exit=Shutdown()" if process.required else ""
     package = _EXECUTABLE.fullmatch(process.argv[0]) if process.argv else None
-    told_file = any("${params_file}" in word for word in (*process.env.values(), *_rest(process)[0]))
+    own, ros_words = _rest(process)
+    told_file = any("${params_file}" in word for word in (*process.env.values(), *own))
     if package is None or len(process.nodes) != 1 or process.cwd is not None or told_file:
         return [f"process({process.name!r}{again}{ends}),"]
     namespace, _, node = process.nodes[0].rpartition("/")
-    arguments, ros_arguments = ([_filled(word) for word in words] for words in _rest(process))
+    arguments, ros_arguments = ([_filled(word) for word in words] for words in (own, ros_words))
     told = [
         f"package={package[1]!r}, executable={package[2]!r}, name={node!r}, namespace={namespace or '/'!r}",
         f"remappings={list(process.remap.items())!r}",

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from tfcompose.pose import Pose, Quaternion, Vector
 
 _TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-_SAFETY = ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity")
+_SOFT_LIMITS = ("soft_lower_limit", "soft_upper_limit")
 _ORDER = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
@@ -118,9 +118,10 @@ def _motion(joint: Joint) -> dict[str, Any]:
     if joint.dynamics:
         said["dynamics"] = {key: getattr(joint.dynamics, key) for key in Dynamics.__slots__}
     if joint.safety:
-        ends = {key: getattr(joint.safety, key) for key in _SAFETY[:2]}
-        gains = {key: getattr(joint.safety, key) for key in SafetyController.__slots__ if key not in ends}
-        said["safety_controller"] = {key: place(value) for key, value in ends.items() if value is not None} | gains
+        values = {key: getattr(joint.safety, key) for key in SafetyController.__slots__}
+        said["safety_controller"] = {
+            key: place(value) if key in _SOFT_LIMITS else value for key, value in values.items()
+        }
     if reference:
         ends = {"rising": reference.rising, "falling": reference.falling}
         said["calibration"] = {key: place(value) for key, value in ends.items() if value is not None}

@@ -123,7 +123,7 @@ class _Writer:
     def _joints(self) -> dict[str, Any]:
         entries = {}
         for edge in self.robot.edges:
-            if edge in self.bare or edge.child in self.brought:
+            if self._is_bare(edge) or edge.child in self.brought:
                 continue
             entries[edge.joint_name] = self.said.joint(edge, MOVER if edge.free else None)
         return entries

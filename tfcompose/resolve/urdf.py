@@ -45,9 +45,10 @@ def robot_of_urdf(root: Element, file: str, finder: Finder) -> tuple[Robot, tupl
         _add(joints, element, values)
     edges = [edge for element in root.all("joint") if (edge := edge_of(element, values))]
     frames = {link: element.place("name") for link, element in links.items()}
+    names = {edge.joint_name: None for edge in edges}
     for element in root.children:
         if element.tag in REFERRING:
-            wrong = references(element, frames, {edge.joint_name: None for edge in edges})
+            wrong = references(element, frames, names)
             values.found += [replace(one, severity="warning") for one in wrong]
     robot = Robot(
         name=name,
@@ -75,11 +76,12 @@ def _blocks(root: Element) -> Iterator[Block]:
 
 def _declared(element: Element, root: Element) -> str:
     """Return the element as it is written, with the namespaces that it takes from the root."""
+    raw = element.raw
     spaces = {name: value for name, value in root.attributes.items() if name.startswith("xmlns:")}
-    needed = {name: value for name, value in spaces.items() if re.search(rf"[<\s]{re.escape(name[6:])}:", element.raw)}
+    needed = {name: value for name, value in spaces.items() if re.search(rf"[<\s]{re.escape(name[6:])}:", raw)}
     more = "".join(f' {name}="{_quoted(value)}"' for name, value in needed.items() if name not in element.attributes)
     begin = 1 + len(element.tag)
-    return element.raw[:begin] + more + element.raw[begin:]
+    return raw[:begin] + more + raw[begin:]
 
 
 def _add(known: dict[str, Element], element: Element, values: Values) -> None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from tfcompose.diagnostic import did_you_mean
+from tfcompose.frozen import replace
 from tfcompose.model import (
     JOINTS,
     STATIC,
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tfcompose.pose import Vector
     from tfcompose.resolve.urdf_values import Values
 
-T = TypeVar("T")
+T = TypeVar("T", Dynamics, Limit, ReferencePositions, SafetyController)
 
 MOVING = ("revolute", "continuous", "prismatic")
 TYPES = (*MOVING, "fixed", "floating", "planar")
@@ -98,5 +98,5 @@ def _numbers(cls: type[T], element: Element | None, values: Values) -> T | None:
     """Return the object whose fields are the element's attributes; those that are missing have their defaults."""
     if element is None:
         return None
-    given = {field.name: values.number(element, field.name) for field in fields(cls)}  # type: ignore[arg-type]
+    given = {name: values.number(element, name) for name in cls.__slots__}
     return cls(**{name: value for name, value in given.items() if value is not None})

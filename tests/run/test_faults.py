@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import psutil
@@ -18,6 +19,7 @@ from tfcompose.plan import Plan, PlanProcess, RosSettings
 from tfcompose.plan.file import write_plan
 from tfcompose.run.launcher.control import ask, connect
 from tfcompose.run.launcher.leftovers import end, leftovers
+from tfcompose.run.launcher.supervisor import LONGEST_SLEEP_S
 from tfcompose.run.place import Place
 
 if TYPE_CHECKING:
@@ -76,6 +78,18 @@ if os.fork() == 0:
     open("daemon", "w").write(str(os.getpid()))
     os.close(1), os.close(2)
     time.sleep(60)
+"""
+
+#: As DAEMON; and it goes on as a program without a variable in its environment, whose parent stays or goes.
+BARE = """
+import os, sys, time
+if os.fork() == 0:
+    os.setsid()
+    os.close(1), os.close(2)
+    code = "import os, time; open('daemon', 'w').write(str(os.getpid())); time.sleep(60)"
+    os.execve(sys.executable, [sys.executable, "-I", "-c", code], {})
+while "stays" in sys.argv:
+    time.sleep(1)
 """
 
 
@@ -187,6 +201,40 @@ def test_a_daemon_that_left_its_group_ends_with_the_run(launch: Callable[..., Ru
     assert until(lambda: gone(pid), 4)
 
 
+@pytest.mark.parametrize("parent", ["stays", "goes"])
+@pytest.mark.parametrize("how", ["is stopped", "is killed"])
+def test_what_left_its_group_and_its_environment_ends_with_the_run(
+    launch: Callable[..., Run], tmp_path: Path, how: str, parent: str
+) -> None:
+    bare = replace(program("bare", BARE), argv=(*PYTHON, BARE, parent))
+    run = launch(bare, program("calm", SLEEPER))
+    assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
+    pid = int((tmp_path / "daemon").read_text())
+    assert until(lambda: run.ps()["bare"]["state"] == ("RUNNING" if parent == "stays" else "EXITED"))
+    assert pid not in {one.pid for one in leftovers(f"{NAME}:")}
+    if how == "is killed":
+        time.sleep(1.5 * LONGEST_SLEEP_S)  # so often does the launcher look what descends from it
+        run.popen.kill()
+    else:
+        assert run.down() == 0
+    assert until(lambda: gone(pid), 4)
+
+
+def test_a_keeper_that_is_killed_is_replaced(launch: Callable[..., Run], tmp_path: Path) -> None:
+    run = launch(program("daemon", DAEMON), program("calm", SLEEPER))
+    assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
+    first = keeper_of(run)
+    assert first
+    first.kill()
+    assert until(lambda: keeper_of(run) not in {None, first})
+    run.popen.kill()
+    assert until(lambda: gone(int((tmp_path / "daemon").read_text())), 4)
+
+
+def keeper_of(run: Run) -> psutil.Process | None:
+    return next((one for one in psutil.Process(run.popen.pid).children() if one.name() == "sh"), None)
+
+
 def test_leftovers_are_recognised_by_the_runs_id_and_ended_on_request_only(
     launch: Callable[..., Run], tmp_path: Path
 ) -> None:
@@ -194,8 +242,10 @@ def test_leftovers_are_recognised_by_the_runs_id_and_ended_on_request_only(
     assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
     pid = int((tmp_path / "daemon").read_text())
     assert {one.launcher for one in leftovers(f"{NAME}:")} == {run.popen.pid}
-    keeper = next(child for child in psutil.Process(run.popen.pid).children() if child.name() == "sh")
-    os.kill(keeper.pid, signal.SIGKILL)
+    run.popen.send_signal(signal.SIGSTOP)  # it shall not get another keeper
+    keeper = keeper_of(run)
+    assert keeper
+    keeper.kill()
     run.popen.kill()
     run.popen.wait()
     assert until(lambda: [one.pid for one in leftovers(f"{NAME}:")] == [pid])

@@ -61,9 +61,10 @@ class Robot:
     ``frames`` holds every frame that was declared, with its place; ``base`` is where the URDF begins, or None where the
     tree has no single root; ``sensors`` are those with a known preset, ``as_written`` the numbers of poses and limits
     before they became poses, ``unused`` the variables that nothing uses; ``written`` is the plain data that the robot
-    was made from, profiles laid over it; ``broken`` holds the entries (section, name) that were refused
-    already, of a part how its names begin. ``parts`` are those that are robots of their own. ``foreign`` are the
-    files that somebody else wrote: what those say otherwise than is usual here cannot be mended here.
+    was made from, profiles laid over it; ``broken`` holds the entries (section, name) that were refused already, of a
+    part how its names begin. ``parts`` are those that are robots of their own, ``mounted`` the root frame of each part
+    by its name. ``foreign`` are the files that somebody else wrote: what those say otherwise than is usual here cannot
+    be mended here.
     """
 
     name: str
@@ -82,6 +83,7 @@ class Robot:
     broken: frozenset[tuple[str, str]] = frozenset()
     claims: tuple[Claim, ...] = ()
     parts: tuple[Part, ...] = ()
+    mounted: dict[str, str] = field(default_factory=dict, compare=False)
     hardware: tuple[Hardware, ...] = ()
     blocks: tuple[Block, ...] = ()
     foreign: frozenset[str] = field(default=frozenset(), compare=False)

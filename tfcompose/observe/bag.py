@@ -30,10 +30,6 @@ _CLOCK, _CLOCK_BYTES = Struct("<iI"), 12
 _NAMED_AT_MOST = 12
 
 
-class NoTopicError(BagError):
-    """Raised when a bag has none of the topics."""
-
-
 @dataclass(frozen=True, slots=True)
 class Recorded:
     """One TFMessage of a bag, on one of the ``topics`` (moving, fixed); ``rows`` is None where it cannot be decoded.
@@ -74,7 +70,7 @@ class Recording:
         """Yield the messages of the pairs of topics (moving, fixed), in the order in which they were recorded.
 
         Raises:
-            NoTopicError: if it has none of the topics.
+            BagError: if it has none of the topics.
             BagError: if it is no bag, is damaged, or its messages are not TF's.
         """
         library = import_module("rosbags.rosbag2")
@@ -152,18 +148,18 @@ def _is_tf(connection: Any, wanted: Mapping[str, Topics]) -> bool:
     return True
 
 
-def _no_topic(path: str, pairs: Sequence[Topics], held: set[tuple[str, str]]) -> NoTopicError:
+def _no_topic(path: str, pairs: Sequence[Topics], held: set[tuple[str, str]]) -> BagError:
     """Return what to say where none of the topics is: which TF topics the bag has instead."""
     asked = [topic for pair in pairs for topic in pair]
     for topic, type_ in sorted(held):
         if topic in asked:
-            return NoTopicError(f"{topic} in {path} is {type_}, not {TF_MESSAGE}", _help_of(type_))
+            return BagError(f"{topic} in {path} is {type_}, not {TF_MESSAGE}", _help_of(type_))
     others = sorted(topic for topic, type_ in held if type_ == TF_MESSAGE)
     if others:
         names = ", ".join(others[:_NAMED_AT_MOST])
-        return NoTopicError(f"{path} has neither {' nor '.join(asked)}", f"TF is on {names}: {namespace_words(others)}")
+        return BagError(f"{path} has neither {' nor '.join(asked)}", f"TF is on {names}: {namespace_words(others)}")
     names = ", ".join(sorted({topic for topic, _ in held})[:_NAMED_AT_MOST])
-    return NoTopicError(f"{path} holds no TF", f"it holds {names}" if names else "it holds nothing")
+    return BagError(f"{path} holds no TF", f"it holds {names}" if names else "it holds nothing")
 
 
 def _help_of(type_: str) -> str:

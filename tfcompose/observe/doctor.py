@@ -12,13 +12,14 @@ from tfcompose.observe.diagnose import diagnose
 from tfcompose.observe.diagnose.tree import trees_of
 from tfcompose.observe.elsewhere import tf_elsewhere
 from tfcompose.observe.live import Live
-from tfcompose.observe.seen import GLOBAL, RosProcess, Seen, Topic
+from tfcompose.observe.seen import RosProcess, Seen, Topic
 from tfcompose.observe.sideline import Sideline
 from tfcompose.ros.clock import wall_ns
 from tfcompose.ros.graph import ends, nodes, topics, volatile_readers
 from tfcompose.ros.node import middleware, open_node
 from tfcompose.ros.processes import ros_processes, settings_in
 from tfcompose.ros.settings import RMW
+from tfcompose.ros.topics import GLOBAL
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -113,7 +114,7 @@ class _Ear:
     sideline: Sideline = field(init=False)
 
     def __post_init__(self) -> None:
-        self.live = Live(self.node, self.census, topics=self.topics)
+        self.live = Live(self.node, self.census, self.topics)
         self.sideline = Sideline(self.node, self.topics[0].removesuffix("/tf"))
 
     def hear(self, timeout_s: float, stop: Stop) -> None:

@@ -1,4 +1,4 @@
-"""The moving joints and the links of a robot's description, as a listener reads it."""
+"""The moving joints of a robot's description, as a listener reads it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ class _Reader:
     """Reads the joints of a URDF; a document that declares a type or entities is not read on."""
 
     def __init__(self) -> None:
-        self.links: set[str] = set()
         self.joints: list[Movable] = []
         self._depth = 0
         self._joint: dict[str, str] = {}
@@ -27,14 +26,11 @@ class _Reader:
         try:
             self._parser.Parse(text, True)  # noqa: FBT003 (expat's: this is all)
         except (expat.ExpatError, ValueError):
-            self.links.clear()
             self.joints.clear()
 
     def _start(self, name: str, attributes: dict[str, str]) -> None:
         self._depth += 1
-        if self._depth == 2 and name == "link":  # noqa: PLR2004 (below <robot>)
-            self.links.add(attributes.get("name", ""))
-        elif self._depth == 2 and name == "joint":  # noqa: PLR2004
+        if self._depth == 2 and name == "joint":  # noqa: PLR2004 (below <robot>)
             self._joint = {"name": attributes.get("name", ""), "type": attributes.get("type", "")}
         elif name in {"parent", "child"} and self._joint:
             self._joint[name] = attributes.get("link", "")
@@ -55,8 +51,8 @@ class _Reader:
         raise ValueError
 
 
-def joints_of(description: str) -> tuple[frozenset[str], tuple[Movable, ...]]:
-    """Return the links and the moving joints of a URDF; nothing where it is none."""
+def joints_of(description: str) -> tuple[Movable, ...]:
+    """Return the moving joints of a URDF; none where it is none."""
     reader = _Reader()
     reader.read(description)
-    return frozenset(reader.links), tuple(reader.joints)
+    return tuple(reader.joints)

@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.observe.census import Census, Publisher, nearer_clock, topics_below
+from tfcompose.observe.census import Census, Publisher, nearer_clock
 from tfcompose.ros.clock import SimClock, wall_ns
 from tfcompose.ros.decoder import Decoder
 from tfcompose.ros.graph import UNKNOWN_NODE, nodes, own_gid, writers
@@ -41,14 +41,14 @@ class Heard:
 class Live:
     """Listens to the topics of moving and of fixed edges, as long as its node lives.
 
-    ``topics`` (moving, fixed) may be given instead. Where a simulator publishes /clock, stamps that are
+    ``topics`` are (moving, fixed). Where a simulator publishes /clock, stamps that are
     nearer to it than to the system's time are compared with it.
     """
 
-    def __init__(self, node: Node, census: Census, namespace: str = "", topics: tuple[str, str] | None = None) -> None:
+    def __init__(self, node: Node, census: Census, topics: tuple[str, str]) -> None:
         self.node = node
         self.census = census
-        self.topics = topics or topics_below(namespace)
+        self.topics = topics
         self._subscriptions = [
             (TFSubscription(node, static=static, topic=self.topics[static]), static) for static in (True, False)
         ]

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from tfcompose.ros.topics import GLOBAL
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -12,7 +14,6 @@ if TYPE_CHECKING:
     from tfcompose.plan import Plan
 
 NAMELESS = "a publisher without a node name"
-GLOBAL = ("/tf", "/tf_static")
 #: Of a list of names so many are shown.
 LISTED = 6
 
@@ -73,7 +74,6 @@ class Seen:
         clock_ns: the newest time on /clock, None where nothing came.
         clock_moves: whether that changed.
         stamped: what came with a header.
-        links: the links of ``robot_description``, where somebody publishes it.
         movable: its moving joints.
         joint_names: those in joint states.
         settings: the variables by which ROS is set up here.
@@ -94,7 +94,6 @@ class Seen:
     clock_ns: int | None = None
     clock_moves: bool = False
     stamped: tuple[Stamped, ...] = ()
-    links: frozenset[str] = frozenset()
     movable: tuple[Movable, ...] = ()
     joint_names: frozenset[str] = frozenset()
     settings: Mapping[str, str] = field(default_factory=dict)

@@ -38,7 +38,6 @@ class Sideline:
         self._joints: dict[str, JointStateSubscription] = {}
         self._delays: dict[tuple[str, str], list[float]] = {}
         self._senders: dict[str, tuple[str, ...]] = {}
-        self._links: frozenset[str] = frozenset()
         self._movable: tuple[Movable, ...] = ()
         self._names: set[str] = set()
 
@@ -73,7 +72,7 @@ class Sideline:
             for received in joints.take()[-1:]:
                 self._names |= _names(received.data)
         for _, text in self._description.take_texts()[-1:]:
-            self._links, self._movable = joints_of(text)
+            self._movable = joints_of(text)
 
     def picture(self) -> dict[str, Any]:
         """Return what was heard, as parts of ``Seen``."""
@@ -83,7 +82,6 @@ class Sideline:
         )
         return {
             "stamped": stamped,
-            "links": self._links,
             "movable": self._movable,
             "joint_names": frozenset(self._names),
         }

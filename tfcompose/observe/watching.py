@@ -41,7 +41,7 @@ def watch(  # noqa: PLR0913 (all but two are named)
     end = None if duration_s is None else begun + duration_s
     due = begun + every_s
     with open_node(name, "") as node:
-        lives = [Live(node, census, topics=topics) for topics, census in censuses.items()]
+        lives = [Live(node, census, topics) for topics, census in censuses.items()]
         while not stop.requested:
             now = time.monotonic()
             if end is not None and now >= end:

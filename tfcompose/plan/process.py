@@ -18,11 +18,10 @@ STOP_SIGNALS = ("SIGINT", "SIGTERM", "SIGQUIT", "SIGHUP", "SIGKILL", "SIGUSR1", 
 #: How well the pose of a frame is known that a driver publishes.
 KNOWN = ("exact", "nominal")
 
-#: What stands in an ``argv`` for values that only the starting machine knows. As its first word
-#: ``${executable:PACKAGE/NAME}`` is a package's program, and ``${launch:PACKAGE/FILE}`` a package's launch file; the
-#: words after that are the launch file's arguments, ``name:=value``.
-PLACEHOLDERS = ("${python}", "${plan}", "${build_dir}", "${params_file}")
-
+#: In an ``argv``, ``${python}``, ``${plan}``, ``${build_dir}`` and ``${params_file}`` stand for what only the starting
+#: machine knows. As its first word ``${executable:PACKAGE/NAME}`` is a package's program, and
+#: ``${launch:PACKAGE/FILE}`` a package's launch file; the words after that are the launch file's arguments,
+#: ``name:=value``.
 _AT_START = re.compile(r"\$\{(?:file:|build_dir\}|params_file\})")
 
 

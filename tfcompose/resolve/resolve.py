@@ -203,6 +203,7 @@ class _Work:
             written=_written(self.source, self.joined),
             broken=frozenset(self.broken),
             parts=tuple(alone for part in parts for alone in part.parts),
+            mounted={part.name: part.root for part in self.joined if part.root is not None},
             hardware=tuple(one for part in in_tree for one in part.hardware),
             blocks=tuple(one for part in in_tree for one in part.blocks),
             foreign=frozenset(file for part in parts for file in part.foreign),

@@ -43,7 +43,7 @@ def far_from_the_robot(robot: Robot) -> Iterator[Diagnostic]:
     )
     moved = {edge.joint_name: edge.child for edge in robot.edges if edge.joint_name}
     mounted = {sensor.name: sensor.mount for sensor in robot.sensors}
-    named: dict[str | int, dict[str, str]] = {"joints": moved, "sensors": mounted}
+    named: dict[str | int, dict[str, str]] = {"joints": moved, "sensors": mounted, "parts": robot.mounted}
     for value in robot.as_written:
         if value.path[2:] != ("xyz",) or norm(value.numbers) <= limit or value.path[0] == "processes":
             continue

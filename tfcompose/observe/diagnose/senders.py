@@ -6,9 +6,10 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, finding
-from tfcompose.observe.seen import GLOBAL, NAMELESS, counted, listed, who
+from tfcompose.observe.seen import NAMELESS, counted, listed, who
 from tfcompose.ros.message import TF_MESSAGE
 from tfcompose.ros.misfits import best_effort_writer, leak, volatile_writer
+from tfcompose.ros.topics import GLOBAL
 from tfcompose.verdict.offset import Offset, offset_of
 
 if TYPE_CHECKING:

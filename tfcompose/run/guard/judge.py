@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Judge", "Message", "Writer"]
 
-#: A guard that follows one that died misses nobody for so long: it takes that to find all publishers again.
+#: A guard that follows one that died misses nobody for so long: it takes that to find all nodes again.
 FINDING_S = 5.0
 
 

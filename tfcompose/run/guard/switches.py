@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, finding
 from tfcompose.run.events import Found
+from tfcompose.run.guard.judge import FINDING_S
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -29,8 +30,6 @@ LOOK_EVERY_S = 0.5
 #: For so long a parameter that the node does not have is asked for again, so often.
 DECLARED_WITHIN_S = 20.0
 AGAIN_EVERY_S = 2.0
-#: A guard that follows one that died misses no node for so long: it takes that to find all of them again.
-FINDING_S = 5.0
 
 
 @dataclass(slots=True)

@@ -17,9 +17,10 @@ from tfcompose.run.hold import GO, HOLD_FD
 from tfcompose.run.launcher.child import LAST_LINE_LENGTH, Child, Pipe, bury_adopted, has_ended, kill_group, spawn
 from tfcompose.run.launcher.happening import Exited, LogSeen, Started, StartFailed
 from tfcompose.run.launcher.keeper import Keeper
-from tfcompose.run.launcher.leftovers import LAUNCHER, launcher_mark, leftovers
+from tfcompose.run.launcher.leftovers import LAUNCHER, launcher_mark, leftovers, these
 from tfcompose.run.launcher.leftovers import end as end_leftovers
 from tfcompose.run.launcher.notice import LogLine
+from tfcompose.run.launcher.processes import descendants
 from tfcompose.run.place import RUN_ID
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ class Children:
         self._guard_pipes: GuardPipes | None = None
         self._marks = {RUN_ID: run_id, LAUNCHER: launcher_mark()} if run_id else {}
         self._keeper = Keeper(run_id)
+        self._strays: set[int] = set()
 
     def start(self, process: PlanProcess, command: Command, guard: GuardPipes | None = None) -> Event:
         """Start the process, with the pipes of a guard if it is one, and return what came of it."""
@@ -119,7 +121,16 @@ class Children:
             if child.name not in self._held:
                 self._ended(child)
         if self._run_id:
-            bury_adopted({child.popen.pid for child in self._children.values()} | {self._keeper.pid})
+            bury_adopted(self._groups() | {self._keeper.pid})
+
+    def look_around(self) -> None:
+        """Note which groups there are of what descends from this process, and have a keeper who knows them."""
+        if not self._run_id:
+            return
+        if self._keeper.ended:
+            self._keeper = Keeper(self._run_id)
+        self._strays = set(self._descendants().values())
+        self._keep()
 
     def close(self) -> None:
         """Kill what is left: something, only if an error in the launcher itself ends it."""
@@ -128,9 +139,12 @@ class Children:
             self._bury(child)
         self._children.clear()
         self._close_guard_pipes()
-        self._keep()
         if self._run_id:
-            end_leftovers(leftovers(self._run_id), 1.0)
+            marked = leftovers(self._run_id)
+            others = self._descendants().keys() - {one.pid for one in marked}
+            end_leftovers(marked + these(others, self._run_id), 1.0)
+        self._strays.clear()
+        self._keep()
         self._keeper.close()
 
     # A process's life.
@@ -216,7 +230,14 @@ class Children:
             self._guard_pipes = None
 
     def _keep(self) -> None:
-        self._keeper.keep(child.popen.pid for child in self._children.values())
+        self._keeper.keep(self._groups() | self._strays)
+
+    def _groups(self) -> set[int]:
+        """Return the groups of the children, each of which leads its own."""
+        return {child.popen.pid for child in self._children.values()}
+
+    def _descendants(self) -> dict[int, int]:
+        return descendants(os.getpid(), but=self._keeper.pid)
 
 
 def _reason(error: Exception) -> str:

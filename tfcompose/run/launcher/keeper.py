@@ -1,7 +1,7 @@
 """What ends a run whose launcher was killed: a shell that outlives the launcher by a moment.
 
-It kills the groups that it was told last, and then whatever carries the run's id in its environment: processes that
-left their groups.
+It kills the groups that it was told last, those of everything that descends from the launcher, and then whatever
+carries the run's id in its environment: processes that left their groups since.
 """
 
 from __future__ import annotations
@@ -47,13 +47,18 @@ class Keeper:
         """Its process number."""
         return self._shell.pid
 
-    def keep(self, pids: Iterable[int]) -> None:
+    @property
+    def ended(self) -> bool:
+        """Whether somebody killed it."""
+        return self._shell.poll() is not None
+
+    def keep(self, groups: Iterable[int]) -> None:
         """Say which groups there are now."""
-        line = " ".join(map(str, pids)) + "\n"
-        self._kept = line.strip()
-        if self._shell.stdin:
+        kept = " ".join(map(str, sorted(groups)))
+        if self._shell.stdin and kept != self._kept:
+            self._kept = kept
             with contextlib.suppress(BrokenPipeError):
-                self._shell.stdin.write(line.encode())
+                self._shell.stdin.write(f"{kept}\n".encode())
 
     def close(self) -> None:
         """Let it go; the groups that it was told last are killed."""

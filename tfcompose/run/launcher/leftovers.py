@@ -1,4 +1,7 @@
-"""Processes of a run, found by the run's id in their environment: also those that left their group and session."""
+"""Processes that a run left behind: those with the run's id in their environment, and a launcher's descendants.
+
+Both find also what left its group and session; the first also where the launcher was killed.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +10,13 @@ import os
 import signal
 import time
 from dataclasses import dataclass
-from pathlib import Path
+from typing import TYPE_CHECKING
 
+from tfcompose.run.launcher.processes import BEGAN, PROC, STATE, all_pids, began, fields_of
 from tfcompose.run.place import RUN_ID
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 #: The variable that names the launcher of a run: its process number, and when it began (clock ticks).
 LAUNCHER = "TFCOMPOSE_LAUNCHER"
@@ -33,20 +40,26 @@ class Leftover:
 
 def launcher_mark() -> str:
     """Return what a process of a run is told of its launcher, which is this process."""
-    return f"{os.getpid()}:{_began(Path('/proc/self'))}"
+    return f"{os.getpid()}:{began('self')}"
 
 
 def leftovers(run: str) -> list[Leftover]:
     """Return the processes whose run's id is, or begins with, ``run``: "rover@0:" finds all of rover's runs."""
     found = []
-    for folder in Path("/proc").iterdir():
-        if not folder.name.isdigit() or int(folder.name) == os.getpid():
-            continue
+    for pid in all_pids():
         with contextlib.suppress(OSError, ValueError, IndexError):
-            one = _look(folder, run)
-            if one:
+            if pid != os.getpid() and (one := _marked(pid, run)):
                 found.append(one)
     return sorted(found, key=lambda one: one.pid)
+
+
+def these(pids: Iterable[int], run: str) -> list[Leftover]:
+    """Return those of these processes that run, as what this run left behind."""
+    found = []
+    for pid in pids:
+        with contextlib.suppress(OSError, ValueError, IndexError):
+            found.append(Leftover(pid, run, _command(pid), began(pid)))
+    return found
 
 
 def variables_of(pid: int) -> dict[str, str]:
@@ -55,33 +68,31 @@ def variables_of(pid: int) -> dict[str, str]:
     Raises:
         OSError: if the process has ended, or is somebody else's.
     """
-    words = (Path("/proc") / str(pid) / "environ").read_bytes().decode(errors="replace").split("\0")
+    words = (PROC / str(pid) / "environ").read_bytes().decode(errors="replace").split("\0")
     return {name: value for name, _, value in (word.partition("=") for word in words)}
 
 
-def _look(folder: Path, run: str) -> Leftover | None:
-    if RUN_ID.encode() not in (folder / "environ").read_bytes():
+def _marked(pid: int, run: str) -> Leftover | None:
+    if RUN_ID.encode() not in (PROC / str(pid) / "environ").read_bytes():
         return None
-    env = variables_of(int(folder.name))
+    env = variables_of(pid)
     if not env.get(RUN_ID, "").startswith(run):
         return None
-    words = (folder / "cmdline").read_bytes().rstrip(b"\0").split(b"\0")
-    command = b" ".join(words).decode(errors="replace")[:200]
-    return Leftover(int(folder.name), env[RUN_ID], command, _began(folder), _launcher(env.get(LAUNCHER, "")))
+    return Leftover(pid, env[RUN_ID], _command(pid), began(pid), _launcher(env.get(LAUNCHER, "")))
+
+
+def _command(pid: int) -> str:
+    words = (PROC / str(pid) / "cmdline").read_bytes().rstrip(b"\0").split(b"\0")
+    return b" ".join(words).decode(errors="replace")[:200]
 
 
 def _launcher(mark: str) -> int | None:
     """Return the launcher's number if it still runs, in this network."""
-    pid, _, began = mark.partition(":")
+    pid, _, since = mark.partition(":")
     with contextlib.suppress(OSError, ValueError, IndexError):
-        folder = Path("/proc") / str(int(pid))
-        same = (folder / "ns/net").readlink() == Path("/proc/self/ns/net").readlink()
-        return int(pid) if same and _began(folder) == int(began) else None
+        same = (PROC / str(int(pid)) / "ns/net").readlink() == (PROC / "self/ns/net").readlink()
+        return int(pid) if same and began(pid) == int(since) else None
     return None
-
-
-def _began(folder: Path) -> int:
-    return int((folder / "stat").read_text().rpartition(")")[2].split()[19])
 
 
 def end(found: list[Leftover], patience_s: float = 2.0) -> list[Leftover]:
@@ -109,9 +120,8 @@ def _send(one: Leftover, number: int) -> None:
 
 
 def _is_there(one: Leftover) -> bool:
-    folder = Path("/proc") / str(one.pid)
     try:
-        state = (folder / "stat").read_text().rpartition(")")[2].split()[0]
-        return _began(folder) == one.began and state != "Z"
-    except (OSError, IndexError):
+        fields = fields_of(one.pid)
+        return int(fields[BEGAN]) == one.began and fields[STATE] != "Z"
+    except (OSError, IndexError, ValueError):
         return False

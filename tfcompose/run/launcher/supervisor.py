@@ -131,9 +131,12 @@ class _Supervisor:
                 key.data()
             for number in self._signals.taken():
                 self._handle(Signalled(number))
-            if self._signals.children_changed() or time.monotonic() >= self._look_at:
-                self._look_at = time.monotonic() + LONGEST_SLEEP_S
+            look = time.monotonic() >= self._look_at
+            if self._signals.children_changed() or look:
                 self._children.bury()
+            if look:
+                self._children.look_around()
+                self._look_at = time.monotonic() + LONGEST_SLEEP_S
             if end is not None and time.monotonic() >= end:
                 self._handle(TimeUp())
             elif self._events or (self._due or math.inf) <= time.monotonic():

@@ -5,7 +5,8 @@ from __future__ import annotations
 import contextlib
 import os
 import time
-from pathlib import Path
+
+from tfcompose.run.launcher.processes import GROUP, PROC, SYSTEM_TICKS, USER_TICKS, all_pids, fields_of
 
 #: The processor's use is measured over this time, in seconds.
 OVER_S = 0.2
@@ -29,31 +30,25 @@ def usage_of(groups: list[int]) -> dict[int, tuple[float, int]]:
 
 def _members(groups: set[int]) -> dict[int, list[int]]:
     members: dict[int, list[int]] = {}
-    for folder in Path("/proc").iterdir():
-        if folder.name.isdigit():
-            with contextlib.suppress(OSError, IndexError, ValueError):
-                group = int(_fields(int(folder.name))[2])
-                if group in groups:
-                    members.setdefault(group, []).append(int(folder.name))
+    for pid in all_pids():
+        with contextlib.suppress(OSError, IndexError, ValueError):
+            group = int(fields_of(pid)[GROUP])
+            if group in groups:
+                members.setdefault(group, []).append(pid)
     return members
-
-
-def _fields(pid: int) -> list[str]:
-    """Return the fields of ``/proc/PID/stat`` behind the name: state, parent, group, …."""
-    return Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
 
 
 def _ticks(pid: int) -> int:
     try:
-        fields = _fields(pid)
-        return int(fields[11]) + int(fields[12])
+        fields = fields_of(pid)
+        return int(fields[USER_TICKS]) + int(fields[SYSTEM_TICKS])
     except (OSError, IndexError, ValueError):
         return 0
 
 
 def _memory(pid: int) -> int:
     with contextlib.suppress(OSError, IndexError, ValueError):
-        for line in Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii").splitlines():
+        for line in (PROC / str(pid) / "smaps_rollup").read_text(encoding="ascii").splitlines():
             if line.startswith("Pss:"):
                 return int(line.split()[1]) * 1024
     return 0

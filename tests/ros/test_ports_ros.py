@@ -1,0 +1,34 @@
+"""Which ports of Fast DDS's shared memory a process reads: who first writes to an idle one may wait for 333 ms."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tfcompose.plan import RosSettings
+from tfcompose.ros.environment import child_environment
+
+pytestmark = pytest.mark.ros
+
+#: Says which ports the process holds as their reader: Fast DDS locks a file beside each.
+NODE = """
+import os
+from pathlib import Path
+from tfcompose.ros.node import open_node
+with open_node("one", "/"):
+    held = {os.readlink(one) for one in Path("/proc/self/fd").iterdir() if one.exists()}
+print(*sorted(one for one in held if "fastrtps_port" in one))
+"""
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_on_one_machine_tfcomposes_own_processes_read_no_shared_memory_and_others_do(
+    domain: object, *, own: bool
+) -> None:
+    assert domain
+    env = child_environment(os.environ, RosSettings(discovery="localhost"), own=own)
+    said = subprocess.run([sys.executable, "-c", NODE], env=env, capture_output=True, text=True, check=True, timeout=60)
+    assert (said.stdout == "\n") == own, said.stdout

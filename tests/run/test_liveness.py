@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.pose import Pose
-from tfcompose.run.events import Complete, Found, GuardEvent, Live, OwnerReady, Recovered
+from tfcompose.run.events import Complete, Found, GuardEvent, Live, OwnerReady, Recovered, from_line, to_line
 from tfcompose.run.guard.liveness import Liveness
 
 if TYPE_CHECKING:
@@ -68,10 +68,19 @@ def watch() -> Callable[..., History]:
     return make
 
 
+def test_what_comes_in_one_message_is_announced_in_few_events(watch: Callable[..., History]) -> None:
+    names = [f"frame_{n}" for n in range(2500)]
+    history = watch(*(edge(f"base {name}", "static", kind="static") for name in names))
+    live = [event for event in history.live.arrived(tuple(names), history.now) if isinstance(event, Live)]
+    assert [len(event.children) for event in live] == [1000, 1000, 500]
+    assert [child for event in live for child in event.children] == names
+    assert [from_line(to_line(event)) for event in live] == live
+
+
 def test_edges_owners_and_the_tree_are_each_announced_once(watch: Callable[..., History]) -> None:
     history = watch(edge("map odom", "slam", 10), edge("odom a", "drive", 10), edge("odom b", "drive", 10))
     history.steadily(1, 10, "a", "odom").steadily(1, 10, "a", "b", "odom")
-    assert [event.child for event in history.events if isinstance(event, Live)] == ["a", "odom", "b"]
+    assert [event.children for event in history.events if isinstance(event, Live)] == [("a",), ("odom",), ("b",)]
     assert [event.process for event in history.events if isinstance(event, OwnerReady)] == ["slam", "drive"]
     assert [event for event in history.events if isinstance(event, Complete)] == [Complete(3)]
 

@@ -126,7 +126,7 @@ def test_lifecycle_nodes_are_driven_and_ready_means_that_they_are_there() -> Non
 def test_all_ready_is_told_once_with_when_each_was_started_and_ready() -> None:
     history = begin(GUARD, STATIC, gated()).wait(1).feed(Clear()).wait(1)
     assert [notice.waiting for notice in history.all(AllStarted)] == [()]
-    history.feed(Live("base_link", "laser", "static", "/static"), OwnerReady("static"), Complete(1)).wait(1)
+    history.feed(Live("static", ("laser",)), OwnerReady("static"), Complete(1)).wait(1)
     assert history.all(AllReady) == []
     history.feed(GateOpen("lidar", "x"))
     (told,) = history.all(AllReady)
@@ -180,7 +180,7 @@ def test_everything_is_stopped_on_request_with_exit_code_0() -> None:
 
 
 def test_a_process_is_restarted_and_the_guard_is_told_before_and_after() -> None:
-    history = begin(GUARD, STATIC, SLAM).feed(Clear(), Live("map", "odom", "slam", "/slam"), OwnerReady("slam"))
+    history = begin(GUARD, STATIC, SLAM).feed(Clear(), Live("slam", ("odom",)), OwnerReady("slam"))
     history.feed(Asked("slam", "restart"))
     assert history.killed == [("slam", SIGINT)]
     assert history.orders == [Absent("slam")]
@@ -238,7 +238,7 @@ def test_a_guard_that_is_restarted_is_told_who_is_absent_and_which_gates_are_shu
 
 
 def test_a_guard_that_dies_is_told_and_started_again_with_what_it_said_and_what_is_live_stays_so() -> None:
-    history = begin(GUARD, STATIC, SLAM).feed(Clear(), Live("map", "odom", "slam", "/slam"), OwnerReady("slam"))
+    history = begin(GUARD, STATIC, SLAM).feed(Clear(), Live("slam", ("odom",)), OwnerReady("slam"))
     history.feed(Remember({"a": 1, "b": 1}), Remember({"b": 2}))
     history.told.clear()
     history.feed(Exited("guard", -SIGKILL, ("last words",)))
@@ -267,7 +267,7 @@ def test_a_strict_guard_that_dies_lets_nothing_pass_and_says_so() -> None:
 
 def test_an_owner_that_ended_while_nobody_watched_is_to_be_seen_anew() -> None:
     slam = replace(SLAM, restart="always")
-    history = begin(GUARD, slam).feed(Clear(), Live("map", "odom", "slam", "/slam"), Remember({"a": 1}))
+    history = begin(GUARD, slam).feed(Clear(), Live("slam", ("odom",)), Remember({"a": 1}))
     history.feed(Exited("guard", 1), Exited("slam", 1))
     history.orders.clear()
     history.wait(1)
@@ -287,7 +287,7 @@ def test_a_guard_that_dies_again_and_again_ends_everything_with_1() -> None:
 
 
 def test_a_guard_that_is_asked_for_anew_or_follows_another_plan_begins_without_memory() -> None:
-    history = begin(GUARD, STATIC).feed(Clear(), Remember({"a": 1}), Live("base_link", "laser", "static", "/static"))
+    history = begin(GUARD, STATIC).feed(Clear(), Remember({"a": 1}), Live("static", ("laser",)))
     history.feed(Asked("guard", "restart"), Exited("guard", 0))
     assert (history.state.memory, history.state.live, history.found()) == ({}, frozenset(), [])
     history.feed(Clear(), Remember({"a": 1}), Exited("guard", 1))

@@ -15,7 +15,7 @@ from tfcompose.run.launcher.answers import status
 from tfcompose.run.launcher.happening import Asked, Exited, Signalled, StartFailed, TimeUp
 from tfcompose.run.launcher.notice import AllReady, AllStarted, Ended, Waiting
 
-LIVE = (Live("base_link", "laser", "static", "/static"), OwnerReady("static"))
+LIVE = (Live("static", ("laser",)), OwnerReady("static"))
 
 
 def optional(name: str = "camera", **more: Any) -> PlanProcess:

@@ -282,7 +282,7 @@ def test_placeholders_environment_and_folder_are_those_of_the_plan(tmp_path: Pat
 
 
 def test_the_guards_events_steer_the_start_and_a_line_that_is_none_is_shown(tmp_path: Path) -> None:
-    seen = Live("base_link", "laser", "a", "/a")
+    seen = Live("a", ("laser",))
     events = guard(Clear(), "rubbish\n", seen, OwnerReady("a"), Complete(1))
     a, b = program("a", SLEEPER, owns=(("base_link", "laser"),)), program("b", SLEEPER, after={"a": "ready"})
     told: list[Notice] = []

@@ -31,12 +31,10 @@ class Taken:
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """An edge was received from its owner for the first time."""
+    """Edges, named by their children, were received from their owner for the first time."""
 
-    parent: str
-    child: str
     owner: str
-    node: str
+    children: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +112,8 @@ def from_line(line: str) -> GuardEvent:
     kind = _KINDS.get(data.pop("event", "")) if isinstance(data, dict) else None
     if kind is None:
         raise ValueError(f"not an event: {line!r}")
+    if "children" in data:
+        data["children"] = tuple(data["children"])
     if "found" in data:
         data["found"] = diagnostic(data["found"])
     return kind(**data)

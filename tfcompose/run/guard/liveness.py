@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 FAST_AGAIN_ABOVE = 0.9
 #: For so many combinations of edges their tracks are remembered.
 MOST_MESSAGES = 1000
+#: So many edges one event names: a line of it is shorter than what a pipe's reader takes.
+MOST_NAMED = 1000
 
 
 class Liveness:
@@ -122,9 +124,12 @@ class Liveness:
         """Return that the track's edges are live."""
         owner = track.edge.owner
         self.changes += 1
-        events: list[GuardEvent] = [Live(e.parent, e.child, e.owner, e.node) for e in track.edges]
+        children = tuple(edge.child for edge in track.edges)
+        events: list[GuardEvent] = [
+            Live(owner, children[start : start + MOST_NAMED]) for start in range(0, len(children), MOST_NAMED)
+        ]
         waiting = self._waiting[owner]
-        waiting.difference_update(edge.child for edge in track.edges)
+        waiting.difference_update(children)
         if not waiting:
             events.append(OwnerReady(owner))
         if not self._complete and not any(self._waiting.values()):

@@ -23,8 +23,8 @@ def guard_said(turn: Turn, event: Event) -> None:
     match event:
         case Clear():
             _cleared(turn, seconds)
-        case Live(child=child):
-            turn.know(live=turn.state.live | {child})
+        case Live(children=children):
+            turn.know(live=turn.state.live.union(children))
         case Complete(edges):
             _complete(turn, edges)
         case Found(found, process):

@@ -1,0 +1,173 @@
+"""Histories replayed to the guard's judge, with a clock that is set by hand."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from tfcompose.plan import Claim, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.pose import Pose
+from tfcompose.run.events import Clear, Found, GuardEvent, Taken
+from tfcompose.run.guard.judge import Judge, Message, Writer
+
+if TYPE_CHECKING:
+    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.plan import EdgeKind
+
+
+LOOK_S = 0.1
+
+
+SETTLE_S = 1.0
+
+
+def edge(names: str, owner: str, kind: EdgeKind = "dynamic", rate: float | None = None) -> PlanEdge:
+    parent, child = names.split()
+    return PlanEdge(parent, child, kind, owner, f"/{owner}", Pose(), rate, ("rover.yaml", 7))
+
+
+EDGES = (
+    edge("map odom", "slam"),
+    edge("odom base", "drive"),
+    edge("base left", "joints", "joint"),
+    edge("base lidar", "static", "static"),
+    edge("base camera", "static", "static"),
+)
+
+
+TOOL = replace(edge("arm tool", "changer"), switched=("rack_1", "rack_2"))
+
+
+PROCESSES = (
+    PlanProcess("static", "static"),
+    PlanProcess("joints", "joints"),
+    PlanProcess("slam", "run"),
+    PlanProcess("drive", "external"),
+    PlanProcess("guard", "guard"),
+)
+
+
+FIXED = "base lidar, base camera"
+
+
+@dataclass
+class Publisher:
+    """A publisher of the history; ``sent`` counts its messages."""
+
+    node: str | None
+    static: bool = False
+    volatile: bool = False
+    gid: bytes = b""
+    sent: int = 0
+
+
+@dataclass
+class History:
+    """A judge that looks every tenth of a second, and the publishers that it sees."""
+
+    guard: GuardPolicy = field(default_factory=GuardPolicy)
+    processes: tuple[PlanProcess, ...] = PROCESSES
+    clock: str = "wall"
+    settle_s: float = SETTLE_S
+    gids: bool = True
+    says_who: bool = True
+    edges: tuple[PlanEdge, ...] = EDGES
+    claims: tuple[Claim, ...] = ()
+    now: float = 1000.0
+    events: list[GuardEvent] = field(default_factory=list)
+    graph: list[Publisher] = field(default_factory=list)
+    made: int = 0
+    judge: Judge = field(init=False)
+    looked: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        settings = RosSettings(clock=self.clock)
+        plan = Plan("rover", "0", "base", settings, self.edges, self.processes, self.guard, self.claims)
+        self.judge = Judge(plan, self.settle_s, self.now, self.wall_ns(), says_who=self.says_who)
+        self.looked = self.now
+
+    def wall_ns(self) -> int:
+        return 1_700_000_000_000_000_000 + round(self.now * 1e9)
+
+    def joins(
+        self, node: str | None, *, static: bool = False, volatile: bool = False, hidden: bool = False
+    ) -> Publisher:
+        """Let a publisher come; one that is hidden is not in the graph yet."""
+        self.made += 1
+        publisher = Publisher(node, static, volatile, bytes([self.made]) * 16)
+        if not hidden:
+            self.graph.append(publisher)
+        return publisher
+
+    def leaves(self, publisher: Publisher) -> None:
+        self.graph.remove(publisher)
+
+    def send(
+        self,
+        publisher: Publisher,
+        edges: str,
+        *,
+        static: bool | None = None,
+        ago: float = 0.0,
+        stamp_s: float | None = None,
+    ) -> History:
+        """Let a message arrive that was sent ``ago`` seconds before, stamped so."""
+        publisher.sent += 1
+        pairs = tuple((names.split()[0], names.split()[1]) for names in edges.split(", "))
+        kind = publisher.static if static is None else static
+        gid = (publisher.gid if self.says_who else publisher.gid[:8] + bytes(8)) if self.gids else None
+        sent_ns = self.wall_ns() - round(ago * 1e9)
+        stamps = () if stamp_s is None else (round(stamp_s * 1e9),) * len(pairs)
+        message = Message(pairs, kind, gid, sent_ns, publisher.sent, stamps, self.wall_ns())
+        self.events += self.judge.message(message, self.now)
+        return self
+
+    def look(self) -> History:
+        writers = [Writer(p.gid, p.node, p.static, p.volatile) for p in self.graph]
+        self.events += self.judge.graph(writers, self.now)
+        self.events += self.judge.tick(self.now)
+        return self
+
+    def wait(self, seconds: float) -> History:
+        """Let time pass, in looks."""
+        end = self.now + seconds
+        while self.now < end - 1e-9:
+            self.now = min(end, self.now + LOOK_S)
+            self.look()
+        return self
+
+    def repeat(self, publisher: Publisher, edges: str, times: int, every: float = 0.1) -> History:
+        """Let a publisher send, and the guard look, so many times."""
+        for _ in range(times):
+            self.send(publisher, edges).wait(every)
+        return self
+
+    def clear(self) -> History:
+        """Look until all is clear."""
+        self.wait(self.settle_s + LOOK_S)
+        assert Clear() in self.events
+        return self
+
+    def dies(self, down_s: float = 1.5) -> History:
+        """Let another judge follow with this one's memory, after a time in which nobody looked, and forget events."""
+        memory = json.loads(json.dumps(self.judge.memory()))
+        self.now += down_s
+        self.judge = Judge(self.judge.plan, 0.0, self.now, 0)
+        self.events = self.judge.recall(memory, self.now)
+        return self
+
+    def found(self) -> list[Diagnostic]:
+        return [event.found for event in self.events if isinstance(event, (Found, Taken))]
+
+    def said(self) -> list[str]:
+        return [
+            f"{event.found.code} {event.found.message}" for event in self.events if isinstance(event, (Found, Taken))
+        ]
+
+    def all(self, kind: type[GuardEvent]) -> list[GuardEvent]:
+        return [event for event in self.events if isinstance(event, kind)]
+
+
+def wall(running: History) -> float:
+    return running.wall_ns() / 1e9

@@ -188,8 +188,10 @@ def test_events_are_told_from_the_start_and_wait_returns_the_exit_code(tfc: Call
 def test_a_dry_run_is_the_same_everywhere_starts_nothing_and_writes_nothing(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
+    (tmp_path / "robot.yaml").write_text(f"{ROVER}  web: {{run: [serve], cwd: .}}\n")
     first = tfc("up", "--dry-run")
     assert first.returncode == 0
+    assert "folder   ${build_dir}/../.." in first.stdout
     assert not (tmp_path / "build").exists()
     assert str(tmp_path) not in first.stdout
     assert "command  ${python} -m tfcompose.run.static ${plan} static" in first.stdout

@@ -16,7 +16,7 @@ from tfcompose.diagnostic import RejectedError
 from tfcompose.emit import Target, emit
 from tfcompose.plan import PlanProcess, Ready, StopRule
 from tfcompose.plan.file import read_plan, write_plan
-from tfcompose.run.launcher.executable import filled_in, own_env
+from tfcompose.run.launcher.executable import filled_in, folder_of, own_env
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -84,7 +84,12 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "run: [a], env: {B: c}, restart: always, node: n": ("a",),
     "run: [a, --now], log_level: debug": ("a", "--now", "--ros-args", "--log-level", "debug"),
     "run: [a], remap: {/scan: /front}": ("a", "--ros-args", "-r", "/scan:=/front"),
-    "run: [a], params: {x: 1}": ("a", "--ros-args", "--params-file", "${params_file}"),
+    "run: [a], params: {x: 1}": (
+        "a", "--ros-args", "-r", "__node:=a", "-r", "__ns:=/r1", "--params-file", "${params_file}",
+    ),
+    "run: [a], nodes: {m: {params: {x: 1}}, n: {}}": (
+        "a", "--ros-args", "-r", "__ns:=/r1", "--params-file", "${params_file}",
+    ),
     "run: [a, '${params_file}'], params: {x: 1}": ("a", "${params_file}"),
     "run: [a, --ros-args, -p, 'y:=2'], remap: {b: c}": (
         "a", "--ros-args", "-p", "y:=2", "--ros-args", "-r", "b:=c",
@@ -206,6 +211,16 @@ def test_a_file_is_named_from_the_plans_folder_and_found_from_wherever_the_plan_
     assert filled[2] == str(tmp_path / "build/r/x")
     uri = own_env(process, tmp_path / "build/r/plan.json")["URI"]
     assert os.path.realpath(uri.removeprefix("file://")) == str(maps / "a.yaml")
+
+
+@pytest.mark.parametrize(
+    ("cwd", "place"), [("maps", "robots/maps"), (".", "robots"), ('"${file(maps)}"', "robots/maps"), ("/", "/")]
+)
+def test_a_process_runs_in_the_folder_beside_the_file_that_names_it(tmp_path: Path, cwd: str, place: str) -> None:
+    built = built_at(tmp_path, "build/r", f"{FILES}    cwd: {cwd}\n")
+    assert isinstance(built, tuple)
+    build_dir = tmp_path / "build/r"
+    assert folder_of(built[1], build_dir / "plan.json", build_dir) == tmp_path / place
 
 
 def test_the_same_robot_in_another_place_is_built_to_the_same_bytes(tmp_path: Path) -> None:

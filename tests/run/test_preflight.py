@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
@@ -99,6 +100,21 @@ def test_a_relative_program_is_looked_up_in_the_processs_folder(tmp_path: Path, 
     process = PlanProcess("lidar", "run", argv=("./sllidar_node",), cwd="ros/lib/sllidar_ros2")
     commands, _ = look(tmp_path, process)
     assert commands["lidar"].argv == (f"{prefix}/lib/sllidar_ros2/sllidar_node",)
+
+
+@pytest.mark.parametrize("cwd", ["maps", "${build_dir}/../maps"])
+def test_a_folder_that_is_not_there_is_found_before_anything_is_started(tmp_path: Path, cwd: str) -> None:
+    process = PlanProcess("lidar", "run", argv=("true",), cwd=cwd)
+    _, (found,) = look(tmp_path, process)
+    folder = os.path.normpath(tmp_path / cwd.replace("${build_dir}/", ""))
+    assert (found.code, found.message) == ("TF810", f"the folder {folder} that lidar runs in is not there")
+    commands, found_of_optional = look(tmp_path, replace(process, required=False))
+    assert (commands["lidar"].missing, found_of_optional) == (found.message, [])
+
+
+def test_a_relative_program_that_is_not_there_can_be_named_beside_the_robot_file(tmp_path: Path) -> None:
+    _, (found,) = look(tmp_path, lidar("bin/lidar"))
+    assert found.help == "${file(bin/lidar)} is beside the robot file, wherever up is called"
 
 
 def test_a_placeholder_in_a_value_is_not_replaced_again(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from argparse import Namespace
 
     from tfcompose.emit import Form
-    from tfcompose.model import Asset
+    from tfcompose.model import Asset, Robot
 
 
 def build(arguments: Namespace) -> tuple[Path, list[str]] | int:
@@ -30,8 +30,7 @@ def build(arguments: Namespace) -> tuple[Path, list[str]] | int:
     if lost:
         print_findings(lost, sys.stderr)
         return 1
-    folder = Path(arguments.output) if arguments.output else Path("build") / robot.name
-    target = Target(form, folder.as_posix(), Path.cwd().as_posix())
+    folder, target = destination(arguments, robot)
     written = emit(robot, target)
     if getattr(arguments, "read_back", False):  # what reads it is loaded only then
         unlike = import_module("tfcompose.emit.read_back").unlike(robot, written, target)
@@ -45,6 +44,13 @@ def build(arguments: Namespace) -> tuple[Path, list[str]] | int:
         complain(f"nothing was written to {folder}: {error.strerror}{where}")
         return UNREADABLE
     return folder, [file.path for file in written]
+
+
+def destination(arguments: Namespace, robot: Robot) -> tuple[Path, Target]:
+    """Return the folder that the robot is built in, and how the files in it name others."""
+    folder = Path(arguments.output) if arguments.output else Path("build") / robot.name
+    form: Form = getattr(arguments, "mesh", "as-written")
+    return folder, Target(form, folder.as_posix(), Path.cwd().as_posix())
 
 
 def _otherwise(path: str, what: str) -> Diagnostic:

@@ -32,7 +32,8 @@ def dry_run(arguments: Namespace) -> int:
         compiled = import_module("tfcompose.cli.compiling").robot_or_code(arguments.file, arguments)
         if isinstance(compiled, int):
             return compiled
-        files = {file.path: file.text for file in import_module("tfcompose.emit").emit(compiled) if file.text}
+        _, target = import_module("tfcompose.cli.building").destination(arguments, compiled)
+        files = {file.path: file.text for file in import_module("tfcompose.emit").emit(compiled, target) if file.text}
         plan = read_plan(files[PLAN], PLAN)
     share = as_asked(plan, arguments)
     if isinstance(share, int):

@@ -43,6 +43,8 @@ def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> 
         return process.argv
     told = _told_to_node(process, robot, has_params=has_params)
     if process.package is None:
+        if "--params-file" in told:  # which is keyed by the node's name
+            told = [*_names(process, robot), *told]
         return (*process.argv, "--ros-args", *told) if told else process.argv
     program = f"${{executable:{process.package}/{process.executable}}}"
     return (program, *process.argv, "--ros-args", *_names(process, robot), *told)

@@ -155,7 +155,8 @@ def _at(target: Target, process: PlanProcess) -> PlanProcess:
         return _FILE.sub(lambda found: f"${{build_dir}}/{target.from_folder(found[1])}", text)
 
     env = {name: placed(value) for name, value in process.env.items()}
-    return replace(process, argv=tuple(placed(word) for word in process.argv), env=env)
+    cwd = process.cwd and placed(process.cwd)
+    return replace(process, argv=tuple(placed(word) for word in process.argv), env=env, cwd=cwd)
 
 
 def _on(main: str | None, process: PlanProcess) -> PlanProcess:

@@ -43,6 +43,7 @@ class Filler:
             argv=self._fill(process.argv, (*section, "run")),
             remap=self._fill(process.remap, (*section, "remap")),
             env=self._fill(process.env, (*section, "env")),
+            cwd=self._folder(process.cwd, (*section, "cwd")),
         )
         for node in done.nodes:
             self._check_paths(done, node)
@@ -85,6 +86,17 @@ class Filler:
         elif self.disk and not (self.disk.is_file(place) or self.disk.is_folder(place)):
             message = f"${{file({name})}}: {place} is not there"
             self.found.append(finding("TF019", message, at, help="a path is relative to the file that writes it"))
+        return f"${{file:{place}}}"
+
+    def _folder(self, cwd: str | None, path: Path) -> str | None:
+        """Return the folder that a process runs in: a relative one is beside the file that names it."""
+        if cwd is None or cwd.startswith(("/", "${")):
+            return self._fill(cwd, path)  # type: ignore[no-any-return]
+        at = self.source.at(path)
+        place = beside(cwd, at)
+        if self.disk and not self.disk.is_folder(place):
+            advice = "a path is relative to the file that writes it"
+            self.found.append(finding("TF019", f"cwd: the folder {place} is not there", at, help=advice))
         return f"${{file:{place}}}"
 
     def _check_paths(self, process: Process, node: Node) -> None:

@@ -141,7 +141,7 @@ class Started(Model):
     log_level: str | None = key(choice("debug", "info", "warn", "error", "fatal"), None, "of its nodes' loggers")
     remap: dict[str, str] = key(mapping(TEXT), {}, "topic names: from, to")
     env: dict[str, str] = key(Type(_environment, mapping(TEXT).schema), {})
-    cwd: str | None = key(TEXT, None)
+    cwd: str | None = key(TEXT, None, "the folder that it runs in, seen from this file's; left out: where up is called")
     rate: float | None = key(RATE_, None, "for joints: how often joint states come")
     host: str | None = key(TEXT, None, "the machine that it runs on", ("jetson",))
     required: bool | None = key(

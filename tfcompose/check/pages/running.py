@@ -31,7 +31,7 @@ Its last lines are with the finding.""",
     "TF809": """An owner sends its edge on the wrong topic.
 
 Fixed edges belong on /tf_static, moving ones on /tf; tf2 throws its history away when an edge changes between them.""",
-    "TF810": """An executable was not found.
+    "TF810": """An executable, or the folder that a process runs in, was not found.
 
 The finding says where it was looked for. A package's programs are found once its setup file was sourced.""",
     "TF811": """An edge was not published while the plan ran.

@@ -59,7 +59,7 @@ parents, cycles, frames and owners that are not there, processes that wait for e
     "TF018": """A file is not XML, not a robot, or declares entities.
 
 The place is where reading stopped. A URDF is one <robot>; with xacro the message is xacro's own.""",
-    "TF019": """A file or folder that ${file(…)} names is not there.
+    "TF019": """A file or folder that ${file(…)} or cwd names is not there.
 
 A path is relative to the file that writes it, not to the folder that tfcompose is started in.""",
     "TF101": """A key is not known here.

@@ -25,9 +25,11 @@ _PLACEHOLDER = re.compile(r"\$\{(python|plan|build_dir|params_file)\}")
 _ROS_EXECUTABLE = re.compile(r"\$\{executable:([^/}]+)/([^/}]+)\}")
 
 
-def folder_of(process: PlanProcess, build_dir: Path) -> Path:
-    """Return the folder that the process runs in."""
-    return build_dir / process.cwd if process.cwd is not None else Path.cwd()
+def folder_of(process: PlanProcess, plan_file: Path, build_dir: Path) -> Path:
+    """Return the folder that the process runs in, an absolute path without ``..`` where the plan says one."""
+    if process.cwd is None:
+        return Path.cwd()
+    return Path(os.path.normpath(build_dir / _filled(process.cwd, process, plan_file, build_dir)))
 
 
 def filled_in(process: PlanProcess, plan_file: Path, build_dir: Path | None = None) -> tuple[str, ...]:
@@ -80,7 +82,10 @@ def executable_of(process: PlanProcess, word: str, folder: Path, env: Mapping[st
         return _in_package(process, ros[1], ros[2], env)
     if "/" in word:
         path = folder / word
-        return str(path) if _can_run(path) else NotFound(process.name, word, (_why_not(path),))
+        if _can_run(path):
+            return str(path)
+        advice = "" if word.startswith("/") else f"${{file({word})}} is beside the robot file, wherever up is called"
+        return NotFound(process.name, word, (_why_not(path),), advice=advice)
     path_variable = env.get("PATH", os.defpath)
     return shutil.which(word, path=path_variable) or NotFound(process.name, word, (), path_variable)
 

@@ -89,7 +89,11 @@ def _command_of(
     argv = filled_in(process, *files)
     if not argv:
         return finding("TF902", f"the plan does not say how {process.name} is started", None)
-    folder = folder_of(process, files[1])
+    folder = folder_of(process, *files)
+    if not folder.is_dir():
+        lost = f"the folder {folder} that {process.name} runs in is not there"
+        optional = process.required is False
+        return Command(argv, env, folder, missing=lost) if optional else finding("TF810", lost, None)
     command: Command | NotFound | Diagnostic
     if is_launch(argv[0]):
         launched = launch_command(process, ros, argv, env)

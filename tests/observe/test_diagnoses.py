@@ -94,6 +94,62 @@ def test_an_edge_that_comes_late_is_said_with_the_time_that_lookups_lack() -> No
     }
 
 
+def test_odometry_that_is_ahead_is_told_and_a_localizer_that_dates_forward_is_not() -> None:
+    def ahead(edge: str, seconds: float) -> dict[str, str]:
+        history = History().moving(edge, stamp=lambda now: now + int(seconds * SECOND_NS))
+        return messages(history.seen())
+
+    assert ahead("odom base_link", 0.3) == {"TF835": "/drive stamps odom → base_link 300 ms ahead of time"}
+    assert ahead("odom base_link", 0.1) == ahead("robot1/map robot1/odom", 1.0) == {}
+    assert set(ahead("map odom", 2.0)) == {"TF835"}
+
+
+def test_what_is_late_because_the_clocks_differ_is_told_of_the_clocks_alone() -> None:
+    history = robot().moving("base_link arm", b"x", stamp=lambda now: now - 4 * SECOND_NS // 10)
+    assert set(messages(history.seen())) == {"TF833"}
+    assert set(messages(history.seen(skews_s={b"x": -0.4}))) == {"TF834"}
+
+
+def test_a_frame_that_one_node_hands_over_is_no_finding_and_one_that_jumps_to_and_fro_is() -> None:
+    def handed_over(turns_hz: float) -> Seen:
+        history = History().moving("world tool0", hz=60).moving("world table", hz=60)
+        for tick in range(int(SECONDS * 20)):
+            now = BEGUN_NS + tick * SECOND_NS // 20
+            parent = "tool0" if int(tick / 20 * turns_hz) % 2 else "table"
+            history.census.take([row(f"{parent} cup", now)], static=False, gid=b"x", received_ns=now)
+        return history.seen()
+
+    assert messages(handed_over(0.7)) == messages(handed_over(0.3)) == {}
+    found = diagnose(handed_over(20.0))
+    assert [one.code for one in found] == ["TF802"]
+    assert found[0].help == "let /ekf send one of them, or end it if it runs twice"
+
+
+def test_a_name_with_a_slash_in_front_is_the_frame_without_as_in_tf2_and_is_told() -> None:
+    history = History().moving("/odom /base_link").moving("odom base_link", b"x").fixed("base_link laser")
+    found = messages(history.seen())
+    assert set(found) == {"TF501", "TF822"}
+    assert found["TF501"].startswith("/drive publishes odom → base_link with a slash in front")
+    assert found["TF822"].startswith("odom → base_link is published by /drive and by /ekf")
+    assert set(messages(History().fixed("/base_link base_link").seen())) == {"TF821"}
+
+
+def test_stamps_that_stand_with_the_clock_are_told_of_the_clock_alone() -> None:
+    history = History().moving("odom base_link", stamp=lambda _: 106 * SECOND_NS).fixed("base_link laser")
+    clock = Topic("/clock", "rosgraph_msgs/msg/Clock", ("/gazebo",), ("/nav",))
+    stands = history.seen(clock_ns=106 * SECOND_NS, clock_moves=False, graph=(clock,))
+    assert set(messages(stands)) == {"TF836"}
+    assert "TF823" in messages(replace(stands, clock_moves=True))
+
+
+def test_where_some_are_dropped_it_is_not_said_that_the_frame_is_missing() -> None:
+    history = robot()
+    history.census.take([row("odom base_link", END_NS, float("nan"))], static=False, gid=b"d", received_ns=END_NS)
+    assert [one.help for one in diagnose(history.seen())] == [
+        "mend what the node computes it from; tf2 goes on with those before and after"
+    ]
+
+
 def test_a_machine_whose_clock_is_ahead_is_known_by_messages_that_come_before_they_were_sent() -> None:
     seen = robot().seen(skews_s={b"d": 3.2})
     assert messages(seen) == {"TF834": "the clock of /drive is 3.2 s ahead of this machine's"}

@@ -55,7 +55,7 @@ def positive(text: str) -> float:
     """
     value = _number(text)
     if value is None or value == 0:
-        raise ArgumentTypeError(f"{text} is not a positive number")
+        raise ArgumentTypeError(f"{text} is not a positive number below a billion")
     return value
 
 
@@ -78,7 +78,7 @@ def not_negative(text: str) -> float:
     """
     value = _number(text)
     if value is None:
-        raise ArgumentTypeError(f"{text} is not a number of 0 or more")
+        raise ArgumentTypeError(f"{text} is not a number of 0 or more, below a billion")
     return value
 
 

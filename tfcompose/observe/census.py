@@ -7,12 +7,10 @@ no topic. What it keeps does not grow with time, and with strange names up to a 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import isfinite
 from typing import TYPE_CHECKING
 
-from tfcompose.observe.refusal import DENORMALISED, Refusal, refusal
+from tfcompose.observe.strand import Strand, Turns
 from tfcompose.observe.tally import Tally, Timing
-from tfcompose.pose import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -57,73 +55,6 @@ class Publisher:
     where: str = ""
     topic: str = ""
     type: str = ""
-
-
-@dataclass(slots=True)
-class Strand:
-    """An edge, as one publisher sends it on one kind of topic.
-
-    Attributes:
-        parent: the frame in which the pose is given.
-        child: the frame whose pose it is.
-        static: whether it came on /tf_static.
-        gid: the publisher's id, 16 bytes; None where that is not known, as in a bag.
-        row: the newest transform.
-        stamp_ns: the newest message's stamp.
-        newest_ns: the largest stamp so far.
-        first_ns: when the first message came, by the receiver's clock.
-        lag_ns: how old the newest message's stamp was when it came; negative: ahead of the receiver's clock.
-        stamps_back: how many stamps were before the one that came before them.
-        stamps_repeated: how many stamps were the one that came before them.
-        refused: why tf2 does not take it, the newest time that it did not.
-        refusals: how many were not taken.
-        tally: the arrivals; ``tally.count`` are all, ``tally.last_ns`` is when the newest came.
-    """
-
-    parent: str
-    child: str
-    static: bool
-    gid: bytes | None
-    tally: Tally
-    first_ns: int
-    row: Row
-    newest_ns: int = -1
-    stamp_ns: int = -1
-    lag_ns: int = 0
-    stamps_back: int = 0
-    stamps_repeated: int = 0
-    refused: Refusal | None = None
-    refusals: int = 0
-
-    @property
-    def pose(self) -> Pose:
-        """The newest pose of the child in the parent, as it was sent; nothing is normalised."""
-        return Pose(self.row[4:7], self.row[7:11])
-
-    def take(self, row: Row, received_ns: int, clock_ns: int) -> None:
-        """Note a transform; ``clock_ns`` is the time that its stamp is compared with."""
-        stamp_ns = row[2] * _SECOND_NS + row[3]
-        self.row = row
-        if stamp_ns > self.newest_ns:
-            self.newest_ns = stamp_ns
-        elif stamp_ns < self.stamp_ns:
-            self.stamps_back += 1
-        elif stamp_ns == self.stamp_ns:
-            self.stamps_repeated += 1
-        self.stamp_ns = stamp_ns
-        self.lag_ns = clock_ns - stamp_ns
-        self.tally.arrived(received_ns, None if self.static else self.lag_ns)
-        _, _, _, _, px, py, pz, x, y, z, w = row
-        far = px + py + pz
-        sound = abs(x * x + y * y + z * z + w * w - 1) < DENORMALISED and isfinite(far)
-        if not sound or self.parent == self.child or not self.parent or not self.child:
-            self.refuse()
-
-    def refuse(self) -> None:
-        """Count the newest transform as one that tf2 does not take, if that is so."""
-        why = refusal(self.parent, self.child, self.row[4:])
-        if why is not None:
-            self.refused, self.refusals = why, self.refusals + 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +110,7 @@ class Census:
     others: tuple[str, ...] = ()
     present: frozenset[bytes] | None = None
     _strands: dict[tuple[str, str, bytes | None, bool], Strand] = field(default_factory=dict)
+    _turns: dict[tuple[str, bytes], Turns] = field(default_factory=dict)
 
     def take(
         self, rows: Iterable[Row], *, static: bool, gid: bytes | None, received_ns: int, clock_ns: int | None = None
@@ -192,13 +124,27 @@ class Census:
         for row in rows:
             strand = strands.get((row[0], row[1], gid, static))
             if strand is None:
-                if len(strands) >= MOST_STRANDS:
+                strand = self._met(row, static=static, gid=gid, received_ns=received_ns)
+                if strand is None:
                     self.beyond += 1
                     continue
-                tally = Tally(int(self.window_s * _SECOND_NS), int(self.settle_s * _SECOND_NS))
-                strand = Strand(row[0], row[1], static, gid, tally, received_ns, row)
-                strands[row[0], row[1], gid, static] = strand
             strand.take(row, received_ns, clock)
+
+    def _met(self, row: Row, *, static: bool, gid: bytes | None, received_ns: int) -> Strand | None:
+        """Return the strand of an edge that is new, or written with a slash; None where there are too many."""
+        parent, child = row[0].removeprefix("/"), row[1].removeprefix("/")
+        strand = self._strands.get((parent, child, gid, static))
+        if strand is None:
+            if len(self._strands) >= MOST_STRANDS:
+                return None
+            tally = Tally(int(self.window_s * _SECOND_NS), int(self.settle_s * _SECOND_NS))
+            strand = Strand(parent, child, static, gid, tally, received_ns, row)
+            self._strands[parent, child, gid, static] = strand
+            if gid is not None and not static:
+                self._turns.setdefault((child, gid), Turns([], strand)).join(strand)
+        if (parent, child) != row[:2]:
+            strand.slashed = True
+        return strand
 
     def take_malformed(self, gid: bytes | None) -> None:
         """Count a message that is no TFMessage."""

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 WAIT_S = 0.05
 LOOK_EVERY_S = 0.5
+#: A simulator or a player sends its time much more often.
+CLOCK_STANDS_S = 2.0
 #: Nodes of tools that look, as this one does, say nothing about the robot.
 TOOLS = ("/tfcompose_", "/_ros2cli_")
 #: What is looked at besides TF itself.
@@ -109,7 +111,7 @@ class _Ear:
     topics: Topics
     census: Census = field(default_factory=lambda: Census(0.0, SETTLE_S))
     skews_s: dict[bytes, float] = field(default_factory=dict)
-    clocks: set[int] = field(default_factory=set)
+    clock: tuple[int | None, float] = (None, 0.0)  # the newest, and when it moved, of the monotonic clock; 0: not yet
     live: Live = field(init=False)
     sideline: Sideline = field(init=False)
 
@@ -121,8 +123,8 @@ class _Ear:
         for heard in self.live.look(timeout_s, stop):
             self._compare_clocks(heard)
         clock_ns = self.live.clock_ns
-        if clock_ns is not None and len(self.clocks) < 2:  # noqa: PLR2004 (two times say that it moves)
-            self.clocks.add(clock_ns)
+        if clock_ns != self.clock[0]:
+            self.clock = (clock_ns, 0.0 if self.clock[0] is None else time.monotonic())
         self.sideline.take(clock_ns)
 
     def _compare_clocks(self, heard: Heard) -> None:
@@ -141,7 +143,7 @@ class _Ear:
             forgetful=tuple(name for name in volatile_readers(self.node, self.topics[1]) if not name.startswith(TOOLS)),
             malformed=dict(self.census.malformed),
             clock_ns=self.live.clock_ns,
-            clock_moves=len(self.clocks) > 1,
+            clock_moves=self.clock[1] > time.monotonic() - CLOCK_STANDS_S,
             skews_s=self.skews_s,
             **self.sideline.picture(),
         )

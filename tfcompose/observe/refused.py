@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 _ZERO = 1e-9
 _MEND = "mend what the node computes it from; until then the frame is not there"
+_MEND_SOME = "mend what the node computes it from; tf2 goes on with those before and after"
 _NORMALISE = (
     "bring it to length 1 in the node: RViz shows the frame all the same, since tf2 on Jazzy does so when it takes it, "
     "but stricter readers drop it"
@@ -27,6 +28,8 @@ def refused_transform(edge: EdgeSeen) -> Iterator[Diagnostic]:
     if strand.refused is None or strand.refused is Refusal.SELF:
         return
     what, why, advice = "which tf2 drops", strand.refused.text, _MEND
+    if strand.refusals < strand.tally.count:
+        advice = _MEND_SOME
     length = sum(part * part for part in strand.pose.quat_xyzw) ** 0.5
     if strand.refused is Refusal.DENORMALISED:
         why = f"its quaternion has length {length:.3f}"

@@ -72,7 +72,7 @@ class Seen:
         nodes: the full names of other nodes, of this robot or not.
         graph: the topics, those of TF among them.
         clock_ns: the newest time on /clock, None where nothing came.
-        clock_moves: whether that changed.
+        clock_moves: whether that changed lately.
         stamped: what came with a header.
         movable: its moving joints.
         joint_names: those in joint states.

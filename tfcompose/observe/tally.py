@@ -102,6 +102,14 @@ class Tally:
         if delay_ns is not None and not self.settle_ns:
             self._now.delay(delay_ns)
 
+    def began_again(self, at_ns: int) -> None:
+        """Note an arrival before which nothing was to come for a while, which is no gap."""
+        if self.count:
+            self.count += 1
+            self.last_ns = at_ns
+        else:
+            self.arrived(at_ns, None)
+
     def timing(self, now_ns: int) -> Timing:
         """Return what was measured until ``now_ns``, of the clock of the arrivals."""
         sums = self._before.plus(self._now)

@@ -124,7 +124,8 @@ ahead; the least delay of all is what a clock is behind, or a network is slow. U
     "TF835": """An edge is stamped ahead of time.
 
 AMCL, SLAM and others date map → odom forward by a tolerance of up to a second, so that lookups of now find it. More
-than that is a guess about where the robot will be, or a clock that is ahead.""",
+than that, or odometry and joints that are ahead at all, is a guess about where the robot will be, or a clock that is
+ahead: a lookup for a scan gets the pose from before the scan, and what was seen lands beside where it is.""",
     "TF836": """Nodes use simulated time, and it does not come.
 
 A node with use_sim_time: true takes its time from /clock; until that comes its time is 0 and stands: timers do not

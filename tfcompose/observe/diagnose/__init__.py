@@ -26,6 +26,7 @@ DIAGNOSES: tuple[Callable[[Seen], Iterator[Diagnostic]], ...] = (
     senders.many_static,
     tree.self_transform,
     tree.drops,
+    tree.slash_in_front,
     tree.loop,
     tree.second_parent,
     tree.two_trees,

@@ -60,10 +60,13 @@ def gap(seen: Seen) -> Iterator[Diagnostic]:
 def fell_silent(seen: Seen) -> Iterator[Diagnostic]:
     """An edge came, and does not come any more."""
     alive = {(edge.strand.parent, edge.strand.child) for edge in seen.moving if not is_silent(edge)}
+    handed_over = {(edge.strand.child, edge.strand.gid) for edge in seen.moving if not is_silent(edge)}
     rated = seen.rated
     for edge in seen.moving:
         if not is_silent(edge) or edge.strand.child in rated or (edge.strand.parent, edge.strand.child) in alive:
             continue
+        if (edge.strand.child, edge.strand.gid) in handed_over:
+            continue  # its publisher has put the frame elsewhere
         gone = ", which has left" if edge.present is False else ", which is still there"
         message = f"{edge.name}: nothing for {seconds(edge.age_s)} from {who(edge)}{gone}"
         advice = "start it again, and look why it ended" if edge.present is False else "what does it wait for?"

@@ -17,10 +17,14 @@ if TYPE_CHECKING:
 
 _SECOND_NS = 1_000_000_000
 KEPT_S = WRONG_BY_NS / _SECOND_NS
-#: Stamps that are older on arrival make lookups of "now", and of new sensor data, fail for so long.
-LATE_S = 0.5
-#: AMCL and others date map → odom forward by up to a second, so that lookups of "now" do not fail.
-AHEAD_S = 1.1
+#: Stamps that are older on arrival make lookups of "now", and of new data, fail for so long; costmaps wait 0.3 s.
+LATE_S = 0.3
+#: Stamps that are ahead by more make lookups of "now" give a pose of before; nodes that predict do so by less.
+AHEAD_S = 0.15
+#: AMCL and others date what hangs on these frames forward by up to a second, so that lookups of "now" do not fail.
+LOCALISED_IN, FORWARD_S = ("map", "earth", "world"), 1.1
+#: A simulated clock takes smaller steps.
+CLOCK_STEP_S = 0.5
 #: A message that seems to arrive so long before it was sent comes from a clock that is ahead.
 SKEW_S = 0.02
 #: A network is not that slow; a clock may be that late.
@@ -33,7 +37,11 @@ LARGE_STEP_S = 1.0
 
 def stamp_repeated(seen: Seen) -> Iterator[Diagnostic]:
     """A publisher sends an edge with the same stamp again and again."""
-    for edges in _by_publisher(seen, lambda edge: _repeats(edge) and edge.strand.stamp_ns > 0):
+
+    def repeats(edge: EdgeSeen) -> bool:
+        return _repeats(edge) and edge.strand.stamp_ns > 0 and not _stands_with_the_clock(seen, edge)
+
+    for edges in _by_publisher(seen, repeats):
         strand = edges[0].strand
         at = strand.stamp_ns / 1e9
         message = f"{who(edges[0])} sends {_names(edges)} with the same stamp again and again: {at:.3f} s"
@@ -91,15 +99,17 @@ def late_stamps(seen: Seen) -> Iterator[Diagnostic]:
     """An edge's stamps are old when they come: lookups of new data extrapolate into the future."""
     told = keeps_data_waiting(seen)
 
-    def late(edge: EdgeSeen) -> bool:
-        return LATE_S <= _least_s(edge) <= KEPT_S and (edge.strand.parent, edge.strand.child) not in told
+    def late_s(edge: EdgeSeen) -> float:
+        under_way_s = -seen.skews_s.get(edge.strand.gid or b"", 0.0)
+        return _least_s(edge) - (under_way_s if under_way_s >= SLOW_S else 0.0)  # that part is a finding of its own
 
-    for edges in _by_publisher(seen, late):
-        late_s = _least_s(edges[0])
-        message = f"{_names(edges)} from {who(edges[0])} is stamped {seconds(late_s)} ago when it comes"
-        notes = [
-            Note(f"a lookup of now, or of data that is newer, is extrapolation into the future by {seconds(late_s)}")
-        ]
+    def is_late(edge: EdgeSeen) -> bool:
+        return LATE_S <= late_s(edge) <= KEPT_S and (edge.strand.parent, edge.strand.child) not in told
+
+    for edges in _by_publisher(seen, is_late):
+        late = seconds(late_s(edges[0]))
+        message = f"{_names(edges)} from {who(edges[0])} is stamped {late} ago when it comes"
+        notes = [Note(f"a lookup of now, or of data that is newer, is extrapolation into the future by {late}")]
         advice = "stamp with the time of the measurement and send at once; is the node overloaded, or its clock behind?"
         yield finding("TF833", message, None, severity="warning", notes=notes, help=advice)
 
@@ -110,12 +120,14 @@ def stamps_ahead(seen: Seen) -> Iterator[Diagnostic]:
     def ahead(edge: EdgeSeen) -> bool:
         most = edge.timing.most_delay_s
         skewed = seen.skews_s.get(edge.strand.gid or b"", 0.0) >= SKEW_S
-        return most is not None and -KEPT_S <= most <= -AHEAD_S and not skewed
+        localised = edge.strand.parent.rpartition("/")[2] in LOCALISED_IN
+        least = FORWARD_S if localised else AHEAD_S
+        return most is not None and -KEPT_S <= most <= -least and not skewed
 
     for edges in _by_publisher(seen, ahead):
         ahead_s = -(edges[0].timing.delay_s or 0.0)
         message = f"{who(edges[0])} stamps {_names(edges)} {seconds(ahead_s)} ahead of time"
-        advice = "lookups of now get a pose that was only guessed; lower its transform_tolerance or time offset"
+        advice = "lookups of now get a pose from before; is its clock ahead, or its time offset too large?"
         yield finding("TF835", message, None, severity="warning", help=advice)
 
 
@@ -166,6 +178,15 @@ def _many(edge: EdgeSeen, number: int) -> bool:
 
 def _repeats(edge: EdgeSeen) -> bool:
     return _many(edge, edge.strand.stamps_repeated)
+
+
+def _stands_with_the_clock(seen: Seen, edge: EdgeSeen) -> bool:
+    """Whether its stamps are those of a /clock that stands, which is a finding of its own."""
+    return (
+        seen.clock_ns is not None
+        and not seen.clock_moves
+        and abs(edge.strand.stamp_ns - seen.clock_ns) <= CLOCK_STEP_S * _SECOND_NS
+    )
 
 
 def _went_back(edge: EdgeSeen) -> bool:

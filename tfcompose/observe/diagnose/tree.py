@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, finding, slip_of
 from tfcompose.observe.refused import refused_transform
-from tfcompose.observe.seen import listed, who
+from tfcompose.observe.seen import counted, listed, who
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,6 +28,21 @@ def drops(seen: Seen) -> Iterator[Diagnostic]:
     """Transforms come that no listener takes: a quaternion that is none, a NaN, an empty name."""
     for edge in seen.edges:
         yield from refused_transform(edge)
+
+
+def slash_in_front(seen: Seen) -> Iterator[Diagnostic]:
+    """Names come with a slash in front, which tf2 drops, and does not take in lookups."""
+    found: dict[str, list[EdgeSeen]] = {}
+    for edge in seen.taken:
+        if edge.strand.slashed:
+            found.setdefault(who(edge), []).append(edge)
+    for publisher, edges in found.items():
+        more = f" and {counted(len(edges) - 1, 'more edge')}" if len(edges) > 1 else ""
+        message = (
+            f"{publisher} publishes {edges[0].name}{more} with a slash in front of a frame's name, which tf2 drops"
+        )
+        advice = "write the node's frame names without it: lookups of a name that begins with / fail"
+        yield finding("TF501", message, None, severity="warning", help=advice)
 
 
 def loop(seen: Seen) -> Iterator[Diagnostic]:
@@ -52,8 +67,13 @@ def second_parent(seen: Seen) -> Iterator[Diagnostic]:
         if len(parents) < 2 or child in in_loops or child in planned:  # noqa: PLR2004 (two parents)
             continue
         message = f"{child} has {len(parents)} parents: {' and '.join(parents)}; tf2 takes whichever came last"
+        if _hands_over(edges):
+            continue  # one node hands it over, which is what a gripper does
         notes = [Note(_said(seen, edge)) for edge in edges]
+        nodes = {who(edge) for edge in edges}
         advice = f"let one node publish {child}: end the other, or switch its TF off"
+        if len(nodes) == 1:
+            advice = f"let {nodes.pop()} send one of them, or end it if it runs twice"
         yield finding("TF802", message, None, notes=notes, help=advice)
 
 
@@ -116,6 +136,12 @@ def _said(seen: Seen, edge: EdgeSeen) -> str:
     where = seen.where(edge)
     rate = f" at {edge.timing.rate:.3g} Hz" if edge.timing.rate and not edge.strand.static else ""
     return f"{edge.name} is published by {who(edge)}{rate}{', ' if where else ''}{where}"
+
+
+def _hands_over(edges: list[EdgeSeen]) -> bool:
+    """Whether they are all of one publisher, who puts the frame now in this parent, now in that."""
+    turns = edges[0].strand.turns
+    return turns is not None and turns.are_taken and len(turns.strands) == len(edges)
 
 
 def _above(seen: Seen) -> dict[str, list[EdgeSeen]]:

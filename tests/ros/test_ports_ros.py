@@ -24,11 +24,12 @@ print(*sorted(one for one in held if "fastrtps_port" in one))
 """
 
 
+@pytest.mark.parametrize("discovery", ["localhost", "subnet"])
 @pytest.mark.parametrize("own", [True, False])
-def test_on_one_machine_tfcomposes_own_processes_read_no_shared_memory_and_others_do(
-    domain: object, *, own: bool
+def test_tfcomposes_own_processes_read_no_shared_memory_and_others_do(
+    domain: object, discovery: str, *, own: bool
 ) -> None:
     assert domain
-    env = child_environment(os.environ, RosSettings(discovery="localhost"), own=own)
+    env = child_environment(os.environ, RosSettings(discovery=discovery), own=own)
     said = subprocess.run([sys.executable, "-c", NODE], env=env, capture_output=True, text=True, check=True, timeout=60)
     assert (said.stdout == "\n") == own, said.stdout

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tfcompose.run.launcher.child import Lines, spawn
+from tfcompose.run.launcher.child import BURST, LINE_LIMIT, Bucket, Lines, Pipe, spawn
 from tfcompose.run.launcher.command import Command
 from tfcompose.run.launcher.signals import Signals
 
@@ -39,6 +39,37 @@ def test_no_line_is_longer_than_the_limit_nothing_is_lost_and_little_is_kept(chu
     assert all(len(line) <= 8 for line in said)
     if all(max(chunk, default=0) < 128 for chunk in chunks):
         assert len("".join(said)) == sum(len(chunk) - chunk.count(b"\r") for chunk in chunks)
+
+
+def read_flood(written: bytes, ending: bytes) -> list[str]:
+    """Return the lines that are kept of a process that writes all at once, and then its end, and ends."""
+    said: list[str] = []
+    read_end, write_end = os.pipe()
+    with os.fdopen(write_end, "wb", buffering=0) as writer:
+        pipe = Pipe(os.fdopen(read_end, "rb", buffering=0), said.append, bucket=Bucket(lambda: 0.0))
+        for start in range(0, len(written), 4096):
+            writer.write(written[start : start + 4096])
+            pipe.read()
+        writer.write(ending)
+    pipe.drain()
+    return said
+
+
+def test_the_last_words_of_a_process_that_flooded_are_kept() -> None:
+    written = b"flood, flood\n" * (BURST // 13 + 100_000)
+    *flood, note, last = read_flood(written, b"\nValueError: the reason\n")[-330:]
+    assert last == "ValueError: the reason"
+    assert (note, set(flood[-5:])) == ("", {"flood, flood"})
+    (told,) = [line for line in flood if line.startswith("…")]
+    kept = len(flood) - flood.index(told) - 1
+    thrown = int(told.split()[1].replace(",", ""))
+    assert thrown + kept * 13 == pytest.approx(len(written) - BURST, abs=4096 + 13)
+
+
+def test_the_last_words_after_an_endless_line_are_kept() -> None:
+    said = read_flood(b"a" * (BURST + 1_000_000), b"\nlast\n")
+    assert said[-1] == "last"
+    assert max(map(len, said)) <= LINE_LIMIT
 
 
 @pytest.mark.parametrize(("data", "line"), [(b"a\r\n", "a"), (b"\xff\n", "\ufffd"), (b"\n", "")])

@@ -42,6 +42,7 @@ if "lifecycle" not in sys.argv:
     time.sleep(0.5)
     publisher = node.create_publisher(String, "scan", 1)
     service = node.create_service(Trigger, "reset", lambda request, response: response)
+    client = node.create_client(Trigger, "asked_for")
 try:
     rclpy.spin(node)
 except BaseException:
@@ -140,12 +141,21 @@ def test_edges_a_line_and_an_exit_code_that_do_not_come_are_told_with_what_was_s
 @pytest.mark.usefixtures("domain")
 def test_gates_that_stay_shut_say_what_was_seen_instead(tmp_path: Path) -> None:
     scan = Ready("topic", "/robot/scam", timeout_s=3.0)
+    other = Ready("topic", "/front/scan", timeout_s=3.0)
     active = Ready("lifecycle", "active", timeout_s=4.0)
     slam = node("slam", "lifecycle", "fail", lifecycle={"/robot/slam": "active"}, ready=active)
-    told = run(tmp_path, 6, node("lidar", ready=scan), slam)
+    asked = Ready("service", "/robot/asked_for", timeout_s=3.0)
+    told = run(
+        tmp_path, 6, node("lidar", ready=scan), slam, script("calm", "sleep 30", asked), script("c", "sleep 30", other)
+    )
     found = {notice.found.message: notice.found for notice in told if isinstance(notice, FindingShown)}
     topic = found["lidar is not ready after 3 s: nobody publishes /robot/scam"]
     assert "/robot/scan" in topic.notes[0].message
+    lost = found["c is not ready after 3 s: nobody publishes /front/scan"].notes[0].message
+    assert lost.startswith("seen instead: topics /robot/scan, "), "the same name elsewhere comes first"
+    service = found["calm is not ready after 3 s: there is no service /robot/asked_for"].notes[0].message
+    assert service.startswith("seen instead: services /robot/reset, /robot/slam/change_state, ")
+    assert "asked_for" not in service, "nobody offers it"
     state = found["slam is not ready after 4 s: its nodes are not in their lifecycle states"]
     assert state.notes[0].message == "seen instead: /robot/slam is unconfigured, and does not configure"
     assert state.notes[-1].message == "slam: configured"

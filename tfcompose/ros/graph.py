@@ -87,9 +87,29 @@ def _full_name(namespace: str, name: str) -> str:
     return f"{namespace.rstrip('/')}/{name}"
 
 
+#: The services that a node has by itself.
+_OF_EACH_NODE = frozenset(
+    {
+        "describe_parameters",
+        "get_parameter_types",
+        "get_parameters",
+        "get_type_description",
+        "list_parameters",
+        "set_parameters",
+        "set_parameters_atomically",
+    }
+)
+
+
+def is_offered(node: Node, service: str) -> bool:
+    """Return whether ``node`` has discovered somebody who offers the service, and not only who asks for it."""
+    return bool(node.count_services(service))
+
+
 def services(node: Node) -> list[str]:
-    """Return the full names of the services that ``node`` has discovered until now, sorted."""
-    return sorted(name for name, _ in node.get_service_names_and_types())
+    """Return the full names of the services that are offered, but for those that each node has."""
+    names = [name for name, _ in node.get_service_names_and_types() if name.rpartition("/")[2] not in _OF_EACH_NODE]
+    return [name for name in names if is_offered(node, name)]
 
 
 def topics(node: Node) -> list[tuple[str, tuple[str, ...]]]:

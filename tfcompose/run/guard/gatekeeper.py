@@ -6,7 +6,7 @@ import time
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from tfcompose.ros.graph import services, writers
+from tfcompose.ros.graph import is_offered, services, writers
 from tfcompose.run.events import GateOpen, GateShut
 from tfcompose.run.orders import Gate
 
@@ -69,22 +69,32 @@ class Gates:
         looks = [self._nodes[gate.process, name].look(now) for name in gate.nodes]
         if gate.topic:
             found = writers(self._node, gate.topic)
-            seen = f"{gate.topic} is published by {', '.join(one.node for one in found)}" if found else self._topics()
+            seen = (
+                f"{gate.topic} is published by {', '.join(one.node for one in found)}"
+                if found
+                else self._topics(gate.topic)
+            )
             looks.append((bool(found), seen))
         if gate.service:
-            there = services(self._node)
-            is_there = gate.service in there
-            looks.append((is_there, f"the service {gate.service} is there" if is_there else _some("services", there)))
+            is_there = is_offered(self._node, gate.service)
+            seen = f"the service {gate.service} is there" if is_there else self._services(gate.service)
+            looks.append((is_there, seen))
         for topic in gate.writers:
             names = ", ".join(one.node for one in writers(self._node, topic))
             looks.append((False, f"{topic} is published by {names or 'nobody'}"))
         return all(is_open for is_open, _ in looks), "; ".join(seen for _, seen in looks)
 
-    def _topics(self) -> str:
-        return _some("topics", sorted(name for name, _ in self._node.get_topic_names_and_types()))
+    def _topics(self, wanted: str) -> str:
+        return _some("topics", [name for name, _ in self._node.get_topic_names_and_types()], wanted)
+
+    def _services(self, wanted: str) -> str:
+        return _some("services", services(self._node), wanted)
 
 
-def _some(what: str, names: list[str]) -> str:
+def _some(what: str, names: list[str], wanted: str) -> str:
+    """Return the first names: those with another namespace, then those of the same, then the others."""
+    above, _, last = wanted.rpartition("/")
+    names = sorted(names, key=lambda name: (name.rpartition("/")[2] != last, name.rpartition("/")[0] != above, name))
     more = f" and {len(names) - NAMED_AT_MOST} more" if len(names) > NAMED_AT_MOST else ""
     return f"{what} {', '.join(names[:NAMED_AT_MOST])}{more}" if names else f"no {what}"
 

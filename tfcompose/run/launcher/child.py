@@ -32,6 +32,8 @@ READ_SIZE = 64 * 1024
 #: What a process may write: so much at once, and so much a second; more is read, counted and thrown away; bytes.
 BURST = 8_000_000
 PER_SECOND = 1_000_000
+#: The end of what is thrown away is kept, and comes when there is time again: a process's last words count; bytes.
+TAIL = 4096
 #: What is read from a process that has ended, at most: more than a pipe holds, less than for ever; bytes.
 DRAIN_LIMIT = 1024 * 1024
 
@@ -82,6 +84,7 @@ class Bucket:
         self._clock = clock
         self._left: float = BURST
         self._at = clock()
+        self._dry = False
         self.thrown = 0
 
     def take(self, size: int) -> bool:
@@ -90,11 +93,9 @@ class Bucket:
         self._left = min(BURST, self._left + (now - self._at) * PER_SECOND)
         self._at = now
         # Once it is empty, it is filled a little, so that what is kept comes in pieces that can be read.
-        if self._left < (PER_SECOND if self.thrown else size):
-            self.thrown += size
-            return False
-        self._left -= size
-        return True
+        self._dry = self._left < (PER_SECOND if self._dry else size)
+        self._left -= 0 if self._dry else size
+        return not self._dry
 
 
 class Pipe:
@@ -111,6 +112,7 @@ class Pipe:
         self._bucket = bucket
         self._sink = sink
         self._lines = Lines(limit)
+        self._tail = b""
         os.set_blocking(file.fileno(), False)
 
     def read(self) -> int | None:
@@ -120,13 +122,33 @@ class Pipe:
             return None
         bucket = self._bucket
         if bucket and data and not bucket.take(len(data)):
+            self._throw_away(bucket, data)
             return len(data)
-        if bucket and bucket.thrown:
-            thrown, bucket.thrown = bucket.thrown, 0
-            self._sink(f"… {thrown:,} bytes of output were thrown away here: more came than a log can hold")
+        if bucket:
+            self._catch_up(bucket)
         for line in self._lines.feed(data) if data else self._lines.end():
             self._sink(line)
         return len(data)
+
+    def _throw_away(self, bucket: Bucket, data: bytes) -> None:
+        for line in self._lines.end():
+            self._sink(line)
+        kept = (self._tail + data)[-TAIL:]
+        bucket.thrown += len(self._tail) + len(data) - len(kept)
+        self._tail = kept
+
+    def _catch_up(self, bucket: Bucket) -> None:
+        """Say how much was thrown away, and go on with the end of it, from a line's beginning."""
+        tail, self._tail = self._tail, b""
+        if bucket.thrown and b"\n" in tail[:-1]:
+            begin = tail.index(b"\n") + 1
+            bucket.thrown += begin
+            tail = tail[begin:]
+        if bucket.thrown:
+            self._sink(f"… {bucket.thrown:,} bytes of output were thrown away here: more came than a log can hold")
+            bucket.thrown = 0
+        for line in self._lines.feed(tail):
+            self._sink(line)
 
     def drain(self) -> None:
         """Pass on what is left of a process that has ended, then close."""
@@ -134,6 +156,8 @@ class Pipe:
         try:
             while left > 0 and (count := self.read()):
                 left -= count
+            if self._bucket:
+                self._catch_up(self._bucket)
             for line in self._lines.end():
                 self._sink(line)
         finally:

@@ -119,11 +119,28 @@ def test_a_mass_over_a_mesh_is_spread_by_its_triangles_and_trimesh_is_loaded_onl
     assert loaded() == "True"
 
 
+#: What a checkout without Git LFS has in a file's place.
+POINTER = f"version https://git-lfs.github.com/spec/v1\noid sha256:{'0' * 64}\nsize 12345\n"
+
+
+def test_a_mesh_that_is_yet_to_be_fetched_is_a_warning(workspace: Path) -> None:
+    mesh = workspace / "src/robots/meshes/a b.stl"
+    before = mesh.read_bytes()
+    mesh.write_text(POINTER)
+    done = build(workspace)
+    assert (done.returncode, "warning[TF723]" in done.stderr) == (0, True)
+    assert "a b.stl is a Git LFS pointer" in done.stderr
+    assert "git lfs pull" in done.stderr
+    mesh.write_bytes(before)
+    assert "TF723" not in build(workspace).stderr
+
+
 @pytest.mark.parametrize(
     ("hidden", "content", "code", "words"),
     [
         ("trimesh", None, "TF905", "pip install 'tfcompose[mesh]'"),
         ("", "no mesh at all", "TF725", "has no volume"),
+        ("", POINTER, "TF725", "Git LFS"),
     ],
 )
 def test_a_mass_that_cannot_be_spread_is_a_finding(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 from functools import cache
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.terminal import read_text
 from tfcompose.resolve.moments import Moments
-from tfcompose.resolve.packages import Disk, UnmeasurableError
+from tfcompose.resolve.packages import FETCH, Disk, UnmeasurableError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -18,16 +19,26 @@ if TYPE_CHECKING:
     from tfcompose.pose import Vector
     from tfcompose.resolve.packages import Packages
 
+_POINTER = b"version https://git-lfs.github.com/spec/"
+
 
 def disk() -> Disk:
     """Return this machine's files, with the packages of the workspaces that are sourced."""
     prefixes = tuple(prefix for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix)
-    return Disk(read_text, os.path.isfile, os.path.isdir, prefixes, moments, _expanded, os.path.abspath)
+    return Disk(read_text, os.path.isfile, os.path.isdir, prefixes, moments, _expanded, os.path.abspath, _is_pointer)
 
 
 def _expanded(file: str, packages: Packages, arguments: Mapping[str, Any], text: str | None) -> str:
     result: str = import_module("tfcompose.cli.xacro").expanded(file, packages, arguments, text)
     return result
+
+
+@cache
+def _is_pointer(path: str) -> bool:
+    """Return whether the file is what a checkout without Git LFS has in another's place (git-lfs's own spec, v1)."""
+    with contextlib.suppress(OSError), open(path, "rb") as file:
+        return file.read(len(_POINTER)) == _POINTER
+    return False
 
 
 @cache
@@ -37,6 +48,8 @@ def moments(path: str, scale: Vector) -> Moments:
     Raises:
         UnmeasurableError: if the file is no mesh, or the mesh is not closed; or if trimesh is not installed.
     """
+    if _is_pointer(path):
+        raise UnmeasurableError("TF725", "it is a Git LFS pointer, and has no volume", FETCH)
     try:
         trimesh: Any = import_module("trimesh")
     except ImportError:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _PACKAGE_NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://")
 _NEAR = 0.8  # many packages end in _description
+FETCH = "git lfs pull fetches the file itself"
 _HIGHEST = 12  # so many folders above a file its package.xml is looked for
 
 
@@ -33,6 +34,7 @@ class Disk:
 
     ``expand`` gives the URDF that xacro makes of a file, with arguments, or of a text that stands for it.
     ``moments`` gives those of a mesh file at a scale, and raises ``UnmeasurableError`` with the finding's parts.
+    ``is_pointer`` says of a file that is there whether Git LFS has yet to put the file itself in its place.
     """
 
     read: Callable[[str], str]
@@ -42,6 +44,7 @@ class Disk:
     moments: Callable[[str, Vector], Moments] | None = None
     expand: Callable[[str, Packages, Mapping[str, Any], str | None], str] | None = None
     absolute: Callable[[str], str] = str
+    is_pointer: Callable[[str], bool] = lambda _: False
 
 
 class UnmeasurableError(Exception):
@@ -119,9 +122,13 @@ class Packages:
         return Asset(uri, at, path, name, inside), self._missing(path, f"no file {inside} in {name}", at)
 
     def _missing(self, path: str, message: str, at: Span) -> Diagnostic | None:
-        if self.disk is None or ("\0" not in path and self.disk.is_file(path)):
+        if self.disk is None:
             return None
-        return finding("TF723", message, at, help=f"looked for {path}")
+        if "\0" in path or not self.disk.is_file(path):
+            return finding("TF723", message, at, help=f"looked for {path}")
+        if self.disk.is_pointer(path):
+            return finding("TF723", f"{path} is a Git LFS pointer", at, help=FETCH, severity="warning")
+        return None
 
     def _package_above(self, path: str) -> tuple[str, str]:
         """Return the package whose source or share folder the file is in, and its path there; empty without one."""

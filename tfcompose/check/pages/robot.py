@@ -113,7 +113,8 @@ Readers refuse the robot or keep one of the two. Often a xacro macro was used tw
     "TF723": """The file of a mesh or a texture is not there.
 
 The body does not appear, and the collision with it is not checked. A relative path begins at the file that writes
-it.""",
+it. A warning where a checkout without Git LFS has a pointer in the file's place: what is built is right, once the file
+is fetched.""",
     "TF724": """A package is not to be found here.
 
 It was looked for where packages: says, then in share/PACKAGE of each folder in AMENT_PREFIX_PATH. Source the

@@ -7,6 +7,7 @@ import math
 import os
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.terminal import read_text
@@ -36,7 +37,7 @@ def _expanded(file: str, packages: Packages, arguments: Mapping[str, Any], text:
 @cache
 def _is_pointer(path: str) -> bool:
     """Return whether the file is what a checkout without Git LFS has in another's place (git-lfs's own spec, v1)."""
-    with contextlib.suppress(OSError), open(path, "rb") as file:
+    with contextlib.suppress(OSError), Path(path).open("rb") as file:
         return file.read(len(_POINTER)) == _POINTER
     return False
 

@@ -198,3 +198,29 @@ def test_a_dry_run_is_the_same_everywhere_starts_nothing_and_writes_nothing(
     assert "edge     odom → base_link (dynamic, 20 Hz)" in first.stdout
     tfc("build")
     assert tfc("up", "build/rover/plan.json", "--dry-run").stdout == first.stdout
+
+
+def test_a_launcher_that_was_stopped_is_named_at_once_and_hides_no_other_robot(
+    tfc: Callable[..., Any], tmp_path: Path
+) -> None:
+    (tmp_path / "other.yaml").write_text(
+        ROVER.replace("rover", "other").replace("base_link", "body").replace("lidar", "lamp")
+    )
+    tfc("up", "-d")
+    launcher = launcher_of(tmp_path)
+    tfc("up", "other.yaml", "-d")
+    os.kill(launcher, signal.SIGSTOP)
+    try:
+        began = time.monotonic()
+        listed = tfc("ps")
+        assert (
+            f"rover@{os.environ['ROS_DOMAIN_ID']} does not answer: its launcher {launcher} is stopped" in listed.stderr
+        )
+        assert f"kill -CONT {launcher}" in listed.stderr
+        assert (listed.returncode, listed.stdout.split("@")[0]) == (1, "other")
+        down = tfc("down", "--robot", "rover")
+        assert (down.returncode, down.stdout) == (1, "")
+        assert time.monotonic() - began < 15, "nobody waits for an answer"
+    finally:
+        os.kill(launcher, signal.SIGCONT)
+    assert tfc("ps", "--robot", "rover").returncode == 0

@@ -10,9 +10,8 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.cli.running import add_robot, is_meant, running
+from tfcompose.cli.running import add_robot, asked, is_meant, running
 from tfcompose.cli.terminal import UNREADABLE, complain
-from tfcompose.run.launcher.control import ask
 from tfcompose.run.launcher.usage import usage_of
 from tfcompose.run.place import PlaceError
 
@@ -32,13 +31,15 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Print the table; exit code 0, 1 where no robot runs."""
-    robots = _robots(arguments.robot)
-    if isinstance(robots, int):
-        return robots
+    try:
+        robots, code = _robots(arguments.robot)
+    except PlaceError as error:
+        complain(str(error))
+        return UNREADABLE
     if arguments.format == "json":
         sys.stdout.write(json.dumps(robots, indent=1) + "\n")
-        return 0 if robots else 1
-    if not robots:
+        return code if robots else 1
+    if not robots and not code:
         complain("no robot is running" if arguments.robot is None else f"{arguments.robot} is not running")
         return 1
     for robot in robots:
@@ -47,27 +48,24 @@ def run(arguments: Namespace) -> int:
         state += f", without {', '.join(failed)}" if failed else ""
         sys.stdout.write(f"{robot['name']}: {state}, launcher {robot['launcher']}, since {_time(robot['uptime'])}\n")
         _table([_row(process) for process in robot["processes"]])
-    return 0
+    return code
 
 
-def _robots(name: str | None) -> list[dict[str, Any]] | int:
-    found = []
-    try:
-        for place, _ in running():
-            if is_meant(place, name):
-                found.append({"name": place.name} | ask(place, do="ps"))
-    except PlaceError as error:
-        complain(str(error))
-        return UNREADABLE
-    except OSError as error:
-        complain(f"a robot does not answer: {error}")
-        return 1
+def _robots(name: str | None) -> tuple[list[dict[str, Any]], int]:
+    """Return those that answer, and the exit code: 1 after saying who does not."""
+    found, code = [], 0
+    for place, _ in running():
+        answer = asked(place, do="ps") if is_meant(place, name) else 0
+        if isinstance(answer, int):
+            code = code or answer
+        else:
+            found.append({"name": place.name} | answer)
     used = usage_of([process["pid"] for robot in found for process in robot["processes"] if process["pid"]])
     for robot in found:
         for process in robot["processes"]:
             cpu, memory = used.get(process["pid"], (None, None))
             process |= {"cpu": cpu, "memory": memory}
-    return found
+    return found, code
 
 
 def _row(process: dict[str, Any]) -> tuple[str, ...]:

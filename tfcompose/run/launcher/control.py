@@ -15,6 +15,8 @@ import struct
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.run.launcher.processes import STATE, fields_of
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
@@ -67,8 +69,9 @@ def connect(place: Place) -> socket.socket:
     """Return a connection to whoever runs the robot.
 
     Raises:
-        OSError: if nobody does.
+        OSError: if nobody does, or whoever does was stopped (by Ctrl-Z) and cannot answer.
     """
+    _ensure_it_runs(place)
     connection = socket.socket(socket.AF_UNIX)
     connection.settimeout(ANSWER_S)
     try:
@@ -78,6 +81,15 @@ def connect(place: Place) -> socket.socket:
         connection.close()
         raise
     return connection
+
+
+def _ensure_it_runs(place: Place) -> None:
+    holder = place.holder()
+    if holder is None:
+        return
+    with contextlib.suppress(FileNotFoundError, ProcessLookupError, IndexError):
+        if fields_of(holder.pid)[STATE] == "T":
+            raise ConnectionError(f"its launcher {holder.pid} is stopped; kill -CONT {holder.pid} lets it go on")
 
 
 def ask(place: Place, **request: Any) -> dict[str, Any]:

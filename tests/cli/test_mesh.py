@@ -7,6 +7,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
 import pytest
@@ -23,6 +24,8 @@ links:
       - {mesh: package://sourced/meshes/s.stl}
 """
 MESHES = ("ws/src/robots/meshes/a b.stl", "ws/src/third party/named/n.stl", "ws/install/share/sourced/meshes/s.stl")
+
+CORNERS = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
 
 
 @pytest.fixture
@@ -139,17 +142,24 @@ def test_a_mesh_that_is_yet_to_be_fetched_is_a_warning(workspace: Path) -> None:
     ("hidden", "content", "code", "words"),
     [
         ("trimesh", None, "TF905", "pip install 'tfcompose[mesh]'"),
-        ("", "no mesh at all", "TF725", "has no volume"),
         ("", POINTER, "TF725", "Git LFS"),
+        ("", "no mesh at all", "TF725", "it has no triangles"),
+        ("", (((0, 0, 0), (1, 0, 0), (0, 1, 1)), ((0, 1, 2), (0, 2, 1))), "TF725", "it is flat"),
+        ("", (CORNERS, ((0, 2, 1), (0, 1, 3), (1, 2, 3))), "TF725", "it is not closed"),
+        ("", (CORNERS, ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 3, 2))), "TF725", "some of its triangles face inwards"),
     ],
 )
 def test_a_mass_that_cannot_be_spread_is_a_finding(
-    workspace: Path, hidden: str, content: str | None, code: str, words: str
+    workspace: Path, hidden: str, content: str | tuple[Any, Any] | None, code: str, words: str
 ) -> None:
+    """Nothing is built of a mesh with a volume that is only a sum of its triangles, and no library warns aside."""
     robot = workspace / "src/robots/r.yaml"
     robot.write_text(ROBOT + "    inertial: {mass: 6 kg}\n")
-    if content:
-        (workspace / "src/robots/meshes/a b.stl").write_text(content)
+    shown = workspace / "src/robots/meshes/a b.stl"
+    if isinstance(content, str):
+        shown.write_text(content)
+    elif content:
+        trimesh.Trimesh(*content, process=False).export(shown)
     hide = f"import sys; sys.modules[{hidden!r}] = None; " if hidden else "import sys; "
     code_run = f"{hide}import tfcompose.cli as c; sys.exit(c.main(['build', 'src/robots/r.yaml']))"
     env = os.environ | {"AMENT_PREFIX_PATH": f"{workspace}/install"}
@@ -160,4 +170,5 @@ def test_a_mass_that_cannot_be_spread_is_a_finding(
     assert f"r.yaml:10:5: error[{code}] meshes/a b.stl: " in done.stderr
     assert words in done.stderr
     assert "Traceback" not in done.stderr
+    assert "RuntimeWarning" not in done.stderr
     assert not (workspace / "build").exists()

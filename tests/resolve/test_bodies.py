@@ -132,6 +132,17 @@ def test_a_mesh_has_the_inertia_of_the_box_that_it_shows(tmp_path: Path, ending:
     assert matrix(by_mesh) == pytest.approx(matrix(by_box), rel=1e-5, abs=1e-6)
 
 
+def test_a_collada_file_is_as_large_as_its_unit_says(tmp_path: Path) -> None:
+    """RViz and Gazebo show it so: a box of 300 mm is not one of 300 m."""
+    trimesh.creation.box([300, 500, 900]).export(tmp_path / "box.dae")
+    text = (tmp_path / "box.dae").read_text()
+    (tmp_path / "box.dae").write_text(text.replace("<asset>", '<asset><unit name="millimeter" meter="1.0e-3"/>'))
+    by_mesh = inertial_of({"visual": {"mesh": "box.dae"}, "inertial": {"density": 2}}, tmp_path)
+    by_box = inertial_of({"visual": {"box": [0.3, 0.5, 0.9]}, "inertial": {"density": 2}})
+    assert by_mesh.mass == pytest.approx(by_box.mass, rel=1e-6)
+    assert matrix(by_mesh) == pytest.approx(matrix(by_box), rel=1e-6)
+
+
 def test_a_centre_of_mass_that_is_given_is_kept_and_the_tensor_about_it_is_that_of_the_shapes() -> None:
     shape = {"visual": {"box": [1, 2, 3], "xyz": [0.1, 0, 0]}}
     free = inertial_of(shape | {"inertial": {"mass": 2}})

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 import stat
 import sys
+from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING
@@ -43,10 +45,24 @@ def read_text(path: str) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        before = data[: error.start]
-        line, column = before.count(b"\n") + 1, error.start - before.rfind(b"\n")
-        message = f"not a text file: byte 0x{data[error.start]:02x} is not UTF-8"
-        raise RejectedError([finding("TF001", message, Span(path, line, column, line, column + 1))]) from None
+        return _declared(path, data, error)
+
+
+def _declared(path: str, data: bytes, error: UnicodeDecodeError) -> str:
+    """Return the text of what is not UTF-8, by the encoding that a URDF declares; xacro reads UTF-8 whatever a file says."""
+    is_urdf = path.endswith(".urdf")
+    said = is_urdf and re.match(rb"""<\?xml\b[^>]*\bencoding\s*=\s*["']([A-Za-z][\w.-]*)""", data)
+    if said:
+        with suppress(LookupError, UnicodeDecodeError):
+            return data.decode(said[1].decode())
+    before = data[: error.start]
+    line, column = before.count(b"\n") + 1, error.start - before.rfind(b"\n")
+    message = f"not a text file: byte 0x{data[error.start]:02x} is not UTF-8"
+    advice = "save it as UTF-8"
+    if is_urdf:
+        advice += ', or say in its first line what it is: <?xml version="1.0" encoding="ISO-8859-1"?>'
+    place = Span(path, line, column, line, column + 1)
+    raise RejectedError([finding("TF001", message, place, help=advice)]) from None
 
 
 def _unreadable(path: str, error: OSError) -> Diagnostic:

@@ -121,7 +121,8 @@ It was looked for where packages: says, then in share/PACKAGE of each folder in 
 workspace's setup file first, or name the folder: packages: {my_robot_description: ../description}.""",
     "TF725": """A mass is to be spread over a mesh that has no volume.
 
-Only a closed mesh has one, and only one that is found here. Close it, give a closed collision shape (the tensor is
+Only a closed mesh has one whose triangles all face outwards, or all inwards, and only one that is found here. Mend it
+(normals: recalculate outside), give a closed collision shape (the tensor is
 computed from collision shapes where there are any), or give mass and inertia from CAD.""",
     "TF726": """A mesh is to be addressed by package, and is in none.
 

@@ -127,6 +127,7 @@ CODES = {
     "TF717": "interface_claimed_twice",
     "TF718": "mimic_joint_commanded",
     "TF719": "xml_block_out_of_place",
+    "TF727": "joint_key_without_effect",
     # a URDF that somebody else wrote; meshes and packages
     "TF720": "unknown_urdf_word",
     "TF721": "bad_urdf_value",

@@ -109,6 +109,18 @@ def test_what_is_no_urdf_or_could_do_harm_is_one_finding(what: str) -> None:
     assert said in found.message
 
 
+@pytest.mark.parametrize("encoding", ["ISO-8859-1", "windows-1252", "GB2312"])
+def test_a_file_is_read_in_the_encoding_that_it_declares(encoding: str, tmp_path: Path) -> None:
+    head = f'<?xml version="1.0" encoding="{encoding}"?>'
+    written = "轮子" if encoding == "GB2312" else "grün"
+    file = tmp_path / "r.urdf"
+    file.write_bytes(f'{head}<robot name="r"><link name="{written}"/></robot>'.encode(encoding))
+    assert [one.message for one in lint_urdf(str(file))] == [f"'{written}' is no good name"]
+    file.write_bytes(file.read_bytes().replace(encoding.encode(), b"UTF-8"))
+    (found,) = lint_urdf(str(file))
+    assert (found.code, found.help[:16]) == ("TF001", "save it as UTF-8")
+
+
 def test_where_a_tag_does_not_match_is_said() -> None:
     (found,) = lint_text(REFUSED["a tag that is not closed"][0])
     assert found.code == "TF018"

@@ -67,6 +67,16 @@ def test_hardware_is_written_as_ros2_control_reads_it() -> None:
         assert same(found, ET.fromstring(EXPECTED)), ET.tostring(found)  # noqa: S314 (as above)
 
 
+def test_the_joints_that_there_are_are_named_in_the_files_order_and_not_all_of_a_hundred() -> None:
+    names = [f"j{number}" for number in range(100)]
+    joints = "".join(f"  {one}: {{type: continuous, parent: base_link, child: {one}_link}}\n" for one in names)
+    links = "".join(f"  {one}_link: {{}}\n" for one in names)
+    control = "ros2_control: {h: {plugin: a/B, joints: {gripper: {state: [position]}}}}\n"
+    text = f"tfcompose: 1\nrobot: r\nlinks:\n  base_link: {{}}\n{links}joints:\n{joints}{control}"
+    (found,) = compile_robot(text, "r.yaml", library()).errors
+    assert found.help == "there is j0, j1, j2, j3, j4, j5, j6, j7 and 92 more"
+
+
 def test_a_raw_block_is_written_as_it_stands_in_both_files() -> None:
     block = '<gazebo reference="wheel">\n  <mu1>1.2</mu1> <!-- worn: 0.9 -->\n</gazebo>\n<gazebo/>'
     text = "vars: {mu: 1.2}\nxml:\n  wheels: |\n" + "\n".join(

@@ -37,7 +37,8 @@ joints:
 frames: {tool: {parent: hand, xyz: [0, 0, 1]}}
 ros2_control:
   motors:
-    {plugin: x/Y, params: {path: "$HOME/$(cwd)"}, joints: {joint: {command: [effort]}}, gpios: {lamp: {state: [on]}}}
+    {plugin: x/Y, params: {path: "$HOME/$(cwd)", tip: hand}, joints:
+      {joint: {command: {effort: {min: joint}}, params: {mimic: joint}}}, gpios: {lamp: {state: [on]}}}
 xml:
   all: |
     <!-- $(find here) stays -->
@@ -126,7 +127,7 @@ def test_names_in_hardware_and_blocks_get_the_prefix_and_words_do_not(tmp_path: 
     (control,) = found.findall("ros2_control")
     names = [one.get("name") for one in (control, *control.findall("joint"), *control.findall("gpio"))]
     assert names == ["left_motors", "left_joint", "left_lamp"]
-    assert control.findtext("hardware/param") == "$HOME/$(cwd)"
+    assert [one.text for one in control.iter("param")] == ["$HOME/$(cwd)", "left_hand", "joint", "left_joint"]
     (gazebo,) = found.findall("gazebo")
     assert gazebo.get("reference") == "left_hand"
     assert [str(gazebo.findtext(f"plugin/{tag}")).strip() for tag in ("frame", "joint", "text", "cost")] == [

@@ -126,6 +126,16 @@ def test_an_urdf_is_taken_twice_with_everything_in_it_renamed(cell: Any) -> None
     assert {one.get("name") for one in root.iter("material")} == {"left_grey", "right_grey"}
 
 
+def test_a_shape_is_there_though_readers_of_the_urdf_alone_would_stumble_over_its_tabs(
+    cell: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "plate.urdf").write_text(
+        '<robot name="p"><link name="plate"><visual><geometry><box size="1\n\t2\t3"/></geometry></visual></link></robot>'
+    )
+    text = files(cell("plate: {urdf: plate.urdf, parent: table}"))["robot.full.urdf"]
+    assert '<box size="1 2 3"/>' in text
+
+
 def test_what_is_about_links_and_joints_that_are_cut_off_is_cut_off_too(cell: Any, tmp_path: Path) -> None:
     control = """<ros2_control name="{}" type="system"><hardware><plugin>a/B</plugin></hardware>{}</ros2_control>"""
     joint = '<joint name="{}"><command_interface name="position"/></joint>'

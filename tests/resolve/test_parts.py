@@ -234,6 +234,17 @@ def test_drivers_of_sensors_that_are_cut_off_are_cut_off_and_others_stay() -> No
     assert "left_low_link" not in cut.frames
 
 
+def test_a_parameter_that_names_a_frame_or_joint_goes_with_it_and_no_other_does() -> None:
+    """As in the raw block of a URDF part, so that an arm moves alike by its URDF and by what import made of it."""
+    shoulder = "shoulder: {command: [position], state: {effort: {source: shoulder}}, params: {mimic: shoulder, k: 1}}"
+    hardware = f"ros2_control: {{h: {{plugin: a/B, params: {{tip: upper, port: upper_1}}, joints: {{{shoulder}}}}}}}\n"
+    (found,) = sound(CELL.replace("EXTRA", ""), arm_yaml=ARM.replace("processes:", f"{hardware}processes:")).hardware
+    (joint,) = found.components
+    assert found.params == {"tip": "left_upper", "port": "upper_1"}
+    assert joint.params == {"mimic": "left_shoulder", "k": "1"}
+    assert joint.state[0].params == {"source": "shoulder"}
+
+
 def test_one_owner_takes_every_edge_of_the_part_and_not_its_mount() -> None:
     text = CELL.replace("EXTRA", "owner: ur") + "processes: {ur: {external: true}}\n"
     owners = {edge.child: edge.owner for edge in sound(text).edges}

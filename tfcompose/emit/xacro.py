@@ -11,7 +11,7 @@ from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from tfcompose.emit.markup import quoted
+from tfcompose.emit.markup import escaped, quoted
 
 if TYPE_CHECKING:
     from tfcompose.model import Robot
@@ -24,6 +24,8 @@ _NAME = re.compile(
     r"\n(?:  <(?:link|joint|ros2_control) name=.|"
     r"    <(?:(?:parent|child) link|mimic joint|(?:joint|sensor|gpio) name)=.)"
 )
+#: A parameter of hardware, or of what is in it, but not of an interface.
+_PARAMETER = re.compile(r"(\n {4}(?:  )?<param name=[^\n]*?>)([^<>\n]*)(?=</param>)")
 #: Addresses that begin at the written file.
 _RELATIVE = re.compile(r"(<(?:mesh|texture) filename=.)(?!/|[A-Za-z][A-Za-z0-9+.-]*://)")
 #: Tags of xacro's own, which no macro can be called.
@@ -44,6 +46,7 @@ def macro(robot: Robot, body: list[str]) -> str:
     text = "\n".join(["", *body, *_hardware(robot)])
     text = _EVALUATED.sub(r"$\1", text) if "$" in text else text
     text = _NAME.sub(_with_prefix, text)
+    text = _with_parameters(text, robot) if robot.hardware else text
     text = _RELATIVE.sub(r"\1${meshes}", text) if " filename=" in text else text
     text = "\n".join([text, *_blocks(robot)])[1:]
     more = " meshes:=''" if "${meshes}" in text else ""
@@ -70,6 +73,16 @@ def _with_prefix(found: re.Match[str]) -> str:
     return f"{found[0]}${{prefix}}"
 
 
+def _with_parameters(text: str, robot: Robot) -> str:
+    """Return the text with the prefix in front of each parameter that is the name of a link or joint, and no more."""
+    names = {_EVALUATED.sub(r"$\1", escaped(name)) for name in _names(robot)}
+
+    def other(found: re.Match[str]) -> str:
+        return f"{found[1]}${{prefix}}{found[2]}" if found[2] in names else found[0]
+
+    return _PARAMETER.sub(other, text)
+
+
 def caller(robot: Robot) -> str:
     """Return the file that is the robot alone: the macro, called with arguments of the same names."""
     defaults = {"prefix": "", "parent": "", "xyz": "0 0 0", "rpy": "0 0 0"}
@@ -94,12 +107,16 @@ def _blocks(robot: Robot) -> list[str]:
     """Return the raw blocks, in which what is a name of the robot's, and nothing else, gets the prefix."""
     if not robot.blocks:
         return []
-    names = [*robot.frames, *(edge.joint_name for edge in robot.edges if edge.joint_name)]
+    names = _names(robot)
     names += [name for block in robot.blocks for name in block.own_names()]
     names = [_EVALUATED.sub(r"$\1", name) for name in names]  # as they stand in the text below
     again = {name: f"${{prefix}}{name}" for name in names}
     blocks = [replace(block, text=_EVALUATED.sub(r"$\1", block.text)).renamed(again) for block in robot.blocks]
     return _block_lines((), blocks)
+
+
+def _names(robot: Robot) -> list[str]:
+    return [*robot.frames, *(edge.joint_name for edge in robot.edges if edge.joint_name)]
 
 
 def _block_lines(*given: object) -> list[str]:

@@ -144,7 +144,7 @@ class Reader:
             return self.tagged(tag, text, place)
         except OverflowError as error:
             self.found.append(finding("TF007", str(error), place.span, help="give a finite number"))
-            return 0.0
+            return 1.0  # which sizes, masses and axes can be: one fault is one finding
 
     def tagged(self, tag: str, text: str, place: Place) -> Any:
         """Return the value of a scalar with a tag, and note what is wrong with it."""

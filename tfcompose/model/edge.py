@@ -74,6 +74,7 @@ class Edge:
     given: bool = True
     owner_at: Span | None = None
     child_at: Span | None = None
+    joint_at: Span | None = None
     sensor: str | None = None
     nominal: bool = False
     rate_at: Span | None = None

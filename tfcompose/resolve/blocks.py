@@ -25,6 +25,8 @@ ALLOWED = ("transmission", "gazebo", "ros2_control", "sensor", "material")
 _OWN = {"link": "links", "joint": "joints", "robot": "include"}
 #: What names links or joints of the robot.
 REFERRING = frozenset({"gazebo", "transmission", "ros2_control"})
+#: As many joints are named where one is wrong.
+_LISTED = 8
 _INNER = frozenset({"visual", "collision", "inertial", "origin", "geometry", "limit", "mimic", "axis", "plugin"})
 
 
@@ -60,7 +62,9 @@ def unknown_joints(hardware: tuple[Hardware, ...], joints: Collection[str]) -> I
 
 
 def _no_joint(name: str, at: Span, joints: Collection[str]) -> Diagnostic:
-    advice = did_you_mean(name, joints, f"there is {', '.join(joints)}" if joints else "no joint moves")
+    more = f" and {len(joints) - _LISTED} more" if len(joints) > _LISTED else ""
+    there = f"there is {', '.join(list(joints)[:_LISTED])}{more}"
+    advice = did_you_mean(name, joints, there if joints else "no joint moves")
     return finding("TF703", f"no moving joint {name}", at, help=advice)
 
 

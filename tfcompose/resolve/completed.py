@@ -46,7 +46,7 @@ def _with_blocks(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, 
     frames = [frame for frame in robot.frames if frame in robot.links or robot.parent_edge(frame)]
     joints = [edge.joint_name for edge in robot.edges if edge.joint_name]
     blocks, found = work.blocks_of(spec.xml, source, frames, joints)
-    known = {*moving, *(name for section, name in robot.broken if section == "joints")}
+    known = [*moving, *sorted(name for section, name in robot.broken if section == "joints")]
     found += work.unknown_joints(hardware, known)
     return replace(robot, hardware=(*hardware, *robot.hardware), blocks=(*blocks, *robot.blocks)), found
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from tfcompose.diagnostic import Diagnostic, Note, Span, finding
 from tfcompose.frozen import dataclass, field
 from tfcompose.model import JOINTS, STATIC, Edge, Joint, Link, MountedSensor, Process
-from tfcompose.resolve.joints import FREE, joint_of
+from tfcompose.resolve.joints import FREE, idle_keys, joint_of
 from tfcompose.resolve.poses import Draft, pose_of
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ class Drafts:
         """Take the edges between bodies."""
         for name, joint in self.spec.joints.items():
             moving = joint_of(name, joint, self.source.at_key(("joints", name)))
+            self.found += idle_keys(name, joint.type, self.source.data["joints"][name], self.source)
             self.add(("joints", name), joint.parent, joint.child, joint, joint=moving, joint_name=name)
 
     def add_part(self, part: Joined) -> bool:
@@ -105,6 +106,7 @@ class Drafts:
         part: str | None = None,
     ) -> None:
         """Take the edge that is written at a place; a sensor's and a part's is its mount."""
+        named_at = joint.at if joint else self.source.at_key(at) if joint_name else None
         free = joint if joint and joint.type in FREE else None
         joint = None if free else joint
         owner = owner or keys.owner or (JOINTS if joint else STATIC)
@@ -120,6 +122,7 @@ class Drafts:
             joint=joint,
             free=free,
             joint_name=joint_name,
+            joint_at=named_at,
             child_at=self.source.at((*at, "child")) if joint_name else None,
             owner_at=self.source.at((*at, "owner")) if keys.owner else None,
             sensor=sensor.name if sensor else None,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.diagnostic import Diagnostic, finding
 from tfcompose.model import Dynamics, Joint, Limit, ReferencePositions, SafetyController
 from tfcompose.pose import norm
 
@@ -11,11 +12,19 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tfcompose.diagnostic import Span
+    from tfcompose.load import Path, Source
     from tfcompose.validate import Validated
     from tfcompose.validate.joints import JointSpec
 
 #: Types of which joint states say nothing: they have more than one position.
 FREE = frozenset({"planar", "floating"})
+_MOVING = "revolute, continuous or prismatic"
+#: What is said of a joint's motion, by types of joints of which it says nothing.
+_IDLE = {
+    "fixed": ("axis", "limit", "mimic", "dynamics", "safety_controller", "calibration"),
+    "floating": ("axis", "limit", "mimic", "dynamics", "safety_controller", "calibration"),
+    "planar": ("mimic",),
+}
 
 
 def joint_of(name: str, written: JointSpec, at: Span) -> Joint | None:
@@ -43,6 +52,20 @@ def joint_of(name: str, written: JointSpec, at: Span) -> Joint | None:
         else None,
         reference=ReferencePositions(reference.rising, reference.falling) if reference else None,
     )
+
+
+def idle_keys(name: str, kind: str, said: dict[str, Any], source: Source) -> Iterator[Diagnostic]:
+    """Yield a finding where a joint says what joints of its type do not have; ``said`` is what is written."""
+    at: Path = ("joints", name)
+    idle = [key for key in said if key in _IDLE.get(kind, ())]
+    advice = "leave it out" if kind in FREE else f"leave it out; if {name} moves, type: {_MOVING}"
+    limit = said.get("limit")
+    if kind == "continuous" and isinstance(limit, dict):
+        at, idle = (*at, "limit"), [key for key in ("lower", "upper") if key in limit]
+        advice = "leave it out; if there is an end, type: revolute"
+    if idle:
+        message = f"the joint {name} is {kind}: {', '.join(idle)} {'have' if idle[1:] else 'has'} no effect"
+        yield finding("TF727", message, source.at_key((*at, idle[0])), help=advice, severity="warning")
 
 
 def unjoined(validated: Validated) -> Iterator[tuple[str, str]]:

@@ -54,6 +54,7 @@ class Names:
 
 def renamed(robot: Robot, names: Names) -> Robot:
     """Return the robot with the names that it has as a part."""
+    again = _again(robot, names) if robot.hardware else {}
     kept = [process for process in robot.processes if process.name not in BUILT_IN or names.alone]
     broken = {(section, again) for section, name in robot.broken for again in _names_of(section, name, names)}
     return replace(
@@ -68,7 +69,7 @@ def renamed(robot: Robot, names: Names) -> Robot:
         claims=tuple(replace(c, parent=names.frame(c.parent), child=names.frame(c.child)) for c in robot.claims),
         broken=frozenset(broken),
         parts=tuple(_part(part, names) for part in robot.parts),
-        hardware=tuple(_hardware(hardware, names) for hardware in robot.hardware),
+        hardware=tuple(_hardware(hardware, names, again) for hardware in robot.hardware),
         blocks=tuple(_blocks(robot, names)),
     )
 
@@ -105,16 +106,28 @@ def _joint(joint: Joint, names: Names) -> Joint:
     return replace(joint, name=names.joint(joint.name), mimic=names.joint(joint.mimic) if joint.mimic else None)
 
 
-def _hardware(hardware: Hardware, names: Names) -> Hardware:
-    """Return the hardware, and its sensors and gpios, under names that no other part has."""
-    inside = (replace(one, name=names.joint(one.name)) for one in hardware.components)
-    return replace(hardware, name=names.joint(hardware.name), components=tuple(inside))
+def _hardware(hardware: Hardware, names: Names, again: dict[str, str]) -> Hardware:
+    """Return the hardware, its sensors and gpios under names that no other part has, as a raw block would have them."""
+    inside = (
+        replace(one, name=names.joint(one.name), params=_params(one.params, again)) for one in hardware.components
+    )
+    params = _params(hardware.params, again)
+    return replace(hardware, name=names.joint(hardware.name), params=params, components=tuple(inside))
+
+
+def _params(params: dict[str, str], again: dict[str, str]) -> dict[str, str]:
+    """Return the parameters, of which one that is the name of a frame or joint, such as mimic, goes with it."""
+    return {key: again.get(value, value) for key, value in params.items()}
+
+
+def _again(robot: Robot, names: Names) -> dict[str, str]:
+    """Return what frames and joints are called now, by what they were called."""
+    again = {frame: names.frame(frame) for frame in robot.frames}
+    return again | {edge.joint_name: names.joint(edge.joint_name) for edge in robot.edges if edge.joint_name}
 
 
 def _blocks(robot: Robot, names: Names) -> Iterator[Block]:
-    again = {frame: names.frame(frame) for frame in robot.frames}
-    again |= {edge.joint_name: names.joint(edge.joint_name) for edge in robot.edges if edge.joint_name}
-    again = {name: names.joint(name) for block in robot.blocks for name in block.own_names()} | again
+    again = {name: names.joint(name) for block in robot.blocks for name in block.own_names()} | _again(robot, names)
     for block in robot.blocks:
         yield replace(block.renamed(again), name=f"{names.part}/{block.name}")
 

@@ -62,18 +62,19 @@ class Bodies:
 
     def _primitive(self, element: Element, form: Element) -> list[Shape]:
         size: list[float] = []
-        before = len(self.values.found)
+        before = self.values.refused
         for key, count in _FORMS[form.tag]:
             if key not in form.attributes:
                 self.values.refuse(f"<{form.tag}> has no {key}", form.at)
                 return []
             size += self.values.numbers(form, key, (0.0,) * count)
-        if len(self.values.found) == before and not all(0 < value < _HUGE for value in size):
+        if self.values.refused > before:
+            return []
+        if not all(0 < value < _HUGE for value in size):
             at = form.place(_FORMS[form.tag][0][0])
             flat: Severity = "warning" if min(size) == 0 and max(size) < _HUGE else "error"
             advice = "give it a size, or remove it: some readers see nothing, others refuse the robot"
             self.values.refuse(f"a {form.tag} of size {' '.join(f'{value:g}' for value in size)}", at, advice, flat)
-        if len(self.values.found) > before:
             return []
         kind: Any = form.tag
         return [Shape(kind, tuple(size), self.values.pose(element), self._material(element))]

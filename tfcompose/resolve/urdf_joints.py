@@ -58,6 +58,7 @@ def edge_of(element: Element, values: Values) -> Edge | None:
         joint=None if free else moving,
         free=moving if free else None,
         joint_name=name,
+        joint_at=element.place("name"),
         child_at=ends["child"].place("link"),
     )
 

@@ -17,14 +17,19 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class Values:
-    """Reads attributes; ``found`` is what was wrong with them, ``has_quaternions`` whether rotations may be such."""
+    """Reads attributes; ``found`` is what was wrong with them, ``has_quaternions`` whether rotations may be such.
+
+    ``refused`` counts what is no value; what is a warning only leaves a value as it is.
+    """
 
     found: list[Diagnostic] = field(default_factory=list)
     has_quaternions: bool = False
+    refused: int = 0
 
     def refuse(self, message: str, at: Span, advice: str = "", severity: Severity = "error") -> None:
         """Note that a value is wrong."""
         self.found.append(finding("TF721", message, at, help=advice, severity=severity))
+        self.refused += severity == "error"
 
     def text(self, element: Element, name: str, sample: str) -> str:
         """Return an attribute that must be there, or an empty text."""
@@ -72,11 +77,11 @@ class Values:
 
     def _quaternion(self, origin: Element) -> Quaternion:
         """Return the rotation that is given as a quaternion, which URDF has from version 1.1 on."""
-        before, at = len(self.found), origin.place("quat_xyzw")
+        before, at = self.refused, origin.place("quat_xyzw")
         x, y, z, w = self.numbers(origin, "quat_xyzw", (0.0, 0.0, 0.0, 1.0))
         if not any((x, y, z, w)):
             self.refuse("this quaternion is no rotation", at, "no rotation at all is 0 0 0 1")
-        if len(self.found) > before:
+        if self.refused > before:
             return (0.0, 0.0, 0.0, 1.0)
         turned = normalised((x, y, z, w))
         angles = " ".join(f"{angle + 0.0:.17g}" for angle in rpy_from_quat(turned))

@@ -123,7 +123,7 @@ def measure(dimension: Dimension, least: float | None = None) -> Type:
     def read(value: Any, path: Path, problems: Problems) -> Any:
         number = read_quantity(value, path, problems, dimension)
         if least is not None and number is not BROKEN and number < least:
-            what = "is not greater than 0" if number <= 0 else f"is less than {least!r}"
+            what = "is not greater than 0" if number <= 0 else f"is less than {least:g}"
             return problems.refuse("TF106", path, f"{shown(value)} {what}")
         return number
 
@@ -164,7 +164,7 @@ def _scale(value: Any, path: Path, problems: Problems) -> Any:
     factors = _THREE.read(value if isinstance(value, list) else [value] * 3, path, problems)
     if factors is BROKEN or all(abs(factor) > 1 / LARGEST for factor in factors):
         return factors
-    return problems.refuse("TF106", path, f"{shown(value)} is no scale: nothing is left of the mesh")
+    return problems.refuse("TF106", path, "a scale of 0: nothing is left of the mesh", "for example 0.001")
 
 
 def _plain(value: Any) -> Any:

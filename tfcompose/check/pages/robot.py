@@ -100,6 +100,10 @@ date.""",
 
 A block stands beside links and joints in the URDF: <gazebo>, <transmission>, and what other programs read. Links and
 joints are written under links: and joints:, so that they are checked and have an owner.""",
+    "TF727": """A joint says something that joints of its type do not have.
+
+A fixed or floating joint has no axis, limits or mimic, and a continuous one turns for ever, whatever its lower and
+upper limit: it is not written, or no reader takes it. Often the type is what is wrong.""",
     "TF720": """An element or an attribute is not one of URDF's.
 
 Readers pass over it without a word: with <orign> a joint is at its parent's origin. An error where a known name is

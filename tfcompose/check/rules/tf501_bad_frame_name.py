@@ -37,7 +37,7 @@ def bad_frame_name(robot: Robot) -> Iterator[Diagnostic]:
     for edge in robot.edges:
         names.setdefault(edge.child, edge.child_at or edge.at)
         if edge.joint_name:
-            names.setdefault(edge.joint_name, edge.joint.at if edge.joint else edge.at)
+            names.setdefault(edge.joint_name, edge.joint_at or edge.at)
     for name, at in names.items():
         if not _GOOD.fullmatch(name):
             taken = re.fullmatch(_TAKEN, name) or (at.file in robot.foreign and not re.fullmatch(_LOST, name))

@@ -130,7 +130,7 @@ def test_a_shape_is_there_though_readers_of_the_urdf_alone_would_stumble_over_it
     cell: Any, tmp_path: Path
 ) -> None:
     (tmp_path / "plate.urdf").write_text(
-        '<robot name="p"><link name="plate"><visual><geometry><box size="1\n\t2\t3"/></geometry></visual></link></robot>'
+        '<robot name="p"><link name="flat"><visual><geometry><box size="1\n\t2\t3"/></geometry></visual></link></robot>'
     )
     text = files(cell("plate: {urdf: plate.urdf, parent: table}"))["robot.full.urdf"]
     assert '<box size="1 2 3"/>' in text

@@ -103,7 +103,7 @@ def _collada_unit(path: str) -> float:
     """Return the metres in the unit of a COLLADA file; 1 where it says none, and for other files."""
     if not path.lower().endswith(".dae"):
         return 1.0
-    with open(path, "rb") as file:
+    with Path(path).open("rb") as file:
         said = _UNIT.search(file.read(_HEAD))
     metres = float(said[1]) if said else 1.0
     return metres if 0 < metres < math.inf else 1.0

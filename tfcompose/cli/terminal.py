@@ -49,7 +49,7 @@ def read_text(path: str) -> str:
 
 
 def _declared(path: str, data: bytes, error: UnicodeDecodeError) -> str:
-    """Return the text of what is not UTF-8, by the encoding that a URDF declares; xacro reads UTF-8 whatever a file says."""
+    """Return the text of a URDF in the encoding that it declares; xacro reads UTF-8 whatever a file says."""
     is_urdf = path.endswith(".urdf")
     said = is_urdf and re.match(rb"""<\?xml\b[^>]*\bencoding\s*=\s*["']([A-Za-z][\w.-]*)""", data)
     if said:

@@ -128,6 +128,7 @@ CODES = {
     "TF718": "mimic_joint_commanded",
     "TF719": "xml_block_out_of_place",
     "TF727": "joint_key_without_effect",
+    "TF728": "joint_named_like_a_frame",
     # a URDF that somebody else wrote; meshes and packages
     "TF720": "unknown_urdf_word",
     "TF721": "bad_urdf_value",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 import time
@@ -295,3 +296,13 @@ def test_pose_in_json_is_the_pose_of_the_second_frame_in_the_first(folder: Path)
     assert (found["parent"], found["child"]) == ("camera_link", "laser_link")
     assert found["xyz"] == pytest.approx([-0.1, 0, 0.1])
     assert found["quat_xyzw"] == [0, 0, 0, 1]
+
+
+@pytest.mark.parametrize("closed", [">&-", "<&-", "2>&-", "<&- >&- 2>&-"])
+def test_a_stream_that_is_closed_is_no_traceback(tmp_path: Path, closed: str) -> None:
+    said = tmp_path / "said"
+    kept = f"2>{said}" if "2>" not in closed else f">{said}" if ">&- 2" not in closed else ""
+    command = f"{shlex.quote(sys.executable)} -m tfcompose explain TF301 {kept} {closed}; echo $?"
+    done = subprocess.run(["/bin/sh", "-c", command], capture_output=True, text=True, timeout=30, check=False)
+    assert done.stdout.splitlines()[-1] == "0"
+    assert "Traceback" not in done.stdout + done.stderr + (said.read_text() if said.exists() else "")

@@ -60,6 +60,7 @@ UNREAD = 141
 
 def main(argv: list[str] | None = None) -> int:
     """Run the command line and return the exit code: 0 clean, 1 findings or a failed process, 2 wrong use."""
+    _opened()
     _steady(sys.stdout, sys.stderr)
     try:
         code = _main(sys.argv[1:] if argv is None else argv)
@@ -86,6 +87,18 @@ def _main(words: list[str]) -> int:
         sys.stdout.write(f"tfcompose {__version__}\n")
         return 0
     return _run(command, words[1:]) if command in COMMANDS else _no_command(command)
+
+
+def _opened() -> None:
+    """Give a process that was started with closed streams (``>&-``) some that lead nowhere: Python has None there."""
+    for fd, name, mode in ((0, "stdin", "r"), (1, "stdout", "w"), (2, "stderr", "w")):
+        if getattr(sys, name) is not None:
+            continue
+        nowhere = os.open(os.devnull, os.O_RDWR)
+        if nowhere != fd:
+            os.dup2(nowhere, fd)
+            os.close(nowhere)
+        setattr(sys, name, os.fdopen(fd, mode, closefd=False))
 
 
 def _steady(*streams: TextIO | None) -> None:

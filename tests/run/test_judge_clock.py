@@ -53,6 +53,22 @@ def test_one_stray_stamp_is_no_wrong_clock(running: History) -> None:
     assert "TF825" not in {found.code for found in running.found()}
 
 
+@pytest.mark.parametrize("off", [0.0, -60.0])
+def test_what_waited_while_the_guard_was_kept_from_looking_says_nothing_of_its_senders_clock(
+    running: History, off: float
+) -> None:
+    slam = running.joins("/slam")
+    stamped(running, slam, "map odom", [wall(running) + n / 10 for n in range(20)])
+    waited = wall(running)
+    running.now += 12.7  # the guard, or the machine, stood still, and looks again
+    for n in range(30):
+        running.send(slam, "map odom", stamp_s=waited + n / 50)
+    assert running.look().said() == []
+    for _ in range(60):
+        running.send(slam, "map odom", stamp_s=wall(running) + off).wait(0.1)
+    assert [found.code for found in running.found() if found.code != "TF824"] == (["TF825"] if off else [])
+
+
 def test_in_simulated_time_the_systems_time_is_the_wrong_one_and_clock_decides() -> None:
     running = History(clock="sim").clear()
     slam, drive = running.joins("/slam"), running.joins("/drive")

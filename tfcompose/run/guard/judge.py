@@ -192,12 +192,14 @@ class Judge:
         """Judge the stamps of an owner's message, and return the age of the first in seconds, where it is known."""
         if message.static or not message.stamps_ns:
             return None
-        code, detail = stream.stamps.judge(message.stamps_ns, message.received_ns, self.clocks)
+        # A message that waited for the guard says nothing of its sender's clock.
+        clocks = Clocks(simulated=True) if self.live.is_behind(now) else self.clocks
+        code, detail = stream.stamps.judge(message.stamps_ns, message.received_ns, clocks)
         if code:
             nodes = self._senders.nodes(message.gid, static=False)
             for child in stream.children:
                 edge = self._law.planned[child]
                 offence = Offence(code, edge.parent, child, nodes, static=False, edge=edge, detail=detail)
                 self.cases.note(offence, message.gid, now)
-        reference = self.clocks.reference_ns(message.received_ns)
+        reference = clocks.reference_ns(message.received_ns)
         return None if reference is None else (reference - message.stamps_ns[0]) / 1e9

@@ -141,6 +141,10 @@ class Liveness:
         """Return the age of the track's last arrival, and its rate in hertz, None while there is too little to say."""
         return now - track.last, track.rate(self._watched.at(now)) if track.silent_after is not None else None
 
+    def is_behind(self, now: float) -> bool:
+        """Return whether what comes now may have waited for the guard."""
+        return self._watched.is_behind(now)
+
     def look(self, now: float) -> None:
         """Note that the guard looks, and judge nobody."""
         self._watched.look(now)

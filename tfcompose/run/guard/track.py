@@ -43,6 +43,11 @@ class Watched:
         """Take what is missing until then as not found yet."""
         self._catching_up_until = until
 
+    def is_behind(self, now: float) -> bool:
+        """Return whether what comes now may have waited: the guard was kept from looking, or still catches up."""
+        stalled = self._looked is not None and now - self._looked > STALLED_S
+        return stalled or now < self._catching_up_until
+
     def look(self, now: float) -> float:
         """Note that the guard looks now, and return the seconds until then."""
         if self._looked is not None and now - self._looked > STALLED_S:

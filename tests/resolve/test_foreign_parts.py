@@ -136,6 +136,20 @@ def test_a_shape_is_there_though_readers_of_the_urdf_alone_would_stumble_over_it
     assert '<box size="1 2 3"/>' in text
 
 
+def test_a_joint_that_is_there_already_is_refused_as_a_frame_is(cell: Any, tmp_path: Path) -> None:
+    """Of two joints with one name, joint states move both, and readers of the URDF refuse it."""
+    text = '<robot name="r"><link name="{0}_a"/><link name="{0}_b"/><joint name="j" type="{1}"><parent link="{0}_a"/>'
+    for name, kind in (("one", "fixed"), ("two", "continuous")):
+        whole = text.format(name, kind) + f'<child link="{name}_b"/></joint></robot>'
+        (tmp_path / f"{name}.urdf").write_text(whole, encoding="utf-8")
+    one, two = "one: {urdf: one.urdf, parent: table}", "two: {urdf: two.urdf, parent: table}"
+    (found,) = cell(one, two).found
+    assert (found.code, found.message) == ("TF505", "the part two brings the joint j, which is there already")
+    assert [note.span.file.rpartition("/")[2] for note in found.notes if note.span] == ["one.urdf", "two.urdf"]
+    assert found.help == "a prefix of its own, prefix: two/"
+    assert sound(cell(one, two.replace("parent", "prefix: t_, parent")))
+
+
 def test_what_is_about_links_and_joints_that_are_cut_off_is_cut_off_too(cell: Any, tmp_path: Path) -> None:
     control = """<ros2_control name="{}" type="system"><hardware><plugin>a/B</plugin></hardware>{}</ros2_control>"""
     joint = '<joint name="{}"><command_interface name="position"/></joint>'

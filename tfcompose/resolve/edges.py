@@ -11,6 +11,8 @@ from tfcompose.resolve.joints import FREE, idle_keys, joint_of
 from tfcompose.resolve.poses import Draft, pose_of
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from tfcompose.load import Path, Source
     from tfcompose.plan import EdgeKind
     from tfcompose.resolve.bodies import Bodies
@@ -29,6 +31,7 @@ class Drafts:
     simulated: frozenset[str]
     bodies: Bodies
     frames: dict[str, Span] = field(default_factory=dict)
+    joints: dict[str, Span] = field(default_factory=dict)
     edges: list[Draft] = field(default_factory=list)
     links: dict[str, Link] = field(default_factory=dict)
     drivers: list[Process] = field(default_factory=list)
@@ -67,9 +70,17 @@ class Drafts:
         hanging = {edge.child for edge in robot.edges}
         free = part.shared | (self.spec.frames.keys() - hanging)  # a free root can have its edge here
         taken = [name for name in robot.frames if name in self.frames and name not in free]
+        joints = {
+            edge.joint_name: edge.joint_at or edge.at for edge in robot.edges if edge.joint_name and not part.alone
+        }
+        taken_joints = [name for name in joints if name in self.joints]
         if taken:
             self._refuse_names(taken, part)
+        elif taken_joints:
+            self._refuse("joint", taken_joints, self.joints, joints, part)
+        if taken or taken_joints:
             return False
+        self.joints |= joints
         for name, place in robot.frames.items():
             self.frames.setdefault(name, place)
         for name, link in robot.links.items():
@@ -83,12 +94,25 @@ class Drafts:
         return True
 
     def _refuse_names(self, taken: list[str], part: Joined) -> None:
+        first = taken[0]
+        more = f"; or ros: {{shared_frames: [{first}]}}"
+        root = not part.said.prefix and len(taken) == 1 and first != part.root and part.said.root is None
+        before = f"root: {first}, if the part begins there; or " if root else ""
+        self._refuse("frame", taken, self.frames, part.robot.frames, part, (before, more))
+
+    def _refuse(  # noqa: PLR0913, PLR0917 (what is taken, where, by whom, and what else could be done)
+        self,
+        kind: str,
+        taken: list[str],
+        there: Mapping[str, Span],
+        brought: Mapping[str, Span],
+        part: Joined,
+        else_: tuple[str, str] = ("", ""),
+    ) -> None:
         first, more = taken[0], f" and {len(taken) - 1} more" if taken[1:] else ""
-        notes = [Note(f"{first} stands here", self.frames[first]), Note("and here", part.robot.frames[first])]
-        advice = f"a prefix of its own, prefix: {part.name}/; or ros: {{shared_frames: [{first}]}}"
-        if not part.said.prefix and len(taken) == 1 and first != part.root and part.said.root is None:
-            advice = f"root: {first}, if the part begins there; or {advice}"
-        message = f"the part {part.name} brings the frame {first}{more}, which is there already"
+        notes = [Note(f"{first} stands here", there[first]), Note("and here", brought[first])]
+        advice = f"{else_[0]}a prefix of its own, prefix: {part.name}/{else_[1]}"
+        message = f"the part {part.name} brings the {kind} {first}{more}, which is there already"
         place = self.source.at_key(("parts", part.name))
         self.found.append(finding("TF505", message, place, notes=notes, help=advice))
 
@@ -107,6 +131,8 @@ class Drafts:
     ) -> None:
         """Take the edge that is written at a place; a sensor's and a part's is its mount."""
         named_at = joint.at if joint else self.source.at_key(at) if joint_name else None
+        if named_at:
+            self.joints[joint_name] = named_at
         free = joint if joint and joint.type in FREE else None
         joint = None if free else joint
         owner = owner or keys.owner or (JOINTS if joint else STATIC)

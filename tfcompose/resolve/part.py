@@ -39,6 +39,11 @@ class Joined:
     root: str | None
     shared: frozenset[str]
 
+    @property
+    def alone(self) -> bool:
+        """Whether it is a robot of its own beside the others, with joint states of its own."""
+        return bool((self.said.namespace or "").strip("/"))
+
 
 @dataclass(slots=True)
 class PartEntry:

@@ -55,10 +55,11 @@ the nominal values, so the frame ends up off by the difference. Give this unit's
     "TF502": """One name is used for two things.
 
 Sensors and processes share one name space, because a sensor's driver is a process; joints share another.""",
-    "TF505": """A part brings a frame of a name that is taken.
+    "TF505": """A part brings a frame or a joint of a name that is taken.
 
-Frames of all robots in one file need different names, because listeners know frames by nothing else. Give the part a
-prefix; or, if both mean one and the same frame, name it under ros: shared_frames.""",
+Frames of all robots in one file need different names, because listeners know frames by nothing else; so do the joints
+of one robot, which joint states and the URDF know by name. Give the part a prefix; or, if both mean one and the same
+frame, name it under ros: shared_frames.""",
     "TF601": """There is no such preset.
 
 tfcompose presets lists those that come with it; preset_path names folders with your own, VENDOR/MODEL.yaml.""",

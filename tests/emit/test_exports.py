@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import configparser
+import os
 import shutil
 import subprocess
 import sys
@@ -207,7 +208,32 @@ def test_every_service_that_waits_for_health_has_a_check_of_an_edge_of_the_plan(
             assert how["condition"] != "service_healthy" or "healthcheck" in services[other]
         if "healthcheck" in service:
             words = service["healthcheck"]["test"]
+            assert words[0] == "CMD"
             assert tuple(words[words.index("echo") + 1 :][:2]) in edges
+
+
+def test_a_health_check_has_ross_environment_also_where_only_the_entry_point_sources_it(tmp_path: Path) -> None:
+    service = yaml.safe_load(compose(compiled_plan(DRIVEN), Machine(".."))[0][0].text)["services"]["static"]
+    words = [word.replace("$$", "$") for word in service["healthcheck"]["test"][1:]]
+    (tmp_path / "rolling").mkdir()
+    (tmp_path / "rolling/setup.sh").write_text("export SOURCED=yes\n")
+    end = words.index("python3")
+    words[end:] = ["sh", "-c", 'echo "$SOURCED $1"', "sh", "two words"]
+    words = [word.replace("/opt/ros", str(tmp_path)) for word in words]
+    for distro, said in (("rolling", "yes two words"), ("jazzy", " two words")):
+        env = {"PATH": os.environ["PATH"], "ROS_DISTRO": distro}
+        done = subprocess.run(words, env=env, capture_output=True, text=True, check=False)
+        assert (done.stdout.strip("\n"), done.stderr) == (said, "")
+
+
+def test_a_folder_that_a_container_does_not_have_is_said() -> None:
+    plan = compiled_plan(DRIVEN)
+    there = {"drive": "${build_dir}/x", "slam": "${build_dir}/../.."}
+    processes = tuple(replace(one, cwd=there.get(one.name)) for one in plan.processes)
+    said = compose(replace(plan, processes=processes), Machine(".."))[1]
+    assert [line for line in said if "${build_dir}" in line] == [
+        "slam needs ${build_dir}/../.., which is outside of /robot: add a volume"
+    ]
 
 
 # launch
@@ -299,6 +325,17 @@ def test_a_driver_is_a_node_with_its_name_parameters_and_remappings(
     assert len(handlers) == 2, "configured when it was started, and activated when it is inactive"
     variables = [action.words for action in actions if action.kind == "SetEnvironmentVariable"]
     assert variables == [("ROS_DOMAIN_ID", "7"), ("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")]
+
+
+def test_what_launch_does_otherwise_with_a_process_is_said() -> None:
+    text = DRIVEN.replace("node: slam,", "node: slam, lifecycle: active,")
+    _, said = launch(compiled_plan(text), Machine(".."), built(text)["robot.urdf"])
+    assert [line for line in said if line.startswith(("drive", "/r1"))] == [
+        "drive is started again without a limit",
+        "drive is ended by SIGINT, and not by SIGTERM",
+        "/r1/slam of slam is not brought into its lifecycle state",
+    ]
+    assert "slam is started again whatever its exit code, and without a limit" in said
 
 
 def test_where_a_urdf_is_not_all_that_we_send_our_own_publishers_are_started(

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 #: Where the plan's folder is inside a container.
 INSIDE = "/robot"
 IMAGE = "${TFCOMPOSE_IMAGE:?set it to an image with ROS 2 Jazzy and tfcompose}"
+#: A health check does not come through the image's entry point, which sources the setup file for the process itself.
+_SOURCED = 'setup=/opt/ros/${ROS_DISTRO:-jazzy}/setup.sh; [ ! -f "$setup" ] || . "$setup"; exec "$@"'
 _MET = {"started": "service_started", "ready": "service_healthy", "done": "service_completed_successfully"}
 
 
@@ -30,8 +32,9 @@ def compose(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
         for name, what in process.after.items():
             if what == "ready" and plan.process(name).kind != "external" and not plan.edges_of(name):
                 said.append(f"{process.name} waits until {name} was started: compose cannot see that it is ready")
-        outside = [word for word in (*process.argv, *process.env.values()) if "${build_dir}/.." in word]
-        said += [f"{process.name} reads {word}, which is outside of {INSIDE}: add a volume" for word in outside]
+        named = (*process.argv, *process.env.values(), process.cwd or "")
+        outside = [word for word in named if "${build_dir}/.." in word]
+        said += [f"{process.name} needs {word}, which is outside of {INSIDE}: add a volume" for word in outside]
     return (File("compose.yaml", "\n".join([*lines, ""])),), said
 
 
@@ -61,7 +64,7 @@ def _service(plan: Plan, process: PlanProcess, machine: Machine) -> dict[str, An
     if edges:
         words = ["python3", "-m", "tfcompose", "echo", edges[0].parent, edges[0].child, "--once", "--timeout", "5"]
         words += _namespace(process)
-        test = ["CMD", *(_kept(word) for word in words)]
+        test = ["CMD", *(_kept(word) for word in ("sh", "-c", _SOURCED, "sh", *words))]
         service["healthcheck"] = {"test": test, "interval": "10s", "timeout": "8s", "start_period": "30s", "retries": 3}
     return service
 

@@ -88,9 +88,21 @@ def launch(plan: Plan, machine: Machine, urdf: str) -> tuple[tuple[File, ...], l
             lines += _started(process)
         if process.after and process.kind != "guard":
             said.append(f"{process.name} does not wait for {', '.join(process.after)}: launch knows no readiness")
+        said += _unlike(process)
     head = _HEAD.replace("{robot}", plan.robot).replace("{folder!r}", repr(machine.folder))
     text = head + "".join(f"        {line}\n" for line in lines) + "    ])\n"
     return (File(f"{plain_name(plan.robot)}.launch.py", text),), said
+
+
+def _unlike(process: PlanProcess) -> Iterator[str]:
+    """Yield what launch does otherwise with a process."""
+    if process.kind == "run" and process.lifecycle and not _is_node(process):
+        yield f"{', '.join(process.lifecycle)} of {process.name} is not brought into its lifecycle state"
+    if process.kind == "run" and process.restart != "no":
+        whatever = "whatever its exit code, and " if process.restart == "on-failure" else ""
+        yield f"{process.name} is started again {whatever}without a limit"
+    if process.stop.signal != "SIGINT":
+        yield f"{process.name} is ended by SIGINT, and not by {process.stop.signal}"
 
 
 def _variables(plan: Plan) -> Iterator[tuple[str, str]]:
@@ -164,10 +176,9 @@ def _started(process: PlanProcess) -> list[str]:
     again = "" if process.restart == "no" else ", respawn=True, respawn_delay=1.0"
     ends = ", on_exit=Shutdown()" if process.required else ""
     package = _EXECUTABLE.fullmatch(process.argv[0]) if process.argv else None
-    own, ros_words = _rest(process)
-    told_file = any("${params_file}" in word for word in (*process.env.values(), *own))
-    if package is None or len(process.nodes) != 1 or process.cwd is not None or told_file:
+    if package is None or not _is_node(process):
         return [f"process({process.name!r}{again}{ends}),"]
+    own, ros_words = _rest(process)
     namespace, _, node = process.nodes[0].rpartition("/")
     arguments, ros_arguments = ([_filled(word) for word in words] for words in (own, ros_words))
     told = [
@@ -182,6 +193,12 @@ def _started(process: PlanProcess) -> list[str]:
     made = f"({', '.join(told)}{again}{ends})"
     state = process.lifecycle.get(process.nodes[0])
     return [f"*managed(LifecycleNode{made}, active={state == 'active'}),"] if state else [f"Node{made},"]
+
+
+def _is_node(process: PlanProcess) -> bool:
+    """Return whether launch can start the process as one node, and not only as a process."""
+    told_file = any("${params_file}" in word for word in (*process.env.values(), *_rest(process)[0]))
+    return bool(_package(process)) and len(process.nodes) == 1 and process.cwd is None and not told_file
 
 
 def _rest(process: PlanProcess) -> tuple[list[str], list[str]]:

@@ -77,6 +77,19 @@ def test_the_table_has_a_line_for_each_edge(tmp_path: Path) -> None:
     assert lines[2].split()[3:] == ["–", "dynamic", "50.0", "Hz", "0.0", "ms", "20.0", "ms", "4.0", "ms", "4.0", "ms"]
 
 
+def test_the_table_says_how_many_were_refused(tmp_path: Path) -> None:
+    nan = (float("nan"), 0.0, 0.0)
+    some = [(*sent[:5], nan if index % 10 == 0 else sent[5], UP) for index, sent in enumerate(drive())]
+    lines = tfcompose("monitor", "--bag", str(write_bag(tmp_path / "bag", some))).stdout.splitlines()
+    assert lines[2].endswith("  20 of 200 refused: a value is not a finite number")
+    bag = write_bag(tmp_path / "all", [(*sent[:5], nan, UP) for sent in drive()])
+    assert (
+        tfcompose("monitor", "--bag", str(bag))
+        .stdout.splitlines()[2]
+        .endswith("  refused: a value is not a finite number")
+    )
+
+
 def test_a_namespace_is_looked_at_alone_and_where_tf_is_instead_is_said(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / "bag", drive(topic="/robot1/tf"))
     assert edges(tfcompose("monitor", "--bag", str(bag), "--namespace", "robot1", "--format", "json"))

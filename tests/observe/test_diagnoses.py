@@ -134,6 +134,11 @@ def test_a_name_with_a_slash_in_front_is_the_frame_without_as_in_tf2_and_is_told
     assert set(messages(History().fixed("/base_link base_link").seen())) == {"TF821"}
 
 
+def test_what_is_sent_with_a_timer_of_the_least_rate_is_often_enough() -> None:
+    assert messages(History().moving("odom base_link", hz=19.4).seen()) == {}
+    assert set(messages(History().moving("odom base_link", hz=15.0).seen())) == {"TF838"}
+
+
 def test_stamps_that_stand_with_the_clock_are_told_of_the_clock_alone() -> None:
     history = History().moving("odom base_link", stamp=lambda _: 106 * SECOND_NS).fixed("base_link laser")
     clock = Topic("/clock", "rosgraph_msgs/msg/Clock", ("/gazebo",), ("/nav",))

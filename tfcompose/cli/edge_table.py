@@ -59,7 +59,8 @@ def _row(seen: EdgeSeen, several: set[str]) -> tuple[str, ...]:
     strand, timing = seen.strand, seen.timing
     remarks = []
     if strand.refused is not None:
-        remarks.append(f"refused: {strand.refused.text}")
+        some = f"{strand.refusals} of {strand.tally.count} " if strand.refusals < strand.tally.count else ""
+        remarks.append(f"{some}refused: {strand.refused.text}")
     if strand.child in several and seen.present is not False:
         remarks.append("not the only one")
     if seen.present is False:

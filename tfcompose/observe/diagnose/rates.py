@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 LEAST = {("odom", "base_link"): 20.0, ("odom", "base_footprint"): 20.0, ("map", "odom"): 5.0}
 #: Any edge that others hang on.
 LEAST_INSIDE = 5.0
+#: A timer of 20 Hz sends a little less than 20 Hz.
+NEARLY = 0.9
 #: So many messages say how often something comes.
 FEWEST = 3
 #: A gap that is longer by this factor than the others, and than so many seconds.
@@ -34,7 +36,7 @@ def low_rate(seen: Seen) -> Iterator[Diagnostic]:
     inside, rated = {edge.strand.parent for edge in seen.taken}, seen.rated
     for edge in seen.moving:
         rate, least = edge.timing.rate, least_of(edge, inside)
-        if edge.strand.child in rated or rate is None or rate >= least or is_silent(edge) or _has_gap(edge):
+        if edge.strand.child in rated or rate is None or rate >= NEARLY * least or is_silent(edge) or _has_gap(edge):
             continue
         if edge.strand.tally.count < FEWEST and seen.seconds < 2 * SURE_S:
             continue

@@ -134,6 +134,22 @@ def test_a_name_with_a_slash_in_front_is_the_frame_without_as_in_tf2_and_is_told
     assert set(messages(History().fixed("/base_link base_link").seen())) == {"TF821"}
 
 
+def test_data_in_a_frame_without_its_robots_prefix_are_told_the_name_with_it() -> None:
+    history = History().moving("robot1/odom robot1/base_link").fixed("robot1/base_link robot1/laser")
+    data = Stamped("/robot1/scan", "laser", ("/robot1/lidar",), (0.0,) * 5)
+    found = diagnose(history.seen(stamped=(data,)))
+    assert [(one.code, one.help) for one in found] == [
+        ("TF840", "is it meant to be robot1/laser? A frame_prefix is on one side only")
+    ]
+
+
+def test_a_node_that_sends_a_loop_alone_is_not_told_to_end_one_of_several() -> None:
+    alone = History().moving("a b").moving("b a")
+    assert [one.help for one in diagnose(alone.seen())] == ["let /drive leave one of these edges out"]
+    two = History().moving("a b").moving("b a", b"x")
+    assert [one.help for one in diagnose(two.seen())] == ["end one of these nodes, or turn its edge round"]
+
+
 def test_what_is_sent_with_a_timer_of_the_least_rate_is_often_enough() -> None:
     assert messages(History().moving("odom base_link", hz=19.4).seen()) == {}
     assert set(messages(History().moving("odom base_link", hz=15.0).seen())) == {"TF838"}

@@ -39,6 +39,9 @@ def data_frame_unknown(seen: Seen) -> Iterator[Diagnostic]:
         plain = each.frame.removeprefix("/")
         otherwise = f"set the driver's frame_id to a frame of the tree, or publish the edge that leads to {each.frame}"
         advice = did_you_mean(each.frame, frames, otherwise)
+        prefixed = sorted(name for name in frames if name.rpartition("/")[2] == plain.rpartition("/")[2])
+        if prefixed:
+            advice = f"is it meant to be {listed(prefixed)}? A frame_prefix is on one side only"
         if plain in frames:
             message = f"{each.topic} from {who_sends} is in the frame {each.frame}: tf2 refuses names that begin with /"
             advice = f"set the driver's frame_id to {plain}"

@@ -55,7 +55,11 @@ def loop(seen: Seen) -> Iterator[Diagnostic]:
         notes = [Note(f"{edge.name} is published by {who(edge)}") for edge in on_it]
         elsewhere = [edge for edge in seen.taken if edge.strand.child in frames and edge.strand.parent not in frames]
         notes += [Note(f"{edge.name}, which leads out of the loop, is published by {who(edge)}") for edge in elsewhere]
-        yield finding("TF820", message, None, notes=notes, help="end one of these nodes, or turn its edge round")
+        nodes = {who(edge) for edge in on_it}
+        advice = "end one of these nodes, or turn its edge round"
+        if len(nodes) == 1 and not elsewhere:
+            advice = f"let {nodes.pop()} leave one of these edges out"
+        yield finding("TF820", message, None, notes=notes, help=advice)
 
 
 def second_parent(seen: Seen) -> Iterator[Diagnostic]:

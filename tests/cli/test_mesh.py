@@ -13,6 +13,8 @@ from urllib.parse import unquote
 import pytest
 import trimesh
 
+from tfcompose.cli import main
+
 ROBOT = """tfcompose: 1
 robot: r
 packages: {named: ../third party/named}
@@ -96,6 +98,53 @@ def test_a_package_that_is_nowhere_is_said_with_the_places_that_were_looked_at(w
     asked = build(workspace, "--mesh", "file")
     assert asked.returncode == 1
     assert "error[TF724] package://sorced/meshes/s.stl was not found" in asked.stderr
+
+
+def test_a_package_that_is_nowhere_else_is_the_one_around_the_file_that_asks(
+    workspace: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So a checkout of a vendor's package is read before it is built and sourced, and what is sourced comes first."""
+    source = workspace / "src/third party/named"
+    (source / "package.xml").write_text("<package><name>named</name></package>")
+    (source / "urdf").mkdir()
+    (source / "urdf/height.xacro").write_text(
+        '<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:property name="size" value="2"/></robot>'
+    )
+    (source / "urdf/arm.xacro").write_text(
+        '<robot name="arm" xmlns:xacro="http://ros.org/wiki/xacro"><link name="base"><visual><geometry>'
+        '<xacro:include filename="$(find named)/urdf/height.xacro"/>'
+        '<mesh filename="package://named/n.stl" scale="1 1 ${size}"/></geometry></visual></link></robot>'
+    )
+    monkeypatch.setenv("AMENT_PREFIX_PATH", "/nowhere")
+    monkeypatch.chdir(workspace)
+    whole = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\nparts:\n  arm: {xacro: ../ARM, parent: base_link}\n"
+    (workspace / "src/robots/r.yaml").write_text(whole.replace("ARM", "third party/named/urdf/arm.xacro"))
+    assert main(["build", "src/robots/r.yaml", "--mesh", "file"]) == 0
+    assert unquote(addresses(workspace / "build/r")[0]) == f"file://{source}/n.stl"
+    assert main(["import", "src/third party/named/urdf/arm.xacro", "-o", "src/robots/imported.yaml"]) == 0
+    assert "  named: ../third party/named\n" in (workspace / "src/robots/imported.yaml").read_text().replace('"', "")
+    assert main(["lint", "src/robots/imported.yaml", "src/third party/named/urdf/arm.xacro"]) == 0
+    assert "TF724" not in capsys.readouterr().err
+    (workspace / "install/share/named").mkdir()
+    monkeypatch.setenv("AMENT_PREFIX_PATH", f"{workspace}/install")
+    assert main(["build", "src/robots/r.yaml"]) == 1
+    assert f"No such file or directory: {workspace}/install/share/named/urdf/height.xacro" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("command", "way"), [("import", "; --package nmd=FOLDER, or source"), ("lint", "; source the")]
+)
+def test_what_to_do_about_a_package_is_what_the_command_can_do(
+    workspace: Path, capsys: pytest.CaptureFixture[str], command: str, way: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("AMENT_PREFIX_PATH", "")
+    file = workspace / "a.xacro"
+    file.write_text(
+        '<robot name="a" xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="$(find nmd)/x"/></robot>'
+    )
+    assert main([command, str(file)]) != 0
+    said = capsys.readouterr()
+    assert f"AMENT_PREFIX_PATH is empty{way}" in said.err + said.out
 
 
 def test_a_build_is_the_same_wherever_the_workspace_is(workspace: Path) -> None:

@@ -47,7 +47,7 @@ _HELP = {
 def lint_urdf(file: str) -> list[Diagnostic]:
     """Return what is wrong with the file, by place. A xacro file is expanded, and places are those of the result."""
     try:
-        read = read_urdf(file, Packages(disk()))
+        read = read_urdf(file, Packages(disk(), otherwise="source the workspace's setup file"))
     except RejectedError as error:
         return list(error.diagnostics)
     return read.judged()

@@ -37,7 +37,7 @@ def expanded(file: str, packages: Packages, arguments: Mapping[str, str] | None 
         raise RejectedError([finding("TF904", "xacro is not installed", Span(file), help=advice)]) from None
     try:
         xacro.all_includes.clear()
-        with _finding(packages):
+        with _finding(packages, file):
             given = {name: str(value) for name, value in (arguments or {}).items()}
             document = _document(xacro, file, text, given)
         _refuse_unknown(given, [file, *xacro.all_includes], file)
@@ -108,13 +108,13 @@ def _no_argument(name: str, known: Collection[str], file: str) -> Diagnostic:
 
 
 @contextlib.contextmanager
-def _finding(packages: Packages) -> Iterator[None]:
-    """Let $(find NAME) be answered by the robot's packages too, for as long as a file is expanded."""
+def _finding(packages: Packages, file: str) -> Iterator[None]:
+    """Let $(find NAME) be answered by the robot's packages too, for as long as ``file`` is expanded."""
     substitution: Any = import_module("xacro.substitution_args")
     before = substitution._eval_find  # noqa: SLF001 (xacro offers no other way)
 
     def find(name: str) -> str:
-        folder = packages.folder(name)
+        folder = packages.folder(name, file)
         if folder is None:
             raise _MissingError(packages.not_found(name, None))
         return str(Path(folder).absolute())  # relative paths in xacro begin at the file that includes

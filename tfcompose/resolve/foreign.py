@@ -85,7 +85,7 @@ def _address(named: str, at: Span, packages: Packages) -> str:
     found = _PACKAGE.fullmatch(named)
     if found is None:
         return beside(named, at)
-    folder = packages.folder(found[1])
+    folder = packages.folder(found[1], at.file)
     if folder is None:
         raise RejectedError([replace(packages.not_found(found[1], at), severity="error")])
     return f"{folder}/{found[2]}"

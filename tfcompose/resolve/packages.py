@@ -1,4 +1,4 @@
-"""Where packages and files are: by the robot's own ``packages:``, then by the ament index.
+"""Where packages and files are: by the robot's own ``packages:``, then by the ament index, then above the file that asks.
 
 Nothing is opened here. What may be asked about files is handed in, so that a robot can be compiled from text alone.
 """
@@ -62,10 +62,16 @@ def _unquoted(text: str) -> str:
 
 @dataclass(slots=True)
 class Packages:
-    """Finds packages and addressed files. ``named`` are the robot's own: name → folder and its place."""
+    """Finds packages and addressed files. ``named`` are the robot's own: name → folder and its place.
+
+    ``otherwise`` is what to do where a package is nowhere. ``own`` are the packages, with their folders, that were
+    found nowhere else than around the file that addresses something in them, as in a source tree that is not built.
+    """
 
     disk: Disk | None = None
     named: Mapping[str, tuple[str, Span]] = field(default_factory=dict)
+    otherwise: str = "packages: {{{name}: FOLDER}}, or source the workspace's setup file"
+    own: dict[str, str] = field(default_factory=dict)
     _above: dict[str, tuple[str, str]] = field(default_factory=dict)
     _missed: set[tuple[str, str]] = field(default_factory=set)
 
@@ -74,19 +80,20 @@ class Packages:
         own = [beside(*self.named[name])] if name in self.named else []
         return own + [posixpath.join(prefix, "share", name) for prefix in (self.disk.prefixes if self.disk else ())]
 
-    def folder(self, name: str) -> str | None:
-        """Return the package's folder, or None where there is none."""
+    def folder(self, name: str, file: str) -> str | None:
+        """Return the package's folder, or None where there is none; the last one looked at is that around ``file``."""
         if self.disk is None:
             return None
-        return next((place for place in self.places(name) if self.disk.is_folder(place)), None)
+        there = next((place for place in self.places(name) if self.disk.is_folder(place)), None)
+        around, folder = ("", "") if there is not None else self._around(posixpath.dirname(file))
+        return (folder or ".") if around == name else there
 
     def not_found(self, name: str, at: Span | None) -> Diagnostic:
         """Return the finding that a package is nowhere, with the list of where it was looked for."""
         places = self.places(name)
         looked = f"looked in {', '.join(places)}" if places else "AMENT_PREFIX_PATH is empty"
-        otherwise = f"packages: {{{name}: FOLDER}}, or source the workspace's setup file"
         near = slip_of(name, self.named) or nearest(name, self.named, _NEAR)
-        advice = f"{looked}; {f'did you mean {near}?' if near else otherwise}"
+        advice = f"{looked}; {f'did you mean {near}?' if near else self.otherwise.format(name=name)}"
         return finding("TF724", f"no package {name}", at, help=advice, severity="warning")
 
     def asset(self, uri: str, at: Span) -> tuple[Asset, Diagnostic | None]:
@@ -113,11 +120,13 @@ class Packages:
         if not name or not inside:
             advice = f"a slash too many: package://{inside}" if "/" in inside else "package://NAME/PATH"
             return Asset(uri, at), finding("TF723", f"{uri} is no address of a file", at, help=advice)
-        folder = self.folder(name)
+        folder = self.folder(name, at.file)
         if folder is None:
             is_new = self.disk is not None and (name, at.file) not in self._missed
             self._missed.add((name, at.file))  # that a package is missing is said once of a file
             return Asset(uri, at, "", name, inside), self.not_found(name, at) if is_new else None
+        if folder not in self.places(name):
+            self.own[name] = folder
         path = posixpath.join(folder, inside)
         return Asset(uri, at, path, name, inside), self._missing(path, f"no file {inside} in {name}", at)
 
@@ -132,11 +141,14 @@ class Packages:
 
     def _package_above(self, path: str) -> tuple[str, str]:
         """Return the package whose source or share folder the file is in, and its path there; empty without one."""
-        folder = posixpath.dirname(path)
+        name, top = self._around(posixpath.dirname(path))
+        return (name, posixpath.relpath(path, top or ".")) if name else ("", "")
+
+    def _around(self, folder: str) -> tuple[str, str]:
+        """Return the name and folder of the package that the folder is, or is in; empty without one."""
         if folder not in self._above:
             self._above[folder] = self._find_above(folder)
-        name, top = self._above[folder]
-        return (name, posixpath.relpath(path, top or ".")) if name else ("", "")
+        return self._above[folder]
 
     def _find_above(self, folder: str) -> tuple[str, str]:
         for _ in range(_HIGHEST if self.disk else 0):

@@ -122,8 +122,9 @@ it. A warning where a checkout without Git LFS has a pointer in the file's place
 is fetched.""",
     "TF724": """A package is not to be found here.
 
-It was looked for where packages: says, then in share/PACKAGE of each folder in AMENT_PREFIX_PATH. Source the
-workspace's setup file first, or name the folder: packages: {my_robot_description: ../description}.""",
+It was looked for where packages: says, then in share/PACKAGE of each folder in AMENT_PREFIX_PATH; a file's own package
+is also the one around it, by its package.xml. Source the workspace's setup file first, or name the folder:
+packages: {my_robot_description: ../description}.""",
     "TF725": """A mass is to be spread over a mesh that has no volume.
 
 Only a closed mesh has one whose triangles all face outwards, or all inwards, and only one that is found here. Mend it

@@ -70,7 +70,8 @@ def run(arguments: Namespace) -> int:
         return 2
     try:
         named = {name: (str(Path(folder).absolute()), Span(folder)) for name, folder in packages.items()}
-        read = read_urdf(arguments.file, Packages(disk(), named), given)
+        known = Packages(disk(), named, otherwise="--package {name}=FOLDER, or source the workspace's setup file")
+        read = read_urdf(arguments.file, known, given)
     except RejectedError as error:
         print_findings(error.diagnostics, sys.stderr)
         return UNREADABLE if unreadable(error.diagnostics) else 1
@@ -79,7 +80,7 @@ def run(arguments: Namespace) -> int:
     if errors and not arguments.keep_going:
         complain("nothing was written; --keep-going writes what can be taken")
         return 1
-    text, failed = _written(read, arguments, packages)
+    text, failed = _written(read, arguments, known.own | packages)
     if failed and not arguments.keep_going:
         print_findings([replace(one, span=None) for one in failed], sys.stderr)  # places in what is not written
         complain("nothing was written: the source has what a robot file cannot; --keep-going writes it all the same")

@@ -1,4 +1,4 @@
-"""Where packages and files are: by the robot's own ``packages:``, then by the ament index, then above the file that asks.
+"""Where packages and files are: by the robot's ``packages:``, then by the ament index, then around the file that asks.
 
 Nothing is opened here. What may be asked about files is handed in, so that a robot can be compiled from text alone.
 """

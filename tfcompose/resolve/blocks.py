@@ -5,6 +5,7 @@ A raw block is text of the user's; its places are lines of the robot file.
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, RejectedError, Span, did_you_mean, finding, nearest
@@ -27,6 +28,8 @@ _OWN = {"link": "links", "joint": "joints", "robot": "include"}
 REFERRING = frozenset({"gazebo", "transmission", "ros2_control"})
 #: As many joints are named where one is wrong.
 _LISTED = 8
+_SUBSTITUTION = re.compile(r"\$\((?:find|find-pkg-share|arg|var|env|optenv|eval|dirname|cwd)\b[^()\n<>]*\)")
+_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _INNER = frozenset({"visual", "collision", "inertial", "origin", "geometry", "limit", "mimic", "axis", "plugin"})
 
 
@@ -83,9 +86,24 @@ def blocks_of(
             found += [replace(one, span=_in_file(one.span, text, source, at)) for one in error.diagnostics]
             continue
         blocks.append(Block(name, place, text))
-        for one in _misplaced(root, frames, joints):
+        for one in (*_misplaced(root, frames, joints), *_unexpanded(text, source.file)):
             found.append(replace(one, span=_in_file(one.span, text, source, at)))
     return tuple(blocks), found
+
+
+def _unexpanded(text: str, file: str) -> Iterator[Diagnostic]:
+    """Yield a finding for each substitution of xacro's or a launch file's, with its place below the line <robot>."""
+    for found in _SUBSTITUTION.finditer(_COMMENT.sub(_blank, text)):
+        before = text[: found.start()]
+        line, column = before.count("\n") + 2, found.start() - before.rfind("\n")
+        message = f"{found[0]} stays as it is: nobody expands it in a URDF"
+        advice = "the path itself; with vars: {config: /opt/…}, ${config}/x.yaml and --set vars.config=… elsewhere"
+        place = Span(file, line, column, line, column + len(found[0]))
+        yield finding("TF729", message, place, help=advice, severity="warning")
+
+
+def _blank(comment: re.Match[str]) -> str:
+    return re.sub(r"[^\n]", " ", comment[0])
 
 
 def _in_file(span: Span | None, text: str, source: Source, at: Path) -> Span:

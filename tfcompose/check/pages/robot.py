@@ -105,6 +105,10 @@ joints are written under links: and joints:, so that they are checked and have a
 
 A fixed or floating joint has no axis, limits or mimic, and a continuous one turns for ever, whatever its lower and
 upper limit: it is not written, or no reader takes it. Often the type is what is wrong.""",
+    "TF729": """A raw XML block has $(find …), or another substitution of xacro files or launch files.
+
+A block stands in the URDF as it is written, and no reader of a URDF expands that: Gazebo looks for a folder called
+$(find my_robot). Write the path itself; a variable keeps it in one place, and --set changes it on another machine.""",
     "TF720": """An element or an attribute is not one of URDF's.
 
 Readers pass over it without a word: with <orign> a joint is at its parent's origin. An error where a known name is

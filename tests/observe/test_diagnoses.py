@@ -143,6 +143,37 @@ def test_data_in_a_frame_without_its_robots_prefix_are_told_the_name_with_it() -
     ]
 
 
+def test_data_of_another_clock_are_told_which_it_is() -> None:
+    def of(stamp_ns: int, history: History, **more: Any) -> tuple[str, str]:
+        times = [END_NS, more["clock_ns"]] if "clock_ns" in more else [END_NS]
+        delay_s = min((time_ns - stamp_ns for time_ns in times), key=abs) / 1e9
+        data = Stamped("/imu", "base_link", ("/imu",), (delay_s,) * 5, stamp_ns, END_NS)
+        (found,) = diagnose(history.seen(stamped=(data,), **more))
+        assert found.code == "TF841"
+        return found.message, found.help
+
+    message, advice = of(0, robot())
+    assert message.startswith("/imu from /imu has no stamp: no lookup brings it together with odom → base_link")
+    assert advice.startswith("set header.stamp")
+    message, advice = of(1234 * SECOND_NS, robot())
+    assert "is stamped with 1234.0 s, which is simulated time, or time since a start: no lookup" in message
+    assert advice.endswith("let the driver stamp with ROS time, not with its device's")
+    message, advice = of(END_NS + 7200 * SECOND_NS, robot())
+    assert "is stamped 2 h ahead of the system's time" in message
+    assert advice.startswith("the clock behind /imu is 2 h ahead: sync it")
+    simulated = History().moving("odom base_link", stamp=lambda now: now - BEGUN_NS).fixed("base_link laser")
+    message, advice = of(END_NS, simulated, clock_ns=5 * SECOND_NS, clock_moves=True)
+    assert "is stamped with the system's time, and /clock says 5.0 s" in message
+    assert advice.startswith("set use_sim_time alike")
+
+
+def test_data_and_a_tree_of_one_old_recording_are_together() -> None:
+    day_ns = 86_400 * SECOND_NS
+    played = History().moving("odom base_link", stamp=lambda now: now - day_ns).fixed("base_link laser")
+    data = Stamped("/scan", "laser", ("/player",), (86_400.0,) * 5, END_NS - day_ns, END_NS)
+    assert set(messages(played.seen(stamped=(data,)))) == {"TF825"}
+
+
 def test_a_node_that_sends_a_loop_alone_is_not_told_to_end_one_of_several() -> None:
     alone = History().moving("a b").moving("b a")
     assert [one.help for one in diagnose(alone.seen())] == ["let /drive leave one of these edges out"]

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from tfcompose.ros.topics import GLOBAL
+from tfcompose.verdict.clock import WRONG_BY_NS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -33,13 +34,16 @@ class Stamped:
     """Messages with a header on a topic, of one frame.
 
     ``delays_s`` are how old their stamps were when they came, in seconds of the clock that they are nearest to;
-    negative: ahead of it.
+    negative: ahead of it. ``stamp_ns`` is the newest message's stamp, and ``received_ns`` when it came by the system's
+    clock; None and 0 where that is not known.
     """
 
     topic: str
     frame: str
     nodes: tuple[str, ...]
     delays_s: tuple[float, ...]
+    stamp_ns: int | None = None
+    received_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +126,16 @@ class Seen:
     def rated(self) -> frozenset[str]:
         """The frames of which a plan says how often they come: they are judged by that."""
         return frozenset(edge.child for edge in self.plan.edges if edge.rate) if self.plan else frozenset()
+
+    @property
+    def simulated(self) -> bool:
+        """Whether stamps should be of simulated time: a plan says so, or most edges are nearer to /clock."""
+        if self.plan and self.plan.ros.clock == "sim":
+            return True
+        if self.clock_ns is None:
+            return False
+        stamps = [edge.strand.stamp_ns for edge in self.moving if edge.strand.stamp_ns]
+        return 2 * sum(abs(stamp_ns - self.clock_ns) <= WRONG_BY_NS for stamp_ns in stamps) >= len(stamps)
 
     def where(self, edge: EdgeSeen) -> str:
         """Return on which machine and as which process the publisher of an edge runs, empty if that is not known."""

@@ -37,6 +37,7 @@ class Sideline:
         self._headers: dict[str, HeaderSubscription | None] = {}
         self._joints: dict[str, JointStateSubscription] = {}
         self._delays: dict[tuple[str, str], list[float]] = {}
+        self._newest: dict[tuple[str, str], tuple[int, int]] = {}  # stamp and arrival
         self._senders: dict[str, tuple[str, ...]] = {}
         self._movable: tuple[Movable, ...] = ()
         self._names: set[str] = set()
@@ -64,6 +65,7 @@ class Sideline:
                 times = [received_ns] if clock_ns is None else [received_ns, clock_ns]
                 delay_ns = min((time - stamp_ns for time in times), key=abs)
                 self._delays.setdefault((topic, frame), []).append(delay_ns / 1e9)
+                self._newest[topic, frame] = (stamp_ns, received_ns)
             heard = sum(len(some) for (name, _), some in self._delays.items() if name == topic) if taken else 0
             if subscription and heard >= ENOUGH:
                 self._end(subscription)
@@ -77,7 +79,7 @@ class Sideline:
     def picture(self) -> dict[str, Any]:
         """Return what was heard, as parts of ``Seen``."""
         stamped = tuple(
-            Stamped(topic, frame, self._senders.get(topic, ()), tuple(delays))
+            Stamped(topic, frame, self._senders.get(topic, ()), tuple(delays), *self._newest[topic, frame])
             for (topic, frame), delays in sorted(self._delays.items())
         )
         return {

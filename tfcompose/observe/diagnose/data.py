@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
 from tfcompose.observe.seen import listed, who
-from tfcompose.verdict.clock import seconds
+from tfcompose.verdict.clock import WRONG_BY_NS, other_clock, seconds
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,6 +21,8 @@ KEPT_S = 10.0
 LACK_S = 0.3
 #: A clock, or a driver, that is ahead by more.
 AHEAD_S = 0.05
+#: A clock that is farther off is another clock.
+HOUR_S = 3600.0
 FEWEST = 3
 
 
@@ -53,7 +55,11 @@ def data_beyond_tf(seen: Seen) -> Iterator[Diagnostic]:
     for each in seen.stamped:
         sender = listed(each.nodes) or "somebody"
         for lack_s, age_s, edge in _latest_above(seen, each):
-            if lack_s > LACK_S:
+            said = _clock_said(seen, each, edge, age_s)
+            if said:
+                message = f"{each.topic} from {sender} {said}: no lookup brings it together with {edge.name}"
+                yield finding("TF841", message, None, help=_clock_help(each, age_s))
+            elif lack_s > LACK_S:
                 message = f"{each.topic} from {sender} is stamped {seconds(lack_s)} after the newest {edge.name}"
                 message += f" from {who(edge)}"
                 yield finding("TF841", f"{message}: extrapolation into the future", None, help=_ahead_help(each, age_s))
@@ -80,6 +86,27 @@ def keeps_data_waiting(seen: Seen) -> set[tuple[str, str]]:
     """Return the edges, parent and child, whose stamps are behind data that need them: they are told with the data."""
     found = [way for each in seen.stamped for way in _latest_above(seen, each)]
     return {(edge.strand.parent, edge.strand.child) for lack_s, _, edge in found if lack_s > LACK_S}
+
+
+def _clock_said(seen: Seen, each: Stamped, edge: EdgeSeen, age_s: float) -> str:
+    """Return how data are of another clock than an edge; nothing where they are only late or ahead."""
+    if each.stamp_ns is None or KEPT_S < abs(age_s) < HOUR_S:
+        return ""
+    apart_ns = each.stamp_ns - edge.strand.stamp_ns - (each.received_ns - edge.strand.tally.last_ns)
+    if abs(apart_ns) <= WRONG_BY_NS:
+        return ""  # a recording that is played without its clock, perhaps
+    if each.stamp_ns == 0:
+        return "has no stamp"
+    said = other_clock(each.stamp_ns, each.received_ns, seen.clock_ns, simulated=seen.simulated)
+    return f"is stamped {said}" if said else ""
+
+
+def _clock_help(each: Stamped, age_s: float) -> str:
+    if each.stamp_ns == 0:
+        return "set header.stamp in the driver; a node with use_sim_time stamps 0 while there is no /clock"
+    if age_s < -AHEAD_S:
+        return _ahead_help(each, age_s)
+    return "set use_sim_time alike for all nodes, and let the driver stamp with ROS time, not with its device's"
 
 
 def _ahead_help(each: Stamped, age_s: float) -> str:

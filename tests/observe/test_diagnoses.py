@@ -125,6 +125,28 @@ def test_a_frame_that_one_node_hands_over_is_no_finding_and_one_that_jumps_to_an
     assert found[0].help == "let /ekf send one of them, or end it if it runs twice"
 
 
+def test_a_parent_that_comes_between_now_and_then_is_a_second_one_also_from_the_same_node() -> None:
+    history = History()
+    for tick in range(int(SECONDS * 50)):
+        now = BEGUN_NS + tick * SECOND_NS // 50
+        history.census.take([row("odom base_link", now)], static=False, gid=b"x", received_ns=now)
+        if tick % 15 == 0:
+            history.census.take([row("map base_link", now)], static=False, gid=b"x", received_ns=now)
+    assert "TF802" in messages(history.seen())
+
+
+def test_a_frame_that_goes_from_node_to_node_is_told_once_and_one_whose_node_has_left_is_told_of_too() -> None:
+    history = History().moving("table cup", b"d", until_s=2.0)
+    for tick in range(int(SECONDS * 50)):
+        now = BEGUN_NS + tick * SECOND_NS // 50
+        if tick > 100:
+            history.census.take([row("tool0 cup", now)], static=False, gid=b"x", received_ns=now)
+    history.fixed("table tool0")
+    assert set(messages(history.seen())) == {"TF802"}
+    history.census.graph([Publisher(b"x", "/ekf", static=False), Publisher(b"s", "/static", static=True)])
+    assert "TF804" in messages(history.seen())
+
+
 def test_a_name_with_a_slash_in_front_is_the_frame_without_as_in_tf2_and_is_told() -> None:
     history = History().moving("/odom /base_link").moving("odom base_link", b"x").fixed("base_link laser")
     found = messages(history.seen())

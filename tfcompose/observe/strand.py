@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tfcompose.observe.tally import Tally
     from tfcompose.ros.decoder import Row
 
-#: A frame that changes its parent after so many transforms, or more, in the mean, is handed over.
+#: A frame that stays in each parent for so many transforms, or more, in the mean, is handed over.
 SOME_IN_TURN = 3
 _SECOND_NS = 1_000_000_000
 
@@ -120,6 +120,5 @@ class Turns:
 
     @property
     def are_taken(self) -> bool:
-        """Whether the frame changes hands, now and then; where both come all the time, it jumps to and fro."""
-        sent = sum(each.tally.count for each in self.strands)
-        return sum(each.begun for each in self.strands) * SOME_IN_TURN <= sent
+        """Whether the frame changes hands, now and then; where one comes between the others, it jumps to and fro."""
+        return all((each.begun - 1) * SOME_IN_TURN <= each.tally.count for each in self.strands)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, finding
@@ -50,8 +51,9 @@ def low_rate(seen: Seen) -> Iterator[Diagnostic]:
 def gap(seen: Seen) -> Iterator[Diagnostic]:
     """An edge comes often, and then not at all for a while."""
     rated = seen.rated
+    parents = Counter(child for _, child in {(edge.strand.parent, edge.strand.child) for edge in seen.moving})
     for edge in seen.moving:
-        if not _has_gap(edge) or edge.strand.child in rated:
+        if not _has_gap(edge) or edge.strand.child in rated or parents[edge.strand.child] > 1:
             continue
         rate, longest = edge.timing.rate or 0.0, edge.timing.longest_gap_s or 0.0
         message = f"{edge.name} from {who(edge)} stayed away for {seconds(longest)}, and comes with {rate:.3g} Hz else"
@@ -62,13 +64,13 @@ def gap(seen: Seen) -> Iterator[Diagnostic]:
 def fell_silent(seen: Seen) -> Iterator[Diagnostic]:
     """An edge came, and does not come any more."""
     alive = {(edge.strand.parent, edge.strand.child) for edge in seen.moving if not is_silent(edge)}
-    handed_over = {(edge.strand.child, edge.strand.gid) for edge in seen.moving if not is_silent(edge)}
+    elsewhere = {edge.strand.child for edge in seen.moving if not is_silent(edge)}
     rated = seen.rated
     for edge in seen.moving:
         if not is_silent(edge) or edge.strand.child in rated or (edge.strand.parent, edge.strand.child) in alive:
             continue
-        if (edge.strand.child, edge.strand.gid) in handed_over:
-            continue  # its publisher has put the frame elsewhere
+        if edge.strand.child in elsewhere and edge.present is not False:
+            continue  # the frame hangs on another parent now, which is a finding of its own, or right
         gone = ", which has left" if edge.present is False else ", which is still there"
         message = f"{edge.name}: nothing for {seconds(edge.age_s)} from {who(edge)}{gone}"
         advice = "start it again, and look why it ended" if edge.present is False else "what does it wait for?"

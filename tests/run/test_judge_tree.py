@@ -157,3 +157,20 @@ def test_the_process_that_can_be_stopped_is_named_only_where_it_is_sure() -> Non
     running.repeat(running.joins("/drive"), "base camera", 3)
     found = [event for event in running.events if isinstance(event, Found)]
     assert [(event.found.code, event.process) for event in found] == [("TF801", "slam"), ("TF801", ""), ("TF801", "")]
+
+
+@pytest.mark.parametrize(
+    ("edges", "advice"),
+    [
+        ("odom base", "let /mapper leave base out, or own it: owner: slam"),
+        ("map base", "let /mapper leave base out"),
+    ],
+)
+def test_a_program_of_the_robots_own_is_not_to_be_ended_but_to_leave_the_edge_out(edges: str, advice: str) -> None:
+    slam = next(one for one in PROCESSES if one.name == "slam")
+    history = History(processes=(*(one for one in PROCESSES if one != slam), replace(slam, nodes=("/mapper",)))).clear()
+    history.repeat(history.joins("/mapper"), edges, 5).repeat(history.joins("/rogue"), edges, 5)
+    assert [found.help.split("; ")[0] for found in history.found()] == [
+        advice,
+        "end /rogue, or switch its TF off",
+    ]

@@ -38,7 +38,7 @@ def violation(
     severity: Severity = "warning" if mild else "error"
     notes = [*_others(offences), *([] if place else _declared(first)), *_runs(first, where)]
     message = message_of(first, _more(offences), driven) or _message(offences, plan)
-    advice = advice_of(first, driven) or _switch(first, plan) or _help(first)
+    advice = advice_of(first, driven) or _switch(first, plan) or _help(first, plan)
     return finding(first.code, message, place, help=advice, notes=notes, severity=severity)
 
 
@@ -121,7 +121,7 @@ def _more(offences: Sequence[Offence]) -> str:
     return f" and {more} more edge{'s' if more > 1 else ''}" if more else ""
 
 
-def _help(first: Offence) -> str:
+def _help(first: Offence, plan: Plan) -> str:
     if first.code == "TF803":
         allowed = f"{{parent: {first.parent}, child: {first.child}}}"
         return f"declare it under frames, or allow it: guard: {{allow: [{allowed}]}}"
@@ -137,7 +137,18 @@ def _help(first: Offence) -> str:
         return "tf2 takes whatever came last"
     if first.code == "TF802" and first.is_owners:
         return f"correct what {first.who} publishes, or the parent in the robot's file"
+    if process := _run_by(first, plan):
+        owns = f", or own it: owner: {process}" if first.code == "TF801" else ""
+        return f"let {first.who} leave {first.child} out{owns}"
     return f"end {first.whom}, or switch its TF off; tf2 takes whatever came last"
+
+
+def _run_by(first: Offence, plan: Plan) -> str:
+    """Return which process with programs of the robot's own the offender is of, if it is surely one."""
+    for process in plan.processes if len(first.nodes) == 1 else ():
+        if process.kind in {"run", "external"} and first.nodes[0] in process.nodes:
+            return process.name
+    return ""
 
 
 def _switch(first: Offence, plan: Plan) -> str:

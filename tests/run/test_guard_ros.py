@@ -233,6 +233,14 @@ def test_a_guard_that_was_stopped_for_a_while_blames_nobody(robot: Robot) -> Non
     assert robot.lines("error[") == before
 
 
+def test_a_guard_that_hangs_is_replaced(robot: Robot) -> None:
+    guard = robot.child("guard")
+    guard.send_signal(signal.SIGSTOP)
+    robot.says("guard hangs: it has watched nothing for 1", within=25)
+    robot.says("over", "guard watches again after", within=15)
+    assert robot.child("guard").pid != guard.pid
+
+
 def test_an_owner_that_is_too_slow_is_a_warning(robot: Robot, tmp_path: Path) -> None:
     assert robot
     text = ROBOT.read_text(encoding="utf-8").replace("speed: 0.5 rad/s}, rate: 50 Hz", "speed: 0.5 rad/s}, rate: 20 Hz")

@@ -10,7 +10,7 @@ import pytest
 
 from tests.run.history import GUARD, SLAM, STATIC, begin, plan_of, run_process
 from tfcompose.plan import GuardPolicy, Plan, PlanProcess, Ready, StopRule
-from tfcompose.run.events import Clear, Complete, GateOpen, GateShut, Live, OwnerReady, Remember
+from tfcompose.run.events import Alive, Clear, Complete, GateOpen, GateShut, Live, OwnerReady, Remember
 from tfcompose.run.launcher.happening import Asked, Down, Exited, LogSeen, NewPlan, Signalled
 from tfcompose.run.launcher.lives import refusal
 from tfcompose.run.launcher.notice import (
@@ -256,6 +256,28 @@ def test_a_guard_that_dies_is_told_and_started_again_with_what_it_said_and_what_
     assert back.text == "guard watches again after 1.5 s"
     assert (history.state.stop, history.state.shown, history.killed) == (None, frozenset(), [])
     assert history.state.tracked["guard"].restarts == 1
+
+
+@pytest.mark.parametrize(("mode", "did"), [("watch", "watched nothing"), ("strict", "passed nothing on")])
+def test_a_guard_that_hangs_is_told_and_ended_and_its_end_is_that_of_one_that_dies(mode: str, did: str) -> None:
+    history = begin(GUARD, STATIC, guard=GuardPolicy(mode)).feed(Clear(), Alive())  # type: ignore[arg-type]
+    history.wait(9).feed(Alive())
+    assert (history.sleep_until_due(), history.killed) == (10.0, []), "the launcher may have been kept from running"
+    assert (history.sleep_until_due(), history.killed) == (5.0, [("guard", SIGKILL)])
+    (found,) = history.found()
+    assert (found.severity, found.message) == ("warning", f"guard hangs: it has {did} for 15 s")
+    history.wait(60).feed(Exited("guard", -SIGKILL)).wait(2)
+    assert history.started[-1] == "guard"
+    history.wait(60)
+    assert len(history.killed) == 1, "the next one has not said yet that it looks"
+
+
+def test_a_guard_that_is_heard_again_before_it_is_believed_to_hang_goes_on() -> None:
+    history = begin(GUARD, STATIC).feed(Clear(), Alive())
+    for _ in range(3):
+        history.wait(3600)  # the launcher, or the whole machine, stood still
+        history.wait(1).feed(Alive())
+    assert (history.killed, history.found()) == ([], [])
 
 
 def test_a_strict_guard_that_dies_lets_nothing_pass_and_says_so() -> None:

@@ -137,3 +137,11 @@ def test_ps_says_what_is_optional_why_it_ended_and_that_it_has_failed() -> None:
     camera = said["camera"]
     assert (camera["state"], camera["detail"], camera["failed"]) == ("EXITED", "exit code 3", True)
     assert (camera["required"], said["slam"]["required"]) == (False, None)
+
+
+def test_what_waited_in_vain_is_not_named_as_the_first_that_failed() -> None:
+    nav = optional("nav", after={"camera": "done"})
+    history = begin(STATIC, nav, optional()).feed(Exited("camera", 3))
+    assert history.state.given_up == ("nav", "camera")
+    history.feed(TimeUp(), Exited("static", 0))
+    assert history.all(Ended) == [Ended(1, ("camera ended with exit code 3",))]

@@ -258,7 +258,7 @@ def test_the_rest_goes_on_without_optional_processes_that_are_not_there_or_fail(
 def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
     code, told = run(tmp_path, program("a", SLEEPER, cwd="maps"))
     (found,) = [notice.found for notice in told if isinstance(notice, FindingShown)]
-    assert (code, found.message) == (1, f"a could not be started: No such file or directory: {tmp_path}/maps")
+    assert (code, found.message) == (1, f"the folder {tmp_path}/maps that a runs in is not there")
 
 
 def test_missing_executables_are_all_reported_before_anything_is_started(tmp_path: Path) -> None:

@@ -89,11 +89,16 @@ class Remember:
     changed: dict[str, Any]
 
 
-GuardEvent = Clear | Taken | Live | OwnerReady | Complete | Found | Recovered | GateOpen | GateShut | Remember
+@dataclass(frozen=True, slots=True)
+class Alive:
+    """The guard looks; it says so once a second."""
+
+
+GuardEvent = Alive | Clear | Taken | Live | OwnerReady | Complete | Found | Recovered | GateOpen | GateShut | Remember
 
 _KINDS: dict[str, type[GuardEvent]] = {
     kind.__name__: kind
-    for kind in (Clear, Taken, Live, OwnerReady, Complete, Found, Recovered, GateOpen, GateShut, Remember)
+    for kind in (Alive, Clear, Taken, Live, OwnerReady, Complete, Found, Recovered, GateOpen, GateShut, Remember)
 }
 
 

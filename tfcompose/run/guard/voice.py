@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+import select
 import sys
+import time
 
 from tfcompose.run.events import (
     EVENTS_FD,
+    Alive,
     Clear,
     Complete,
     GateOpen,
@@ -20,7 +23,11 @@ from tfcompose.run.events import (
 from tfcompose.run.own import say
 
 #: What a guard says that is switched off: it looks, and judges nobody.
-_SEEN = (Clear, Live, OwnerReady, Complete, GateOpen, GateShut, Remember)
+_SEEN = (Alive, Clear, Live, OwnerReady, Complete, GateOpen, GateShut, Remember)
+
+
+#: How often the launcher hears that the guard looks, in seconds.
+ALIVE_EVERY_S = 1.0
 
 
 class Voice:
@@ -30,6 +37,7 @@ class Voice:
         self._judges = judges
         self._said: list[str] = []
         self._pipe = int(os.environ[EVENTS_FD]) if EVENTS_FD in os.environ else None
+        self._alive_due = 0.0
 
     def emit(self, event: GuardEvent) -> None:
         """Take an event; a guard that judges nobody keeps what it finds to itself."""
@@ -39,6 +47,15 @@ class Voice:
             self._said.append(to_line(event))
         elif not isinstance(event, Remember):
             say(to_line(event).rstrip())
+
+    def pulse(self) -> None:
+        """Say from time to time that the guard looks; a launcher that does not listen is not waited for."""
+        now = time.monotonic()
+        if self._pipe is None or now < self._alive_due:
+            return
+        self._alive_due = now + ALIVE_EVERY_S
+        if select.select([], [self._pipe], [], 0)[1]:
+            self.emit(Alive())
 
     def flush(self) -> None:
         """Say what was taken."""

@@ -68,7 +68,7 @@ def guard(own: Own, stop: Stop) -> None:
         bulletin = Bulletin(node, own.plan.robot)
         looks = [Orders(judged, Gates(node, emit)).take, *(watch.look for watch in watches)]
         looks += [memory.look for memory in memories]
-        looks += [voice.flush, lambda: bulletin.look(judged, lambda: held_back(watches))]
+        looks += [voice.pulse, voice.flush, lambda: bulletin.look(judged, lambda: held_back(watches))]
         looks += [switches.look] if switches else []
         looks += [] if ORDERS_FD in os.environ else [Unattended(node, own.plan).look]
         looks += [ClockWatch(own, node).look, *(watch.report for watch in watches)]

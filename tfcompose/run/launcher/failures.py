@@ -52,6 +52,13 @@ def guard_lost(name: str, event: Exited, *, strict: bool) -> Diagnostic:
     return finding("TF808", message, None, severity="warning", notes=notes, help=advice)
 
 
+def guard_hangs(name: str, seconds: float, *, strict: bool) -> Diagnostic:
+    """Return the finding for a guard that runs and does nothing."""
+    blind = "passed nothing on" if strict else "watched nothing"
+    message = f"{name} hangs: it has {blind} for {seconds:.0f} s"
+    return finding("TF808", message, None, severity="warning", help="it is ended and started again")
+
+
 def not_started(name: str, why: str) -> Diagnostic:
     """Return the finding for a process that the operating system would not start."""
     return finding("TF808", f"{name} could not be started: {why}", None)

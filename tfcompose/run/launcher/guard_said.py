@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.run.events import Clear, Complete, Found, Live, Recovered, Remember
+from tfcompose.run.events import Alive, Clear, Complete, Found, Live, Recovered, Remember
 from tfcompose.run.launcher.action import Order
 from tfcompose.run.launcher.gates import kind_of, opened
 from tfcompose.run.launcher.notice import OwnerLive, RecoveredShown, TreeComplete
 from tfcompose.run.launcher.offender import judged
+from tfcompose.run.launcher.vigil import heard
 from tfcompose.run.orders import Absent, Present
 
 if TYPE_CHECKING:
@@ -21,6 +22,8 @@ def guard_said(turn: Turn, event: Event) -> None:
     """Take what the guard says of the tree; other events are left alone."""
     seconds = turn.now - (turn.state.begun or 0.0)
     match event:
+        case Alive():
+            heard(turn)
         case Clear():
             _cleared(turn, seconds)
         case Live(children=children):

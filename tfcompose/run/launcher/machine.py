@@ -37,6 +37,7 @@ from tfcompose.run.launcher.notice import Missing, Waiting
 from tfcompose.run.launcher.prerequisites import give_up_waiting, unmet
 from tfcompose.run.launcher.timing import backoff_s, by_owner, waiting_due
 from tfcompose.run.launcher.turn import Turn
+from tfcompose.run.launcher.vigil import forget, keep
 
 if TYPE_CHECKING:
     from tfcompose.plan import Plan, PlanEdge
@@ -114,7 +115,9 @@ def _started(turn: Turn, name: str, pid: int) -> None:
     turn.enter(name, "RUNNING", pid=pid, began=turn.now)
     if name != turn.state.guard:
         order_gate(turn, turn.state.tracked[name])
-    elif turn.state.clear is not None:  # it joins the others
+        return
+    forget(turn)
+    if turn.state.clear is not None:  # it joins the others
         for other in turn.state.tracked.values():
             say_of(turn, other)
             if not other.ready and other.state in ("RUNNING", "EXPECTED"):
@@ -140,6 +143,7 @@ def _settle(turn: Turn) -> None:
 
 def _go_on(turn: Turn) -> None:
     look(turn)
+    keep(turn)
     give_up_waiting(turn)
     for name, one in turn.state.tracked.items():
         if one.state not in ("STOPPED", "BACKOFF"):

@@ -33,6 +33,10 @@ class Times:
     """a run as long as this makes earlier failures forgotten"""
     ready_s: float = 30.0
     """for a process to be ready, where it says by what and not until when"""
+    guard_silent_s: float = 10.0
+    """without a word of the guard's, until it is doubted"""
+    guard_doubt_s: float = 5.0
+    """further, until it hangs"""
     same_signal_s: float = 0.2
     """two signals closer than this are one: ``timeout`` and closing terminals send theirs twice"""
 
@@ -97,7 +101,8 @@ class State:
     """Everything that is known about a running plan.
 
     ``live`` holds the children of the edges that were seen; ``begun_anew`` is when another plan came, if one did.
-    ``memory`` is what the guard said that the next one must know; ``unwatched`` is since when it is dead, if it is.
+    ``memory`` is what the guard said that the next one must know; ``unwatched`` is since when it is dead, if it is;
+    ``guard_heard`` when it last said that it looks, and ``guard_doubted`` since when that is missed.
     """
 
     plan: Plan
@@ -119,6 +124,8 @@ class State:
     finished: bool = False
     memory: dict[str, Any] = field(default_factory=dict)
     unwatched: float | None = None
+    guard_heard: float | None = None
+    guard_doubted: float | None = None
 
     @property
     def missing(self) -> tuple[PlanEdge, ...]:

@@ -6,6 +6,7 @@ from signal import SIGKILL, SIGTERM, Signals
 from typing import TYPE_CHECKING
 
 from tfcompose.run.launcher.gates import late_at, opens_at
+from tfcompose.run.launcher.vigil import due_at
 
 if TYPE_CHECKING:
     from tfcompose.plan import PlanEdge, PlanProcess
@@ -84,6 +85,8 @@ def wake_time(state: State) -> float | None:
     if state.stop is None and state.begun is not None:
         if state.clear is None:
             due.append(state.begun + times.clear_s)
+        if (hangs := due_at(state)) is not None:
+            due.append(hangs)
         reminder = waiting_due(state)
         if reminder is not None:
             due.append(reminder)

@@ -89,6 +89,7 @@ class Turn:
     def finish(self, exit_code: int) -> None:
         """End: nothing runs any more."""
         self.know(finished=True)
-        failed = sorted((one for one in self.state.tracked.values() if one.failed), key=lambda one: one.since)
+        failed = [one for one in self.state.tracked.values() if one.failed]
+        failed.sort(key=lambda one: (one.order == 0, one.since))  # what was not started waited for another
         self.tell(Ended(exit_code, self.state.because or (failed[0].failed if failed else ())))
         self.actions.append(Finish(exit_code))

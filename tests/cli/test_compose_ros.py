@@ -77,6 +77,19 @@ def test_a_robot_in_the_background_is_ready_when_the_command_returns_is_listed_a
     assert "ended" in tfc("logs", "tfcompose", "-n", "1").stdout
 
 
+def test_an_edge_whose_owner_hangs_is_not_listed_as_live(tfc: Callable[..., Any]) -> None:
+    tfc("up", "--wait")
+    drive = ps(tfc)["drive"]["pid"]
+    os.kill(drive, signal.SIGSTOP)
+    try:
+        assert until(lambda: ps(tfc)["drive"]["live"] == 0, 10)
+        assert "tree not complete" in tfc("ps").stdout
+    finally:
+        os.kill(drive, signal.SIGCONT)
+    assert until(lambda: ps(tfc)["drive"]["live"] == 1, 10)
+    assert "tree complete" in tfc("ps").stdout
+
+
 def test_what_is_missing_when_the_time_is_over_is_said_with_1_and_the_robot_goes_on(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:

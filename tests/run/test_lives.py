@@ -10,7 +10,8 @@ import pytest
 
 from tests.run.history import GUARD, SLAM, STATIC, begin, plan_of, run_process
 from tfcompose.plan import GuardPolicy, Plan, PlanProcess, Ready, StopRule
-from tfcompose.run.events import Alive, Clear, Complete, GateOpen, GateShut, Live, OwnerReady, Remember
+from tfcompose.run.events import Alive, Clear, Complete, GateOpen, GateShut, Live, OwnerReady, Remember, Silent
+from tfcompose.run.launcher.answers import status
 from tfcompose.run.launcher.happening import Asked, Down, Exited, LogSeen, NewPlan, Signalled
 from tfcompose.run.launcher.lives import refusal
 from tfcompose.run.launcher.notice import (
@@ -278,6 +279,21 @@ def test_a_guard_that_is_heard_again_before_it_is_believed_to_hang_goes_on() -> 
         history.wait(3600)  # the launcher, or the whole machine, stood still
         history.wait(1).feed(Alive())
     assert (history.killed, history.found()) == ([], [])
+
+
+def test_edges_that_are_silent_are_not_counted_as_live_until_they_are_heard_again() -> None:
+    def counted() -> tuple[bool, list[str], int]:
+        said = status(history.state, history.now)
+        return said["complete"], said["silent"], said["processes"][1]["live"]
+
+    history = begin(GUARD, STATIC).feed(Clear(), Live("static", ("laser",)), OwnerReady("static"), Complete(1))
+    assert counted() == (True, [], 1)
+    history.feed(Silent(("laser",), over=False))
+    assert counted() == (False, ["base_link → laser"], 0)
+    history.feed(Silent(("laser",), over=True))
+    assert counted() == (True, [], 1)
+    history.feed(Remember({"a": 1}), Silent(("laser",), over=False), Exited("guard", -SIGKILL)).wait(1)
+    assert counted() == (True, [], 1), "the next guard says itself what is silent"
 
 
 def test_a_strict_guard_that_dies_lets_nothing_pass_and_says_so() -> None:

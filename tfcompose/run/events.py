@@ -38,6 +38,14 @@ class Live:
 
 
 @dataclass(frozen=True, slots=True)
+class Silent:
+    """Edges, named by their children, that were live come no more; or, if that is ``over``, come again."""
+
+    children: tuple[str, ...]
+    over: bool
+
+
+@dataclass(frozen=True, slots=True)
 class OwnerReady:
     """All edges of a process are live."""
 
@@ -94,12 +102,16 @@ class Alive:
     """The guard looks; it says so once a second."""
 
 
-GuardEvent = Alive | Clear | Taken | Live | OwnerReady | Complete | Found | Recovered | GateOpen | GateShut | Remember
+GuardEvent = (
+    Alive | Clear | Taken | Live | Silent | OwnerReady | Complete | Found | Recovered | GateOpen | GateShut | Remember
+)
 
 _KINDS: dict[str, type[GuardEvent]] = {
     kind.__name__: kind
-    for kind in (Alive, Clear, Taken, Live, OwnerReady, Complete, Found, Recovered, GateOpen, GateShut, Remember)
-}
+    for kind in (
+        Alive, Clear, Taken, Live, Silent, OwnerReady, Complete, Found, Recovered, GateOpen, GateShut, Remember,
+    )
+}  # fmt: skip
 
 
 def to_line(event: GuardEvent) -> str:

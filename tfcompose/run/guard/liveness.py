@@ -141,6 +141,14 @@ class Liveness:
         """Return the age of the track's last arrival, and its rate in hertz, None while there is too little to say."""
         return now - track.last, track.rate(self._watched.at(now)) if track.silent_after is not None else None
 
+    def silent(self) -> list[str]:
+        """Return the children of the edges that were live and come no more."""
+        quiet = [track for track in self.tracks if track.live and (track.silent or self._is_gone(track))]
+        return _children(quiet)
+
+    def _is_gone(self, track: Track) -> bool:
+        return track.edge.kind == "static" and track.edge.owner in self._gone
+
     def is_behind(self, now: float) -> bool:
         """Return whether what comes now may have waited for the guard."""
         return self._watched.is_behind(now)

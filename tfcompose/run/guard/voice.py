@@ -18,12 +18,13 @@ from tfcompose.run.events import (
     Live,
     OwnerReady,
     Remember,
+    Silent,
     to_line,
 )
 from tfcompose.run.own import say
 
 #: What a guard says that is switched off: it looks, and judges nobody.
-_SEEN = (Alive, Clear, Live, OwnerReady, Complete, GateOpen, GateShut, Remember)
+_SEEN = (Alive, Clear, Live, OwnerReady, Complete, GateOpen, GateShut, Remember, Silent)
 
 
 #: How often the launcher hears that the guard looks, in seconds.
@@ -45,7 +46,7 @@ class Voice:
             return
         if self._pipe is not None:
             self._said.append(to_line(event))
-        elif not isinstance(event, Remember):
+        elif not isinstance(event, (Remember, Silent)):
             say(to_line(event).rstrip())
 
     def pulse(self) -> None:

@@ -18,6 +18,7 @@ from tfcompose.run.guard.gatekeeper import Gates
 from tfcompose.run.guard.heeding import Orders
 from tfcompose.run.guard.judge import Judge
 from tfcompose.run.guard.memory import Memory, SwitchMemory, recalled
+from tfcompose.run.guard.quiet import Quiet
 from tfcompose.run.guard.switches import Switches
 from tfcompose.run.guard.topics import plans_by_topics, together
 from tfcompose.run.guard.unattended import Unattended
@@ -68,7 +69,12 @@ def guard(own: Own, stop: Stop) -> None:
         bulletin = Bulletin(node, own.plan.robot)
         looks = [Orders(judged, Gates(node, emit)).take, *(watch.look for watch in watches)]
         looks += [memory.look for memory in memories]
-        looks += [voice.pulse, voice.flush, lambda: bulletin.look(judged, lambda: held_back(watches))]
+        looks += [
+            Quiet(judged, emit).look,
+            voice.pulse,
+            voice.flush,
+            lambda: bulletin.look(judged, lambda: held_back(watches)),
+        ]
         looks += [switches.look] if switches else []
         looks += [] if ORDERS_FD in os.environ else [Unattended(node, own.plan).look]
         looks += [ClockWatch(own, node).look, *(watch.report for watch in watches)]

@@ -32,10 +32,11 @@ def status(state: State, now: float) -> dict[str, Any]:
         "launcher": os.getpid(),
         "plan": state.plan.spec_digest,
         "uptime": round(now - (state.begun or now), 3),
-        "complete": state.complete,
+        "complete": state.complete and not state.silent,
         "ready": is_ready(state),
         "stopping": state.stop is not None,
         "missing": [edge.name for edge in state.missing],
+        "silent": [edge.name for edge in state.plan.edges if edge.child in state.silent & state.live],
         "processes": [_process(state, one, now) for one in state.tracked.values()],
     }
 
@@ -57,7 +58,7 @@ def _process(state: State, one: Tracked, now: float) -> dict[str, Any]:
         "uptime": round(now - one.began, 3) if one.state in ("RUNNING", "STOPPING") else None,
         "restarts": one.restarts,
         "edges": len(owned),
-        "live": sum(child in state.live for child in owned),
+        "live": sum(child in state.live and child not in state.silent for child in owned),
         "nodes": list(one.process.nodes),
     }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.run.events import Alive, Clear, Complete, Found, Live, Recovered, Remember
+from tfcompose.run.events import Alive, Clear, Complete, Found, Live, Recovered, Remember, Silent
 from tfcompose.run.launcher.action import Order
 from tfcompose.run.launcher.gates import kind_of, opened
 from tfcompose.run.launcher.notice import OwnerLive, RecoveredShown, TreeComplete
@@ -28,6 +28,9 @@ def guard_said(turn: Turn, event: Event) -> None:
             _cleared(turn, seconds)
         case Live(children=children):
             turn.know(live=turn.state.live.union(children))
+        case Silent(children, over):
+            silent = turn.state.silent
+            turn.know(silent=silent.difference(children) if over else silent.union(children))
         case Complete(edges):
             _complete(turn, edges)
         case Found(found, process):

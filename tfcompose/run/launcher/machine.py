@@ -117,6 +117,7 @@ def _started(turn: Turn, name: str, pid: int) -> None:
         order_gate(turn, turn.state.tracked[name])
         return
     forget(turn)
+    turn.know(silent=frozenset())  # it says itself what is
     if turn.state.clear is not None:  # it joins the others
         for other in turn.state.tracked.values():
             say_of(turn, other)

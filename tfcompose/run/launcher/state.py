@@ -100,9 +100,10 @@ class Stop:
 class State:
     """Everything that is known about a running plan.
 
-    ``live`` holds the children of the edges that were seen; ``begun_anew`` is when another plan came, if one did.
-    ``memory`` is what the guard said that the next one must know; ``unwatched`` is since when it is dead, if it is;
-    ``guard_heard`` when it last said that it looks, and ``guard_doubted`` since when that is missed.
+    ``live`` holds the children of the edges that were seen, ``silent`` those that come no more; ``begun_anew`` is when
+    another plan came, if one did. ``memory`` is what the guard said that the next one must know; ``unwatched`` is since
+    when it is dead, if it is; ``guard_heard`` when it last said that it looks, and ``guard_doubted`` since when that is
+    missed.
     """
 
     plan: Plan
@@ -113,6 +114,7 @@ class State:
     begun_anew: float = 0.0
     clear: float | None = None
     live: frozenset[str] = frozenset()
+    silent: frozenset[str] = frozenset()
     complete: bool = False
     shown: frozenset[str] = frozenset()
     waiting: frozenset[str] = frozenset()

@@ -143,6 +143,24 @@ def test_the_command_line_knows_a_urdf_by_its_name_or_by_its_option(tmp_path: Pa
     assert (run(tmp_path, "fine.urdf").returncode, run(tmp_path, "none.urdf").returncode) == (0, 2)
 
 
+@pytest.mark.parametrize(
+    "written",
+    [
+        "$(find mine)/meshes/a.stl",
+        "file://$(find mine)/meshes/a.stl",
+        "$(find-pkg-share mine)/meshes/a.stl",
+        "package:/mine/meshes/a.stl",
+        "package:mine//meshes/a.stl",
+        "package:///mine/meshes/a.stl",
+    ],
+)
+def test_what_is_nearly_the_address_of_a_file_in_a_package_is_told_how_it_is_written(written: str) -> None:
+    _, found = Packages(disk()).asset(written, Span("a.urdf"))
+    assert found
+    assert found.message == f"{written} is no address of a file"
+    assert found.help.removeprefix("a slash too many: ") == "package://mine/meshes/a.stl"
+
+
 def test_a_package_is_looked_for_where_ros_looks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = tmp_path / "share" / "mine" / "meshes" / "a.stl"
     mesh.parent.mkdir(parents=True)

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 _PACKAGE_NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://")
+#: What others write for a file in a package: xacro and launch files, and those who forget a slash.
+_MEANT = re.compile(r"(?:(?:file://)?\$\(find(?:-pkg-share)?\s+([\w.-]+)\s*\)|package:/?([\w.-]+))/+(.+)")
 _NEAR = 0.8  # many packages end in _description
 FETCH = "git lfs pull fetches the file itself"
 _HIGHEST = 12  # so many folders above a file its package.xml is looked for
@@ -102,6 +104,10 @@ class Packages:
         ``package://NAME/PATH`` is in a package, ``file:///PATH`` and plain paths are files, the relative ones beside
         the file that writes them. Other schemes (``http``, ``model``) are for others to resolve.
         """
+        meant = _MEANT.fullmatch(uri)
+        if meant or not uri:
+            advice = f"package://{meant[1] or meant[2]}/{meant[3]}" if meant else "package://NAME/PATH, or a path"
+            return Asset(uri, at), finding("TF723", f"{uri or repr(uri)} is no address of a file", at, help=advice)
         scheme = _SCHEME.match(uri)
         if scheme and scheme[1] == "package":
             return self._in_package(uri, at)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.validate.edges import MountKeys
 from tfcompose.validate.fields import ANYTHING, NAMESPACE, TEXT
 from tfcompose.validate.posed import Posed
-from tfcompose.validate.schema import Problems, Type, key, listing, mapping, record
+from tfcompose.validate.schema import BROKEN, Problems, Type, key, listing, mapping, record
 
 if TYPE_CHECKING:
     from tfcompose.load import Path
@@ -60,6 +60,8 @@ class PartSpec(MountKeys):
 #: What can be the part, and which keys go with it alone.
 KINDS = {"spec": ("vars", "profiles"), "urdf": (), "xacro": ("args", "macro", "params", "include")}
 _MACRO = ("params", "include")
+#: What a file is by its ending. xacro reads plain URDF too, so that xacro: FILE.urdf is right.
+_ENDINGS = {".urdf": "urdf", ".xacro": "xacro", ".yaml": "spec", ".yml": "spec"}
 
 
 def _part(value: Any, path: Path, problems: Problems) -> Any:
@@ -68,6 +70,7 @@ def _part(value: Any, path: Path, problems: Problems) -> Any:
         kind = next((kind for kind in KINDS if kind in value), None)
         if kind is None and set(value) <= set(PartSpec.KEYS):
             problems.refuse("TF102", path, "a part without a robot", "give spec, urdf or xacro", on_key=True)
+        other_kind = kind is not None and _is_refused(value[kind], kind, (*path, kind), problems)
         for other, keys in KINDS.items():
             for name in keys:
                 if name in value and kind not in {None, other}:
@@ -75,7 +78,20 @@ def _part(value: Any, path: Path, problems: Problems) -> Any:
         for name in _MACRO:
             if name in value and "macro" not in value:
                 problems.refuse("TF102", (*path, name), f"{name} without a macro", "macro: NAME", on_key=True)
+        if other_kind:
+            return BROKEN
     return record(PartSpec).read(value, path, problems)
+
+
+def _is_refused(file: Any, kind: str, path: Path, problems: Problems) -> bool:
+    """Whether the file is another kind of part, by its ending."""
+    ending = next((one for one in _ENDINGS if isinstance(file, str) and file.endswith(one)), "")
+    meant = _ENDINGS.get(ending, kind)
+    is_other = meant != kind and (kind, meant) != ("xacro", "urdf")
+    if is_other:
+        what = "a robot file" if meant == "spec" else f"a {ending[1:]} file"
+        problems.refuse("TF106", path, f"{file} is {what}", f"{meant}: instead of {kind}:")
+    return is_other
 
 
 PART = Type(_part, PartSpec)

@@ -20,6 +20,7 @@ _TAKEN = r"[\w.:+@-]+(/[\w.:+@-]+)*"
 #: What no listener can look up, or no XML file can hold.
 _LOST = r"(?s)|/.*|\s.*|.*\s|.*[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff].*"
 _PROCESS = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(/[A-Za-z0-9_][A-Za-z0-9_.-]*)*")
+_LAUNCHER = "tfcompose"
 _NODE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
@@ -45,7 +46,10 @@ def bad_frame_name(robot: Robot) -> Iterator[Diagnostic]:
     for process in robot.processes:
         if not _PROCESS.fullmatch(process.name):
             yield _bad(process.name, process.at, "name for a process")
-        elif (process.package or process.kind != "run") and not _NODE.fullmatch(process.node):
+        elif process.name == _LAUNCHER:
+            message = f"{_LAUNCHER} is the launcher's own name, in logs and findings"
+            yield finding("TF501", message, process.at, help="give the process another name")
+        elif (process.package or process.kind != "run" or process.params) and not _NODE.fullmatch(process.node):
             yield _bad(process.node, process.at, "name for a node")
 
 

@@ -348,3 +348,15 @@ def test_another_plan_restarts_what_changed_starts_what_is_new_and_stops_what_is
     assert list(history.state.tracked) == ["static", "a", "new"]
     assert history.all(Replanned) == [Replanned(("a",), ("new",), ("b",), ("base_link → x",))]
     assert history.found() == []
+
+
+def test_a_tree_stays_complete_where_another_plan_changes_nothing_of_it() -> None:
+    a = run_process("a")
+    history = begin(GUARD, STATIC, a).feed(Clear(), Live("static", ("laser",)), OwnerReady("static"), Complete(1))
+    history.feed(NewPlan(plan_of(GUARD, STATIC, replace(a, argv=("other",))), frozenset({"a"})), Exited("a", 0))
+    assert status(history.state, history.now)["complete"]
+    history.feed(NewPlan(plan_of(GUARD, replace(STATIC, argv=("other",)), a), frozenset({"static"})))
+    assert not status(history.state, history.now)["complete"], "its owner is restarted"
+    history.feed(Exited("static", 0), Live("static", ("laser",)), OwnerReady("static"))
+    history.feed(NewPlan(plan_of(GUARD, STATIC, SLAM), frozenset()))
+    assert not status(history.state, history.now)["complete"], "an edge is new"

@@ -13,7 +13,7 @@ from tfcompose.diagnostic import finding
 from tfcompose.plan import GuardPolicy, PlanProcess
 from tfcompose.run.events import Clear, Complete, Found, Live, OwnerReady, Recovered, Taken
 from tfcompose.run.launcher.action import Finish, Kill, Start
-from tfcompose.run.launcher.happening import Begin, Exited, OutputLost, Signalled, Started, StartFailed, TimeUp
+from tfcompose.run.launcher.happening import Asked, Begin, Exited, OutputLost, Signalled, Started, StartFailed, TimeUp
 from tfcompose.run.launcher.machine import step
 from tfcompose.run.launcher.notice import (
     Ended,
@@ -390,6 +390,13 @@ def test_time_is_up_ends_with_1_and_names_the_edges_that_were_never_seen() -> No
     assert [(found.code, found.message) for found in history.found()] == [("TF811", "slam never published map → odom")]
     history.feed(Exited("slam", 0), Exited("static", 0), Exited("guard", 0))
     assert history.exit_code == 1
+
+
+def test_a_process_that_was_stopped_is_not_said_to_have_never_published() -> None:
+    slam = replace(SLAM, argv=("slam",))
+    history = begin(GUARD, STATIC, slam).feed(Clear(), Live("static", ("laser",)), Live("slam", ("odom",)), Complete(2))
+    history.feed(Asked("slam", "stop"), Exited("slam", -SIGINT), TimeUp())
+    assert [found.message for found in history.found()] == ["nobody publishes map → odom: slam is stopped: SIGINT"]
 
 
 def test_a_process_that_was_never_started_is_not_blamed_for_its_edges() -> None:

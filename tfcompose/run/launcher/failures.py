@@ -84,4 +84,7 @@ def never_seen(owner: Tracked, edges: tuple[PlanEdge, ...]) -> Diagnostic:
         waits = " and ".join(f"{other} to be {what}" for other, what in owner.process.after.items())
         why = f"was not started: it waits for {waits}" if waits else "was not started"
         return finding("TF811", f"nobody published {names}{more}: {name} {why}", None)
+    if owner.state in ("STOPPED", "EXITED", "FATAL", "BACKOFF"):
+        why = f"{owner.state.lower()}: {owner.detail}" if owner.detail else owner.state.lower()
+        return finding("TF811", f"nobody publishes {names}{more}: {name} is {why}", None)
     return finding("TF811", f"{name} never published {names}{more}", None)

@@ -139,12 +139,13 @@ def follow(turn: Turn, event: NewPlan) -> None:
     state, plan = turn.state, event.plan
     before = state.tracked
     guards = [process.name for process in plan.processes if process.kind == "guard"]
+    live = frozenset(edge.child for edge in plan.edges if edge.child in state.live)
     turn.know(
         plan=plan,
         guard=guards[0] if guards else None,
         tracked={process.name: _taken_over(before, process.name, event) for process in plan.processes},
-        live=frozenset(edge.child for edge in plan.edges if edge.child in state.live),
-        complete=False,
+        live=live,
+        complete=len(live) == len(plan.edges),
         all_started=False,
         all_ready=False,
         waiting_said=turn.now,

@@ -203,6 +203,34 @@ def test_a_node_that_sends_a_loop_alone_is_not_told_to_end_one_of_several() -> N
     assert [one.help for one in diagnose(two.seen())] == ["end one of these nodes, or turn its edge round"]
 
 
+def test_in_a_slow_simulation_edges_come_as_much_more_rarely() -> None:
+    def found(speed: float) -> set[str]:
+        history = History().moving(
+            "odom base_link", hz=10.0, stamp=lambda now: 100 * SECOND_NS + int((now - BEGUN_NS) * speed)
+        )
+        return set(messages(history.seen(clock_ns=int((100 + SECONDS * speed) * SECOND_NS), clock_moves=True)))
+
+    assert found(0.4) == set()
+    assert found(1.0) == {"TF838"}
+
+
+def test_of_a_quaternion_that_is_wrong_now_and_then_the_wrong_ones_length_is_told() -> None:
+    history = robot()
+    short = ("odom", "base_link", *divmod(END_NS, SECOND_NS), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.9)
+    for each in (short, row("odom base_link", END_NS + 1)):
+        history.census.take([each], static=False, gid=b"d", received_ns=END_NS)
+    assert messages(history.seen())["TF831"].endswith("its quaternion has length 0.900 (1 of 252)")
+
+
+def test_of_a_frame_with_very_many_parents_some_are_named() -> None:
+    history = History()
+    for index in range(60):
+        history.fixed(f"parent{index:02} cup")
+    (found,) = [one for one in diagnose(history.seen()) if one.code == "TF802"]
+    assert found.message.startswith("cup has 60 parents: parent00, parent01, ")
+    assert len(found.notes) < 10
+
+
 def test_what_is_sent_with_a_timer_of_the_least_rate_is_often_enough() -> None:
     assert messages(History().moving("odom base_link", hz=19.4).seen()) == {}
     assert set(messages(History().moving("odom base_link", hz=15.0).seen())) == {"TF838"}

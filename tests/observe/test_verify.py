@@ -70,9 +70,10 @@ class Tree:
         for at in times:
             if not more.get("until", 11) > at or more.get("gap", (11, 11))[0] < at < more.get("gap", (11, 11))[1]:
                 continue
-            stamp = 100 * S + round(at * S)
+            received = 100 * S + round(at * S)
+            stamp = 100 * S + round(at * S * more.get("speed", 1.0))
             row = (parent, child, *divmod(stamp, S), *pose.xyz, *pose.quat_xyzw)
-            self.census.take([row], static=static, gid=gid, received_ns=stamp)
+            self.census.take([row], static=static, gid=gid, received_ns=received)
 
     def told(self, plan: Plan, *, graph: bool = True) -> list[Diagnostic]:
         for child, words in self.sent.items():
@@ -265,6 +266,24 @@ def test_an_edge_that_falls_silent_is_told(plan: Plan, tree: Tree, more: dict[st
 def test_an_edge_that_comes_too_rarely_is_told(plan: Plan, tree: Tree) -> None:
     tree.sent["base"]["rate"] = 7.0
     assert only(tree.told(plan)) == ("TF805", "odom → base comes at 7 Hz from drive (/rover/drive), declared are 10 Hz")
+
+
+def test_where_a_simulation_goes_slower_than_the_time_of_day_edges_may_come_as_much_more_rarely(
+    plan: Plan, tree: Tree
+) -> None:
+    tree.sent["base"] |= {"rate": 2.0, "speed": 0.2}
+    tree.sent["wheel"] |= {"rate": 2.0, "speed": 0.2}
+    assert tree.told(replace(plan, ros=RosSettings(clock="sim"))) == []
+    rarely = Tree()
+    rarely.sent["base"] |= {"rate": 5.0}
+    found = rarely.told(replace(plan, ros=RosSettings(clock="sim")))
+    assert [one.code for one in found] == ["TF805"]
+
+
+def test_a_value_is_compared_also_where_one_before_it_was_refused(plan: Plan, tree: Tree) -> None:
+    tree.send("laser", "base", STATIC, Pose((float("nan"), 0.0, 0.0)))
+    tree.sent["laser"]["pose"] = Pose((0.0, 0.0, 0.4))
+    assert [one.code for one in tree.told(plan)] == ["TF831", "TF846"]
 
 
 def test_what_tf2_refuses_is_told(plan: Plan, tree: Tree) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.run.watched import FIXED, History, Publisher, wall
+from tests.run.watched import FIXED, History, Publisher, edge, wall
 from tfcompose.run.events import Recovered
 
 
@@ -77,18 +77,40 @@ def test_in_simulated_time_the_systems_time_is_the_wrong_one_and_clock_decides()
         running.send(drive, "odom base", stamp_s=100 + n / 10).wait(0.1)
     assert running.said() == []  # nothing on /clock, so nothing is known
     for n in range(20):
-        running.judge.clock(round((102 + n / 10) * 1e9))
+        running.judge.clock(round((102 + n / 10) * 1e9), running.now)
         running.send(slam, "map odom", stamp_s=wall(running))
         running.send(drive, "odom base", stamp_s=102 + n / 10).wait(0.1)
     (found,) = running.found()
     assert found.message == "/slam stamps map → odom with the system's time, and /clock says 102.2 s"
 
 
+@pytest.mark.parametrize(
+    ("stretches", "codes"),
+    [
+        ([(1.0, 0.25)], ["TF805"]),
+        ([(0.2, 0.25)], []),
+        ([(1.0, 0.05), (0.2, 0.25)], []),
+        ([(0.2, 0.25), (1.0, 0.25)], ["TF805"]),
+    ],
+)
+def test_where_simulated_time_goes_slowly_rates_are_judged_by_it(
+    stretches: list[tuple[float, float]], codes: list[str]
+) -> None:
+    running = History(clock="sim", edges=(edge("odom base", "drive", rate=20.0),)).clear()
+    drive, sim_s = running.joins("/drive"), 100.0
+    for speed, every_s in stretches:
+        for _ in range(round(12 / every_s)):
+            running.judge.clock(round(sim_s * 1e9), running.now)
+            running.send(drive, "odom base", stamp_s=sim_s).wait(every_s)
+            sim_s += speed * every_s
+    assert [found.code for found in running.found()] == codes
+
+
 def test_simulated_time_that_begins_again_takes_the_stamps_with_it() -> None:
     running = History(clock="sim").clear()
     drive = running.joins("/drive")
     for n in range(60):
-        running.judge.clock(round((20 + n % 30 / 10) * 1e9))
+        running.judge.clock(round((20 + n % 30 / 10) * 1e9), running.now)
         running.send(drive, "odom base", stamp_s=20 + n % 30 / 10).wait(0.1)
     assert running.said() == []
 

@@ -94,7 +94,8 @@ class _Comparison:
             if edge.may_hang_on(one.strand.parent) and (not one.nodes or self._may_own(edge, one))
         ]
         if owners:  # one that was started again is judged by what came last
-            yield from _times(edge, max(owners, key=lambda one: (one.present is not False, one.strand.tally.last_ns)))
+            newest = max(owners, key=lambda one: (one.present is not False, one.strand.tally.last_ns))
+            yield from _times(edge, newest, simulated=self.plan.ros.clock == "sim")
 
     def undeclared(self) -> Iterator[Difference]:
         planned = {edge.child for edge in self.plan.edges}
@@ -113,7 +114,7 @@ class _Comparison:
         owner, sure = unknown or self._may_own(edge, one), unknown or len(one.nodes) == 1
         code = code_of(edge, strand.parent, static=strand.static, owner=owner, sure=sure)
         if code:
-            off = self._off(edge, strand.pose) if code == "TF801" and strand.refused is None else None
+            off = self._off(edge, strand.pose) if code == "TF801" and strand.refused_row is not strand.row else None
             found = self._told(code, edge, one)
             yield replace(found, off=off) if off is not None and off.beyond(self.tolerance) else found
 
@@ -142,7 +143,7 @@ class _Comparison:
 
     def _value(self, edge: PlanEdge, one: EdgeSeen) -> Iterator[Difference]:
         strand = one.strand
-        if strand.refused is not None or not edge.may_hang_on(strand.parent):
+        if strand.refused_row is strand.row or not edge.may_hang_on(strand.parent):
             return
         if one.nodes and not self._may_own(edge, one):
             return  # somebody else's value is told with who it is
@@ -169,20 +170,22 @@ class _Comparison:
         return off if owner.kind == "static" or edge.pose != Pose() else None
 
 
-def _times(edge: PlanEdge, one: EdgeSeen) -> Iterator[Difference]:
-    """Judge whether it comes, and often enough."""
+def _times(edge: PlanEdge, one: EdgeSeen, *, simulated: bool) -> Iterator[Difference]:
+    """Judge whether it comes, and often enough; a simulation may go slower than the time of day."""
     rate, limit_s = edge.rate, edge.silent_after_s
     if one.present is False:
         yield Difference("TF804", edge, one, quiet_s=one.age_s)
         return
     if one.strand.static or rate is None or limit_s is None:
         return
+    speed = min(1.0, one.strand.speed) if simulated else 1.0
+    limit_s /= speed
     gap_s, seen_rate = one.timing.longest_gap_s, one.timing.rate
     if one.age_s > limit_s:
         yield Difference("TF804", edge, one, quiet_s=one.age_s)
     elif gap_s is not None and gap_s > limit_s:
         yield Difference("TF804", edge, one, quiet_s=gap_s, over=True)
-    elif seen_rate is not None and one.strand.tally.count >= FEWEST and seen_rate < SLOW_BELOW * rate:
+    elif seen_rate is not None and one.strand.tally.count >= FEWEST and seen_rate < SLOW_BELOW * rate * speed:
         yield Difference("TF805", edge, one)
 
 

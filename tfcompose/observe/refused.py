@@ -30,7 +30,7 @@ def refused_transform(edge: EdgeSeen) -> Iterator[Diagnostic]:
     what, why, advice = "which tf2 drops", strand.refused.text, _MEND
     if strand.refusals < strand.tally.count:
         advice = _MEND_SOME
-    length = sum(part * part for part in strand.pose.quat_xyzw) ** 0.5
+    length = sum(part * part for part in (strand.refused_row or strand.row)[7:11]) ** 0.5
     if strand.refused is Refusal.DENORMALISED:
         why = f"its quaternion has length {length:.3f}"
         if length > _ZERO:

@@ -32,11 +32,13 @@ class Strand:
         row: the newest transform.
         stamp_ns: the newest message's stamp.
         newest_ns: the largest stamp so far.
+        oldest_ns: the stamp of the first message.
         first_ns: when the first message came, by the receiver's clock.
         lag_ns: how old the newest message's stamp was when it came; negative: ahead of the receiver's clock.
         stamps_back: how many stamps were before the one that came before them.
         stamps_repeated: how many stamps were the one that came before them.
         refused: why tf2 does not take it, the newest time that it did not.
+        refused_row: the newest that it did not take.
         refusals: how many were not taken.
         slashed: whether a name came with a slash in front.
         turns: the edges that put this frame in other parents, from the same publisher, and this one; None if none does.
@@ -53,10 +55,12 @@ class Strand:
     row: Row
     newest_ns: int = -1
     stamp_ns: int = -1
+    oldest_ns: int = -1
     lag_ns: int = 0
     stamps_back: int = 0
     stamps_repeated: int = 0
     refused: Refusal | None = None
+    refused_row: Row | None = None
     refusals: int = 0
     slashed: bool = False
     turns: Turns | None = None
@@ -67,11 +71,19 @@ class Strand:
         """The newest pose of the child in the parent, as it was sent; nothing is normalised."""
         return Pose(self.row[4:7], self.row[7:11])
 
+    @property
+    def speed(self) -> float:
+        """How fast its stamps go on: seconds of them in a second, 1 where that cannot be said."""
+        took_ns, stamped_ns = self.tally.last_ns - self.first_ns, self.newest_ns - self.oldest_ns
+        return stamped_ns / took_ns if took_ns > 0 and stamped_ns > 0 else 1.0
+
     def take(self, row: Row, received_ns: int, clock_ns: int) -> None:
         """Note a transform; ``clock_ns`` is the time that its stamp is compared with."""
         stamp_ns = row[2] * _SECOND_NS + row[3]
         self.row = row
         if stamp_ns > self.newest_ns:
+            if self.newest_ns < 0:
+                self.oldest_ns = stamp_ns
             self.newest_ns = stamp_ns
         elif stamp_ns < self.stamp_ns:
             self.stamps_back += 1
@@ -93,7 +105,7 @@ class Strand:
         """Count the newest transform as one that tf2 does not take, if that is so."""
         why = refusal(self.parent, self.child, self.row[4:])
         if why is not None:
-            self.refused, self.refusals = why, self.refusals + 1
+            self.refused, self.refused_row, self.refusals = why, self.row, self.refusals + 1
 
 
 @dataclass(slots=True)

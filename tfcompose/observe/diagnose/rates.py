@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, finding
 from tfcompose.observe.seen import who
-from tfcompose.verdict.clock import seconds
+from tfcompose.verdict.clock import WRONG_BY_NS, seconds
 from tfcompose.verdict.timing import gone
 
 if TYPE_CHECKING:
@@ -36,13 +36,13 @@ def low_rate(seen: Seen) -> Iterator[Diagnostic]:
     """An edge comes so seldom that lookups fail between two messages, and frames jump."""
     inside, rated = {edge.strand.parent for edge in seen.taken}, seen.rated
     for edge in seen.moving:
-        rate, least = edge.timing.rate, least_of(edge, inside)
+        rate, least = edge.timing.rate, least_of(edge, inside) * _speed(seen, edge)
         if edge.strand.child in rated or rate is None or rate >= NEARLY * least or is_silent(edge) or _has_gap(edge):
             continue
         if edge.strand.tally.count < FEWEST and seen.seconds < 2 * SURE_S:
             continue
         often = f"{rate:.2g} Hz" if rate < least / 2 else f"{rate:.3g} Hz"
-        message = f"{edge.name} comes with {often} from {who(edge)}, and should with {least:g} Hz or more"
+        message = f"{edge.name} comes with {often} from {who(edge)}, and should with {least:.3g} Hz or more"
         notes = [Note(f"between two messages, {seconds(1 / rate)}, lookups of now are extrapolation into the future")]
         advice = "raise its rate: publish_rate, publish_frequency, frequency, transform_publish_period"
         yield finding("TF838", message, None, severity="warning", notes=notes, help=advice)
@@ -88,6 +88,13 @@ def fixed_left(seen: Seen) -> Iterator[Diagnostic]:
             lost.setdefault(who(edge), []).append(edge)
     for publisher, edges in lost.items():
         yield gone(publisher, [edge.name for edge in edges])
+
+
+def _speed(seen: Seen, edge: EdgeSeen) -> float:
+    """Return how fast simulated time goes by, 1 at most: so much less often may come what it rules."""
+    clock_ns = seen.clock_ns
+    ruled = clock_ns is not None and abs(edge.strand.stamp_ns - clock_ns) <= WRONG_BY_NS
+    return min(1.0, edge.strand.speed) if ruled else 1.0
 
 
 def least_of(edge: EdgeSeen, inside: set[str]) -> float:

@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from tfcompose.observe.seen import Seen
 
 
+#: So many publishers are named of one frame.
+MOST_NOTES = 8
+
+
 def self_transform(seen: Seen) -> Iterator[Diagnostic]:
     """A frame is published in itself."""
     for edge in seen.edges:
@@ -70,10 +74,10 @@ def second_parent(seen: Seen) -> Iterator[Diagnostic]:
         parents = sorted({edge.strand.parent for edge in edges})
         if len(parents) < 2 or child in in_loops or child in planned:  # noqa: PLR2004 (two parents)
             continue
-        message = f"{child} has {len(parents)} parents: {' and '.join(parents)}; tf2 takes whichever came last"
+        message = f"{child} has {len(parents)} parents: {_both(parents)}; tf2 takes whichever came last"
         if _hands_over(edges):
             continue  # one node hands it over, which is what a gripper does
-        notes = [Note(_said(seen, edge)) for edge in edges]
+        notes = [Note(_said(seen, edge)) for edge in edges[:MOST_NOTES]]
         nodes = {who(edge) for edge in edges}
         advice = f"let one node publish {child}: end the other, or switch its TF off"
         if len(nodes) == 1:
@@ -140,6 +144,10 @@ def _said(seen: Seen, edge: EdgeSeen) -> str:
     where = seen.where(edge)
     rate = f" at {edge.timing.rate:.3g} Hz" if edge.timing.rate and not edge.strand.static else ""
     return f"{edge.name} is published by {who(edge)}{rate}{', ' if where else ''}{where}"
+
+
+def _both(names: list[str]) -> str:
+    return " and ".join(names) if len(names) < MOST_NOTES else listed(names)
 
 
 def _hands_over(edges: list[EdgeSeen]) -> bool:

@@ -79,7 +79,7 @@ class Eyes:
         if strangers:  # who sends once and goes is in the graph for a moment only
             self._look_round(now)
         if self._clock:
-            self.judge.clock(self._clock.now_ns())
+            self.judge.clock(self._clock.now_ns(), now)
         for each in heard:
             self._hear(each, now)
         if now >= self._due:

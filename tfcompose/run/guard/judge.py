@@ -99,9 +99,10 @@ class Judge:
             events += self.live.static_writers({w.node for w in writers if w.static and w.node is not None})
         return events
 
-    def clock(self, sim_ns: int | None) -> None:
+    def clock(self, sim_ns: int | None, now: float) -> None:
         """Take the newest time on /clock; where that went back, stamps go back with it."""
-        before, self.clocks.sim_ns = self.clocks.sim_ns, sim_ns
+        before = self.clocks.sim_ns
+        self.clocks.take(sim_ns, now)
         if before is not None and sim_ns is not None and sim_ns < before:
             self._streams.forget_stamps()
 
@@ -116,7 +117,7 @@ class Judge:
             over = self.cases.over(now)
             self._law.changes += bool(over)
             replaced = self._endpoints.replaced(self._senders, self.live.partly_missing(), now)
-            return [*events, *self.live.judge(now), *replaced, *over]
+            return [*events, *self.live.judge(now, self.clocks.speed(now)), *replaced, *over]
         self.live.look(now)
         if now - self.begun >= self.settle_s and not self._streams.waits and not self.cases.untold:
             self._start.clear(now)

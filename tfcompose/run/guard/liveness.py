@@ -157,12 +157,15 @@ class Liveness:
         """Note that the guard looks, and judge nobody."""
         self._watched.look(now)
 
-    def judge(self, now: float) -> list[GuardEvent]:
-        """Return which owners fell silent or slow since the last time, and came back: one event for each owner."""
+    def judge(self, now: float, speed: float = 1.0) -> list[GuardEvent]:
+        """Return which owners fell silent or slow since the last time, and came back: one event for each owner.
+
+        ``speed`` is how fast time goes by for them: in a simulation that is slow all rates are lower.
+        """
         seen = self._watched.look(now)
         changed: dict[tuple[str, str], list[Track]] = {}
         for track in self.tracks:
-            change = _change(track, seen) if track.live and track.silent_after is not None else None
+            change = _change(track, seen, speed) if track.live and track.silent_after is not None else None
             if change:
                 changed.setdefault((change, track.edge.owner), []).append(track)
         self.changes += len(changed)
@@ -207,7 +210,7 @@ def _children(tracks: list[Track]) -> list[str]:
     return [edge.child for track in tracks for edge in track.edges]
 
 
-def _change(track: Track, seen: float) -> str | None:
+def _change(track: Track, seen: float, speed: float) -> str | None:
     """Bring the track up to date and return what changed."""
     after = track.silent_after or 0.0
     quiet = seen - track.heard > after
@@ -219,7 +222,7 @@ def _change(track: Track, seen: float) -> str | None:
         track.silent = track.slow = False
         track.arrivals.clear()
         return "back"
-    rate, wanted = track.rate(seen), track.edge.rate or 0.0
+    rate, wanted = track.rate(seen), speed * (track.edge.rate or 0.0)
     if rate is None:
         return None
     if not track.slow and rate < SLOW_BELOW * wanted:

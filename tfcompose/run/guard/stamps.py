@@ -20,6 +20,8 @@ WRONG_IN_A_ROW = 3
 #: Each fault counts up by so many, each right message down by one; at so many the fault is reported.
 REPEAT_COUNTS, REPEATS = 2, 10
 STEP_COUNTS, BACK_STEPS = 4, 12
+#: How fast simulated time goes by is measured over so long.
+SPEED_OVER_S = 2.0
 #: One step back by so much is enough.
 LARGE_STEP_NS = _SECOND_NS
 
@@ -30,6 +32,29 @@ class Clocks:
 
     simulated: bool
     sim_ns: int | None = None
+    _since: tuple[float, int] | None = None
+    _speed: float = 1.0
+
+    def take(self, sim_ns: int | None, now: float) -> None:
+        """Take the newest time on /clock, and when that was."""
+        self.sim_ns = sim_ns
+        if sim_ns is None:
+            return
+        if self._since is None or sim_ns < self._since[1]:
+            self._since = (now, sim_ns)
+        elif now - self._since[0] >= SPEED_OVER_S:
+            self._speed = self._passed(now)
+            self._since = (now, sim_ns)
+
+    def speed(self, now: float) -> float:
+        """Return how many seconds go by on /clock in a second, 1 at most: the least of what is, and was a while ago."""
+        enough = self._since is not None and now - self._since[0] >= SPEED_OVER_S / 4
+        return min(self._speed, self._passed(now)) if enough else self._speed
+
+    def _passed(self, now: float) -> float:
+        """Return the speed since the last time that it was measured."""
+        begun, begun_ns = self._since or (now, 0)
+        return min(1.0, ((self.sim_ns or 0) - begun_ns) / _SECOND_NS / max(now - begun, 1e-9))
 
     def reference_ns(self, received_ns: int) -> int | None:
         """Return the time that stamps should have, or None if that is not known."""

@@ -130,6 +130,7 @@ CODES = {
     "TF727": "joint_key_without_effect",
     "TF728": "joint_named_like_a_frame",
     "TF729": "substitution_in_urdf",
+    "TF730": "body_in_no_urdf",
     # a URDF that somebody else wrote; meshes and packages
     "TF720": "unknown_urdf_word",
     "TF721": "bad_urdf_value",

@@ -62,6 +62,7 @@ from tfcompose.check.rules.tf716_soft_limit_outside import soft_limit_outside
 from tfcompose.check.rules.tf717_interface_claimed_twice import interface_claimed_twice
 from tfcompose.check.rules.tf718_mimic_joint_commanded import mimic_joint_commanded
 from tfcompose.check.rules.tf728_joint_named_like_a_frame import joint_named_like_a_frame
+from tfcompose.check.rules.tf730_body_in_no_urdf import body_in_no_urdf
 from tfcompose.check.rules.tf812_start_order_loop import start_order_loop
 from tfcompose.check.rules.tf815_process_without_role import process_without_role
 from tfcompose.check.rules.tf818_required_without_role import required_without_role
@@ -152,6 +153,7 @@ RULES: tuple[Rule, ...] = (
     Rule("TF717", interface_claimed_twice),
     Rule("TF718", mimic_joint_commanded),
     Rule("TF728", joint_named_like_a_frame, WARNING),
+    Rule("TF730", body_in_no_urdf, WARNING),
     Rule("TF812", start_order_loop),
     Rule("TF815", process_without_role, WARNING),
     Rule("TF818", required_without_role, WARNING),

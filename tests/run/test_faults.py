@@ -78,6 +78,8 @@ if os.fork() == 0:
     open("daemon", "w").write(str(os.getpid()))
     os.close(1), os.close(2)
     time.sleep(60)
+while not os.path.exists("daemon"):  # before, its group is its parent's, and ends with it
+    time.sleep(0.01)
 """
 
 #: As DAEMON; and it goes on as a program without a variable in its environment, whose parent stays or goes.
@@ -199,6 +201,26 @@ def test_a_daemon_that_left_its_group_ends_with_the_run(launch: Callable[..., Ru
     else:
         assert run.down() == 0
     assert until(lambda: gone(pid), 4)
+
+
+@pytest.mark.parametrize("how", ["restart", "stop"])
+def test_what_left_its_group_ends_with_its_process_that_is_stopped_or_started_again(
+    launch: Callable[..., Run], tmp_path: Path, how: str
+) -> None:
+    """One that ignores signals ends before the next one of its process begins, and others when that is stopped."""
+    assert "signal.SIG_IGN" in DAEMON
+    code = (DAEMON if how == "restart" else DAEMON.replace("signal.SIG_IGN", "signal.SIG_DFL")) + "time.sleep(60)\n"
+    run = launch(program("lidar", code), program("calm", SLEEPER))
+    assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
+    first = int((tmp_path / "daemon").read_text())
+    calm = run.ps()["calm"]["pid"]
+    ask(run.place, do=how, name="lidar")
+    assert until(lambda: gone(first), 8)
+    if how == "restart":
+        assert until(lambda: (tmp_path / "daemon").read_text() not in {"", str(first)})
+        assert not gone(int((tmp_path / "daemon").read_text()))
+    assert run.ps()["calm"]["pid"] == calm
+    assert run.down() == 0
 
 
 @pytest.mark.parametrize("parent", ["stays", "goes"])

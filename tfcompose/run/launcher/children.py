@@ -17,7 +17,7 @@ from tfcompose.run.hold import GO, HOLD_FD
 from tfcompose.run.launcher.child import LAST_LINE_LENGTH, Child, Pipe, bury_adopted, has_ended, kill_group, spawn
 from tfcompose.run.launcher.happening import Exited, LogSeen, Started, StartFailed
 from tfcompose.run.launcher.keeper import Keeper
-from tfcompose.run.launcher.leftovers import LAUNCHER, launcher_mark, leftovers, these
+from tfcompose.run.launcher.leftovers import LAUNCHER, PROCESS, launcher_mark, leftovers, tell, these
 from tfcompose.run.launcher.leftovers import end as end_leftovers
 from tfcompose.run.launcher.notice import LogLine
 from tfcompose.run.launcher.processes import descendants
@@ -60,6 +60,8 @@ class Children:
         self._marks = {RUN_ID: run_id, LAUNCHER: launcher_mark()} if run_id else {}
         self._keeper = Keeper(run_id)
         self._strays: set[int] = set()
+        self._ran: set[str] = set()
+        self._left: set[str] = set()
 
     def start(self, process: PlanProcess, command: Command, guard: GuardPipes | None = None) -> Event:
         """Start the process, with the pipes of a guard if it is one, and return what came of it."""
@@ -68,6 +70,9 @@ class Children:
         try:
             if command.missing:
                 return StartFailed(process.name, command.missing)
+            if process.name in self._ran and self._run_id:  # nobody wants two of what it left behind
+                tell(self._run_id, {process.name}, signal.SIGKILL)
+            self._left.discard(process.name)
             child = self._spawn(process, command, guard)
         except (OSError, subprocess.SubprocessError, ValueError) as error:
             if guard:
@@ -104,6 +109,7 @@ class Children:
     def kill(self, name: str, number: int) -> None:
         """Send the signal to the child's group, if it runs."""
         if name in self._children:
+            self._left.add(name)
             kill_group(self._children[name].popen.pid, number)
 
     def order(self, order: GuardOrder) -> None:
@@ -130,6 +136,10 @@ class Children:
         if self._keeper.ended:
             self._keeper = Keeper(self._run_id)
         self._strays = set(self._descendants().values())
+        if told := self._left.difference(self._children):
+            self._left -= told
+            if self._strays - self._groups():
+                tell(self._run_id, told, signal.SIGTERM)
         self._keep()
 
     def close(self) -> None:
@@ -164,7 +174,8 @@ class Children:
     def _spawn(
         self, process: PlanProcess, command: Command, guard: GuardPipes | None, pass_fds: tuple[int, ...] = ()
     ) -> Child:
-        more = (guard.env if guard else {}) | self._marks
+        more = (guard.env if guard else {}) | self._marks | ({PROCESS: process.name} if self._run_id else {})
+        self._ran.add(process.name)
         if command.fence:
             command.fence[0].parent.mkdir(exist_ok=True)
             command.fence[0].write_text(command.fence[1], encoding="utf-8")

@@ -16,10 +16,12 @@ from tfcompose.run.launcher.processes import BEGAN, PROC, STATE, all_pids, began
 from tfcompose.run.place import RUN_ID
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Collection, Iterable
 
 #: The variable that names the launcher of a run: its process number, and when it began (clock ticks).
 LAUNCHER = "TFCOMPOSE_LAUNCHER"
+#: The variable that names the plan's process that something belongs to.
+PROCESS = "TFCOMPOSE_PROCESS"
 #: The kernel ends a killed process within this time, in seconds, also where much is going on.
 KILLED_WITHIN_S = 5.0
 
@@ -28,7 +30,8 @@ KILLED_WITHIN_S = 5.0
 class Leftover:
     """A process that a run started: its number, its run's id, its command, and when it began (clock ticks).
 
-    ``launcher`` is the number of the run's launcher if that one still runs: then nothing was left behind.
+    ``launcher`` is the number of the run's launcher if that one still runs: then nothing was left behind. ``process``
+    is the plan's process that started it, as far as it says.
     """
 
     pid: int
@@ -36,6 +39,7 @@ class Leftover:
     command: str
     began: int
     launcher: int | None = None
+    process: str = ""
 
 
 def launcher_mark() -> str:
@@ -78,7 +82,7 @@ def _marked(pid: int, run: str) -> Leftover | None:
     env = variables_of(pid)
     if not env.get(RUN_ID, "").startswith(run):
         return None
-    return Leftover(pid, env[RUN_ID], _command(pid), began(pid), _launcher(env.get(LAUNCHER, "")))
+    return Leftover(pid, env[RUN_ID], _command(pid), began(pid), _launcher(env.get(LAUNCHER, "")), env.get(PROCESS, ""))
 
 
 def _command(pid: int) -> str:
@@ -93,6 +97,13 @@ def _launcher(mark: str) -> int | None:
         same = (PROC / str(int(pid)) / "ns/net").readlink() == (PROC / "self/ns/net").readlink()
         return int(pid) if same and began(pid) == int(since) else None
     return None
+
+
+def tell(run: str, processes: Collection[str], number: signal.Signals) -> None:
+    """Send the signal to what these processes, which have ended, left behind in this very run."""
+    for one in leftovers(run):
+        if one.process in processes:
+            _send(one, number)
 
 
 def end(found: list[Leftover], patience_s: float = 2.0) -> list[Leftover]:

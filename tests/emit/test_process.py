@@ -30,7 +30,7 @@ EXE = "run: {package: p, executable: e}"
 def files_of(processes: str, head: str = HEAD) -> dict[str, str]:
     compiled = compile_robot(f"{head}  {processes}\n", "r.yaml", library())
     assert compiled.robot
-    assert not compiled.found, compiled.found
+    assert not compiled.errors, compiled.found
     return {file.path: file.text for file in emit(compiled.robot)}
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
 from tfcompose.frozen import dataclass, field, replace
+from tfcompose.model import SHELL
 from tfcompose.plan import told_at_start
 from tfcompose.resolve.beside import beside
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Node, Process, Robot
     from tfcompose.resolve.packages import Disk
 
+_WORDS = {"remap": "-r FROM:=TO", "log_level": "--log-level LEVEL", "params": "--params-file ${params_file}"}
 _HOLE = re.compile(r"\$\{\s*(frame|file)\(\s*([^(){}]*?)\s*\)\s*\}")
 
 
@@ -50,13 +52,26 @@ class Filler:
         return done
 
     def needless(self, process: Process) -> list[Diagnostic]:
-        """Return a finding if the process is given the file of its parameters, and has none."""
+        """Return what is said and reaches nobody: a file of no parameters, and keys beside a shell's text."""
         at: Path = ("processes", process.name, "run")
-        asked = any("${params_file}" in word for word in process.argv)
+        asked = any("${params_file}" in word for word in (*process.argv, *process.env.values()))
+        if process.argv[:2] == SHELL:
+            return self._not_reached(process, asked=asked)
         if not asked or any(node.params for node in process.nodes) or not self.source.has(at):
             return []
         message = f"{process.name} is given ${{params_file}}, and has no parameters"
         return [finding("TF816", message, self.source.at(at), help="params: {…}")]
+
+    def _not_reached(self, process: Process, *, asked: bool) -> list[Diagnostic]:
+        """Return a warning for each key that would be told by arguments, which end before the text's programs."""
+        found = []
+        for key in ("remap", "log_level", *(() if asked else ("params",))):
+            at: Path = ("processes", process.name, key)
+            if getattr(process, key) and self.source.has(at):
+                message = f"{key} does not reach {process.name}, which a shell reads"
+                advice = f"write it into the text: --ros-args {_WORDS[key]}; or give run as a list"
+                found.append(finding("TF107", message, self.source.at_key(at), help=advice, severity="warning"))
+        return found
 
     def _fill(self, value: Any, path: Path) -> Any:
         if isinstance(value, str):

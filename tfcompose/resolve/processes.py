@@ -124,17 +124,22 @@ def name_clashes(processes: list[Process], spec: RobotSpec, source: Source) -> l
 def unknown_names(
     processes: list[Process], source: Source, known: frozenset[str], missing: tuple[str, ...]
 ) -> list[Diagnostic]:
-    """Return a finding for each name under ``after`` that is no process.
+    """Return a finding for each name under ``after`` that is no process, and for each end that never comes.
 
     ``known`` are those that are there or were refused, ``missing`` how the names of those begin that are not known.
     """
     names = sorted(known)
+    lasting = {process.name: process for process in processes if process.kind != "run"}
     found = []
     for process in processes:
         section = "processes" if source.has(("processes", process.name)) else "sensors"
         inside = ("after",) if section == "processes" else ("driver", "after")
-        for other in process.after:
-            if other not in known and not other.startswith(missing):
+        for other, what in process.after.items():
+            if what == "done" and other in lasting:
+                place = source.at((section, process.name, *inside, other))
+                message = f"{process.name} waits until {other} is done: that never comes"
+                found.append(finding("TF813", message, place, help=f"after: {{{other}: ready}}, or started"))
+            elif other not in known and not other.startswith(missing):
                 place = source.at_key((section, process.name, *inside, other))
                 advice = did_you_mean(other, names, f"there is {', '.join(names)}")
                 found.append(

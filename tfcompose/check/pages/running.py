@@ -37,7 +37,9 @@ The finding says where it was looked for. A package's programs are found once it
     "TF811": """An edge was not published while the plan ran.
 
 Its owner is named: a process that somebody else starts may not be running, or its node has another name.""",
-    "TF813": """A process waits for one that is not there.""",
+    "TF813": """A process waits for one that is not there, or for its end where it has none.
+
+tfcompose's own processes, and those that somebody else starts, are never done; they are started, and ready.""",
     "TF814": """There is no live pose of one frame in another.
 
 A frame is unknown, the two are in two trees, their edges have no time in common, or nothing is published at all.""",

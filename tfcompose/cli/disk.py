@@ -9,7 +9,6 @@ import re
 import warnings
 from functools import cache
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.terminal import read_text
@@ -46,8 +45,8 @@ def _expanded(file: str, packages: Packages, arguments: Mapping[str, Any], text:
 @cache
 def _is_pointer(path: str) -> bool:
     """Return whether the file is what a checkout without Git LFS has in another's place (git-lfs's own spec, v1)."""
-    with contextlib.suppress(OSError), Path(path).open("rb") as file:
-        return file.read(len(_POINTER)) == _POINTER
+    with contextlib.suppress(OSError), import_module("pathlib").Path(path).open("rb") as file:
+        return bool(file.read(len(_POINTER)) == _POINTER)
     return False
 
 

@@ -45,9 +45,17 @@ def _expanded(file: str, packages: Packages, arguments: Mapping[str, Any], text:
 @cache
 def _is_pointer(path: str) -> bool:
     """Return whether the file is what a checkout without Git LFS has in another's place (git-lfs's own spec, v1)."""
-    with contextlib.suppress(OSError), import_module("pathlib").Path(path).open("rb") as file:
-        return bool(file.read(len(_POINTER)) == _POINTER)
+    with contextlib.suppress(OSError):
+        return _beginning(path, len(_POINTER)) == _POINTER
     return False
+
+
+def _beginning(path: str, size: int) -> bytes:
+    descriptor = os.open(path, os.O_RDONLY)  # pathlib's import costs more than all reads of a lint
+    try:
+        return os.read(descriptor, size)
+    finally:
+        os.close(descriptor)
 
 
 @cache
@@ -102,7 +110,6 @@ def _collada_unit(path: str) -> float:
     """Return the metres in the unit of a COLLADA file; 1 where it says none, and for other files."""
     if not path.lower().endswith(".dae"):
         return 1.0
-    with Path(path).open("rb") as file:
-        said = _UNIT.search(file.read(_HEAD))
+    said = _UNIT.search(_beginning(path, _HEAD))
     metres = float(said[1]) if said else 1.0
     return metres if 0 < metres < math.inf else 1.0

@@ -118,6 +118,11 @@ def low_rate(stage: Stage) -> None:
     stage.fixed(node, "base_link laser")
 
 
+def slashed(stage: Stage) -> None:
+    sound(stage)
+    stage.moving(stage.node("old"), "/odom /gps")
+
+
 def repeated(stage: Stage) -> None:
     began = time.time_ns()
     node = stage.node("drive")
@@ -272,6 +277,7 @@ SCENES: dict[Callable[[Stage], Any], tuple[str, list[str]]] = {
     two_writers: ("TF822", ["odom → base_link is published by /drive and by /ekf", "same value", "Hz", "pid"]),
     second_parent: ("TF802", ["base_link has 2 parents: map and odom", "/drive", "/slam"]),
     low_rate: ("TF838", ["odom → base_link comes with", "/drive", "20 Hz"]),
+    slashed: ("TF501", ["/old publishes odom → gps with a slash in front of a frame's name, which tf2 drops"]),
     repeated: ("TF823", ["/drive sends odom → base_link with the same stamp"]),
     back: ("TF824", ["/drive stamps odom → base_link back in time"]),
     without_stamp: ("TF825", ["/drive stamps odom → base_link without a stamp", "use_sim_time"]),

@@ -107,8 +107,11 @@ def test_what_is_no_bag_is_said_in_one_sentence(tmp_path: Path) -> None:
     [file] = whole.glob("*.mcap")
     (tmp_path / "whole.zstd").write_bytes(b"")
     (tmp_path / "cut.mcap").write_bytes(file.read_bytes()[:2000])
+    (tmp_path / "noise.mcap").write_bytes(file.read_bytes().replace(b"/tf", b"\xff\xfe\xfd"))
     for name, why in [
         ("none", "there is no bag"),
+        ("noise.mcap", "it is damaged ('utf-8' codec"),
+        ("noise.mcap", "help: mcap recover"),
         ("empty", "no recording"),
         ("text.mcap", "cannot be read as a bag"),
         ("text.db3", "cannot be read as a bag"),

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from pathlib import Path
 
 ENDINGS = {".mcap", ".db3"}
 
@@ -58,8 +55,15 @@ def damaged(path: str, error: Exception) -> BagError:
     if "end magic" in words:
         words = "it ends in the middle, as when the recorder was killed"
         advice = "mcap recover FILE -o WHOLE.mcap keeps what is whole in it"
+    elif _is_mcap(Path(path)) and not isinstance(error, OSError) and not type(error).__module__.startswith("rosbags"):
+        words = f"it is damaged ({words})"  # what the library did not expect, such as a size beyond all bounds
+        advice = "mcap recover FILE -o WHOLE.mcap keeps what is whole in it"
     elif "malformed" in words or "missing tables" in words or "not a database" in words:
         advice = "sqlite3 FILE .recover | sqlite3 WHOLE.db3 keeps what is whole in it"
     elif "metadata" in words or "database files are missing" in words:
         advice = "ros2 bag reindex writes metadata.yaml anew; or name a recording in the folder"
     return BagError(f"{path} cannot be read as a bag: {words}", advice)
+
+
+def _is_mcap(path: Path) -> bool:
+    return path.suffix == ".mcap" or any(path.glob("*.mcap"))

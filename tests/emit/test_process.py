@@ -51,6 +51,11 @@ REACH: dict[str, dict[str, Any]] = {
     "stop: {}": {"stop": StopRule("SIGINT", None)},
     "ready: edges": {"ready": Ready("edges")},
     "ready: {edges: true, timeout: 1 min}": {"ready": Ready("edges", timeout_s=60.0)},
+    "namespace: front/left": {"namespace": "r1/front/left", "nodes": ("/r1/front/left/a",)},
+    "namespace: /front": {"namespace": "front", "nodes": ("/front/a",)},
+    "namespace: front, node: b": {"nodes": ("/r1/front/b",)},
+    "namespace: front, node: /b": {"nodes": ("/b",)},
+    "namespace: front, ready: {topic: scan}": {"ready": Ready("topic", "/r1/front/scan")},
     "ready: {topic: scan}": {"ready": Ready("topic", "/r1/scan")},
     "ready: {topic: /scan, timeout: 3}": {"ready": Ready("topic", "/scan", timeout_s=3.0)},
     "ready: {service: a/b}": {"ready": Ready("service", "/r1/a/b")},
@@ -83,6 +88,11 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "run: [a, '|', b]": ("a", "|", "b"),
     "run: [a], env: {B: c}, restart: always, node: n": ("a",),
     "run: [a, --now], log_level: debug": ("a", "--now", "--ros-args", "--log-level", "debug"),
+    "run: [a], namespace: front": ("a", "--ros-args", "-r", "__ns:=/r1/front"),
+    "run: [a], namespace: front, nodes: {m: {}, n: {}}": ("a", "--ros-args", "-r", "__ns:=/r1/front"),
+    "run: [a], namespace: front, params: {x: 1}": (
+        "a", "--ros-args", "-r", "__node:=a", "-r", "__ns:=/r1/front", "--params-file", "${params_file}",
+    ),
     "run: [a], remap: {/scan: /front}": ("a", "--ros-args", "-r", "/scan:=/front"),
     "run: [a], params: {x: 1}": (
         "a", "--ros-args", "-r", "__node:=a", "-r", "__ns:=/r1", "--params-file", "${params_file}",

@@ -61,6 +61,12 @@ def test_what_the_file_says_to_the_node_is_taken_in_its_order_and_inline_paramet
     assert "nested" not in said  # robot1/planner below robot1 is /robot1/robot1/planner
 
 
+def test_a_name_in_the_file_is_below_the_namespace_of_the_process() -> None:
+    file = "planner: {ros__parameters: {near: 1}}\n/robot1/planner: {ros__parameters: {far: 1}}\n"
+    params = yaml.safe_load(written("{file: front.yaml}, namespace: front", front=file))
+    assert params == {"/robot1/front/planner": {"ros__parameters": {"near": 1}}}
+
+
 def test_words_stay_as_they_were_written() -> None:
     text = written("{file: p.yaml}")
     assert '"flag": on\n' in text

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
@@ -64,10 +65,11 @@ def look(
     return commands, found[0] if found else None
 
 
+@pytest.mark.parametrize(("own", "namespace"), [(None, "r"), ("r/nav", "r/nav")])
 def test_the_file_is_included_with_namespace_remappings_sim_time_and_arguments(
-    tmp_path: Path, env: dict[str, str]
+    tmp_path: Path, env: dict[str, str], own: str | None, namespace: str
 ) -> None:
-    plan = Plan("rover", "", None, RosSettings("r", clock="sim"), (), (NAV2,))
+    plan = Plan("rover", "", None, RosSettings("r", clock="sim"), (), (replace(NAV2, namespace=own),))
     told: list[Notice] = []
     assert supervise(plan, tmp_path / "plan.json", report=told.append, base_env=env) == 0
     (line,) = [notice.text for notice in told if isinstance(notice, LogLine)]
@@ -80,7 +82,7 @@ def test_the_file_is_included_with_namespace_remappings_sim_time_and_arguments(
             [
                 "GroupAction",
                 [
-                    ["PushRosNamespace", "r"],
+                    ["PushRosNamespace", namespace],
                     ["SetRemap", "/tf", "/r/tf"],
                     ["SetParameter", "use_sim_time", ["value", True]],
                     [

@@ -43,8 +43,11 @@ def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> 
         return process.argv
     told = _told_to_node(process, robot, has_params=has_params)
     if process.package is None:
+        names = _names(process, robot)
         if "--params-file" in told:  # which is keyed by the node's name
-            told = [*_names(process, robot), *told]
+            told = [*names, *told]
+        elif process.namespace is not None:
+            told = [*names[-2:], *told]
         return (*process.argv, "--ros-args", *told) if told else process.argv
     program = f"${{executable:{process.package}/{process.executable}}}"
     return (program, *process.argv, "--ros-args", *_names(process, robot), *told)
@@ -57,8 +60,8 @@ def _is_node(process: Process, *, owns: bool) -> bool:
     """
     if process.argv[:2] == SHELL:
         return False
-    is_told = process.log_level is not None or bool(written_params(process)) or bool(process.remap.keys() - _TF_TOPICS)
-    return owns or is_told or "--ros-args" in process.argv
+    is_told = process.log_level is not None or process.namespace is not None or bool(written_params(process))
+    return owns or is_told or bool(process.remap.keys() - _TF_TOPICS) or "--ros-args" in process.argv
 
 
 def _told_to_node(process: Process, robot: Robot, *, has_params: bool) -> list[str]:
@@ -94,6 +97,6 @@ def _told(params: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
 def _names(process: Process, robot: Robot) -> list[str]:
     """Return what gives the node its name and namespace; several nodes have names of their own."""
     if len(process.nodes) > 1:
-        return ["-r", f"__ns:=/{robot.ros.namespace}"]
+        return ["-r", f"__ns:=/{robot.ros.namespace if process.namespace is None else process.namespace}"]
     namespace, _, node = process.node.rpartition("/")
     return ["-r", f"__node:={node}", "-r", f"__ns:={namespace or '/'}"]

@@ -145,6 +145,7 @@ def _process(process: Process, robot: Robot, owned: list[tuple[str, str]], names
         description=f"{process.part}/{DESCRIPTION}" if process.part and process.kind in _PUBLISHERS else None,
         drives=driven_of(process, robot),
         switches=switches_of(process, robot),
+        namespace=process.namespace,
     )
 
 

@@ -68,6 +68,7 @@ class Process:
     rate: float | None = None
     part: str = ""
     describes: bool = False
+    namespace: str | None = None
 
     @property
     def node(self) -> str:

@@ -94,8 +94,9 @@ def _process_to_json(process: PlanProcess) -> dict[str, Any]:
     row = _fields(process)
     row |= {"stop": _fields(process.stop), "ready": process.ready and _fields(process.ready)}
     simulation = row.pop("simulate")
-    if process.description is None:
-        del row["description"]
+    for key in ("description", "namespace"):
+        if row[key] is None:
+            del row[key]
     row["drives"] = [_fields(driven) for driven in process.drives]
     if not process.drives:
         del row["drives"]

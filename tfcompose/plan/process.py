@@ -102,6 +102,7 @@ class PlanProcess:
     ``drives`` are the sensors that it is the driver of, by their presets. ``switches`` holds, by the full names of its
     nodes, the parameters that were written for them and decide what they publish.
     ``description`` is the file beside the plan that a publisher sends as ``robot_description``; None: the plan's.
+    ``namespace`` is that of its nodes, without a leading slash; None: the plan's.
     """
 
     name: str
@@ -126,6 +127,7 @@ class PlanProcess:
     description: str | None = None
     drives: tuple[Driven, ...] = ()
     switches: dict[str, dict[str, str | int | float | bool]] = field(default_factory=dict)
+    namespace: str | None = None
 
     @property
     def topics(self) -> tuple[str, str]:

@@ -131,6 +131,7 @@ def _process_from_json(data: dict[str, Any], where: str) -> PlanProcess:
         description=get(data, "description", str, where) if "description" in data else None,
         drives=rows(data, "drives", _driven_from_json) if "drives" in data else (),
         switches=_switches_from_json(data, where) if "switches" in data else {},
+        namespace=get(data, "namespace", str, where) if "namespace" in data else None,
     )
 
 

@@ -46,7 +46,7 @@ _LEFT_OUT = {
     "GuardPolicy": {"fence"},
     "Plan": {"host"},
     "PlanEdge": {"joint", "switched"},
-    "PlanProcess": {"simulate", "description", "drives", "switches"},
+    "PlanProcess": {"simulate", "description", "drives", "switches", "namespace"},
 }
 
 

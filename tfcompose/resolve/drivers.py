@@ -8,7 +8,7 @@ from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
 from tfcompose.frozen import replace
 from tfcompose.model import BUILT_IN, Node, Process
 from tfcompose.resolve.isolation import settings_of
-from tfcompose.resolve.nodes import full_name
+from tfcompose.resolve.nodes import full_name, namespace_of
 from tfcompose.resolve.presets import DRIVER
 from tfcompose.resolve.processes import starts
 from tfcompose.resolve.running import how, program
@@ -49,7 +49,7 @@ def driver_process(sensor: Sensor, spec: RobotSpec, source: Source) -> tuple[Pro
     state = driver.lifecycle if driver and run is None else None
     node = Node(driver_node(sensor, spec), place, at, params, (said.lifecycle if said else None) or state)
     process = Process(sensor.name, "external" if external else "run", place, (node,))
-    process = replace(process, **how(said, spec.ros.namespace) if said else {})
+    process = replace(process, **how(said, namespace_of(said, spec.ros.namespace)) if said else {})
     if run:
         process = replace(process, **program(run, shell=bool(said and said.shell)))
     elif driver and launched:
@@ -64,7 +64,8 @@ def driver_node(sensor: Sensor, spec: RobotSpec) -> str:
     """Return the full name of the driver's node."""
     driver, said = sensor.preset.driver, sensor.spec.driver
     own = f"{sensor.named(driver.namespace)}/{sensor.named(driver.node)}".strip("/") if driver else sensor.name
-    return full_name(spec.ros.namespace, (said.node.name if said and said.node else None) or own)
+    namespace = namespace_of(said, spec.ros.namespace)
+    return full_name(namespace, (said.node.name if said and said.node else None) or own)
 
 
 def driver_parameters(sensor: Sensor, prefix: str = "") -> dict[str, Any]:

@@ -21,7 +21,12 @@ if TYPE_CHECKING:
     from tfcompose.model import Node, Process, Robot
     from tfcompose.resolve.packages import Disk
 
-_WORDS = {"remap": "-r FROM:=TO", "log_level": "--log-level LEVEL", "params": "--params-file ${params_file}"}
+_WORDS = {
+    "remap": "-r FROM:=TO",
+    "log_level": "--log-level LEVEL",
+    "namespace": "-r __ns:=/NAMESPACE",
+    "params": "--params-file ${params_file}",
+}
 _HOLE = re.compile(r"\$\{\s*(frame|file)\(\s*([^(){}]*?)\s*\)\s*\}")
 
 
@@ -65,7 +70,7 @@ class Filler:
     def _not_reached(self, process: Process, *, asked: bool) -> list[Diagnostic]:
         """Return a warning for each key that would be told by arguments, which end before the text's programs."""
         found = []
-        for key in ("remap", "log_level", *(() if asked else ("params",))):
+        for key in ("remap", "log_level", "namespace", *(() if asked else ("params",))):
             at: Path = ("processes", process.name, key)
             if getattr(process, key) and self.source.has(at):
                 message = f"{key} does not reach {process.name}, which a shell reads"

@@ -10,7 +10,7 @@ from tfcompose.resolve.node_presets import node_preset, node_preset_names
 
 if TYPE_CHECKING:
     from tfcompose.load import Path, Source
-    from tfcompose.validate.process import ProcessSpec
+    from tfcompose.validate.process import ProcessSpec, Started
     from tfcompose.validate.spec import RobotSpec
 
 #: The key among a process's parameters that names files with more of them.
@@ -22,6 +22,13 @@ def full_name(namespace: str, name: str) -> str:
     if name.startswith("/"):
         return name
     return "/" + "/".join(part for part in (namespace.strip("/"), name) if part)
+
+
+def namespace_of(said: Started | None, namespace: str) -> str:
+    """Return the namespace of a process's nodes, without a leading slash: its own, or the robot's ``namespace``."""
+    if said is None or said.namespace is None:
+        return namespace
+    return full_name(namespace, said.namespace).strip("/")
 
 
 def has_claims(spec: RobotSpec) -> bool:

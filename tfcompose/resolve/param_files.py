@@ -61,7 +61,8 @@ class _Work:
         loaded = self._load(path, at)
         if loaded is None:
             return {}
-        meant = [one for one in loaded.nodes if matches(full_name(self.namespace, one.name), node.name)]
+        namespace = self.namespace if process.namespace is None else process.namespace
+        meant = [one for one in loaded.nodes if matches(full_name(namespace, one.name), node.name)]
         if not meant and not loaded.found:
             self.found.append(_nothing(path, at, node, process, loaded.nodes))
         params: dict[str, Any] = {}

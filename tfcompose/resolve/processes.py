@@ -10,7 +10,7 @@ from tfcompose.load.choices import SIMULATIONS
 from tfcompose.model import BUILT_IN, JOINTS, STATIC, Node, Process
 from tfcompose.plan import Simulation
 from tfcompose.resolve.built_in import built_in_keys
-from tfcompose.resolve.nodes import nodes_of
+from tfcompose.resolve.nodes import namespace_of, nodes_of
 from tfcompose.resolve.poses import pose_of
 from tfcompose.resolve.running import how, program
 
@@ -29,18 +29,19 @@ def user_process(
     place = source.at_key(at)
     if name in BUILT_IN:
         return None, built_in_keys(name, said, source)
-    nodes, found = nodes_of(name, said, spec.ros.namespace, source)
+    namespace = namespace_of(said, spec.ros.namespace)
+    nodes, found = nodes_of(name, said, namespace, source)
     if said.external:
-        keys = how(said, spec.ros.namespace, ("after", "host", "required", "ready"))
+        keys = how(said, namespace, ("after", "host", "required", "ready"))
         return replace(Process(name, "external", place, nodes), **keys), found
     if said.simulate:
         one = (Node(nodes[0].name, nodes[0].at),)
         process, refused = _simulated(Process(name, "simulate", place, one), said.simulate, source)
-        keys = how(said, spec.ros.namespace, ("after", "env", "host", "required"))
+        keys = how(said, namespace, ("after", "env", "host", "required"))
         return process and replace(process, **keys), [*found, *refused]
     if starts(said.run):
         process = Process(name, "run", place, nodes)
-        return replace(process, **how(said, spec.ros.namespace), **program(said.run, shell=bool(said.shell))), found
+        return replace(process, **how(said, namespace), **program(said.run, shell=bool(said.shell))), found
     if _was_refused(source.data["processes"][name].get("run")):
         return None, found
     if said.run:

@@ -18,8 +18,10 @@ _KEYS = (*_AS_WRITTEN, "stop", "ready")
 
 
 def how(said: Started, namespace: str, keys: tuple[str, ...] = _KEYS) -> dict[str, Any]:
-    """Return a process's fields from what was written, those of ``keys``."""
+    """Return a process's fields from what was written, those of ``keys``; ``namespace`` is that of its nodes."""
     fields = {key: getattr(said, key) for key in keys if key in _AS_WRITTEN}
+    if said.namespace is not None:
+        fields["namespace"] = namespace
     if "stop" in keys and said.stop:
         fields["stop"] = StopRule(said.stop.signal, said.stop.timeout)
     if "ready" in keys and said.ready:

@@ -10,6 +10,7 @@ from tfcompose.validate.fields import (
     ANYTHING,
     BOOLEAN,
     DURATION,
+    NAMESPACE,
     ONLY_TRUE,
     RATE_,
     TEXT,
@@ -57,8 +58,10 @@ class ReadySpec(Model):
     """When the process counts as ready; one of these. Left out: when all the edges that it owns are live."""
 
     edges: bool | None = key(ONLY_TRUE, None, "all the edges that it owns are live")
-    topic: str | None = key(TEXT, None, "somebody publishes it; below ros.namespace unless it begins with /", ("scan",))
-    service: str | None = key(TEXT, None, "it is there; below ros.namespace unless it begins with /")
+    topic: str | None = key(
+        TEXT, None, "somebody publishes it; below the process's namespace unless it begins with /", ("scan",)
+    )
+    service: str | None = key(TEXT, None, "it is there; below the process's namespace unless it begins with /")
     lifecycle: str | None = key(choice("inactive", "active"), None, "its nodes are in this state, whoever did it")
     log: str | None = key(then(TEXT, _regular), None, "a regular expression that a line of its output holds")
     exit: int | None = key(integer(0, 255), None, "it has ended with this exit code")
@@ -132,8 +135,11 @@ class Started(Model):
     node: NamedNode | None = key(
         record(NamedNode, lambda value: {"name": value} if isinstance(value, str) else value, NODE_NAME),
         None,
-        "its name, or {preset, name}; below ros.namespace unless it begins with /",
+        "its name, or {preset, name}; below its namespace unless it begins with /",
         ("slam_toolbox", {"preset": "slam_toolbox"}),
+    )
+    namespace: str | None = key(
+        NAMESPACE, None, "its nodes are below it; itself below ros.namespace unless it begins with /", ("front",)
     )
     publishes: tuple[ClaimSpec, ...] = key(PUBLISHES, (), _PUBLISHES_ABOUT)
     params: dict[str, Any] = key(mapping(ANYTHING), {}, _PARAMS_ABOUT)

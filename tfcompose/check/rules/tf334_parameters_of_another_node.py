@@ -18,7 +18,7 @@ def parameters_of_another_node(robot: Robot) -> Iterator[Diagnostic]:
     """Parameters are for a node that the process does not have.
 
     ROS gives a node the parameters that stand under its full name, and drops all others without a word. In a parameter
-    file a name without a leading slash is below ros.namespace, as everywhere; * is one part of a name and ** any number
+    file a name without a leading slash is below the process's namespace; * is one part of a name and ** any number
     of them. Inline parameters stand without the node's name and ``ros__parameters``, because tfcompose writes these.
     """
     for process in robot.processes:

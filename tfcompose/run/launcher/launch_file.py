@@ -54,7 +54,7 @@ def launch_command(
     given = {
         "file": str(file),
         "arguments": arguments,
-        "namespace": ros.namespace,
+        "namespace": ros.namespace if process.namespace is None else process.namespace,
         "remap": process.remap,
         "sim_time": ros.clock == "sim",
     }

@@ -96,6 +96,22 @@ def test_own_processes_say_when_they_are_ready_and_others_are_executed() -> None
     }
 
 
+def test_processes_whose_names_differ_in_a_slash_alone_have_a_unit_and_a_service_each() -> None:
+    names = ("left/arm", "left-arm", "left arm", "arm")
+    waits = PlanProcess("last", "run", argv=("last",), after={"left/arm": "started"})
+    processes = (*(PlanProcess(name, "run", argv=(name,)) for name in names), waits)
+    plan = replace(compiled_plan(DRIVEN), edges=(), processes=processes)
+    units = {file.path: file.text for file in systemd(plan, Machine("/robot"))[0]}
+    assert list(units) == [
+        "rover.target", "rover-left-arm-2.service", "rover-left-arm.service", "rover-left-arm-3.service",
+        "rover-arm.service", "rover-last.service",
+    ]  # fmt: skip
+    assert "After=rover-left-arm-2.service" in units["rover-last.service"]
+    services = yaml.safe_load(compose(plan, Machine("."))[0][0].text)["services"]
+    assert list(services) == ["left-arm-2", "left-arm", "left-arm-3", "arm", "last"]
+    assert list(services["last"]["depends_on"]) == ["left-arm-2"]
+
+
 def test_a_unit_restarts_stops_and_waits_as_the_plan_says() -> None:
     made = units(compiled_plan(DRIVEN))
     slam, drive = made["rover-slam.service"], made["rover-drive.service"]

@@ -6,7 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.emit.emit import File
 from tfcompose.emit.params import mapping
-from tfcompose.emit.supervised import MAX_RESTARTS, STOP_S, after, command_of, plain_name, restart_of, started, unkept
+from tfcompose.emit.supervised import (
+    MAX_RESTARTS,
+    STOP_S,
+    after,
+    command_of,
+    plain_name,
+    plain_names,
+    restart_of,
+    started,
+    unkept,
+)
 
 if TYPE_CHECKING:
     from tfcompose.emit.supervised import Machine
@@ -25,7 +35,8 @@ def compose(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
 
     A process that owns edges is healthy while the first of them is live; ``after: ready`` waits for that.
     """
-    services = {plain_name(process.name): _service(plan, process, machine) for process in started(plan)}
+    names = plain_names(plan)
+    services = {names[process.name]: _service(plan, process, machine) for process in started(plan)}
     lines = [f"name: {plain_name(plan.robot)}", "services:", *mapping(services, "  ")]
     said = unkept(plan)
     for process in started(plan):
@@ -57,8 +68,9 @@ def _service(plan: Plan, process: PlanProcess, machine: Machine) -> dict[str, An
         "stop_grace_period": f"{round(stop_s * 1000)}ms",
     }
     if waits:
+        names = plain_names(plan)
         service["depends_on"] = {
-            plain_name(name): {"condition": _MET[what if what != "ready" or plan.edges_of(name) else "started"]}
+            names[name]: {"condition": _MET[what if what != "ready" or plan.edges_of(name) else "started"]}
             for name, what in waits.items()
         }
     if edges:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from itertools import count
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -36,9 +37,20 @@ def started(plan: Plan) -> list[PlanProcess]:
     return [process for process in plan.processes if process.kind != "external"]
 
 
-def plain_name(process: str) -> str:
-    """Return the process's name with nothing that units, services or nodes may not have in theirs."""
-    return _NO_NAME.sub("-", process)
+def plain_name(name: str) -> str:
+    """Return the name with nothing that units and services may not have in theirs."""
+    return _NO_NAME.sub("-", name)
+
+
+def plain_names(plan: Plan) -> dict[str, str]:
+    """Return the plain name of each process, by its own: no two are the same, and one that is plain stays."""
+    processes = [process.name for process in plan.processes]
+    names = {name: name for name in processes if plain_name(name) == name}
+    for name in processes:
+        if name not in names:
+            plain, taken = plain_name(name), set(names.values())
+            names[name] = next(one for n in count(1) if (one := f"{plain}-{n}" if n > 1 else plain) not in taken)
+    return names
 
 
 def command_of(process: PlanProcess, python: str, plan_file: str) -> list[str]:

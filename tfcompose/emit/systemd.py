@@ -5,7 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.emit.emit import File
-from tfcompose.emit.supervised import MAX_RESTARTS, STOP_S, after, command_of, plain_name, restart_of, started, unkept
+from tfcompose.emit.supervised import (
+    MAX_RESTARTS,
+    STOP_S,
+    after,
+    command_of,
+    plain_name,
+    plain_names,
+    restart_of,
+    started,
+    unkept,
+)
 
 if TYPE_CHECKING:
     from tfcompose.emit.supervised import Machine
@@ -37,7 +47,7 @@ def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
 
 
 def _unit(plan: Plan, process: str) -> str:
-    return f"{plain_name(plan.robot)}-{plain_name(process)}.service"
+    return f"{plain_name(plan.robot)}-{plain_names(plan)[process]}.service"
 
 
 def _target(plan: Plan, units: list[str]) -> str:

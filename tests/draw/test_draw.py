@@ -7,6 +7,7 @@ import io
 import random
 import re
 from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
@@ -258,6 +259,13 @@ def test_a_very_large_tree_gives_a_page_and_an_image_of_bounded_size() -> None:
     assert max(page.mediabox.width, page.mediabox.height) <= 14_400
     width, height = Image.open(io.BytesIO(png(drawing))).size
     assert 30e6 < width * height < 51e6
+
+
+def test_the_image_of_a_very_long_chain_is_one_that_viewers_open() -> None:
+    drawing = replace(draw(tree(1, 3)), width=40_000.0)
+    width, height = Image.open(io.BytesIO(png(drawing))).size
+    assert width == pytest.approx(32_000, abs=2)
+    assert height == pytest.approx(drawing.height * 32_000 / 40_000, abs=2)
 
 
 def test_the_same_graph_gives_the_same_bytes() -> None:

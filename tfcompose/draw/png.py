@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 PIXELS_PER_PX = 2.0  # for screens that have them, and for print
 MOST_PIXELS = 50e6
+MOST_TO_A_SIDE = 32_000.0  # viewers count these in 15 bits
 
 
 def png(drawing: Drawing) -> bytes:
@@ -23,7 +24,9 @@ def png(drawing: Drawing) -> bytes:
         ImportError: if ``pypdfium2`` is not installed.
     """
     pdfium: Any = import_module("pypdfium2")
-    finest = (MOST_PIXELS / (drawing.width * drawing.height)) ** 0.5
+    finest = min(
+        (MOST_PIXELS / (drawing.width * drawing.height)) ** 0.5, MOST_TO_A_SIDE / max(drawing.width, drawing.height)
+    )
     document = pdfium.PdfDocument(pdf(drawing))
     try:
         page = document[0]

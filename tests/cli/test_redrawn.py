@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import TextIO
 
+END = "<the end>"
+
 
 class Terminal:
     """A pseudo-terminal; what is written to ``stream`` is read back by ``shown``."""
@@ -29,8 +31,13 @@ class Terminal:
         fcntl.ioctl(self.stream.fileno(), termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
 
     def shown(self) -> str:
+        """Return what was written since the last time; it may come in pieces, so an end is written after it."""
+        self.stream.write(END)
         self.stream.flush()
-        return os.read(self._screen, 1 << 16).decode().replace("\r\n", "\n")
+        came = b""
+        while not came.endswith(END.encode()):
+            came += os.read(self._screen, 1 << 16)
+        return came.decode().removesuffix(END).replace("\r\n", "\n")
 
     def close(self) -> None:
         self.stream.close()

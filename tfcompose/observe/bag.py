@@ -70,8 +70,7 @@ class Recording:
         """Yield the messages of the pairs of topics (moving, fixed), in the order in which they were recorded.
 
         Raises:
-            BagError: if it has none of the topics.
-            BagError: if it is no bag, is damaged, or its messages are not TF's.
+            BagError: if it has none of the topics, is no bag, is damaged, or its messages are not TF's.
         """
         library = import_module("rosbags.rosbag2")
         decoder = Decoder()

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
 
     from tfcompose.model import Robot
 
+SHOWN = 5
+
 
 def joint_named_like_a_frame(robot: Robot) -> Iterator[Diagnostic]:
     """A joint has the name of a link or frame.
@@ -29,6 +31,3 @@ def joint_named_like_a_frame(robot: Robot) -> Iterator[Diagnostic]:
         more = f", and so {'are' if others[1:] else 'is'} {len(others)} more" if others else ""
         message = f"{first} is a joint and a {kind}{more}"
         yield finding("TF728", message, named[first], help=f"for example {first}_joint", notes=notes)
-
-
-SHOWN = 5

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
 
     from tfcompose.model import Robot
 
+SHOWN = 5
+
 
 def body_in_no_urdf(robot: Robot) -> Iterator[Diagnostic]:
     """A link has a body, and is not below the base.
@@ -33,6 +35,3 @@ def body_in_no_urdf(robot: Robot) -> Iterator[Diagnostic]:
         message = f"the body of {first} is in no URDF: it is not below the base {robot.base}{more}"
         advice = f"base: a frame above {first} and {robot.base}; or a part with a namespace"
         yield finding("TF730", message, outside[first], help=advice, notes=notes)
-
-
-SHOWN = 5

@@ -52,10 +52,11 @@ def data_frame_unknown(seen: Seen) -> Iterator[Diagnostic]:
 
 def data_beyond_tf(seen: Seen) -> Iterator[Diagnostic]:
     """The stamps of data and of the tree do not meet: every lookup for them extrapolates."""
+    simulated = seen.simulated
     for each in seen.stamped:
         sender = listed(each.nodes) or "somebody"
         for lack_s, age_s, edge in _latest_above(seen, each):
-            said = _clock_said(seen, each, edge, age_s)
+            said = _clock_said(seen, each, edge, age_s, simulated=simulated)
             if said:
                 message = f"{each.topic} from {sender} {said}: no lookup brings it together with {edge.name}"
                 yield finding("TF841", message, None, help=_clock_help(each, age_s))
@@ -88,7 +89,7 @@ def keeps_data_waiting(seen: Seen) -> set[tuple[str, str]]:
     return {(edge.strand.parent, edge.strand.child) for lack_s, _, edge in found if lack_s > LACK_S}
 
 
-def _clock_said(seen: Seen, each: Stamped, edge: EdgeSeen, age_s: float) -> str:
+def _clock_said(seen: Seen, each: Stamped, edge: EdgeSeen, age_s: float, *, simulated: bool) -> str:
     """Return how data are of another clock than an edge; nothing where they are only late or ahead."""
     if each.stamp_ns is None or KEPT_S < abs(age_s) < HOUR_S:
         return ""
@@ -97,7 +98,7 @@ def _clock_said(seen: Seen, each: Stamped, edge: EdgeSeen, age_s: float) -> str:
         return ""  # a recording that is played without its clock, perhaps
     if each.stamp_ns == 0:
         return "has no stamp"
-    said = other_clock(each.stamp_ns, each.received_ns, seen.clock_ns, simulated=seen.simulated)
+    said = other_clock(each.stamp_ns, each.received_ns, seen.clock_ns, simulated=simulated)
     return f"is stamped {said}" if said else ""
 
 

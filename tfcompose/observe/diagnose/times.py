@@ -66,8 +66,9 @@ def stamp_went_back(seen: Seen) -> Iterator[Diagnostic]:
 
 def wrong_clock(seen: Seen) -> Iterator[Diagnostic]:
     """Stamps are of another clock than the others': simulated and system time mixed, or no stamp at all."""
-    for edges in _by_publisher(seen, lambda edge: bool(_clock_said(seen, edge))):
-        said = _clock_said(seen, edges[0])
+    simulated = seen.simulated
+    for edges in _by_publisher(seen, lambda edge: bool(_clock_said(seen, edge, simulated=simulated))):
+        said = _clock_said(seen, edges[0], simulated=simulated)
         message = f"{who(edges[0])} stamps {_names(edges)} {said}"
         where = seen.where(edges[0])
         yield finding("TF825", message, None, notes=[Note(f"it runs {where}")] if where else [], help=_clock_help(said))
@@ -204,12 +205,12 @@ def _least_s(edge: EdgeSeen) -> float:
     return 0.0 if least is None or _repeats(edge) else least
 
 
-def _clock_said(seen: Seen, edge: EdgeSeen) -> str:
+def _clock_said(seen: Seen, edge: EdgeSeen, *, simulated: bool) -> str:
     """Return how the stamps are not of the clock that the others have, or nothing."""
     strand = edge.strand
     if strand.stamp_ns and _many(edge, strand.stamps_repeated):
         return ""  # it is off at last, which follows
-    return other_clock(strand.stamp_ns, strand.tally.last_ns, seen.clock_ns, simulated=seen.simulated)
+    return other_clock(strand.stamp_ns, strand.tally.last_ns, seen.clock_ns, simulated=simulated)
 
 
 def _clock_help(said: str) -> str:

@@ -74,9 +74,9 @@ def second_parent(seen: Seen) -> Iterator[Diagnostic]:
         parents = sorted({edge.strand.parent for edge in edges})
         if len(parents) < 2 or child in in_loops or child in planned:  # noqa: PLR2004 (two parents)
             continue
-        message = f"{child} has {len(parents)} parents: {_both(parents)}; tf2 takes whichever came last"
         if _hands_over(edges):
             continue  # one node hands it over, which is what a gripper does
+        message = f"{child} has {len(parents)} parents: {_both(parents)}; tf2 takes whichever came last"
         notes = [Note(_said(seen, edge)) for edge in edges[:MOST_NOTES]]
         nodes = {who(edge) for edge in edges}
         advice = f"let one node publish {child}: end the other, or switch its TF off"

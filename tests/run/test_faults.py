@@ -90,8 +90,8 @@ if os.fork() == 0:
     os.close(1), os.close(2)
     code = "import os, time; open('daemon', 'w').write(str(os.getpid())); time.sleep(60)"
     os.execve(sys.executable, [sys.executable, "-I", "-c", code], {})
-while "stays" in sys.argv:
-    time.sleep(1)
+while "stays" in sys.argv or not os.path.exists("daemon"):  # before, it is of its parent's group, as in DAEMON
+    time.sleep(0.01)
 """
 
 

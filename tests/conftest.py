@@ -6,6 +6,7 @@ Files named ``test_…_ros.py`` import ROS, and are left out where there is none
 from __future__ import annotations
 
 import fcntl
+import itertools
 import os
 import signal
 import subprocess
@@ -18,8 +19,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from hypothesis import HealthCheck, settings
 
-from tests.waiting import until
+from tests.waiting import TIMEOUT_S, until
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.plan.file import write_plan
 from tfcompose.pose import Pose
@@ -33,7 +35,13 @@ if TYPE_CHECKING:
 NO_ROS = missing_ros()
 collect_ignore_glob = ["*_ros.py"] if NO_ROS else []
 
-TIMEOUT_S = 15.0
+# The same examples at each run, however long they take: what fails once fails again, and a busy machine fails none.
+# pytest --hypothesis-profile=default looks for others.
+settings.register_profile("same", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("same")
+
+#: Each test takes the next domain, so that none hears what another left behind for a moment.
+DOMAINS = itertools.cycle(range(1, 101))
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -84,10 +92,10 @@ def domain(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFac
 
 
 class _reserved:  # noqa: N801 (read as a verb in the with statement)
-    """One of the domains 1 to 100, locked by a file so that concurrent runs do not hear each other."""
+    """The next free one of the domains 1 to 100, locked by a file so that concurrent runs do not hear each other."""
 
     def __enter__(self) -> tuple[int, int]:
-        for number in range(1, 101):
+        for number in itertools.islice(DOMAINS, 100):
             path = Path(tempfile.gettempdir()) / f"tfcompose-test-domain-{number}.lock"
             descriptor = os.open(path, os.O_CREAT | os.O_RDWR, 0o666)
             try:
@@ -124,6 +132,8 @@ class Started:
     def until_says(self, text: str) -> None:
         """Wait until a line holds ``text``."""
         until(lambda: text in self.output or self.process.poll() is not None)
+        if self.process.poll() is not None:
+            self._join()  # its last lines may not have been read yet
         assert text in self.output, self.lines + self.errors
 
     def end(self, number: int = signal.SIGINT) -> tuple[int, float]:
@@ -138,11 +148,14 @@ class Started:
         if self.process.poll() is None:
             self.process.kill()
         self.process.wait(TIMEOUT_S)
-        for reader in self._readers:
-            reader.join(TIMEOUT_S)
+        self._join()
         for stream in (self.process.stdout, self.process.stderr):
             if stream:
                 stream.close()
+
+    def _join(self) -> None:
+        for reader in self._readers:
+            reader.join(TIMEOUT_S)
 
 
 @pytest.fixture
@@ -168,7 +181,7 @@ def python() -> Callable[[str], str]:
 
     def run(code: str) -> str:
         command = [sys.executable, "-c", code]
-        return subprocess.run(command, check=True, capture_output=True, text=True, timeout=2 * TIMEOUT_S).stdout
+        return subprocess.run(command, check=True, capture_output=True, text=True, timeout=TIMEOUT_S).stdout
 
     return run
 

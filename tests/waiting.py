@@ -10,7 +10,8 @@ import psutil
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-TIMEOUT_S = 20.0
+#: So long a busy machine may keep what comes to pass; where all is well nobody waits for it.
+TIMEOUT_S = 60.0
 
 
 def until(condition: Callable[[], object], timeout_s: float = TIMEOUT_S) -> bool:

@@ -47,6 +47,8 @@ DOMAINS = itertools.cycle(range(1, 101))
 def pytest_configure(config: pytest.Config) -> None:
     # rclpy's generator package imports an old lark, which imports what Python 3.11 deprecates.
     config.addinivalue_line("filterwarnings", "ignore:module 'sre_.*' is deprecated:DeprecationWarning")
+    # The xacro package has an enumeration whose private name Python 3.10 warns of.
+    config.addinivalue_line("filterwarnings", "ignore:private variables, such as:DeprecationWarning")
 
 
 def pytest_report_header() -> str:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import gc
 from typing import TYPE_CHECKING
 
 import pytest
@@ -11,23 +12,26 @@ from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFPublisher
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 pytestmark = pytest.mark.ros
 
 
-def _address() -> int:
-    return rosidl.capsule_address(typesupport.own_type().__class__._TYPE_SUPPORT)
+@pytest.fixture
+def address() -> Iterator[int]:
+    """Where the own type support is; it lives as long as its class."""
+    kept = typesupport.own_type()
+    yield rosidl.capsule_address(kept.__class__._TYPE_SUPPORT)
 
 
-def test_the_hash_is_that_of_the_description() -> None:
-    address = _address()
+def test_the_hash_is_that_of_the_description(address: int) -> None:
     assert rosidl.hash_text(address) == TF_MESSAGE_HASH
     assert rosidl.type_hash(rosidl.description_json(address)) == TF_MESSAGE_HASH
 
 
-def test_the_description_is_that_of_tf_message() -> None:
-    found = rosidl.description_json(_address())
+def test_the_description_is_that_of_tf_message(address: int) -> None:
+    gc.collect()
+    found = rosidl.description_json(address)
     kind = {
         "type_id": 145,
         "capacity": 0,

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import gc
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -12,26 +12,30 @@ from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFPublisher
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
 pytestmark = pytest.mark.ros
 
 
 @pytest.fixture
-def address() -> Iterator[int]:
-    """Where the own type support is; it lives as long as its class."""
-    kept = typesupport.own_type()
-    yield rosidl.capsule_address(kept.__class__._TYPE_SUPPORT)
+def own() -> Any:
+    """The own type; its type support is there only as long as it is."""
+    return typesupport.own_type()
 
 
-def test_the_hash_is_that_of_the_description(address: int) -> None:
+def _address(own: Any) -> int:
+    return rosidl.capsule_address(own.__class__._TYPE_SUPPORT)
+
+
+def test_the_hash_is_that_of_the_description(own: Any) -> None:
+    address = _address(own)
     assert rosidl.hash_text(address) == TF_MESSAGE_HASH
     assert rosidl.type_hash(rosidl.description_json(address)) == TF_MESSAGE_HASH
 
 
-def test_the_description_is_that_of_tf_message(address: int) -> None:
+def test_the_description_is_that_of_tf_message(own: Any) -> None:
     gc.collect()
-    found = rosidl.description_json(address)
+    found = rosidl.description_json(_address(own))
     kind = {
         "type_id": 145,
         "capacity": 0,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.observe.stage import LOOKS, doctor, finds_nothing, message, said, says
+from tests.observe.stage import LOOKS_S, doctor, finds_nothing, message, said, says
 from tfcompose.pose import OPTICAL_XYZW
 from tfcompose.ros.tf import TFPublisher
 
@@ -171,9 +171,9 @@ def robot(tmp_path: Path) -> str:
     return str(file)
 
 
-def verify(*words: str) -> list[dict[str, Any]]:
-    command = [sys.executable, "-m", "tfcompose", "verify", "--for", "3", "--format", "json", *words]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=40, check=False)
+def verify(robot: str, seconds: float) -> list[dict[str, Any]]:
+    command = [sys.executable, "-m", "tfcompose", "verify", "--for", str(seconds), "--format", "json", robot]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=90, check=False)
     assert "Traceback" not in done.stderr, done.stderr
     found: list[dict[str, Any]] = json.loads(done.stdout)
     return found
@@ -183,8 +183,8 @@ def both(
     robot: str, code: str, words: Sequence[str], others: set[str]
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """Return what the doctor and verify find, when both find that code in those words, and no codes but the others."""
-    for _ in range(LOOKS):
-        found = doctor(robot)[1], verify(robot)
+    for seconds in LOOKS_S:
+        found = doctor(robot, seconds=seconds)[1], verify(robot, seconds)
         if all(says(some, code, words, others) for some in found):
             break
     return found
@@ -218,4 +218,4 @@ ALSO: dict[Callable[[Rover], Any], set[str]] = {
 def test_a_robot_as_planned_has_no_findings(stage: Stage, robot: str) -> None:
     Rover(stage).all_but()
     assert finds_nothing(robot)
-    assert any(verify(robot) == [] for _ in range(LOOKS))
+    assert any(verify(robot, seconds) == [] for seconds in LOOKS_S)

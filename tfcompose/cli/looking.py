@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import os
 import sys
-import time
 from importlib import import_module
 from typing import TYPE_CHECKING, TypeVar
 
@@ -101,13 +100,12 @@ def from_live(  # noqa: PLR0913 (all but two are named)
     gc.enable()  # it may last
     with Stop() as stop:
         watch = import_module("tfcompose.observe.watching").watch
-        begun = time.monotonic()
         try:
-            elsewhere = watch(name, censuses, stop, duration_s=duration_s, every_s=every_s, show=show)
+            seconds, elsewhere = watch(name, censuses, stop, duration_s=duration_s, every_s=every_s, show=show)
         except RosError as error:
             print_findings([finding("TF901", str(error), None)], sys.stderr)
             return 1
-        seconds, heard = time.monotonic() - begun, any(census.heard for census in censuses.values())
+        heard = any(census.heard for census in censuses.values())
         code = ended_early(seconds, duration_s, heard=heard) if stop.requested else None
     return code if code or heard or may_be_silent else _nothing_came(list(censuses), seconds, elsewhere)
 

@@ -64,11 +64,10 @@ def examine(expected: dict[Topics, Plan | None], seconds: float, stop: Stop) -> 
     Raises:
         RosError: if ROS cannot start a node, or take messages.
     """
-    begun = time.monotonic()
     with open_node("tfcompose_doctor", "") as node:
         ears = [_Ear(node, pair) for pair in expected]
         graph: dict[str, Topic] = {}
-        due = begun
+        due = begun = time.monotonic()  # a slow machine may take seconds until it listens
         while not stop.requested and (now := time.monotonic()) < begun + seconds:
             for ear in ears:
                 ear.hear(min(WAIT_S, begun + seconds - now), stop)
@@ -77,6 +76,8 @@ def examine(expected: dict[Topics, Plan | None], seconds: float, stop: Stop) -> 
                 graph |= graph_of(node)
                 for ear in ears:
                     ear.sideline.look(graph.values(), _beside(ear, graph))
+        for ear in ears:
+            ear.hear(0.0, stop)  # what came while this process was kept from looking
         graph |= graph_of(node)  # the last word counts, but what was seen before is not forgotten
         looked = time.monotonic() - begun
         common = Seen(

@@ -41,9 +41,10 @@ def echo(asked: Asked, say: Callable[[Pose, int | None], None], stop: Stop) -> M
         said_ns: int | None = None
         while not stop.requested:
             wait(node, [subscription for subscription, _ in subscriptions], 0.05, stop)
+            clock_ns = clock.now_ns()  # before what is taken, so that nothing of a time before the jump comes after it
             for subscription, static in subscriptions:
                 ear.take(subscription, static=static)
-            ear.follow(clock.now_ns())
+            ear.follow(clock_ns)
             now = time.monotonic()
             if now < next_at:
                 continue

@@ -28,20 +28,20 @@ def watch(  # noqa: PLR0913 (all but two are named)
     duration_s: float | None,
     every_s: float = 1.0,
     show: Callable[[int], None] | None = None,
-) -> tuple[str, ...]:
+) -> tuple[float, tuple[str, ...]]:
     """Fill the censuses of the topics (moving, fixed) for so many seconds, or until ``stop`` is requested.
 
     ``show`` is called ``every_s`` with the time, in nanoseconds of the system's clock. The node's name is ``name``.
-    Return the names of other topics on which there is TF.
+    Return for how many seconds it listened, and the names of other topics on which there is TF.
 
     Raises:
         RosError: if ROS cannot start a node, or take messages.
     """
-    begun = time.monotonic()
-    end = None if duration_s is None else begun + duration_s
-    due = begun + every_s
     with open_node(name, "") as node:
         lives = [Live(node, census, topics) for topics, census in censuses.items()]
+        begun = time.monotonic()  # a slow machine may take seconds until it listens
+        end = None if duration_s is None else begun + duration_s
+        due = begun + every_s
         while not stop.requested:
             now = time.monotonic()
             if end is not None and now >= end:
@@ -51,4 +51,7 @@ def watch(  # noqa: PLR0913 (all but two are named)
             if show is not None and time.monotonic() >= due:
                 due = time.monotonic() + every_s
                 show(time.time_ns())
-        return tf_elsewhere(topics_of(node), [topic for pair in censuses for topic in pair])
+        for live in lives:
+            live.look(0.0, stop)  # what came while this process was kept from looking
+        elsewhere = tf_elsewhere(topics_of(node), [topic for pair in censuses for topic in pair])
+        return time.monotonic() - begun, elsewhere

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from typing import TYPE_CHECKING
 
@@ -31,3 +32,8 @@ def gone(process: int | psutil.Process) -> bool:
         return not found.is_running() or bool(found.status() == psutil.STATUS_ZOMBIE)
     except psutil.NoSuchProcess:
         return True
+
+
+def none_but(threads: list[threading.Thread]) -> bool:
+    """Wait until all threads have ended but these, some of which may end meanwhile; return whether they did in time."""
+    return until(lambda: set(threading.enumerate()) <= set(threads))

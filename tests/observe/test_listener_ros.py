@@ -17,6 +17,7 @@ from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.time import Time
 
+from tests.waiting import none_but
 from tfcompose.observe import Buffer, LookupException, TransformException, TransformListener
 from tfcompose.plan import PlanProcess, Simulation
 from tfcompose.pose import Pose
@@ -66,7 +67,7 @@ def program(tmp_path: Path) -> Callable[..., str]:
         file = tmp_path / f"{name}.py"
         file.write_text(text, "utf-8")
         done = subprocess.run(
-            [sys.executable, file, *arguments], capture_output=True, text=True, timeout=30, check=False
+            [sys.executable, file, *arguments], capture_output=True, text=True, timeout=90, check=False
         )
         assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
         return done.stdout
@@ -151,28 +152,28 @@ def test_the_subscriptions_are_those_of_tf2(node: Any) -> None:
     assert profiles["/tf_static"].durability.name == "TRANSIENT_LOCAL"
 
 
-def test_a_listener_without_a_node_hears_a_namespace_from_its_own_thread(until: Callable[..., bool]) -> None:
-    before = threading.active_count()
+def test_a_listener_without_a_node_hears_a_namespace_from_its_own_thread() -> None:
+    before = threading.enumerate()
     buffer = Buffer()
     with open_node("talks", "") as other, TransformListener(buffer, namespace="robot1"):
         publisher = TFPublisher(other, static=True, topic="/robot1/tf_static")
         publisher.publish(one(0.5, 0))
-        assert buffer.lookup_transform("odom", "base_link", 0, timeout=10 * S).transform.translation.x == 0.5
+        assert buffer.lookup_transform("odom", "base_link", 0, timeout=60 * S).transform.translation.x == 0.5
         assert [writer.node for writer in writers(other, "/robot1/tf_static")] == ["/talks"]
-    assert until(lambda: threading.active_count() == before), "the listener's thread has ended"
+    assert none_but(before), "the listener's thread has ended"
 
 
-def test_a_wait_ends_when_the_transform_comes_and_not_later() -> None:
+def test_a_wait_ends_when_the_transform_comes_or_when_the_time_is_over_and_not_much_later() -> None:
     buffer = Buffer()
     timer = threading.Timer(0.2, lambda: buffer.set("odom", "base_link", Pose(), S, static=False))
-    timer.start()
     begun = time.monotonic()
-    buffer.lookup_transform("odom", "base_link", Time(), timeout=Duration(seconds=10))
-    assert 0.15 < time.monotonic() - begun < 2
+    timer.start()
+    buffer.lookup_transform("odom", "base_link", Time(), timeout=Duration(seconds=60))
+    assert 0.2 <= time.monotonic() - begun < 30
     begun = time.monotonic()
     with pytest.raises(LookupException, match="no frame laser"):
         buffer.lookup_transform("odom", "laser", Time(), timeout=Duration(seconds=0.3))
-    assert 0.25 < time.monotonic() - begun < 2
+    assert 0.25 < time.monotonic() - begun < 30
     timer.join()
 
 
@@ -187,7 +188,7 @@ def test_bytes_that_are_no_message_and_transforms_that_tf2_refuses_are_said_once
         assert until(lambda: publisher.publisher.get_subscription_count() == 1)
         for data in (*bad, *bad, one(1.0, S)):
             publisher.publish(data)
-        assert buffer.lookup_transform("odom", "base_link", 0, timeout=10 * S).transform.translation.x == 1.0
+        assert buffer.lookup_transform("odom", "base_link", 0, timeout=60 * S).transform.translation.x == 1.0
     listener.close()
     said = capfd.readouterr().err
     assert said.count("no TFMessage") == 1
@@ -215,7 +216,7 @@ def test_when_the_clock_goes_back_moving_edges_are_forgotten(node: Any) -> None:
 def test_a_program_that_never_closes_its_listener_ends(domain: Any) -> None:
     code = "from tfcompose.observe import Buffer, Listener; Listener(Buffer()); print('up', flush=True)"
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=20, check=False, env=domain.environment
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=90, check=False, env=domain.environment
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, "up\n", "")
 
@@ -235,7 +236,7 @@ def test_a_wait_is_ended_by_ctrl_c(domain: Any) -> None:
         assert it.stdout.readline() == "up\n"
         it.send_signal(signal.SIGINT)
         assert it.stdout.read() == "out\n"
-        assert it.wait(10) == 0
+        assert it.wait(60) == 0
 
 
 def test_rclpy_is_not_started_by_importing_the_classes() -> None:

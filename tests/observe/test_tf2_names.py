@@ -155,7 +155,7 @@ def test_a_coroutine_waits_and_the_loop_goes_on_meanwhile() -> None:
         timer.start()
         simple = buffer.lookup_transform_async("odom", "laser", Time(4))
         full = buffer.lookup_transform_full_async("base", Time(3), "laser", Time(5), "odom")
-        found = await asyncio.wait_for(asyncio.gather(simple, full), 5)
+        found = await asyncio.wait_for(asyncio.gather(simple, full), 60)
         timer.join()
         return found[0], found[1]
 

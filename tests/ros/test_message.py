@@ -76,10 +76,10 @@ def test_a_truncated_message_is_refused(sent: list[Transform], data: st.DataObje
 
 def test_a_huge_count_costs_neither_time_nor_memory() -> None:
     tracemalloc.start()
-    start = time.monotonic()
+    start = time.thread_time()
     with pytest.raises(ValueError, match="claims 4294967295 transforms"):
         decode(b"\0\1\0\0\xff\xff\xff\xff" + bytes(1000))
-    assert time.monotonic() - start < 0.1
+    assert time.thread_time() - start < 0.1
     assert tracemalloc.get_traced_memory()[1] < 100_000
     tracemalloc.stop()
 

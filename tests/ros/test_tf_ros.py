@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from sensor_msgs.msg import JointState
 
+from tests.waiting import none_but
 from tfcompose.ros.environment import RosError
 from tfcompose.ros.graph import writers
 from tfcompose.ros.message import Transform, decode, encode
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
 
 ONE = Transform(1, "odom", "base", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))
-UNTIL_S = 10.0
+UNTIL_S = 60.0
 
 
 @pytest.fixture
@@ -80,19 +81,21 @@ def test_a_wait_without_messages_ends_in_time(node: Any) -> None:
     subscription = TFSubscription(node, static=False)
     start = time.monotonic()
     wait(node, [subscription], 0.05, Stop())
-    assert 0.04 < time.monotonic() - start < 1.0
+    assert 0.04 < time.monotonic() - start < 30
 
 
 def test_a_signal_ends_a_wait_and_all_later_ones(node: Any) -> None:
     subscription = TFSubscription(node, static=False)
     with Stop() as stop:
-        threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGTERM)).start()
+        timer = threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGTERM))
+        timer.start()
         start = time.monotonic()
-        wait(node, [subscription], 5.0, stop)
+        wait(node, [subscription], 60.0, stop)
         assert stop.requested
         for _ in range(3):
-            wait(node, [subscription], 5.0, stop)
-        assert time.monotonic() - start < 0.5
+            wait(node, [subscription], 60.0, stop)
+        assert time.monotonic() - start < 30
+        timer.join()
 
 
 def test_a_signal_after_the_node_has_ended_does_no_harm(domain: object) -> None:
@@ -109,10 +112,10 @@ def test_a_node_leaves_no_thread_and_offers_nothing_that_it_does_not_answer(doma
     with open_node("quiet", "/rover") as node:
         assert node.get_service_names_and_types_by_node("quiet", "/rover") == []
         assert [topic for topic, _ in node.get_topic_names_and_types()] == ["/parameter_events"]
-    threads = threading.active_count()
+    threads = threading.enumerate()
     with open_node("again", "/rover"):
         pass
-    assert threading.active_count() == threads
+    assert none_but(threads)
 
 
 @pytest.mark.parametrize(

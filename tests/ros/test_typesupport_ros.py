@@ -71,7 +71,7 @@ def test_another_layout_is_refused_with_a_sentence(monkeypatch: pytest.MonkeyPat
 
 SEES = """
 import rclpy, sys, time
-rclpy.init(); node = rclpy.create_node("sees"); end = time.monotonic() + 10
+rclpy.init(); node = rclpy.create_node("sees"); end = time.monotonic() + 50
 while time.monotonic() < end and "/tf" not in dict(node.get_topic_names_and_types()):
     time.sleep(0.02)
 info = node.get_publishers_info_by_topic("/tf")[0]

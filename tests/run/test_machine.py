@@ -11,7 +11,7 @@ import pytest
 from tests.run.history import GUARD, SLAM, STATIC, begin, plan_of, run_process
 from tfcompose.diagnostic import finding
 from tfcompose.plan import GuardPolicy, PlanProcess
-from tfcompose.run.events import Clear, Complete, Found, Live, OwnerReady, Recovered, Taken
+from tfcompose.run.events import SETTLE, Clear, Complete, Found, Live, OwnerReady, Recovered, Taken
 from tfcompose.run.launcher.action import Finish, Kill, Start
 from tfcompose.run.launcher.happening import Asked, Begin, Exited, OutputLost, Signalled, Started, StartFailed, TimeUp
 from tfcompose.run.launcher.machine import step
@@ -71,6 +71,12 @@ def test_a_guard_that_does_not_say_clear_within_20_s_is_a_failure_that_says_so()
     assert "guard did not say within 20 s" in history.found()[0].message
     assert history.feed(Exited("guard", 0)).exit_code == 1
     assert history.started == ["guard"]
+
+
+def test_the_time_that_the_guard_was_told_to_look_is_waited_besides() -> None:
+    history = begin(replace(GUARD, env={SETTLE: "30"}), SLAM)
+    assert history.sleep_until_due() == pytest.approx(50)
+    assert "guard did not say within 50 s" in history.found()[0].message
 
 
 def test_a_guard_that_dies_before_it_is_clear_is_a_failure_that_says_so() -> None:

@@ -11,6 +11,7 @@ from tfcompose.diagnostic import RejectedError
 from tfcompose.frozen import replace
 from tfcompose.plan import Plan
 from tfcompose.plan.file import read_plan
+from tfcompose.run.events import SETTLE
 from tfcompose.run.hosts import share_of
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ def as_asked(plan: Plan, arguments: Namespace) -> Plan | int:
     plan = share
     if arguments.settle is None:
         return plan
-    env = {"TFCOMPOSE_SETTLE_S": str(arguments.settle)}
+    env = {SETTLE: str(arguments.settle)}
     processes = tuple(
         replace(process, env=process.env | env) if process.kind == "guard" else process for process in plan.processes
     )

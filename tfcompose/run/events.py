@@ -15,6 +15,8 @@ from tfcompose.diagnostic import Diagnostic, Note
 EVENTS_FD = "TFCOMPOSE_EVENTS_FD"
 #: The descriptor of what the guard before this one left, in JSON; see ``tfcompose.run.guard.memory``.
 MEMORY_FD = "TFCOMPOSE_MEMORY_FD"
+#: For how many seconds the guard is to look before it says that all is clear.
+SETTLE = "TFCOMPOSE_SETTLE_S"
 
 
 @dataclass(frozen=True, slots=True)

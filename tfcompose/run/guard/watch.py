@@ -11,6 +11,7 @@ from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import wait
 from tfcompose.ros.topics import GLOBAL
 from tfcompose.run.clock_watch import ClockWatch
+from tfcompose.run.events import SETTLE
 from tfcompose.run.fenced import REMAPPED, private_topics
 from tfcompose.run.guard.bulletin import Bulletin
 from tfcompose.run.guard.eyes import LOOK_EVERY_S, Eyes, held_back
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
 
     Topics = tuple[str, str]
 
-SETTLE = "TFCOMPOSE_SETTLE_S"
 DEFAULT_SETTLE_S = 0.5
 
 

@@ -5,8 +5,10 @@ Times are seconds of one monotonic clock.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
+
+from tfcompose.run.events import SETTLE
 
 if TYPE_CHECKING:
     from tfcompose.plan import Plan, PlanEdge, PlanProcess
@@ -18,7 +20,7 @@ class Times:
     """How long the launcher waits, in seconds."""
 
     clear_s: float = 20.0
-    """for the guard's word that nobody publishes a planned edge yet"""
+    """for the guard's word that nobody publishes a planned edge yet, besides the time that it was told to look"""
     interrupt_s: float = 5.0
     """between SIGINT and SIGTERM"""
     terminate_s: float = 5.0
@@ -152,4 +154,7 @@ def initial(plan: Plan, times: Times | None = None) -> State:
     tracked = {
         process.name: Tracked(process, "EXPECTED" if process.kind == "external" else "STOPPED") for process in processes
     }
-    return State(plan, times or Times(), tracked, guards[0] if guards else None, complete=not plan.edges)
+    times = times or Times()
+    looks_s = sum(float(tracked[name].process.env.get(SETTLE, 0)) for name in guards)
+    times = replace(times, clear_s=times.clear_s + looks_s)
+    return State(plan, times, tracked, guards[0] if guards else None, complete=not plan.edges)

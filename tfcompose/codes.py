@@ -190,6 +190,7 @@ CODES = {
     "TF848": "gate_never_opens",
     "TF849": "volatile_static_reader",
     "TF850": "latched_edge_replaced",
+    "TF851": "key_without_effect",
     # the environment
     "TF901": "no_ros",
     "TF902": "bad_plan",

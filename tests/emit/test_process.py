@@ -162,6 +162,20 @@ def test_a_stand_in_takes_the_place_of_a_shells_command() -> None:
     assert [one.code for one in compile_robot(text, "r.yaml", library(), ["sim"]).found] == []
 
 
+def test_a_stand_in_is_kept_and_ended_as_what_it_stands_in_for() -> None:
+    """A gate on what only the real one does is not its own, nor is the folder."""
+    how = "restart: always, max_restarts: 2, stop: {timeout: 3 s}, remap: {/tf: /seen/tf}, env: {A: b}"
+    text = f"{HEAD}  a: {{run: [x], {how}, cwd: ., ready: {{log: up}}, params: {{b: 1}}}}\n"
+    text += "profiles: {sim: {processes: {a: {simulate: {fixed: {}}}}}}\n"
+    compiled = compile_robot(text, "r.yaml", library(), ["sim"])
+    assert compiled.found == ()
+    assert compiled.robot
+    stand_in = next(one for one in compiled.robot.processes if one.name == "a")
+    assert (stand_in.restart, stand_in.max_restarts, stand_in.stop.timeout_s) == ("always", 2, 3.0)
+    assert (stand_in.remap, stand_in.env) == ({"/tf": "/seen/tf"}, {"A": "b"})
+    assert (stand_in.cwd, stand_in.ready, stand_in.params) == (None, None, {})
+
+
 @pytest.mark.parametrize(
     ("old", "new"),
     [

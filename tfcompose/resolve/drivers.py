@@ -11,7 +11,7 @@ from tfcompose.resolve.isolation import settings_of
 from tfcompose.resolve.nodes import full_name, namespace_of
 from tfcompose.resolve.presets import DRIVER
 from tfcompose.resolve.processes import starts
-from tfcompose.resolve.running import how, program
+from tfcompose.resolve.running import EXTERNAL_KEYS, KEYS, how, program
 from tfcompose.validate.preset import Chosen
 
 if TYPE_CHECKING:
@@ -49,7 +49,9 @@ def driver_process(sensor: Sensor, spec: RobotSpec, source: Source) -> tuple[Pro
     state = driver.lifecycle if driver and run is None else None
     node = Node(driver_node(sensor, spec), place, at, params, (said.lifecycle if said else None) or state)
     process = Process(sensor.name, "external" if external else "run", place, (node,))
-    process = replace(process, **how(said, namespace_of(said, spec.ros.namespace)) if said else {})
+    if said:
+        keys = how(said, namespace_of(said, spec.ros.namespace), EXTERNAL_KEYS if external else KEYS)
+        process = replace(process, **keys)
     if run:
         process = replace(process, **program(run, shell=bool(said and said.shell)))
     elif driver and launched:

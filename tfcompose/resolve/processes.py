@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 from tfcompose.diagnostic import Diagnostic, Note, did_you_mean, finding
 from tfcompose.frozen import replace
 from tfcompose.load.choices import SIMULATIONS
-from tfcompose.model import BUILT_IN, JOINTS, STATIC, Node, Process
+from tfcompose.model import BUILT_IN, Node, Process
 from tfcompose.plan import Simulation
 from tfcompose.resolve.built_in import built_in_keys
 from tfcompose.resolve.nodes import namespace_of, nodes_of
 from tfcompose.resolve.poses import pose_of
-from tfcompose.resolve.running import how, program
+from tfcompose.resolve.running import EXTERNAL_KEYS, SIMULATED_KEYS, how, program
 
 if TYPE_CHECKING:
     from tfcompose.load import Path, Source
-    from tfcompose.validate.process import ProcessSpec, Started
+    from tfcompose.validate.process import ProcessSpec
     from tfcompose.validate.running import Run, Simulate
     from tfcompose.validate.spec import RobotSpec
 
@@ -32,12 +32,12 @@ def user_process(
     namespace = namespace_of(said, spec.ros.namespace)
     nodes, found = nodes_of(name, said, namespace, source)
     if said.external:
-        keys = how(said, namespace, ("after", "host", "required", "ready"))
+        keys = how(said, namespace, EXTERNAL_KEYS)
         return replace(Process(name, "external", place, nodes), **keys), found
     if said.simulate:
         one = (Node(nodes[0].name, nodes[0].at),)
         process, refused = _simulated(Process(name, "simulate", place, one), said.simulate, source)
-        keys = how(said, namespace, ("after", "env", "host", "required"))
+        keys = how(said, namespace, SIMULATED_KEYS)
         return process and replace(process, **keys), [*found, *refused]
     if starts(said.run):
         process = Process(name, "run", place, nodes)
@@ -50,25 +50,6 @@ def user_process(
         return None, [finding("TF102", f"{name}: run needs package and executable", source.at_key(at), help=advice)]
     advice = "run: {package: …, executable: …}, simulate: {…}, or external: true"
     return None, [finding("TF102", f"{name} does not say how it runs", place, help=advice)]
-
-
-def idle_rates(spec: RobotSpec, source: Source) -> list[Diagnostic]:
-    """Return a finding for each process with a rate that nothing reads: only ``joints`` has one."""
-    said: dict[Path, tuple[str, Started | None]] = {}
-    said |= {("processes", name): (name, process) for name, process in spec.processes.items() if name != JOINTS}
-    said |= {("sensors", name, "driver"): (f"the driver of {name}", s.driver) for name, s in spec.sensors.items()}
-    found = []
-    for path, (name, process) in said.items():
-        if process is None or process.rate is None:
-            continue
-        advice = "remove it; an edge says itself how often it is sent: odom: {parent: map, owner: …, rate: 10 Hz}"
-        if process.simulate:
-            advice = "write it under simulate"
-        elif name == STATIC:
-            advice = "remove it; fixed edges are sent once"
-        place = source.at_key((*path, "rate"))
-        found.append(finding("TF101", f"{name} has no rate; only the process joints has", place, help=advice))
-    return found
 
 
 def _simulated(process: Process, simulate: Simulate, source: Source) -> tuple[Process | None, list[Diagnostic]]:

@@ -14,13 +14,14 @@ from tfcompose.resolve.bodies import Bodies, with_colours
 from tfcompose.resolve.built_in import built_in
 from tfcompose.resolve.completed import completed
 from tfcompose.resolve.edges import Drafts
+from tfcompose.resolve.idle import idle_keys
 from tfcompose.resolve.isolation import settings_of
 from tfcompose.resolve.joints import unjoined
 from tfcompose.resolve.nodes import names_files
 from tfcompose.resolve.packages import Packages
 from tfcompose.resolve.poses import Solver
 from tfcompose.resolve.presets import sensor_of
-from tfcompose.resolve.processes import idle_rates, name_clashes, unknown_names, user_process
+from tfcompose.resolve.processes import name_clashes, unknown_names, user_process
 from tfcompose.resolve.sensors import add_sensor
 from tfcompose.resolve.simulated import with_positions
 from tfcompose.resolve.whole import Whole
@@ -178,7 +179,7 @@ class _Work:
         missing = tuple(name for section, name in self.broken if section == "parts")
         return [
             *name_clashes(everybody, self.spec, self.source),
-            *idle_rates(self.spec, self.source),
+            *idle_keys(self.spec, self.source),
             *unknown_names(own, self.source, known, missing),
         ]
 

@@ -14,10 +14,14 @@ if TYPE_CHECKING:
 
 #: Keys of a process that have the same name in the model.
 _AS_WRITTEN = ("after", "cwd", "env", "host", "log_level", "max_restarts", "remap", "required", "restart")
-_KEYS = (*_AS_WRITTEN, "stop", "ready")
+#: All that ``how`` reads, of a process that tfcompose starts.
+KEYS = (*_AS_WRITTEN, "stop", "ready")
+#: Those of a process that somebody else starts, and of one that is simulated.
+EXTERNAL_KEYS = ("after", "host", "ready")
+SIMULATED_KEYS = ("after", "env", "host", "max_restarts", "remap", "required", "restart", "stop")
 
 
-def how(said: Started, namespace: str, keys: tuple[str, ...] = _KEYS) -> dict[str, Any]:
+def how(said: Started, namespace: str, keys: tuple[str, ...] = KEYS) -> dict[str, Any]:
     """Return a process's fields from what was written, those of ``keys``; ``namespace`` is that of its nodes."""
     fields = {key: getattr(said, key) for key in keys if key in _AS_WRITTEN}
     if said.namespace is not None:

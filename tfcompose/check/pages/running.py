@@ -183,4 +183,9 @@ and so has ros2 topic echo: ros2 topic echo --qos-durability transient_local --q
 A publisher on /tf_static keeps its last message for those that find it later, and to be found takes a moment. What it
 sent before that one, in messages of their own, nobody gets any more. A subscriber that is counted before sending may
 be a listener of the node's own. Send all fixed edges in each message, as tf2's StaticTransformBroadcaster does.""",
+    "TF851": """A process has a key that does nothing there.
+
+A process that somebody else starts is neither restarted nor stopped here, and its environment, folder, remappings and
+log level are for whoever starts it; a stand-in has no parameters of the node that it stands in for. Keys of a base file
+that an overlay turns into a stand-in, or leaves to somebody else, are not meant: they say how the base starts it.""",
 }

@@ -121,6 +121,21 @@ def test_one_process_is_restarted_stopped_and_started_and_the_guard_blames_nobod
     assert "did you mean drive?" in tfc("restart", "driv").stderr
 
 
+def test_what_waits_for_a_stopped_process_is_said_to_wait_by_ps_and_by_who_starts_it(
+    tfc: Callable[..., Any], tmp_path: Path
+) -> None:
+    late = "  late: {run: [sleep, '1000'], after: {drive: ready}}\n"
+    (tmp_path / "robot.yaml").write_text(ROVER + late)
+    assert tfc("up", "--wait").returncode == 0
+    assert tfc("restart", "late").stdout == "late: restarting\n"
+    assert tfc("stop", "drive").returncode == 0
+    assert until(lambda: ps(tfc)["drive"]["state"] == "STOPPED")
+    assert tfc("restart", "late").stdout == "late: restarting, and waits for drive to be ready\n"
+    assert until(lambda: "  late     waits for drive to be ready  " in tfc("ps").stdout), tfc("ps").stdout
+    assert tfc("down").returncode == 0
+    assert "\ntfcompose | ended\n" in tfc("logs").stdout
+
+
 def test_up_on_a_running_robot_restarts_what_changed_and_says_what_listeners_keep(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:

@@ -72,7 +72,17 @@ def test_the_last_words_after_an_endless_line_are_kept() -> None:
     assert max(map(len, said)) <= LINE_LIMIT
 
 
-@pytest.mark.parametrize(("data", "line"), [(b"a\r\n", "a"), (b"\xff\n", "\ufffd"), (b"\n", "")])
+@pytest.mark.parametrize(
+    ("data", "line"),
+    [
+        (b"a\r\n", "a"),
+        (b"a\r\r\n", "a"),
+        (b"\r 10 %\r100 %\n", "100 %"),
+        (b"\r 10 %\r100 %\r\n", "100 %"),
+        (b"\xff\n", "\ufffd"),
+        (b"\n", ""),
+    ],
+)
 def test_a_line_comes_without_its_end_and_never_fails_to_be_text(data: bytes, line: str) -> None:
     assert list(Lines().feed(data)) == [line]
 

@@ -7,7 +7,7 @@ import os
 import time
 from typing import TYPE_CHECKING
 
-from tfcompose.run.launcher.logs import KEPT, Follower, Logs, logged, read_logs
+from tfcompose.run.launcher.logs import KEPT, Follower, Logs, last_written, logged, read_logs
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -43,6 +43,16 @@ def test_processes_of_parts_have_logs_too(tmp_path: Path) -> None:
     assert logged(tmp_path / "logs") == ["arm/static", "arm/tool/static", "static"]
     for name in logged(tmp_path / "logs"):
         assert [text for _, _, text in read_logs(tmp_path / "logs", [name])][-1] == f"line 9 of {name}"
+
+
+def test_the_run_that_wrote_last_is_known_by_its_lines_and_not_by_when_its_files_were_made(tmp_path: Path) -> None:
+    begun, later = Logs(tmp_path / "a"), Logs(tmp_path / "b")
+    for logs, name, second in ((begun, "arm/static", 10), (later, "static", 20), (begun, "arm/static", 30)):
+        logs.write(name, "text")
+        os.utime(logs.folder / f"{name}.log", (second, second))
+    assert [last_written(tmp_path / name) for name in ("a", "b", "none")] == [30, 20, 0]
+    begun.close()
+    later.close()
 
 
 def test_a_file_that_is_full_is_turned_over_and_the_oldest_lines_go(tmp_path: Path) -> None:

@@ -86,8 +86,13 @@ def ask_of_each(arguments: Namespace, do: str, doing: str) -> int:
     codes = []
     for name in arguments.name:
         answer = asked(place, do=do, name=name)
-        codes.append(answer if isinstance(answer, int) else told(f"{name}: {doing}"))
+        codes.append(answer if isinstance(answer, int) else told(f"{name}: {doing}{_later(answer)}"))
     return max(codes)
+
+
+def _later(answer: dict[str, Any]) -> str:
+    """Return what must happen before what was asked for can; nothing where nothing must."""
+    return f", and waits for {answer['waits']}" if answer.get("waits") else ""
 
 
 def events(place: Place, timeout_s: float | None = None) -> Iterator[tuple[Notice, float]]:

@@ -19,7 +19,7 @@ from tfcompose.cli.running import add_robot, chosen, running
 from tfcompose.cli.terminal import coloured, complain
 from tfcompose.diagnostic import did_you_mean
 from tfcompose.render.text import PLAIN
-from tfcompose.run.launcher.logs import Follower, logged, read_logs
+from tfcompose.run.launcher.logs import Follower, last_written, logged, read_logs
 from tfcompose.run.place import places
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def _place(robot: str | None) -> Place | int:
         return alive[0][0]
     there = [place for place in places(os.environ) if place.logs.is_dir()]
     if robot is None and there and not alive:
-        return max(there, key=lambda place: place.logs.stat().st_mtime)
+        return max(there, key=lambda place: last_written(place.logs))
     return chosen(robot, among=lambda: there)
 
 

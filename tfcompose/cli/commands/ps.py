@@ -89,6 +89,8 @@ def _state(process: dict[str, Any]) -> str:
         return f"{state} of {process['host']}" if process["host"] else state
     if process["state"] == "RUNNING":
         return state if process["ready"] else f"{state}, not ready"
+    if process["state"] == "STOPPED" and process["waits"]:  # it will be started
+        return str(process["waits"])
     detail = process["detail"]
     why = f" ({detail[:LONGEST_WHY]}{'…' * (len(detail) > LONGEST_WHY)})" if detail else ""
     return f"{state}{why}{', failed' if process['failed'] and state != 'fatal' else ''}"

@@ -13,6 +13,7 @@ from tfcompose.run.launcher.gates import is_ready, waits_for
 from tfcompose.run.launcher.happening import Asked, Down, NewPlan
 from tfcompose.run.launcher.lives import refusal
 from tfcompose.run.launcher.preflight import commands_of, started_by_us
+from tfcompose.run.launcher.prerequisites import unmet_in_words
 from tfcompose.run.launcher.replan import change
 
 if TYPE_CHECKING:
@@ -73,8 +74,10 @@ def answer(
     if do == "down":
         return {"ok": True}, Down(), None
     if do in ("restart", "start", "stop"):
-        why = refusal(state, name, do)
-        return ({"error": why}, None, None) if why else ({"ok": True}, Asked(name, do), None)
+        if why := refusal(state, name, do):
+            return {"error": why}, None, None
+        waits = "" if do == "stop" else unmet_in_words(state, state.tracked[name])
+        return {"ok": True, "waits": waits}, Asked(name, do), None
     if do == "update":
         return _update(request, state, plan_file, base, environment)
     return {"error": f"there is nothing like {do!r} to do"}, None, None

@@ -74,7 +74,8 @@ class Lines:
 
 
 def _text(line: bytes) -> str:
-    return line.removesuffix(b"\r").decode(errors="replace")
+    """Return the line as a terminal shows it in the end: a progress bar is written over and over in its place."""
+    return line.rstrip(b"\r").rpartition(b"\r")[2].decode(errors="replace")
 
 
 class Bucket:

@@ -106,7 +106,7 @@ def opens_at(one: Tracked) -> float | None:
 
 def waits_for(state: State, one: Tracked) -> str:
     """Return what a process is still without, in words; "" if it is ready, or is not to run."""
-    if one.state == "STOPPED" and one.wanted and (others := unmet_in_words(state, one)):
+    if one.state == "STOPPED" and one.wanted and not one.failed and (others := unmet_in_words(state, one)):
         return f"waits for {others}"
     if one.ready or one.state not in ("RUNNING", "EXPECTED"):
         return ""

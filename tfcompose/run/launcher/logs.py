@@ -98,6 +98,14 @@ def logged(folder: Path) -> list[str]:
     return sorted(file.relative_to(folder).as_posix().removesuffix(".log") for file in folder.rglob("*.log"))
 
 
+def last_written(folder: Path) -> float:
+    """Return when a line was last written below the folder, in seconds since 1970; 0 where there is none.
+
+    A folder's own time says only when its last file was made.
+    """
+    return max((file.stat().st_mtime for file in folder.rglob("*.log")), default=0.0)
+
+
 def read_logs(folder: Path, names: list[str]) -> Iterator[tuple[str, str, str]]:
     """Yield (time, process, text) of these processes' lines, oldest first."""
     return heapq.merge(*(_lines(folder, name) for name in names), key=lambda line: line[0])

@@ -63,8 +63,8 @@ def test_each_drawing_replaces_the_last_one_and_what_was_below_it_goes(terminal:
 def test_no_line_is_longer_than_the_terminal_and_there_are_no_more_than_it_shows(terminal: Terminal) -> None:
     Redrawn(terminal.stream).draw(["x" * 100, *map(str, range(50))])
     lines = terminal.shown().replace("\033[K", "").split("\n")
-    assert lines[0] == "x" * 39
-    assert lines[8] == "… 43 more; a larger window shows them, o"[:39]
+    assert lines[0] == "x" * 38 + "…"
+    assert lines[8] == "… 43 more; a larger window shows them, "[:38] + "…"
     assert len(lines) == 10
 
 
@@ -75,7 +75,7 @@ def test_after_the_window_shrank_the_screen_is_drawn_anew(terminal: Terminal) ->
     terminal.shown()
     terminal.resize(20, 10)
     redrawn.draw(["y" * 30])
-    assert terminal.shown() == "\033[H\033[2J" + "y" * 19 + "\033[K\n\033[J"
+    assert terminal.shown() == "\033[H\033[2J" + "y" * 18 + "…\033[K\n\033[J"
 
 
 def test_a_terminal_that_cannot_move_its_cursor_and_a_pipe_get_plain_lines(

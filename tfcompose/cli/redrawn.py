@@ -40,7 +40,7 @@ class Redrawn:
         up = f"\r{_ESCAPE}{self._drawn}A" if self._drawn else ""
         if columns < self._columns:  # what was drawn takes more lines now, and how many is the terminal's secret
             up = f"{_ESCAPE}H{_ESCAPE}2J"
-        body = "".join(f"{line[: columns - 1]}{_ESCAPE}K\n" for line in shown)
+        body = "".join(f"{_cut(line, columns - 1)}{_ESCAPE}K\n" for line in shown)
         self._stream.write(f"{up}{body}{_ESCAPE}J")  # what was below the last line goes
         self._stream.flush()
         self._drawn, self._columns = len(shown), columns
@@ -51,3 +51,7 @@ class Redrawn:
         except OSError:
             return 80, 24
         return size.columns or 80, size.lines or 24
+
+
+def _cut(line: str, columns: int) -> str:
+    return line if len(line) <= columns else f"{line[: columns - 1]}…"

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import subprocess
 import sys
 import tempfile
+import threading
 from typing import TYPE_CHECKING
 
 import pytest
@@ -105,6 +107,18 @@ def test_of_two_only_one_gets_the_lock_the_other_learns_who_has_it_and_a_killed_
     assert place.holder() is None
     lock = Lock(place)
     assert lock.run != run
+    lock.close()
+
+
+def test_who_only_looks_is_in_nobodys_way_and_is_taken_for_nobodys_run(env: dict[str, str]) -> None:
+    place = place_of(ROVER, env)
+    Lock(place).close()
+    with (place.folder / "lock").open() as looker:
+        fcntl.flock(looker, fcntl.LOCK_SH)  # as holder does for a moment; this one is kept from going on
+        assert place.holder() is None, "of two who look, each took the other for a run"
+        threading.Timer(0.2, fcntl.flock, (looker, fcntl.LOCK_UN)).start()
+        lock = Lock(place)
+    assert place.holder()
     lock.close()
 
 

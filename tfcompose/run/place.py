@@ -67,11 +67,7 @@ class Place:
         except OSError:
             return None
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return _read_holder(descriptor)
-        else:
-            return None
+            return _read_holder(descriptor) if _is_held(descriptor) else None
         finally:
             os.close(descriptor)
 
@@ -84,7 +80,7 @@ class Lock:
         place.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         self.fd = os.open(place.folder / "lock", os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o600)
         try:
-            fcntl.flock(self.fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _take(self.fd)
         except BaseException:
             os.close(self.fd)
             raise
@@ -100,6 +96,29 @@ class Lock:
     def close(self) -> None:
         """Give it back."""
         os.close(self.fd)
+
+
+def _is_held(descriptor: int) -> bool:
+    """Return whether somebody runs the robot: who only looks shares the lock for a moment with others who look."""
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    fcntl.flock(descriptor, fcntl.LOCK_UN)
+    return False
+
+
+def _take(descriptor: int) -> None:
+    """Take the lock, or raise BlockingIOError; who only looks is waited for."""
+    while True:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if _is_held(descriptor):
+                raise
+            time.sleep(0.001)
+        else:
+            return
 
 
 def _read_holder(descriptor: int) -> Holder | None:

@@ -5,22 +5,19 @@ Files named ``test_…_ros.py`` import ROS, and are left out where there is none
 
 from __future__ import annotations
 
-import fcntl
-import itertools
 import os
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.domains import reserved_domain
 from tests.waiting import TIMEOUT_S, until
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.plan.file import write_plan
@@ -29,6 +26,7 @@ from tfcompose.ros.environment import missing_ros
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
+    from pathlib import Path
 
     from tfcompose.plan import Joint
 
@@ -39,9 +37,6 @@ collect_ignore_glob = ["*_ros.py"] if NO_ROS else []
 # pytest --hypothesis-profile=default looks for others.
 settings.register_profile("same", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("same")
-
-#: Each test takes the next domain, so that none hears what another left behind for a moment.
-DOMAINS = itertools.cycle(range(1, 101))
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -87,30 +82,10 @@ def domain(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFac
         folder = tmp_path_factory.mktemp(name)
         folder.chmod(0o700)
         monkeypatch.setenv(name, str(folder))
-    with _reserved() as (number, _):
+    with reserved_domain() as number:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
         monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         yield Domain(number, dict(os.environ))
-
-
-class _reserved:  # noqa: N801 (read as a verb in the with statement)
-    """The next free one of the domains 1 to 100, locked by a file so that concurrent runs do not hear each other."""
-
-    def __enter__(self) -> tuple[int, int]:
-        for number in itertools.islice(DOMAINS, 100):
-            path = Path(tempfile.gettempdir()) / f"tfcompose-test-domain-{number}.lock"
-            descriptor = os.open(path, os.O_CREAT | os.O_RDWR, 0o666)
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                os.close(descriptor)
-                continue
-            self._descriptor = descriptor
-            return number, descriptor
-        raise RuntimeError("all ROS domains are in use by other tests")
-
-    def __exit__(self, *_: object) -> None:
-        os.close(self._descriptor)
 
 
 @dataclass

@@ -10,6 +10,7 @@ import psutil
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
 #: So long a busy machine may keep what comes to pass; where all is well nobody waits for it.
 TIMEOUT_S = 60.0
@@ -23,6 +24,19 @@ def until(condition: Callable[[], object], timeout_s: float = TIMEOUT_S) -> bool
             return False
         time.sleep(0.005)
     return True
+
+
+def in_one_of_a_few(attempt: Callable[[int], float], limit_s: float, tries: int = 4) -> bool:
+    """Return whether an attempt took less than the limit; each is given its number, and returns its seconds.
+
+    A machine that is busy with other things makes one late now and then. What is slow by itself is slow each time.
+    """
+    return any(attempt(number) < limit_s for number in range(tries))
+
+
+def whole_lines(file: Path) -> list[str]:
+    """Return the lines of a file that somebody still writes: what stands behind the last line's end is not one yet."""
+    return file.read_bytes().rpartition(b"\n")[0].decode().splitlines()
 
 
 def gone(process: int | psutil.Process) -> bool:

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from tfcompose.run.launcher.child import BURST, LINE_LIMIT, Bucket, Lines, Pipe, spawn
 from tfcompose.run.launcher.command import Command
+from tfcompose.run.launcher.keeper import Keeper
 from tfcompose.run.launcher.signals import Signals
 
 if TYPE_CHECKING:
@@ -107,13 +108,22 @@ def test_an_own_process_that_is_told_to_end_while_it_starts_ends_by_its_own_rule
     popen = spawn(Command(argv, dict(os.environ), tmp_path, own=True), ())
     time.sleep(seconds)
     popen.send_signal(number)
-    _, errors = popen.communicate(timeout=15)
+    _, errors = popen.communicate(timeout=60)
     assert popen.returncode == 2  # there is no plan
     assert errors.decode().splitlines()[1:] == []
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_keeper_stays_that_is_told_to_end_in_its_first_moment(number: int) -> None:
+    """As systemd tells all of a unit's processes, also one that it has just started."""
+    keeper = Keeper()
+    os.kill(keeper.pid, number)
+    keeper.close()
+    assert keeper.returncode == 0
+
+
 def test_a_process_that_is_not_our_own_is_started_with_no_signal_blocked(tmp_path: Path) -> None:
-    popen = spawn(Command((sys.executable, "-c", "import time; time.sleep(30)"), dict(os.environ), tmp_path), ())
+    popen = spawn(Command((sys.executable, "-c", "import time; time.sleep(90)"), dict(os.environ), tmp_path), ())
     popen.send_signal(signal.SIGTERM)
-    assert popen.wait(15) == -signal.SIGTERM
+    assert popen.wait(60) == -signal.SIGTERM
     popen.communicate()

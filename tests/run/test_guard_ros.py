@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import psutil
 import pytest
 
+from tests.domains import reserved_domain
 from tests.waiting import until
 from tfcompose.ros.message import decode
 from tfcompose.ros.node import open_node
@@ -84,19 +83,10 @@ class Robot:
 @pytest.fixture(scope="module")
 def domain() -> Iterator[int]:
     """A domain as conftest's, for all tests of this module."""
-    for number in range(1, 101):
-        file = Path(tempfile.gettempdir(), f"tfcompose-test-domain-{number}.lock").open("a", encoding="utf-8")  # noqa: SIM115 (closed below)
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            file.close()
-            continue
-        with file, pytest.MonkeyPatch.context() as patch:
-            patch.setenv("ROS_DOMAIN_ID", str(number))
-            patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-            yield number
-        return
-    raise RuntimeError("all ROS domains are in use by other tests")
+    with reserved_domain() as number, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_DOMAIN_ID", str(number))
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        yield number
 
 
 def start(folder: Path, *words: str) -> Robot:

@@ -11,7 +11,7 @@ import psutil
 import pytest
 
 from tests.run.test_supervisor import LISTEN, SLEEPER, launch, plan_of, program
-from tests.waiting import gone, until
+from tests.waiting import TIMEOUT_S, gone, until
 from tfcompose.ros.stop import Stop
 from tfcompose.run.events import Clear, to_line
 from tfcompose.run.hold import GO, HOLD_FD, wait_for_go
@@ -32,16 +32,18 @@ HELD = f"""
 {LISTEN}
 import os, time
 print("pids", os.getpid(), "loaded", flush=True)
+open("loaded", "w").close()
 said = os.read(int(os.environ["{HOLD_FD}"]), 9)
 print("went on" if said == {GO!r} else "was not let go", flush=True)
-time.sleep(30)
+time.sleep(90)
 """
 
 
-def slow_guard(seconds: float) -> PlanProcess:
-    line = to_line(Clear()).encode()
-    say = f"import os, time; time.sleep({seconds}); os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']), {line!r})"
-    return program("guard", f"{LISTEN}; {say}; {SLEEPER}", kind="guard")
+def looking_until(file: str) -> PlanProcess:
+    """Return a guard whose look before the start ends when there is such a file."""
+    look = f"import os, time\nwhile not os.path.exists({file!r}): time.sleep(0.01)\n"
+    say = f"os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']), {to_line(Clear()).encode()!r}); {SLEEPER}"
+    return program("guard", f"{LISTEN}; {look}{say}", kind="guard", cwd=".")
 
 
 @pytest.mark.parametrize(("sent", "ends"), [(GO, False), (b"", True), (b"no", True)])
@@ -69,7 +71,7 @@ def test_own_publishers_load_while_the_guard_looks_and_go_on_when_they_are_start
         if isinstance(notice, LogLine) and notice.text == "went on":
             os.kill(os.getpid(), signal.SIGINT)
 
-    plan = plan_of(slow_guard(1.0), program("static", HELD, kind="static"), program("other", SLEEPER))
+    plan = plan_of(looking_until("loaded"), program("static", HELD, kind="static", cwd="."), program("other", SLEEPER))
     assert supervise(plan, tmp_path / "plan.json", report=report) == 0
     kinds = [notice for _, notice in told]
     started = next(i for i, one in enumerate(kinds) if isinstance(one, ProcessState) and one.process == "static")
@@ -83,18 +85,21 @@ def test_own_publishers_load_while_the_guard_looks_and_go_on_when_they_are_start
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_one_that_is_held_when_the_launcher_ends_ends_with_it(launch: Callable[..., Launcher], number: int) -> None:
-    launcher = launch(slow_guard(30), program("static", HELD, kind="static"))
-    assert until(lambda: len(launcher.output.read_text().split("pids")) == 2)
+def test_one_that_is_held_when_the_launcher_ends_ends_with_it(
+    launch: Callable[..., Launcher], tmp_path: Path, number: int
+) -> None:
+    launcher = launch(looking_until("never"), program("static", HELD, kind="static", cwd="."))
+    assert until((tmp_path / "loaded").exists)
     below = launcher.below()
     os.kill(launcher.popen.pid, number)
-    assert launcher.popen.wait(10) == (0 if number == signal.SIGINT else -number)
-    assert until(lambda: all(map(gone, below)), 5)
+    assert launcher.popen.wait(TIMEOUT_S) == (0 if number == signal.SIGINT else -number)
+    assert until(lambda: all(map(gone, below)))
 
 
 def test_one_that_dies_while_it_is_held_has_failed_when_it_is_started(tmp_path: Path) -> None:
     told: list[Notice] = []
-    plan = plan_of(slow_guard(0.5), program("static", "raise SystemExit(3)", kind="static"))
+    dies = program("static", "open('dies', 'w').close(); raise SystemExit(3)", kind="static", cwd=".")
+    plan = plan_of(looking_until("dies"), dies)
     assert supervise(plan, tmp_path / "plan.json", report=told.append) == 1
     states = [one.state for one in told if isinstance(one, ProcessState) and one.process == "static"]
     assert states == ["STARTING", "RUNNING", "EXITED"]

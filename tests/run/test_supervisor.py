@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -15,11 +16,12 @@ from typing import TYPE_CHECKING, Any
 import psutil
 import pytest
 
-from tests.waiting import gone, until
+from tests.waiting import TIMEOUT_S, gone, in_one_of_a_few, until, whole_lines
 from tfcompose.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.plan.file import write_plan
 from tfcompose.run.events import Clear, Complete, Live, OwnerReady, Remember, to_line
-from tfcompose.run.launcher.notice import Ended, FindingShown, LogLine, Notice, ProcessState
+from tfcompose.run.launcher.child import READ_SIZE
+from tfcompose.run.launcher.notice import Ended, FindingShown, LogLine, Notice, ProcessState, Stopping
 from tfcompose.run.launcher.state import Times
 from tfcompose.run.launcher.supervisor import supervise
 
@@ -27,25 +29,25 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 PYTHON = ("${python}", "-I", "-S", "-c")
-SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); time.sleep(30)"
+SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); time.sleep(90)"
 #: What tfcompose's own processes do once they handle signals: until then these are blocked.
 LISTEN = "import signal; signal.pthread_sigmask(signal.SIG_UNBLOCK, signal.valid_signals())"
 #: Starts a child of its own that heeds no signal but SIGKILL, and says both process numbers.
 PARENT = """
 import os, signal, subprocess, sys, time
 ignore = "signal.signal(signal.SIGINT, signal.SIG_IGN); signal.signal(signal.SIGTERM, signal.SIG_IGN)"
-deaf = f"import signal, time; {ignore}; print('deaf', flush=True); time.sleep(30)"
+deaf = f"import signal, time; {ignore}; print('deaf', flush=True); time.sleep(90)"
 child = subprocess.Popen([sys.executable, "-I", "-S", "-c", deaf], stdout=subprocess.PIPE)
 child.stdout.readline()
 print("pids", os.getpid(), child.pid, flush=True)
-time.sleep(30)
+time.sleep(90)
 """
 DEAF = """
 import os, signal, time
 signal.signal(signal.SIGINT, signal.SIG_IGN)
 signal.signal(signal.SIGTERM, signal.SIG_IGN)
 print("pids", os.getpid(), flush=True)
-time.sleep(30)
+time.sleep(90)
 """
 #: Runs a plan file as a process of its own, and prints the notices.
 LAUNCHER = """
@@ -84,7 +86,7 @@ class Launcher:
 
     def pids(self) -> list[int]:
         """Return the process numbers that the children have said so far."""
-        said = [line.split("pids ")[1] for line in self.output.read_text().splitlines() if "pids " in line]
+        said = [line.split("pids ")[1] for line in whole_lines(self.output) if "pids " in line]
         return [int(word) for words in said for word in words.rstrip("')").split()]
 
     def below(self, *, recursive: bool = True) -> list[int]:
@@ -106,8 +108,9 @@ def launch(tmp_path: Path) -> Iterator[Callable[..., Launcher]]:
     yield start
     for launcher in launchers:
         if launcher.popen.poll() is None:
-            for pid in (launcher.popen.pid, *launcher.below()):
-                os.kill(pid, SIGKILL)
+            for pid in (*launcher.below(), launcher.popen.pid):
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, SIGKILL)
         launcher.popen.wait()
 
 
@@ -129,33 +132,40 @@ def test_a_signal_ends_everything_with_0_and_no_process_is_left(launch: Callable
     below = launcher.below()
     assert set(launcher.pids()) < set(below)
     os.kill(launcher.popen.pid, number)
-    assert launcher.popen.wait(15) == 0
-    assert [pid for pid in below if not gone(pid)] == []
+    assert launcher.popen.wait(TIMEOUT_S) == 0
+    assert until(lambda: [pid for pid in below if not gone(pid)] == []), (
+        "the kernel may still be ending what was killed"
+    )
 
 
 @pytest.mark.parametrize("keeper", ["with its keeper", "and its keeper was told to end", "and its keeper is dead"])
 def test_sigkill_of_the_launcher_takes_its_children_along_within_2_s(
     launch: Callable[..., Launcher], keeper: str
 ) -> None:
-    launcher = launch(program("a", PARENT), program("b", DEAF))
-    assert until(lambda: len(launcher.pids()) == 3)
-    below, children = launcher.below(), launcher.below()
-    (shell,) = [pid for pid in launcher.below(recursive=False) if psutil.Process(pid).name() == "sh"]
-    if "told" in keeper:
-        os.kill(shell, SIGTERM)
-    if "dead" in keeper:
-        children = launcher.below(recursive=False)
-        os.kill(shell, SIGKILL)
-        assert until(lambda: gone(shell))
-    launcher.popen.kill()
-    launcher.popen.wait()
-    try:
-        assert until(lambda: all(gone(pid) for pid in children), 2)
-        assert len(children) == (3 if "dead" in keeper else 4)
-    finally:
-        for pid in below:
-            if not gone(pid):
-                os.kill(pid, SIGKILL)
+    def attempt(_: int) -> float:
+        launcher = launch(program("a", PARENT), program("b", DEAF))
+        assert until(lambda: len(launcher.pids()) == 3)
+        below, children = launcher.below(), launcher.below()
+        (shell,) = [pid for pid in launcher.below(recursive=False) if psutil.Process(pid).name() == "sh"]
+        if "told" in keeper:
+            os.kill(shell, SIGTERM)
+        if "dead" in keeper:
+            children = launcher.below(recursive=False)
+            os.kill(shell, SIGKILL)
+            assert until(lambda: gone(shell))
+        began = time.monotonic()
+        launcher.popen.kill()
+        launcher.popen.wait()
+        try:
+            assert until(lambda: all(gone(pid) for pid in children))
+            assert len(children) == (3 if "dead" in keeper else 4)
+            return time.monotonic() - began
+        finally:
+            for pid in below:
+                if not gone(pid):
+                    os.kill(pid, SIGKILL)
+
+    assert in_one_of_a_few(attempt, 2)
 
 
 def test_a_child_that_heeds_neither_sigint_nor_sigterm_is_killed(tmp_path: Path) -> None:
@@ -174,19 +184,18 @@ def test_a_child_that_heeds_neither_sigint_nor_sigterm_is_killed(tmp_path: Path)
 
 
 def test_what_a_process_leaves_in_its_group_ends_with_it(tmp_path: Path) -> None:
-    code, told = run(tmp_path, program("a", PARENT.replace("time.sleep(30)\n", "")))
+    code, told = run(tmp_path, program("a", PARENT.replace("time.sleep(90)\n", "")))
     assert code == 0
     assert until(lambda: gone(int(logged(told, "a")[0].split()[2])))  # init may still have to bury it
 
 
 def test_a_process_that_left_its_group_is_not_waited_for(tmp_path: Path) -> None:
     code = PARENT.replace("stdout=subprocess.PIPE)", "start_new_session=True)")
-    code = code.replace("child.stdout.readline()\n", "").replace("time.sleep(30)\n", "")
-    began = time.monotonic()
+    code = code.replace("child.stdout.readline()\n", "").replace("time.sleep(90)\n", "")
     _, told = run(tmp_path, program("a", code))
     (said,) = [line for line in logged(told, "a") if line.startswith("pids")]
+    assert not gone(int(said.split()[2]))
     os.kill(int(said.split()[2]), SIGKILL)
-    assert time.monotonic() - began < 10
 
 
 def test_a_failed_process_is_named_with_its_last_lines_and_the_exit_code_is_1(tmp_path: Path) -> None:
@@ -210,23 +219,25 @@ def test_a_process_that_floods_neither_fills_the_memory_nor_keeps_the_others_fro
     flood = "import os\nwhile True: os.write(1, b'flood\\n' * 1000)"
     endless = "import os\nwhile True: os.write(2, b'x' * 6000)"
     seen = {"a": 0, "b": 0, "c": 0}
-    longest = 0
+    longest = asked = heeded = 0
 
     def report(notice: Notice) -> None:
-        nonlocal longest
+        nonlocal longest, asked, heeded
         if isinstance(notice, LogLine):
             seen[notice.process] += 1
             longest = max(longest, len(notice.text))
+            if seen["a"] > 10_000 and seen["b"] > 10 and seen["c"] and not asked:
+                asked = seen["a"]
+                os.kill(os.getpid(), SIGTERM)
+        elif isinstance(notice, Stopping):
+            heeded = seen["a"]
 
     before = psutil.Process().memory_info().rss
     plan = plan_of(program("a", flood), program("b", endless), program("c", "print('heard', flush=True); " + SLEEPER))
-    began = time.monotonic()
-    supervise(plan, tmp_path / "plan.json", report=report, duration_s=2)
-    assert time.monotonic() - began < 4
+    assert supervise(plan, tmp_path / "plan.json", report=report, duration_s=60) == 0
     assert psutil.Process().memory_info().rss - before < 20e6
-    assert seen["a"] > 10_000
-    assert seen["b"] > 10
-    assert seen["c"] == 1
+    assert (asked > 10_000, seen["b"] > 10, seen["c"]) == (True, True, 1)
+    assert heeded - asked < 3 * READ_SIZE / len("flood\n"), "the flood was read on before a signal was heeded"
     assert longest == 64 * 1024
 
 
@@ -314,21 +325,30 @@ def test_a_guard_that_dies_before_it_is_clear_ends_everything_with_1(tmp_path: P
 
 def test_a_guard_that_dies_is_followed_by_one_that_is_given_its_memory_and_leaves_no_descriptor(tmp_path: Path) -> None:
     code = """
-import os
-from pathlib import Path
+import os, time
 if "TFCOMPOSE_MEMORY_FD" in os.environ:
+    open("counts", "w").close()
     print("remembers", os.read(int(os.environ["TFCOMPOSE_MEMORY_FD"]), 1000).decode(), flush=True)
-    print("descriptors", len(os.listdir(f"/proc/{os.getppid()}/fd")), flush=True)
+    while os.path.exists("counts"):
+        time.sleep(0.01)
 os.write(int(os.environ["TFCOMPOSE_EVENTS_FD"]), SAID)
 """
     said = to_line(Clear()) + to_line(Remember({"é": [1, None]}))
-    dies = program("guard", code.replace("SAID", repr(said.encode())), kind="guard")
+    dies = program("guard", code.replace("SAID", repr(said.encode())), kind="guard", cwd=".")
+    remembered: list[str] = []
+    counted: list[int] = []
+
+    def report(notice: Notice) -> None:
+        if isinstance(notice, LogLine):
+            remembered.append(notice.text)
+            counted.append(len(list(Path("/proc/self/fd").iterdir())))  # the guard waits for that
+            (tmp_path / "counts").unlink()
+
     times = Times(backoff_s=0.05, backoff_limit_s=0.05)
-    returncode, told = run(tmp_path, dies, program("a", SLEEPER), times=times)
-    remembered, counted = logged(told, "guard")[::2], logged(told, "guard")[1::2]
+    plan = plan_of(dies, program("a", SLEEPER))
+    assert supervise(plan, tmp_path / "plan.json", report=report, times=times) == 1
     assert remembered == ['remembers {"\\u00e9": [1, null]}'] * 5
     assert len(set(counted)) == 1, counted
-    assert returncode == 1
 
 
 def test_output_that_nobody_reads_any_more_ends_everything_with_141_and_nothing_more_is_told(tmp_path: Path) -> None:
@@ -354,7 +374,7 @@ def test_an_error_in_the_launcher_itself_leaves_no_process(tmp_path: Path) -> No
 
     with pytest.raises(ZeroDivisionError):
         supervise(plan_of(program("a", PARENT)), tmp_path / "plan.json", report=report)
-    assert until(lambda: all(gone(pid) for pid in pids), 2)
+    assert until(lambda: all(gone(pid) for pid in pids))
     assert len(pids) == 2
 
 

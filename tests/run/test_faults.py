@@ -60,14 +60,14 @@ time.time = lambda: right() - 3600 * os.path.exists("back")
 #: The robot of this run of the tests alone: what it leaves behind is ended, and what others run is not.
 NAME = f"rover{os.getpid()}@0"
 PYTHON = ("${python}", "-I", "-S", "-c")
-SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); print('up', flush=True); time.sleep(60)"
+SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); print('up', flush=True); time.sleep(180)"
 FLOOD = """
 import os, time
 data, count = b"a line of sixty-three characters, which says nothing worth a word\\n" * 1000, 0
 while count < 200_000_000:
     count += os.write(1, data)
 open("flooded", "w").write(str(count))
-time.sleep(60)
+time.sleep(180)
 """
 #: A daemon: its child leaves the group and the session, heeds no signal, and goes on when it has ended.
 DAEMON = """
@@ -78,7 +78,7 @@ if os.fork() == 0:
         signal.signal(number, signal.SIG_IGN)
     open("daemon", "w").write(str(os.getpid()))
     os.close(1), os.close(2)
-    time.sleep(60)
+    time.sleep(180)
 while not os.path.exists("daemon"):  # before, its group is its parent's, and ends with it
     time.sleep(0.01)
 """
@@ -89,7 +89,7 @@ import os, sys, time
 if os.fork() == 0:
     os.setsid()
     os.close(1), os.close(2)
-    code = "import os, time; open('daemon', 'w').write(str(os.getpid())); time.sleep(60)"
+    code = "import os, time; open('daemon', 'w').write(str(os.getpid())); time.sleep(180)"
     os.execve(sys.executable, [sys.executable, "-I", "-c", code], {})
 while "stays" in sys.argv or not os.path.exists("daemon"):  # before, it is of its parent's group, as in DAEMON
     time.sleep(0.01)
@@ -216,7 +216,7 @@ def test_what_left_its_group_ends_with_its_process_that_is_stopped_or_started_ag
 ) -> None:
     """One that ignores signals ends before the next one of its process begins, and others when that is stopped."""
     assert "signal.SIG_IGN" in DAEMON
-    code = (DAEMON if how == "restart" else DAEMON.replace("signal.SIG_IGN", "signal.SIG_DFL")) + "time.sleep(60)\n"
+    code = (DAEMON if how == "restart" else DAEMON.replace("signal.SIG_IGN", "signal.SIG_DFL")) + "time.sleep(180)\n"
     run = launch(program("lidar", code), program("calm", SLEEPER))
     assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
     first = int((tmp_path / "daemon").read_text())
@@ -289,7 +289,7 @@ def test_leftovers_are_recognised_by_the_runs_id_and_ended_on_request_only(
 
 
 def test_200_processes_are_started_listed_and_stopped_and_all_are_gone(launch: Callable[..., Run]) -> None:
-    run = launch(*(PlanProcess(f"p{number}", "run", argv=("sleep", "60")) for number in range(200)))
+    run = launch(*(PlanProcess(f"p{number}", "run", argv=("sleep", "180")) for number in range(200)))
     assert until(run.is_up)
     pids = [process["pid"] for process in run.ps().values()]
     assert len(set(pids)) == 200
@@ -298,7 +298,7 @@ def test_200_processes_are_started_listed_and_stopped_and_all_are_gone(launch: C
 
 
 def test_500_stops_and_starts_leave_no_process_no_descriptor_and_no_memory(launch: Callable[..., Run]) -> None:
-    run = launch(PlanProcess("a", "run", argv=("sleep", "60")), PlanProcess("b", "run", argv=("sleep", "60")))
+    run = launch(PlanProcess("a", "run", argv=("sleep", "180")), PlanProcess("b", "run", argv=("sleep", "180")))
     assert until(run.is_up)
     launcher = psutil.Process(run.popen.pid)
 

@@ -85,7 +85,7 @@ def run(tmp_path: Path, *processes: PlanProcess, late: int = 0) -> list[Notice]:
         if isinstance(notice, AllReady) or (late and len(shut) == late):
             raise BrokenPipeError  # enough was seen
 
-    supervise(plan, file, report=report, duration_s=60)
+    supervise(plan, file, report=report, duration_s=120)
     return told
 
 
@@ -111,10 +111,10 @@ def test_a_lifecycle_node_is_configured_and_activated_and_then_ready(tmp_path: P
 @pytest.mark.usefixtures("domain")
 def test_edges_a_line_an_exit_code_and_a_time_open_gates_and_what_waits_follows(tmp_path: Path) -> None:
     drive = simulated(Ready("edges"))
-    line = script("line", "echo booting; sleep 0.3; echo ready 17; sleep 60", Ready("log", "ready [0-9]+"))
+    line = script("line", "echo booting; sleep 0.3; echo ready 17; sleep 180", Ready("log", "ready [0-9]+"))
     code = script("code", "exit 4", Ready("exit", number=4.0))
-    later = script("later", "sleep 60", Ready("time", number=0.4))
-    last = script("last", "sleep 60", None, after=dict.fromkeys(("drive", "line", "code", "later"), "ready"))
+    later = script("later", "sleep 180", Ready("time", number=0.4))
+    last = script("last", "sleep 180", None, after=dict.fromkeys(("drive", "line", "code", "later"), "ready"))
     told = run(tmp_path, drive, line, code, later, last)
     seen = {notice.process: notice.seen for notice in told if isinstance(notice, ProcessReady)}
     assert seen == {"drive": "its edges are live", "line": "ready 17", "later": "0.4 s have passed"}
@@ -124,9 +124,9 @@ def test_edges_a_line_an_exit_code_and_a_time_open_gates_and_what_waits_follows(
 
 @pytest.mark.usefixtures("domain")
 def test_edges_a_line_and_an_exit_code_that_do_not_come_are_told_with_what_was_seen_instead(tmp_path: Path) -> None:
-    idle = replace(simulated(Ready("edges", timeout_s=6.0)), kind="run", argv=("sleep", "60"), simulate=None)
-    line = script("line", "echo booting; sleep 60", Ready("log", "ready [0-9]+", timeout_s=5.0))
-    code = script("code", "sleep 60", Ready("exit", timeout_s=5.0))
+    idle = replace(simulated(Ready("edges", timeout_s=6.0)), kind="run", argv=("sleep", "180"), simulate=None)
+    line = script("line", "echo booting; sleep 180", Ready("log", "ready [0-9]+", timeout_s=5.0))
+    code = script("code", "sleep 180", Ready("exit", timeout_s=5.0))
     told = run(tmp_path, idle, line, code, late=3)
     found = {notice.found.message: notice.found for notice in told if isinstance(notice, FindingShown)}
     notes = [
@@ -147,7 +147,7 @@ def test_gates_that_stay_shut_say_what_was_seen_instead(tmp_path: Path) -> None:
     asked = Ready("service", "/robot/asked_for", timeout_s=9.0)
     told = run(
         tmp_path,
-        *(node("lidar", ready=scan), slam, script("calm", "sleep 60", asked), script("c", "sleep 60", other)),
+        *(node("lidar", ready=scan), slam, script("calm", "sleep 180", asked), script("c", "sleep 180", other)),
         late=4,
     )
     found = {notice.found.message: notice.found for notice in told if isinstance(notice, FindingShown)}

@@ -35,7 +35,7 @@ print("pids", os.getpid(), "loaded", flush=True)
 open("loaded", "w").close()
 said = os.read(int(os.environ["{HOLD_FD}"]), 9)
 print("went on" if said == {GO!r} else "was not let go", flush=True)
-time.sleep(90)
+time.sleep(180)
 """
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.ros
 
-HELLO = ROVER + "  hello: {run: [sh, -c, 'echo $GREETING; exec sleep 60'], env: {GREETING: good day}}\n"
+HELLO = ROVER + "  hello: {run: [sh, -c, 'echo $GREETING; exec sleep 180'], env: {GREETING: good day}}\n"
 
 
 @pytest.fixture

@@ -29,25 +29,25 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 PYTHON = ("${python}", "-I", "-S", "-c")
-SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); time.sleep(90)"
+SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); time.sleep(180)"
 #: What tfcompose's own processes do once they handle signals: until then these are blocked.
 LISTEN = "import signal; signal.pthread_sigmask(signal.SIG_UNBLOCK, signal.valid_signals())"
 #: Starts a child of its own that heeds no signal but SIGKILL, and says both process numbers.
 PARENT = """
 import os, signal, subprocess, sys, time
 ignore = "signal.signal(signal.SIGINT, signal.SIG_IGN); signal.signal(signal.SIGTERM, signal.SIG_IGN)"
-deaf = f"import signal, time; {ignore}; print('deaf', flush=True); time.sleep(90)"
+deaf = f"import signal, time; {ignore}; print('deaf', flush=True); time.sleep(180)"
 child = subprocess.Popen([sys.executable, "-I", "-S", "-c", deaf], stdout=subprocess.PIPE)
 child.stdout.readline()
 print("pids", os.getpid(), child.pid, flush=True)
-time.sleep(90)
+time.sleep(180)
 """
 DEAF = """
 import os, signal, time
 signal.signal(signal.SIGINT, signal.SIG_IGN)
 signal.signal(signal.SIGTERM, signal.SIG_IGN)
 print("pids", os.getpid(), flush=True)
-time.sleep(90)
+time.sleep(180)
 """
 #: Runs a plan file as a process of its own, and prints the notices.
 LAUNCHER = """
@@ -184,14 +184,14 @@ def test_a_child_that_heeds_neither_sigint_nor_sigterm_is_killed(tmp_path: Path)
 
 
 def test_what_a_process_leaves_in_its_group_ends_with_it(tmp_path: Path) -> None:
-    code, told = run(tmp_path, program("a", PARENT.replace("time.sleep(90)\n", "")))
+    code, told = run(tmp_path, program("a", PARENT.replace("time.sleep(180)\n", "")))
     assert code == 0
     assert until(lambda: gone(int(logged(told, "a")[0].split()[2])))  # init may still have to bury it
 
 
 def test_a_process_that_left_its_group_is_not_waited_for(tmp_path: Path) -> None:
     code = PARENT.replace("stdout=subprocess.PIPE)", "start_new_session=True)")
-    code = code.replace("child.stdout.readline()\n", "").replace("time.sleep(90)\n", "")
+    code = code.replace("child.stdout.readline()\n", "").replace("time.sleep(180)\n", "")
     _, told = run(tmp_path, program("a", code))
     (said,) = [line for line in logged(told, "a") if line.startswith("pids")]
     assert not gone(int(said.split()[2]))
@@ -382,7 +382,7 @@ def test_no_file_descriptor_is_left_open_and_no_handler_in_place_after_50_runs(t
     broken = tmp_path / "broken"
     broken.write_bytes(b"\x7fnothing")
     broken.chmod(0o755)
-    sleeper = PlanProcess("a", "run", argv=("sleep", "60"))
+    sleeper = PlanProcess("a", "run", argv=("sleep", "180"))
     plans = [
         (guard(), sleeper),
         (PlanProcess("g", "guard", argv=(str(broken),)), sleeper),

@@ -13,7 +13,7 @@ import threading
 import time
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -53,10 +53,12 @@ def pytest_report_header() -> str:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     with_ros = [item for item in items if item.get_closest_marker("ros")]
-    for item in with_ros if NO_ROS else ():
-        item.add_marker(pytest.mark.skip(reason=NO_ROS))
-    if with_ros and not NO_ROS:  # a node of a test's that leaves slowly on a busy machine does not end all tests
-        import_module("tfcompose.ros.node").LEAVE_S = 2 * TIMEOUT_S
+    if NO_ROS:
+        for item in with_ros:
+            item.add_marker(pytest.mark.skip(reason=NO_ROS))
+    elif with_ros:  # a node of a test's that leaves slowly on a busy machine does not end all tests
+        node: Any = import_module("tfcompose.ros.node")
+        node.LEAVE_S = 2 * TIMEOUT_S
 
 
 @pytest.fixture(autouse=True)

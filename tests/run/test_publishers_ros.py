@@ -374,7 +374,7 @@ def test_every_process_ends_at_once_and_quietly(
         running = [start(f"tfcompose.run.{process.kind}", file, process.name) for process in processes]
         for each in running:
             each.until_says("edge")
-        took = []
+        took: list[float] = []
         for each in running:
             code, seconds = each.end(number)
             each.close()

@@ -39,6 +39,21 @@ def whole_lines(file: Path) -> list[str]:
     return file.read_bytes().rpartition(b"\n")[0].decode().splitlines()
 
 
+def within(condition: Callable[[], object], seconds: float) -> bool:
+    """Return whether the condition holds after so many seconds in which this process ran.
+
+    Of the time between two looks a twentieth of a second counts: a machine that stands still for all makes nobody late.
+    """
+    left, looked = seconds, time.monotonic()
+    while not condition():
+        now = time.monotonic()
+        left, looked = left - min(0.05, now - looked), now
+        if left < 0:
+            return False
+        time.sleep(0.005)
+    return True
+
+
 def gone(process: int | psutil.Process) -> bool:
     """Return whether the process has ended: nobody may have buried it yet."""
     try:

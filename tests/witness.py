@@ -1,0 +1,46 @@
+"""Whether an edge is really late: what a busy machine holds up is rightly blamed."""
+
+from __future__ import annotations
+
+import threading
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from tfcompose.ros.message import decode
+from tfcompose.ros.node import open_node
+from tfcompose.ros.stop import Stop
+from tfcompose.ros.tf import TFSubscription, wait
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+
+class Witness:
+    """Hears a moving edge in a thread of its own, and when each of its messages was sent."""
+
+    def __init__(self, child: str) -> None:
+        self._child = child
+        self._stop = Stop()
+        self._sent_ns: list[int] = []
+        self._thread = threading.Thread(target=self._hear)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.request()
+        self._thread.join()
+
+    def longest_gap_s(self) -> float:
+        """Return the longest time between two messages; infinite where nothing was heard."""
+        return max((after - before for before, after in pairwise(self._sent_ns)), default=float("inf")) / 1e9
+
+    def _hear(self) -> None:
+        with open_node("witness", "") as node:
+            subscription = TFSubscription(node, static=False)
+            while not self._stop.requested:
+                wait(node, [subscription], 1.0, self._stop)
+                for received in subscription.take():
+                    if any(each.child == self._child for each in decode(received.data)):
+                        self._sent_ns.append(received.source_ns)

@@ -18,7 +18,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.waiting import until
+from tests.waiting import TIMEOUT_S, until
 from tfcompose.cli.console import Console
 from tfcompose.cli.printable import coloured_only, plain
 from tfcompose.cli.status import Status
@@ -175,13 +175,13 @@ class Terminal:
     def __init__(self, command: list[str], columns: int, rows: int) -> None:
         self.pid, self._fd = pty.fork()
         if self.pid == 0:
+            _set_size(0, columns, rows)  # before it is asked for
             os.execvp(command[0], command)  # noqa: S606 (that is how a terminal's program is started)
         self.screen = pyte.HistoryScreen(columns, rows, history=1000)
         self._stream = pyte.ByteStream(self.screen)
-        self.resize(columns, rows)
 
     def resize(self, columns: int, rows: int) -> None:
-        fcntl.ioctl(self._fd, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
+        _set_size(self._fd, columns, rows)
         self.screen.resize(rows, columns)
 
     def read(self, seconds: float = 0.1) -> bool:
@@ -196,13 +196,14 @@ class Terminal:
         return bool(data)
 
     def shows(self, text: str) -> bool:
-        return until(lambda: self.read(0.02) and any(text in line for line in self.screen.display))
+        """Read until a line holds the text; it may have moved up already."""
+        return until(lambda: self.read(0.02) and any(text in line for line in self.lines()))
 
     def type(self, text: str) -> None:
         os.write(self._fd, text.encode())
 
     def ends(self) -> int:
-        end = time.monotonic() + 20
+        end = time.monotonic() + TIMEOUT_S
         while self.read():
             assert time.monotonic() < end
         return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
@@ -210,6 +211,10 @@ class Terminal:
     def lines(self) -> list[str]:
         above = ["".join(row[x].data for x in range(self.screen.columns)) for row in self.screen.history.top]
         return [line.rstrip() for line in [*above, *self.screen.display] if line.strip()]
+
+
+def _set_size(fd: int, columns: int, rows: int) -> None:
+    fcntl.ioctl(fd, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
 
 
 @pytest.fixture

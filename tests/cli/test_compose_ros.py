@@ -145,6 +145,7 @@ def test_what_waits_for_a_stopped_process_is_said_to_wait_by_ps_and_by_who_start
     assert until(lambda: ps(tfc)["drive"]["state"] == "STOPPED")
     assert tfc("restart", "late").stdout == "late: restarting, and waits for drive to be ready\n"
     assert until(lambda: "  late     waits for drive to be ready  " in tfc("ps").stdout), tfc("ps").stdout
+    assert "not ready: late (waits for drive to be ready)\n" in tfc("wait", "--ready", "--timeout", "0.1").stderr
     assert tfc("down").returncode == 0
     assert "\ntfcompose | ended\n" in tfc("logs").stdout
 
@@ -239,6 +240,33 @@ def test_events_are_told_from_the_start_and_wait_returns_the_exit_code(tfc: Call
     found = [event["found"] for event in told if event["event"] == "FindingShown"]
     (found,) = [one for one in found if one["code"] not in LATE]
     assert found["message"] == "static was ended by SIGKILL"
+
+
+@pytest.mark.parametrize("words", [("events",), ("logs", "-f")])
+def test_who_follows_ends_when_nobody_reads_it_any_more(tfc: Callable[..., Any], words: tuple[str, ...]) -> None:
+    """``tfcompose logs -f | grep -m1 complete``: nothing more may ever be written."""
+    assert tfc("up", "--wait").returncode == 0
+    with subprocess.Popen([sys.executable, "-m", "tfcompose", *words], stdout=subprocess.PIPE) as follower:
+        assert follower.stdout
+        while b"all ready after" not in follower.stdout.readline():
+            pass
+        follower.stdout.close()
+        assert follower.wait(20) == 141
+
+
+def test_events_of_a_launcher_that_is_killed_do_not_end_like_those_of_one_that_ends(
+    tfc: Callable[..., Any], tmp_path: Path
+) -> None:
+    assert tfc("up", "-d").returncode == 0
+    command = [sys.executable, "-m", "tfcompose", "events"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as follower:
+        assert follower.stdout
+        assert "started guard" in follower.stdout.readline()
+        os.kill(launcher_of(tmp_path), signal.SIGKILL)
+        _, said = follower.communicate(timeout=20)
+    assert follower.returncode == 1
+    assert said.startswith("tfcompose: rover@")
+    assert said.endswith(" was killed\n")
 
 
 def test_a_dry_run_is_the_same_everywhere_starts_nothing_and_writes_nothing(

@@ -57,7 +57,9 @@ def _files_beside(plan: Plan, folder: Path) -> dict[str, str]:
 def _lines(plan: Plan, files: dict[str, str]) -> Iterator[str]:
     ros = plan.ros
     domain = "the environment's" if ros.domain_id is None else ros.domain_id
-    yield f"robot {plan.robot}: {len(plan.processes)} processes, {len(plan.edges)} edges, domain: {domain}"
+    processes, edges = len(plan.processes), len(plan.edges)
+    counted = f"{processes} process{'es' * (processes != 1)}, {edges} edge{'s' * (edges != 1)}"
+    yield f"robot {plan.robot}: {counted}, domain: {domain}"
     yield from told(plan)
     for process in plan.processes:
         yield ""

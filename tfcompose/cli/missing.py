@@ -52,7 +52,9 @@ def say_missing(place: Place, timeout_s: float) -> None:
 
 
 def _why(process: dict[str, Any]) -> str:
-    """Return the process's state, what it is without, and what is seen there instead."""
+    """Return what it waits for before its start; else its state, what it is without, and what is seen there."""
+    if process["state"] == "STOPPED" and process["waits"]:
+        return str(process["waits"])
     parts = [process["state"].lower()]
     if process["edges"]:
         parts.append(f"{process['live']} of {process['edges']} edges live")

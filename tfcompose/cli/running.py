@@ -7,6 +7,7 @@ import sys
 import time
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.cli.reader import wait_for
 from tfcompose.cli.terminal import UNREADABLE, complain
 from tfcompose.run.launcher.control import ask, connect
 from tfcompose.run.launcher.told import notice_of
@@ -15,6 +16,7 @@ from tfcompose.run.place import PlaceError, places
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from collections.abc import Callable, Iterator
+    from typing import TextIO
 
     from tfcompose.run.launcher.notice import Notice
     from tfcompose.run.place import Holder, Place
@@ -95,11 +97,15 @@ def _later(answer: dict[str, Any]) -> str:
     return f", and waits for {answer['waits']}" if answer.get("waits") else ""
 
 
-def events(place: Place, timeout_s: float | None = None) -> Iterator[tuple[Notice, float]]:
+def events(
+    place: Place, timeout_s: float | None = None, for_whom: TextIO | None = None
+) -> Iterator[tuple[Notice, float]]:
     """Yield what the launcher has told and tells, with when, until it ends.
 
+    ``for_whom`` is where this is written: when nobody reads there any more, it is over, also while nothing is told.
+
     Raises:
-        OSError: if it cannot be heard; TimeoutError if the time is over.
+        OSError: if it cannot be heard; TimeoutError if the time is over; BrokenPipeError if nobody reads.
     """
     end = None if timeout_s is None else time.monotonic() + timeout_s
     with connect(place) as connection:
@@ -110,6 +116,8 @@ def events(place: Place, timeout_s: float | None = None) -> Iterator[tuple[Notic
             if left is not None and left <= 0:
                 raise TimeoutError
             connection.settimeout(left)
+            if for_whom and not wait_for(connection, for_whom):
+                raise BrokenPipeError
             data = connection.recv(64 * 1024)
             if not data:
                 return

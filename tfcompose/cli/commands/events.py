@@ -13,6 +13,7 @@ from tfcompose.cli.console import Console
 from tfcompose.cli.running import add_robot, chosen, events
 from tfcompose.cli.terminal import coloured, complain
 from tfcompose.plan import Plan, RosSettings
+from tfcompose.run.launcher.notice import Ended
 from tfcompose.run.launcher.told import told_line
 
 if TYPE_CHECKING:
@@ -26,14 +27,16 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Print events until the robot ends; exit code 0, 1 where none runs."""
+    """Print events until the robot ends; exit code 0, 1 where none runs, or it is heard no more before it ends."""
     place = chosen(arguments.robot)
     if isinstance(place, int):
         return place
     lines = _Timed()
+    ended = False
     console = Console(Plan(place.name, "", None, RosSettings(), (), ()), lines, colour=coloured(sys.stdout))
     try:
-        for notice, at in events(place):
+        for notice, at in events(place, for_whom=sys.stdout):
+            ended = isinstance(notice, Ended)
             if arguments.format == "json":
                 sys.stdout.write(f"{told_line(notice, at)}\n")
             else:
@@ -45,7 +48,10 @@ def run(arguments: Namespace) -> int:
     except OSError as error:
         complain(f"{place.name} does not answer: {error}")
         return 1
-    return 0
+    if not ended:
+        slow = "tells more than was read here, and did not wait; ask again"
+        complain(f"{place.name} {slow if place.holder() else 'was killed'}")
+    return 0 if ended else 1
 
 
 class _Timed:

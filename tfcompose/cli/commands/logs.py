@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.console import COLOURS
 from tfcompose.cli.options import counted
 from tfcompose.cli.printable import head_of, width_of
+from tfcompose.cli.reader import is_read
 from tfcompose.cli.running import add_robot, chosen, running
 from tfcompose.cli.terminal import coloured, complain
 from tfcompose.diagnostic import did_you_mean
@@ -62,6 +63,8 @@ def run(arguments: Namespace) -> int:
         printer.print(follower.more())
         if ended:
             break
+        if not is_read(sys.stdout):
+            raise BrokenPipeError
         time.sleep(LOOK_EVERY_S)
     return 0
 

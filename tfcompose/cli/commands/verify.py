@@ -63,13 +63,14 @@ def run(arguments: Namespace) -> int:
         return known
     plan, places = known
     censuses = {topics: Census(settle_s=0.0 if arguments.bag else SETTLE_S) for topics in parts_of(plan)}
-    for_programs = arguments.format != "text"  # which are told of each edge that it is missing
+    # Programs are told of each edge that it is missing; a robot without edges misses none.
+    may_be_silent = arguments.format != "text" or not plan.edges
     begun = time.monotonic()
     if arguments.bag:
-        code = from_bag(arguments.bag, censuses, may_be_silent=for_programs)
+        code = from_bag(arguments.bag, censuses, may_be_silent=may_be_silent)
     else:
         code = from_live(
-            "tfcompose_verify", censuses, ros=plan.ros, duration_s=arguments.duration, may_be_silent=for_programs
+            "tfcompose_verify", censuses, ros=plan.ros, duration_s=arguments.duration, may_be_silent=may_be_silent
         )
     if code is not None:
         return code

@@ -306,3 +306,15 @@ def test_a_stream_that_is_closed_is_no_traceback(tmp_path: Path, closed: str) ->
     done = subprocess.run(["/bin/sh", "-c", command], capture_output=True, text=True, timeout=30, check=False)
     assert done.stdout.splitlines()[-1] == "0"
     assert "Traceback" not in done.stdout + done.stderr + (said.read_text() if said.exists() else "")
+
+
+@pytest.mark.parametrize("command", ["build", "export systemd"])
+def test_a_folder_that_was_removed_is_named_as_the_reason(tmp_path: Path, command: str) -> None:
+    (tmp_path / "robot.yaml").write_text(GOOD)
+    (tmp_path / "gone").mkdir()
+    words = f"cd gone && rmdir ../gone && {sys.executable} -m tfcompose {command} {tmp_path}/robot.yaml"
+    done = subprocess.run(
+        ["/bin/sh", "-c", words], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "tfcompose: the folder that this is typed in was removed; cd to one that is there\n"

@@ -179,6 +179,45 @@ def _change(tfc: Callable[..., Any], tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("tfc")
+def test_a_robot_whose_folder_was_removed_goes_on_and_refuses_what_cannot_be_started_there(
+    tfc: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sleeper = "  late: {run: [sleep, '1000']}\n"
+    (tmp_path / "robot.yaml").write_text(ROVER + sleeper)
+    (tmp_path / "there").mkdir()
+    monkeypatch.chdir(tmp_path / "there")
+    assert tfc("up", "../robot.yaml", "--wait", "-o", "../built").returncode == 0
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "there").rmdir()
+    (tmp_path / "robot.yaml").write_text(ROVER + sleeper.replace("1000", "2000"))
+    changed = tfc("up", "-d")
+    assert changed.returncode == 1
+    assert f"the folder {tmp_path}/there that late runs in is not there" in changed.stderr
+    before = ps(tfc)
+    assert tfc("restart", "static", "guard").returncode == 0
+    assert until(lambda: ps(tfc)["static"]["restarts"] == ps(tfc)["guard"]["restarts"] == 1)
+    assert tfc("wait", "--ready", "--timeout", "30").returncode == 0
+    assert ps(tfc)["late"]["pid"] == before["late"]["pid"]
+
+
+def test_an_error_in_a_launcher_in_the_background_is_kept_for_who_looks_for_it(
+    tfc: Callable[..., Any], tmp_path: Path
+) -> None:
+    assert tfc("ps").returncode == 1
+    code = """
+import sys
+from tfcompose.cli import detach, main
+def broken(*_, **__): raise ZeroDivisionError("of a launcher")
+detach.supervise = broken
+sys.exit(main(["up", "-d"]))
+"""
+    up = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    assert up.returncode == 1
+    (said,) = (tmp_path / "log").rglob("launcher.err")
+    assert f"{said} may say why" in up.stderr
+    assert "ZeroDivisionError: of a launcher" in said.read_text()
+
+
 def test_of_two_that_start_at_the_same_moment_one_wins_and_the_other_says_who() -> None:
     command = [sys.executable, "-m", "tfcompose", "up"]
     start = partial(subprocess.Popen, command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.console import Console
@@ -36,7 +37,10 @@ def detach(plan: Plan, place: Place, lock: Lock, session: Session, arguments: Na
         try:
             lock.signed()
             code = _launcher(plan, place, session, arguments.duration)
+        except BaseException:  # noqa: BLE001 (nobody further out says what it was)
+            import_module("traceback").print_exc()
         finally:
+            sys.stderr.flush()
             os._exit(code)
     if session.listener:
         session.listener.close()

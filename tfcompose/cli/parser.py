@@ -70,12 +70,24 @@ def main(argv: list[str] | None = None) -> int:
     except BrokenPipeError:
         return _unwritten()
     except OSError as error:
+        if error.errno == errno.ENOENT and not _is_somewhere():
+            sys.stderr.write("tfcompose: the folder that this is typed in was removed; cd to one that is there\n")
+            return 2
         if error.errno != errno.ENOSPC:
             raise
         _unwritten()
         sys.stderr.write(f"tfcompose: the output cannot be written: {error.strerror}\n")
         return 2
     return code
+
+
+def _is_somewhere() -> bool:
+    """Return whether the current folder is there."""
+    try:
+        os.getcwd()  # noqa: PTH109 (pathlib is loaded where it is needed)
+    except FileNotFoundError:
+        return False
+    return True
 
 
 def _main(words: list[str]) -> int:

@@ -205,7 +205,7 @@ def spawn(command: Command, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes
     return subprocess.Popen(
         command.argv,
         bufsize=0,
-        cwd=command.folder,
+        cwd="/" if command.own and not command.folder.is_dir() else command.folder,  # ours need none
         env=command.env,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,

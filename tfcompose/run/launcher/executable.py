@@ -28,8 +28,16 @@ _ROS_EXECUTABLE = re.compile(r"\$\{executable:([^/}]+)/([^/}]+)\}")
 def folder_of(process: PlanProcess, plan_file: Path, build_dir: Path) -> Path:
     """Return the folder that the process runs in, an absolute path without ``..`` where the plan says one."""
     if process.cwd is None:
-        return Path.cwd()
+        return _here()
     return Path(os.path.normpath(build_dir / _filled(process.cwd, process, plan_file, build_dir)))
+
+
+def _here() -> Path:
+    """Return the folder that this program runs in; where it was removed meanwhile, the one that it was."""
+    try:
+        return Path.cwd()
+    except FileNotFoundError:
+        return Path(str(Path("/proc/self/cwd").readlink()).removesuffix(" (deleted)"))
 
 
 def filled_in(process: PlanProcess, plan_file: Path, build_dir: Path | None = None) -> tuple[str, ...]:

@@ -90,7 +90,7 @@ def _command_of(
     if not argv:
         return finding("TF902", f"the plan does not say how {process.name} is started", None)
     folder = folder_of(process, *files)
-    if not folder.is_dir():
+    if not own and not folder.is_dir():
         lost = f"the folder {folder} that {process.name} runs in is not there"
         optional = process.required is False
         return Command(argv, env, folder, missing=lost) if optional else finding("TF810", lost, None)

@@ -132,6 +132,26 @@ def test_a_mesh_has_the_inertia_of_the_box_that_it_shows(tmp_path: Path, ending:
     assert matrix(by_mesh) == pytest.approx(matrix(by_box), rel=1e-5, abs=1e-6)
 
 
+@pytest.mark.parametrize("inwards", [False, True])
+def test_a_body_in_a_mesh_that_faces_inwards_is_turned_and_a_cavity_is_none(tmp_path: Path, *, inwards: bool) -> None:
+    """In the hole of a ring it stands apart, though it is within the ring's bounds; in the box it is a hole."""
+    ring = trimesh.creation.annulus(r_min=0.3, r_max=0.5, height=0.4, sections=64)
+    box, apart, cavity = (trimesh.creation.box([side] * 3) for side in (0.6, 0.2, 0.4))
+    box.apply_translation([2, 0, 0])
+    cavity.apply_translation([2.05, 0, 0])
+    meant = ring.volume + 0.6**3 + 0.2**3 - 0.4**3
+    x = (2 * 0.6**3 - 2.05 * 0.4**3) / meant
+    for one in (apart, cavity):
+        one.invert()
+    mesh: Any = trimesh.util.concatenate([cavity, ring, apart, box])
+    if inwards:
+        mesh.invert()
+    mesh.export(tmp_path / "several.stl")
+    found = inertial_of({"visual": {"mesh": "several.stl"}, "inertial": {"density": 1}}, tmp_path)
+    assert found.mass == pytest.approx(meant, rel=1e-6)
+    assert found.pose.xyz == pytest.approx((x, 0, 0), abs=1e-6)
+
+
 @pytest.mark.filterwarnings("ignore:Setting the shape on a NumPy array:DeprecationWarning")  # of pycollada's writer
 def test_a_collada_file_is_as_large_as_its_unit_says(tmp_path: Path) -> None:
     """RViz and Gazebo show it so: a box of 300 mm is not one of 300 m."""

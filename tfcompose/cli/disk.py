@@ -81,7 +81,9 @@ def moments(path: str, scale: Vector) -> Moments:
         mesh.apply_scale([factor * unit for factor in scale])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # numpy's, about what is divided by a volume of 0
-            why = _why_without_volume(mesh)
+            why = _why_open(mesh)
+            mesh = mesh if why else import_module("tfcompose.cli.mesh_bodies").facing_alike(mesh)
+            why = why or _why_flat(mesh)
             volume = 0.0 if why else float(mesh.volume)
     except Exception as error:  # noqa: BLE001 (readers of a dozen formats: anything can come out of them)
         said = " ".join(str(error).split()) or type(error).__name__
@@ -95,14 +97,18 @@ def moments(path: str, scale: Vector) -> Moments:
     return Moments(abs(volume), (x, y, z), (xx, xy, xz, yy, yz, zz))
 
 
-def _why_without_volume(mesh: Any) -> str:
-    """Return why the triangles enclose no volume, or an empty text."""
+def _why_open(mesh: Any) -> str:
+    """Return why the triangles enclose nothing, or an empty text."""
     if not len(mesh.faces):
         return "it has no triangles"
     if not mesh.is_watertight:
         return "it is not closed, and has no volume"
     if not mesh.is_winding_consistent:
         return "some of its triangles face inwards and others outwards, so that it has no volume"
+    return ""
+
+
+def _why_flat(mesh: Any) -> str:
     return "" if abs(mesh.volume) > _FLAT * mesh.scale**3 else "it is flat, and has no volume"
 
 

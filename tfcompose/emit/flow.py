@@ -52,8 +52,8 @@ def entry(key: str, value: Any, depth: int = 0) -> list[str]:
 
 
 def _splits(value: Any) -> bool:
-    """Whether the value is longer in lines: a list of numbers is not."""
-    return isinstance(value, dict) or any(isinstance(item, dict) for item in value)
+    """Whether the value can stand in lines of its own: a list of numbers stays as it is, and ``{}`` has none."""
+    return bool(value) if isinstance(value, dict) else any(isinstance(item, dict) for item in value)
 
 
 def _item(value: Any, depth: int) -> list[str]:

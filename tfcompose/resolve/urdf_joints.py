@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T", Dynamics, Limit, ReferencePositions, SafetyController)
 
+#: Their numbers say how far or how much at the most: one that is endless only says nothing.
+_BOUNDS = (Limit, SafetyController)
 MOVING = ("revolute", "continuous", "prismatic")
 TYPES = (*MOVING, "fixed", "floating", "planar")
 
@@ -99,5 +101,6 @@ def _numbers(cls: type[T], element: Element | None, values: Values) -> T | None:
     """Return the object whose fields are the element's attributes; those that are missing have their defaults."""
     if element is None:
         return None
-    given = {name: values.number(element, name) for name in cls.__slots__}
+    read = values.bound if cls in _BOUNDS else values.number
+    given = {name: read(element, name) for name in cls.__slots__}
     return cls(**{name: value for name, value in given.items() if value is not None})

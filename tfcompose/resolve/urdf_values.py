@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from tfcompose.pose import Quaternion
 
 
+#: Beyond this, products of four such numbers leave the range of floats.
+HUGE = 1e30
+
+
 @dataclass(slots=True)
 class Values:
     """Reads attributes; ``found`` is what was wrong with them, ``has_quaternions`` whether rotations may be such.
@@ -52,6 +56,9 @@ class Values:
             text = element.attributes[name]
             self.refuse(f"{name}={text!r} is not {count}", element.place(name), _advice(text, len(default)))
             return default
+        if max(map(abs, values)) > HUGE:
+            self.refuse(f"{name} is beyond what can be computed with", element.place(name))
+            return default
         if element.has_broken_values and re.search(r"[\t\r\n]", element.written(name).lstrip()):
             message = f"a tab or a line break in the numbers of {name}"
             self.refuse(message, element.place(name), "a space: readers of ROS refuse the robot for it", "warning")
@@ -62,6 +69,19 @@ class Values:
         if element is None or name not in element.attributes:
             return default
         return self.numbers(element, name, (0.0,))[0]
+
+    def bound(self, element: Element, name: str) -> float | None:
+        """Return an attribute's number that limits something; one that limits nothing is as large as numbers may be."""
+        try:
+            value = float(element.attributes.get(name, ""))
+        except ValueError:
+            value = 0.0
+        if not HUGE < abs(value) < math.inf:
+            return self.number(element, name)  # type: ignore[no-any-return]  # a number, or None
+        taken = math.copysign(HUGE, value)
+        message = f"{name} is beyond what can be computed with: {taken:g} is taken"
+        self.refuse(message, element.place(name), "such a limit is none", "warning")
+        return taken
 
     def pose(self, parent: Element) -> Pose:
         """Return what the element's origin says."""

@@ -74,6 +74,15 @@ def test_for_readers_without_ros_every_address_is_a_file_that_is_there(workspace
     ]
 
 
+def test_an_address_keeps_every_letter_that_readers_take_as_it_is(workspace: Path) -> None:
+    """Libcurl decodes what ROS reads; readers without ROS decode nothing."""
+    name = "base (1)+ä,=@&'~.stl"
+    (workspace / "src/robots/meshes/a b.stl").rename(workspace / "src/robots/meshes" / name)
+    (workspace / "src/robots/r.yaml").write_text(ROBOT.replace("meshes/a b.stl", f'"meshes/{name}"'))
+    assert build(workspace, "--mesh", "file").returncode == 0
+    assert addresses(workspace / "build/r")[0].endswith("/meshes/" + name.replace(" ", "%20"))
+
+
 def test_for_ros_every_address_is_in_a_package_or_nothing_is_written(workspace: Path) -> None:
     refused = build(workspace, "--mesh", "package")
     assert refused.returncode == 1

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import posixpath
+import re
 from dataclasses import dataclass
-from importlib import import_module
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
@@ -46,11 +46,16 @@ class Target:
 
 
 AS_WRITTEN = Target()
+_NOT_IN_ADDRESSES = re.compile(r"[\x00-\x20\x7f#%?]")
 
 
 def _quoted(path: str) -> str:
-    """Return the path as an address has it: a space is %20."""
-    return str(import_module("urllib.parse").quote(path))  # seldom needed
+    """Return the path as an address has it: a space is %20.
+
+    ROS reads addresses with libcurl, which refuses spaces and takes ``#``, ``?`` and ``%`` for something else. What it
+    takes as it is stays so, since other readers decode nothing.
+    """
+    return _NOT_IN_ADDRESSES.sub(lambda found: f"%{ord(found[0]):02X}", path)
 
 
 def assets(robot: Robot) -> Iterator[Asset]:

@@ -91,9 +91,21 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     sources = (source, *resolved.whole.sources)
     for one in sources:
         found = with_replaced(found, one)
-    kept, used = apply(levelled(dict.fromkeys(found), rules), (*source.allows, *resolved.whole.allows))
+    kept, used = apply(levelled(_once(found), rules), (*source.allows, *resolved.whole.allows))
     ordered = sorted(kept, key=lambda one: one.sort_key)
     return Compiled(resolved.robot, tuple(ordered), source.allows, frozenset(used), sources)
+
+
+def _once(found: list[Diagnostic]) -> list[Diagnostic]:
+    """Return each finding once; where two differ in their notes only, as of a part that is there twice, with all."""
+    first: dict[Diagnostic, Diagnostic] = {}
+    for one in found:
+        alone = replace(one, notes=()) if one.notes else one
+        before = first.setdefault(alone, one)
+        notes = dict.fromkeys((*before.notes, *one.notes))
+        if len(notes) > len(before.notes):
+            first[alone] = replace(before, notes=tuple(notes))
+    return list(first.values())
 
 
 def _about_parts(found: list[Diagnostic], whole: Whole) -> list[Diagnostic]:

@@ -95,9 +95,10 @@ def test_several_turned_boxes_have_the_inertia_of_their_triangles(given: list[An
     """The products of inertia too: trimesh integrates over the triangles of all boxes together."""
     meshes, shapes = [], []
     for size, xyz, rpy in given:
-        placed = np.eye(4)
-        placed[:3, :3], placed[:3, 3] = Rotation.from_euler("xyz", rpy).as_matrix(), xyz
-        meshes.append(trimesh.creation.box(size, transform=placed))
+        mesh = trimesh.creation.box(size)
+        turn = Rotation.from_euler("xyz", rpy).as_matrix()
+        mesh.vertices = mesh.vertices @ turn.T + xyz  # apply_transform does nothing below 1e-8
+        meshes.append(mesh)
         shapes.append({"box": list(size), "xyz": list(xyz), "rpy": list(rpy)})
     whole: Any = trimesh.util.concatenate(meshes)
     whole.density = 7.0

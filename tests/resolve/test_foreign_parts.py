@@ -293,6 +293,27 @@ def test_a_macro_hangs_itself_on_the_holders_frame(cell: Any) -> None:
     assert robot.parent_edge("rear_mast").pose.xyz == (4, 5, 6)
 
 
+@pytest.mark.parametrize("prefix", ["", "prefix: arm_, "])
+def test_what_hangs_on_a_part_that_was_refused_says_nothing_of_its_own(cell: Any, prefix: str) -> None:
+    """A name that is one letter off the robot's own is wrong all the same."""
+    name = "arm_finger" if prefix else "finger"
+    result = cell(
+        f"arm: {{urdf: package://ur/arm.urdf, {prefix}parent: table}}",
+        "other: {urdf: third/arm/arm.urdf, prefix: other_, root: base, parent: table, relative_to: NAME}".replace(
+            "NAME", name
+        ),
+        f"third: {{urdf: third/arm/arm.urdf, prefix: third_, root: base, parent: {name}}}\n"
+        f"frames: {{on: {{parent: {name}}}, off: {{parent: tabel}}}}\n"
+        f"xml: {{g: '<gazebo reference=\"{name}\"/>'}}\n"
+        f"ros2_control: {{hw: {{plugin: a/B, joints: {{{name}: {{state: {{position: {{}}}}}}}}}}}}\n"
+        f"base: {name}",
+    )
+    assert [(one.code, one.message.split(",")[0]) for one in result.found] == [
+        ("TF724", "no package ur"),
+        ("TF203", "off hangs on tabel"),
+    ]
+
+
 def test_warnings_about_somebody_elses_file_are_left_to_its_own_lint(cell: Any, tmp_path: Path) -> None:
     file = tmp_path / "third/arm/arm.urdf"
     file.write_text(ARM.replace('ixx="0.02" iyy="0.02"', 'ixx="9" iyy="9"'), encoding="utf-8")

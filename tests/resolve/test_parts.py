@@ -296,7 +296,7 @@ def test_a_frame_that_is_not_shared_gets_the_prefix() -> None:
         ("prefix: r1/", "prefix: r1/, root: nowhere", "TF203", "no frame nowhere", "fleet.yaml"),
         ("prefix: r1/", "prefix: r1/, profiles: [dmo]", "TF009", "dmo", ""),
         ('serial: "1"', 'serial: "1", msat: 3', "TF105", "no use for the variable msat", "fleet.yaml"),
-        ("prefix: r1/", "prefix: r1/, parent: dock", "TF313", "only roots that are shared", "fleet.yaml"),
+        ("prefix: r1/", "prefix: r1/, parent: dock", "TF313", "the part one hangs on map already", "fleet.yaml"),
     ],
 )
 def test_what_does_not_fit_is_said_once_with_its_place(old: str, new: str, code: str, message: str, place: str) -> None:
@@ -324,11 +324,11 @@ def test_a_clock_of_the_parts_own_is_refused() -> None:
 
 def test_a_fault_in_the_parts_file_is_said_there_and_names_the_part() -> None:
     rover = ROVER.replace("xyz: [0, 0.2, 0]", "xyz: [0, 0.2]")
-    result = compiled(FLEET, **{"robots/rover_yaml": rover})
-    found = next(one for one in result.found if one.code == "TF103")
+    found, *others = (one for one in compiled(FLEET, **{"robots/rover_yaml": rover}).found if one.code == "TF103")
     assert found.span
     assert found.span.file == "robots/rover.yaml"
-    assert [note.message for note in found.notes][-1] == "as the part one"
+    assert [note.message for note in found.notes][-2:] == ["as the part one", "as the part two"]
+    assert not others
 
 
 def test_a_finding_of_a_rule_about_the_parts_file_names_the_parts() -> None:

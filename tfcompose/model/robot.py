@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.diagnostic import slip_of
 from tfcompose.frozen import dataclass, field
 from tfcompose.plan import GuardPolicy, RosSettings
 
@@ -93,7 +94,13 @@ class Robot:
         return frame if frame in self.ros.shared_frames else f"{self.ros.frame_prefix}{frame}"
 
     def excuses(self, name: str) -> bool:
-        """Return whether a frame, process or joint may be missing only because an entry was refused already."""
+        """Return whether a frame, process or joint may be missing only because an entry was refused already.
+
+        A part without a prefix may have brought any name; then one is wrong still that is one letter off the robot's own.
+        """
+        if ("parts", "") in self.broken:
+            known = [*self.frames, *(process.name for process in self.processes)]
+            return name in known or slip_of(name, known) is None
         return any(
             name == entry
             or (section == "sensors" and name.startswith(f"{entry}_"))

@@ -153,10 +153,12 @@ class PartEntry:
         roots = [name for name in robot.roots() if name not in names.shared]
         if self.said.parent is None or len(roots) == 1:
             return names.frame(roots[0]) if len(roots) == 1 else None
-        what = f"several roots: {', '.join(roots)}" if roots else "only roots that are shared"
+        held = (edge.parent for edge in robot.edges if edge.parent in names.shared)
+        listed = ", ".join(roots or dict.fromkeys((*robot.roots(), *held)))
+        what = f"has several roots: {listed}" if roots else f"hangs on {listed} already"
         at = self.source.at((*self.at, "parent"))
-        advice = f"say which: root: {roots[0]}" if roots else "leave parent out"
-        raise RejectedError([finding("TF313", f"the part {self.name} has {what}", at, help=advice)])
+        advice = f"say which: root: {roots[0]}" if roots else "leave parent out, or say what is taken of it: root: FRAME"
+        raise RejectedError([finding("TF313", f"the part {self.name} {what}", at, help=advice)])
 
 
 def _owned(edge: Edge, owner: str, at: Span) -> Edge:

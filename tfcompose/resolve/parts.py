@@ -58,7 +58,7 @@ class Parts:
                 self.found += part.found
             except RejectedError as error:
                 self.found += [*part.found, *error.diagnostics]
-                self.missing += [("parts", begin) for begin in (f"{name}/", part.prefix) if begin]
+                self.missing += [("parts", f"{name}/"), ("parts", part.prefix)]
         return joined
 
     def _robot(self, part: PartEntry, packages: Packages) -> tuple[Robot, frozenset[str]]:

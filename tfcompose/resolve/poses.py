@@ -189,7 +189,9 @@ class Solver:
             if edge.kind != "static" and not (edge.sensor and not edge.given):  # a driver may send it again and again
                 note = Note(f"{edge.name} is published by {edge.owner}", edge.at)
                 what = f"the joint {edge.joint.name} moves" if edge.joint else f"the edge {edge.name} moves"
-                raise _UnsolvableError(finding("TF404", f"{what}, so the pose cannot be solved", at, notes=[note]))
+                advice = "name a frame with only fixed edges on the way to it"
+                message = f"{what}, so the pose cannot be solved"
+                raise _UnsolvableError(finding("TF404", message, at, notes=[note], help=advice))
             pose = self._edge(index).pose @ pose
         return pose
 

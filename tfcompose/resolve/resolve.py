@@ -65,6 +65,10 @@ def resolve(
     return _Work(validated, library, read, disk, holder).resolved()
 
 
+#: What is found where a name is a frame's, joint's or link's of a part that was refused.
+_UNKNOWN_NAMES = frozenset({"TF203", "TF703"})
+
+
 @dataclass(slots=True)
 class _Work:
     """A robot while it is resolved: what was found, and which entries were refused already."""
@@ -75,6 +79,7 @@ class _Work:
     disk: Disk | None
     holder: Parts | None
     found: list[Diagnostic] = field(default_factory=list)
+    of_parts: list[Diagnostic] = field(default_factory=list)
     broken: set[tuple[str, str]] = field(default_factory=set)
     whole: Whole = field(default_factory=Whole)
     joined: list[Joined] = field(default_factory=list)
@@ -101,14 +106,18 @@ class _Work:
         edges = solver.solve()
         own = [with_positions(one, self.spec, edges, self.source, self.found) for one in (*own, *drafts.drivers)]
         self.found += [*drafts.found, *bodies.found, *solver.found, *self._wrong_names(own)]
-        if self.broken:  # an edge on the way may have been refused
-            self.found = [one for one in self.found if one.code != "TF404"]
         robot = self._robot(drafts, edges, self._everybody(own))
         if any(names_files(node.params) for process in own for node in process.nodes):
             work = import_module("tfcompose.resolve.param_files")
             robot = self._take(work.with_param_files(robot, self.source, self.read))
         robot = self._take(completed(robot, self.spec, self.source, self.disk))
-        return Resolved(robot, tuple(self.found), self.whole)
+        found = [one for one in self.found if not self._may_follow(one)] if self.broken else self.found
+        return Resolved(robot, (*self.of_parts, *found), self.whole)
+
+    def _may_follow(self, found: Diagnostic) -> bool:
+        """Return whether it may be there only because an edge on the way, or a part with that name, was refused."""
+        in_parts = any(section == "parts" for section, _ in self.broken)
+        return found.code == "TF404" or (in_parts and found.code in _UNKNOWN_NAMES)
 
     def _take(self, done: tuple[Robot, list[Diagnostic]]) -> Robot:
         robot, found = done
@@ -127,7 +136,7 @@ class _Work:
             self.library, self.read, self.disk, resolve, (self.source.file,), self.whole
         )
         self.joined = parts.join(self.validated, settings_of(self.spec.ros).frame_prefix, packages)
-        self.found += parts.found
+        self.of_parts = parts.found
         self.broken |= {*parts.missing, *(entry for part in self.joined for entry in part.robot.broken)}
 
     def _everybody(self, own: list[Process]) -> list[Process]:
@@ -176,7 +185,7 @@ class _Work:
     def _wrong_names(self, own: list[Process]) -> list[Diagnostic]:
         everybody = self._everybody(own)
         known = frozenset(name for _, name in self.broken) | {process.name for process in everybody}
-        missing = tuple(name for section, name in self.broken if section == "parts")
+        missing = tuple(name for section, name in self.broken if section == "parts" and name)
         return [
             *name_clashes(everybody, self.spec, self.source),
             *idle_keys(self.spec, self.source),

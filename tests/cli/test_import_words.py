@@ -86,6 +86,20 @@ def test_a_limit_without_ends_is_what_readers_take_it_for(tmp_path: Path) -> Non
     assert "# the source says no lower and upper limit, and readers take 0" in text
 
 
+def test_a_limit_beyond_all_numbers_is_the_largest_that_there_is(tmp_path: Path) -> None:
+    """Simulators write the largest float where they mean that there is no limit."""
+    limit = '<limit lower="-1.79769e+308" upper="1.7976931348623157e+308" effort="1e308" velocity="2"/>'
+    text = imported(moving(limit + '<safety_controller k_velocity="1e300"/>'), tmp_path)
+    assert data(text)["joints"]["shoulder"]["limit"] == {"lower": -1e30, "upper": 1e30, "effort": 1e30, "velocity": 2}
+    assert "# TF721 in the source: lower is beyond what can be computed with: -1e+30 is taken" in text
+    assert 'lower="-1e+30" upper="1e+30"' in built(tmp_path / "robot.yaml")
+
+
+def test_a_link_with_a_name_longer_than_a_line_is_a_link(tmp_path: Path) -> None:
+    text = imported(moving("", "continuous").replace('"arm"', f'"{"a" * 150}"'), tmp_path)
+    assert data(text)["links"] == {"base_link": {}, "a" * 150: {}}
+
+
 def test_a_joint_that_a_block_names_stays_a_joint(tmp_path: Path) -> None:
     block = '<gazebo reference="mast_fix"><preserveFixedJoint>true</preserveFixedJoint></gazebo>'
     said = data(imported(f"{HEAD}{fixed('mast', name='mast_fix')}{block}</robot>", tmp_path))

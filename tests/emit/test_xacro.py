@@ -136,7 +136,7 @@ def test_names_in_hardware_and_blocks_get_the_prefix_and_words_do_not(tmp_path: 
     (drive,) = found.findall("transmission")
     assert [one.get("name") for one in drive.iter()] == ["left_drive", "left_joint", "left_motor"]
     assert [mesh.get("filename") for mesh in found.iter("mesh")] == ["meshes/a.stl", "package://x/$(y)/$$(z).stl"]
-    assert [one.get("name") for one in found.iter("material")] == ["paint"]
+    assert [one.get("name") for one in found.iter("material")] == ["left_paint"]  # another robot has another paint
 
 
 def test_relative_meshes_can_be_told_where_they_begin(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """The robot for other people's xacro: a macro with a prefix, a parent and an origin, and a file that calls it.
 
-The macro's body is the robot's URDF with ``${prefix}`` in front of the name of every link, joint and piece of hardware;
-what xacro would evaluate otherwise is escaped. Materials keep their names: URDF has them once for all.
+The macro's body is the robot's URDF with ``${prefix}`` in front of the name of every link, joint, material and piece of
+hardware; what xacro would evaluate otherwise is escaped. Of two materials of one name readers take the first colour.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ _EVALUATED = re.compile(r"(\$+[{(])")
 #: Where the lines of links, joints and hardware hold a name, as they are written here; raw blocks are not among them.
 _NAME = re.compile(
     r"\n(?:  <(?:link|joint|ros2_control) name=.|"
-    r"    <(?:(?:parent|child) link|mimic joint|(?:joint|sensor|gpio) name)=.)"
+    r"    <(?:(?:parent|child) link|mimic joint|(?:joint|sensor|gpio) name)=.|"
+    r"      <material name=.)"
 )
 #: A parameter of hardware, or of what is in it, but not of an interface.
 _PARAMETER = re.compile(r"(\n {4}(?:  )?<param name=[^\n]*?>)([^<>\n]*)(?=</param>)")

@@ -1,6 +1,6 @@
 """The bodies that one mesh file holds: a body that stands apart and faces inwards is no hole.
 
-Integrated as it is, such a body counts with a negative mass. A cavity faces the other way as well, and is within a body.
+Integrated as it is, such a body would have a negative mass. A cavity faces the other way too, and is within a body.
 """
 
 from __future__ import annotations

@@ -96,7 +96,7 @@ class Robot:
     def excuses(self, name: str) -> bool:
         """Return whether a frame, process or joint may be missing only because an entry was refused already.
 
-        A part without a prefix may have brought any name; then one is wrong still that is one letter off the robot's own.
+        A part without a prefix may have brought any name; one that is a letter off the own ones is wrong still.
         """
         if ("parts", "") in self.broken:
             known = [*self.frames, *(process.name for process in self.processes)]

@@ -157,7 +157,7 @@ class PartEntry:
         listed = ", ".join(roots or dict.fromkeys((*robot.roots(), *held)))
         what = f"has several roots: {listed}" if roots else f"hangs on {listed} already"
         at = self.source.at((*self.at, "parent"))
-        advice = f"say which: root: {roots[0]}" if roots else "leave parent out, or say what is taken of it: root: FRAME"
+        advice = f"say which: root: {roots[0]}" if roots else "leave parent out, or take a part of it: root: FRAME"
         raise RejectedError([finding("TF313", f"the part {self.name} {what}", at, help=advice)])
 
 

@@ -249,7 +249,7 @@ LEVELS = {
     "a slip": (f'<link name="a"/>{JOINT.format("j", "continuous", LIMIT.format("", "uper"))}', "error"),
     "a limit without ends": (f'<link name="a"/>{JOINT.format("j", "revolute", f"<limit {RATES}/>")}', "warning"),
     "a limit of the largest float": (
-        f'<link name="a"/>{JOINT.format("j", "revolute", LIMIT.format('lower="-1e308"', "upper"))}', "warning"),
+        '<link name="a"/>' + JOINT.format("j", "revolute", LIMIT.format('lower="-1e308"', "upper")), "warning"),
     "a place beyond all numbers": (
         '<link name="a"/>' + JOINT.format("j", "fixed", '<origin xyz="1e300 0 0"/>'), "error"),
     "no limit": (f'<link name="a"/>{JOINT.format("j", "revolute", "")}', "error"),

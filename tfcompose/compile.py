@@ -119,7 +119,7 @@ def _about_parts(found: list[Diagnostic], whole: Whole) -> list[Diagnostic]:
     said = []
     for one in found:
         file = one.span.file if one.span else ""
-        notes = [whole.foreign[file]] if file in whole.foreign else whole.own.get(file, [])
+        notes = whole.foreign.get(file) or whole.own.get(file, [])
         if file not in whole.foreign or one.severity == "error":
             said.append(replace(one, notes=(*one.notes, *notes)))
     return said

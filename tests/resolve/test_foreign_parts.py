@@ -314,6 +314,30 @@ def test_what_hangs_on_a_part_that_was_refused_says_nothing_of_its_own(cell: Any
     ]
 
 
+def test_what_is_wrong_with_hardware_of_a_part_is_said_at_its_line_with_every_use(cell: Any, tmp_path: Path) -> None:
+    joint = '\n    <joint name="shoulder"><command_interface name="position"/></joint>'
+    control = f'<ros2_control name="hw" type="system"><hardware><plugin>a/B</plugin></hardware>{joint}</ros2_control>'
+    file = tmp_path / "third/arm/arm.urdf"
+    file.write_text(ARM.replace("</robot>", f"{control}</robot>"), encoding="utf-8")
+    mine = "{shoulder: {command: {position: {}}}}".replace("shoulder", "left_shoulder")
+    (found,) = cell(LEFT, f"{RIGHT}\nros2_control: {{mine: {{plugin: a/B, joints: {mine}}}}}").found
+    assert found.code == "TF717"
+    assert found.span
+    assert (
+        file.read_text(encoding="utf-8")
+        .splitlines()[found.span.line - 1][found.span.column - 1 :]
+        .startswith('<joint name="shoulder"')
+    )
+    assert [note.message for note in found.notes][1:] == ["as the part left", "as the part right"]
+
+
+def test_a_block_that_names_nothing_of_its_part_stands_once(cell: Any) -> None:
+    """Two plugins of a simulator would start two controller managers of one name."""
+    texts = [block.text for block in sound(cell(LEFT, RIGHT)).blocks]
+    assert [text for text in texts if "plugin" in text] == ['<gazebo><plugin filename="a.so" name="p"/></gazebo>']
+    assert len([text for text in texts if "<gazebo reference=" in text]) == 2
+
+
 def test_warnings_about_somebody_elses_file_are_left_to_its_own_lint(cell: Any, tmp_path: Path) -> None:
     file = tmp_path / "third/arm/arm.urdf"
     file.write_text(ARM.replace('ixx="0.02" iyy="0.02"', 'ixx="9" iyy="9"'), encoding="utf-8")

@@ -77,7 +77,7 @@ class Parts:
             made = import_module("tfcompose.resolve.foreign").foreign(part, packages, self.read)
         except RejectedError as error:
             raise RejectedError([_noted(one, part) for one in error.diagnostics]) from None
-        self.whole.foreign[made.file] = _note(part)
+        self.whole.foreign.setdefault(made.file, []).append(_note(part))
         self.found += [_noted(one, part) for one in made.found if one.severity == "error" or one.code in _TELLING]
         return made.robot, made.implied
 

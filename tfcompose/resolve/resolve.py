@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tfcompose.load import Source
+    from tfcompose.model import Block
     from tfcompose.plan import FenceWay, GuardMode, OnViolation, UnknownEdges
     from tfcompose.resolve.library import Library
     from tfcompose.resolve.packages import Disk
@@ -215,9 +216,18 @@ class _Work:
             parts=tuple(alone for part in parts for alone in part.parts),
             mounted={part.name: part.root for part in self.joined if part.root is not None},
             hardware=tuple(one for part in in_tree for one in part.hardware),
-            blocks=tuple(one for part in in_tree for one in part.blocks),
+            blocks=_blocks(in_tree),
             foreign=frozenset(file for part in parts for file in part.foreign),
         )
+
+
+def _blocks(parts: list[Robot]) -> tuple[Block, ...]:
+    """Return the parts' raw blocks, and once what names nothing of its part: the plugin of a simulator."""
+    blocks: list[Block] = []
+    for part in parts:
+        there = {block.text for block in blocks}
+        blocks += [block for block in part.blocks if block.text not in there]
+    return tuple(blocks)
 
 
 def _has_calibrations(spec: RobotSpec) -> bool:

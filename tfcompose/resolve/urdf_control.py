@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tfcompose.diagnostic import Span
 from tfcompose.frozen import replace
 from tfcompose.load.urdf import load_xml
 from tfcompose.model import Component, Hardware, Interface
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Span
     from tfcompose.load.urdf import Element
     from tfcompose.model import Block, Robot
 
+#: What stands before a block while it is read.
+_ROUND = "<robot>"
 _TYPES = ("system", "actuator", "sensor")
 _KINDS = ("joint", "sensor", "gpio")
 _SIDES = {"command_interface": "command", "state_interface": "state"}
@@ -29,7 +31,7 @@ def with_hardware(robot: Robot) -> Robot:
     for block in robot.blocks:
         said = None
         if block.text.startswith("<ros2_control"):
-            (element,) = load_xml(f"<robot>{block.text}</robot>", robot.file, with_text=True).children
+            (element,) = load_xml(f"{_ROUND}{block.text}</robot>", robot.file, with_text=True).children
             said = _hardware_of(element, block)
         if said and said.name and said.name not in hardware:
             hardware[said.name] = said
@@ -55,7 +57,9 @@ def _hardware(element: Element, at: Span) -> Hardware:
     if len(inner.all("plugin")) != 1 or said.get("is_async") not in {None, "true", "false"}:
         raise _MisfitError
     plugin = inner.all("plugin")[0]
-    components = [_component(one) for one in element.children if one.tag in _KINDS]
+    components = [
+        replace(_component(one), at=_in_document(one.at, at)) for one in element.children if one.tag in _KINDS
+    ]
     if len({(one.kind, one.name) for one in components}) != len(components):
         raise _MisfitError
     _only(plugin)
@@ -69,6 +73,13 @@ def _hardware(element: Element, at: Span) -> Hardware:
         int(said["rw_rate"]) if "rw_rate" in said else None,
         said["is_async"] == "true" if "is_async" in said else None,
     )
+
+
+def _in_document(place: Span, block: Span) -> Span:
+    """Return the place in the document of one in the block that begins there, and was read within ``_ROUND``."""
+    lines, columns = block.line - 1, block.column - 1 - len(_ROUND) if place.line == 1 else 0
+    begin, end = (place.line + lines, place.column + columns), (place.end_line + lines, place.end_column + columns)
+    return Span(block.file, *begin, *end)
 
 
 def _component(element: Element) -> Component:

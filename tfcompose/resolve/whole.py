@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 class Whole:
     """What is known of all parts of a robot, and of theirs, together.
 
-    ``allows`` are the comments that let findings in their files stand, ``foreign`` the files that somebody else wrote,
-    with a note that says as which part. ``own`` are the robot files that are parts, with such notes, one for each use;
-    ``sources`` are what these were resolved from.
+    ``allows`` are the comments that let findings in their files stand. ``foreign`` are the files that somebody else
+    wrote, and ``own`` the robot files that are parts, with a note for each use that says as which part; ``sources`` are
+    what the latter were resolved from.
     """
 
     count: int = 0
     allows: list[Allow] = field(default_factory=list)
-    foreign: dict[str, Note] = field(default_factory=dict)
+    foreign: dict[str, list[Note]] = field(default_factory=dict)
     own: dict[str, list[Note]] = field(default_factory=dict)
     sources: list[Source] = field(default_factory=list)

@@ -117,7 +117,7 @@ def test_an_urdf_is_taken_twice_with_everything_in_it_renamed(cell: Any) -> None
         names = [one.get("name") for one in root.findall(kind)]
         assert len(names) == len(set(names))
     assert [one.get("joint") for one in root.iter("mimic")] == ["left_shoulder", "right_shoulder"]
-    assert [one.get("reference") for one in root.findall("gazebo")] == ["left_upper", None, "right_upper", None]
+    assert [one.get("reference") for one in root.findall("gazebo")] == ["left_upper", None, "right_upper"]
     assert [one.find("joint").get("name") for one in root.findall("transmission")] == [  # type: ignore[union-attr]
         "left_shoulder",
         "right_shoulder",

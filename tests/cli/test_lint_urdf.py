@@ -257,6 +257,9 @@ LEVELS = {
         + JOINT.format("j", "fixed", ""), "warning"),
     "a body of less": ('<link name="a"><collision><geometry><sphere radius="-1"/></geometry></collision></link>'
         + JOINT.format("j", "fixed", ""), "error"),
+    "a shape that simulators have and Jazzy has not": (
+        '<link name="a"><visual><geometry><capsule radius="1" length="1"/></geometry></visual></link>'
+        + JOINT.format("j", "fixed", ""), "warning"),
     "a tab between numbers": (
         '<link name="a"/>' + JOINT.format("j", "fixed", '<origin xyz="1\t0 0" rpy=" 0 0 0 "/>'), "warning"),
     "a line break": ('<link name="a"/>' + JOINT.format("j", "fixed", "<origin xyz='1 0 0\n'/>"), "warning"),

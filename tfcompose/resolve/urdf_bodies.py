@@ -76,6 +76,9 @@ class Bodies:
             advice = "give it a size, or remove it: some readers see nothing, others refuse the robot"
             self.values.refuse(f"a {form.tag} of size {' '.join(f'{value:g}' for value in size)}", at, advice, flat)
             return []
+        if form.tag == "capsule":
+            message, advice = "readers of ROS 2 Jazzy refuse a robot with a <capsule>", "a cylinder and two spheres"
+            self.values.refuse(message, form.at, advice, "warning")
         kind: Any = form.tag
         return [Shape(kind, tuple(size), self.values.pose(element), self._material(element))]
 

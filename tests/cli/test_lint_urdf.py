@@ -205,6 +205,13 @@ def test_a_xacro_file_is_expanded_and_places_are_those_of_the_expanded_text(tmp_
     (refused,) = lint_urdf(str(file))
     assert refused.code == "TF018"
     assert "'m' is not defined" in refused.message
+    assert refused.span
+    assert refused.span.file == str(file)
+    assert file.read_text().splitlines()[refused.span.line - 1][refused.span.column - 1 :].startswith("${m}")
+    file.write_text(XACRO.replace("<xacro:leg", "<xacro:lag", 1))
+    (unknown,) = lint_urdf(str(file))
+    assert unknown.span
+    assert file.read_text().splitlines()[unknown.span.line - 1][unknown.span.column - 1 :].startswith("<xacro:lag")
 
 
 ALLOWED = """<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">

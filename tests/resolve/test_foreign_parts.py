@@ -202,7 +202,7 @@ def test_a_package_of_the_robot_is_found_in_xacro_where_everything_is_relative(
     [
         ("$(find amr)/sizes.xacro", "TF724", "no package amr"),
         ("$(find arm)/none.xacro", "TF018", "No such file or directory: "),
-        ("$(find arm)/base.stl", "TF018", "no element found: line 1, column 0 (in "),
+        ("$(find arm)/base.stl", "TF018", "base.stl: xacro: no element found: line 1, column 0"),
     ],
 )
 def test_what_xacro_cannot_find_is_said_once(cell: Any, tmp_path: Path, find: str, code: str, message: str) -> None:
@@ -211,6 +211,28 @@ def test_what_xacro_cannot_find_is_said_once(cell: Any, tmp_path: Path, find: st
     (found,) = cell("slide: {xacro: third/arm/slide.xacro, parent: table}").errors
     assert (found.code, found.message.count(message), found.message.count("Error")) == (code, 1, 0)
     assert found.span.file.endswith("cell.yaml")
+
+
+def test_a_part_of_which_nothing_is_left_because_its_own_part_was_refused_says_nothing(tmp_path: Path) -> None:
+    (tmp_path / "inner.yaml").write_text("tfcompose: 1\nrobot: inner\nparts: {a: {urdf: gone.urdf}}\n", "utf-8")
+    for more in ("", ", root: tool"):
+        part = f"m: {{spec: inner.yaml, prefix: m_, parent: base_link{more}}}"
+        text = f"tfcompose: 1\nrobot: r\nlinks: {{base_link: {{}}}}\nparts: {{{part}}}\n"
+        found = compile_robot(text, str(tmp_path / "r.yaml"), library(), read=read_text, disk=disk()).found
+        assert [one.code for one in found] == ["TF001"], more
+
+
+def test_an_error_of_xacro_in_a_macro_of_another_file_is_found_there(cell: Any, tmp_path: Path) -> None:
+    (tmp_path / "third/arm/mast.xacro").write_text(MACRO.replace("${height}", "${hight + 1}"), "utf-8")
+    call = '<xacro:include filename="mast.xacro"/><xacro:mast name="a" parent_link="w" tall="1"><origin/></xacro:mast>'
+    outer = f'<robot name="o" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="w"/>{call}</robot>'
+    (tmp_path / "third/arm/outer.xacro").write_text(outer, "utf-8")
+    (found,) = cell("o: {xacro: third/arm/outer.xacro, parent: table}").found
+    assert "name 'hight' is not defined" in found.message
+    said = [(note.message, note.span and note.span.file.endswith("mast.xacro")) for note in found.notes]
+    assert said == [("it stands here", True), ("in the macro mast", True), ("as the part o", False)]
+    line = MACRO.splitlines()[found.notes[0].span.line - 1]
+    assert line[found.notes[0].span.column - 1 :].startswith("${height}")
 
 
 def test_each_number_of_the_urdf_is_still_there(cell: Any) -> None:

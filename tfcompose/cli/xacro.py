@@ -46,7 +46,7 @@ def expanded(file: str, packages: Packages, arguments: Mapping[str, str] | None 
     except RejectedError:
         raise
     except Exception as error:  # noqa: BLE001 (xacro evaluates Python: anything can come out of it)
-        raise RejectedError([_refused(error, file, list(xacro.filestack or ()))]) from None
+        raise RejectedError([_refused(error, file, xacro)]) from None
     return result
 
 
@@ -58,8 +58,8 @@ class _MissingError(LookupError):
         self.found = found
 
 
-def _refused(error: Exception, file: str, files: list[str]) -> Diagnostic:
-    """Return what xacro, or something that it called, did not like, and in which other file."""
+def _refused(error: Exception, file: str, xacro: Any) -> Diagnostic:
+    """Return what xacro, or something that it called, did not like, and where, or in which other file."""
     chain: list[Any] = [error]
     while getattr(chain[-1], "exc", None) is not None:  # xacro wraps what it calls, again and again
         chain.append(chain[-1].exc)
@@ -77,9 +77,14 @@ def _refused(error: Exception, file: str, files: list[str]) -> Diagnostic:
         words = [*(head for head in heads if str(root) not in head), own]
         words += [str(one.suffix) for one in reversed(chain[:-1]) if getattr(one, "suffix", None)]
     said = " ".join(" ".join(words).split()) or type(error).__name__
+    files, macros = list(xacro.filestack or ()), list(xacro.macrostack or ())
+    whole = finding("TF018", f"xacro: {said}", Span(file))
+    places: Any = import_module("tfcompose.cli.xacro_places")
+    exact: Diagnostic = places.seen_from(file, places.placed(whole, root, files, macros))
     others = [name for name in files[-1:] if name and Path(name).absolute() != Path(file).absolute()]
-    where = f" (in {os.path.relpath(others[0])})" if others else ""
-    return finding("TF018", f"xacro: {said}{where}", Span(file))
+    if others and exact.span == whole.span:
+        return replace(exact, message=f"{exact.message} (in {os.path.relpath(others[0])})")
+    return exact
 
 
 def _document(xacro: Any, file: str, text: str | None, arguments: dict[str, str]) -> Any:

@@ -7,7 +7,7 @@ import re
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
-from tfcompose.diagnostic import Diagnostic, RejectedError, did_you_mean, finding
+from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, did_you_mean, finding
 from tfcompose.frozen import dataclass, replace
 from tfcompose.load.urdf import MACRO, load_xml
 from tfcompose.model import BUILT_IN, Node, Process, Robot
@@ -23,7 +23,6 @@ from tfcompose.validate.part import Block
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tfcompose.diagnostic import Span
     from tfcompose.plan import RosSettings
     from tfcompose.resolve.packages import Packages
     from tfcompose.resolve.part import PartEntry
@@ -129,7 +128,8 @@ def _at(place: Span, found: Diagnostic) -> Diagnostic:
     """Return the finding about a file that has no better place in it, at the place that names the file."""
     if found.span is None or found.code == "TF001":
         return found
-    return replace(found, span=place, message=f"{found.span.file}: {found.message}")
+    exact = () if found.span == Span(found.span.file) else (Note("it stands here", found.span),)
+    return replace(found, span=place, message=f"{found.span.file}: {found.message}", notes=(*exact, *found.notes))
 
 
 def _document(part: PartEntry, file: str, packages: Packages, absolute: Callable[[str], str]) -> str | None:

@@ -144,6 +144,8 @@ class PartEntry:
     def _cut(self, robot: Robot, root: str) -> Robot:
         """Return what is below ``root``."""
         if root not in robot.frames:
+            if robot.excuses(root):
+                raise RejectedError([])
             at, advice = self.source.at((*self.at, "root")), did_you_mean(root, robot.frames)
             raise RejectedError([finding("TF203", f"the part {self.name} has no frame {root}", at, help=advice)])
         return below(robot, root)
@@ -153,6 +155,8 @@ class PartEntry:
         roots = [name for name in robot.roots() if name not in names.shared]
         if self.said.parent is None or len(roots) == 1:
             return names.frame(roots[0]) if len(roots) == 1 else None
+        if robot.broken:
+            raise RejectedError([])  # what would be the root, or would hang on it, was refused
         held = (edge.parent for edge in robot.edges if edge.parent in names.shared)
         listed = ", ".join(roots or dict.fromkeys((*robot.roots(), *held)))
         what = f"has several roots: {listed}" if roots else f"hangs on {listed} already"

@@ -20,17 +20,22 @@ _TURN = count(os.getpid())
 
 @contextmanager
 def reserved_domain() -> Iterator[int]:
-    """Give a domain from 1 to 100, locked by a file so that concurrent runs do not hear each other.
+    """Give a domain from 1 to 100 in which nobody is, locked by a file so that concurrent runs do not take it.
 
     Each test has the next one: what a test before left behind may need a moment to end.
     """
     for _ in range(DOMAINS):
         number = 1 + next(_TURN) % DOMAINS
-        path = Path(tempfile.gettempdir()) / f"tfcompose-test-domain-{number}.lock"
-        descriptor = os.open(path, os.O_CREAT | os.O_RDWR, 0o666)
+        try:
+            descriptor = _opened(Path(tempfile.gettempdir()) / f"tfcompose-test-domain-{number}.lock")
+        except PermissionError:  # of a user who lets nobody read it
+            continue
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            is_free = number not in domains_in_use()
         except BlockingIOError:
+            is_free = False
+        if not is_free:
             os.close(descriptor)
             continue
         try:
@@ -39,3 +44,20 @@ def reserved_domain() -> Iterator[int]:
             os.close(descriptor)
         return
     raise RuntimeError("all ROS domains are in use by other tests")
+
+
+def domains_in_use() -> set[int]:
+    """Return the domains of whoever runs here, tests or not: each has 250 ports to listen on (RTPS 2.2, 9.6.1.1)."""
+    sockets = Path("/proc/net/udp").read_text("ascii").splitlines()[1:]
+    ports = {int(line.split()[1].rpartition(":")[2], 16) for line in sockets}
+    return {(port - 7400) // 250 for port in ports}
+
+
+def _opened(path: Path) -> int:
+    """Return a descriptor of the file, which other users can read."""
+    try:
+        return os.open(path, os.O_RDONLY)
+    except FileNotFoundError:
+        descriptor = os.open(path, os.O_CREAT | os.O_RDONLY, 0o644)
+        os.fchmod(descriptor, 0o644)
+        return descriptor

@@ -1,0 +1,32 @@
+"""The domains that tests have to themselves."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests import domains
+from tfcompose.ros.node import open_node
+
+if TYPE_CHECKING:
+    from tests.conftest import Domain
+
+pytestmark = pytest.mark.ros
+
+
+def test_a_domain_in_which_somebody_is_and_one_that_is_locked_are_not_taken(
+    domain: Domain, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with domains.reserved_domain() as other:
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(other))
+        stranger = open_node("stranger", "")
+        stranger.__enter__()
+    try:  # nobody has locked it any more
+        assert other in domains.domains_in_use()
+        monkeypatch.setattr(domains, "_TURN", itertools.cycle([domain.id - 1, other - 1, *range(100)]))
+        with domains.reserved_domain() as number:
+            assert number not in {domain.id, other}
+    finally:
+        stranger.__exit__(None, None, None)

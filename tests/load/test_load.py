@@ -183,6 +183,24 @@ def test_what_is_no_yaml_is_one_finding_with_its_place(text: str, code: str, lin
     assert (found.code, found.span and (found.span.line, found.span.column)) == (code, (line, column))
 
 
+@pytest.mark.parametrize(
+    ("text", "message", "advice"),
+    [
+        ('<robot name="r"/>', "this is XML", "parts: {NAME: {urdf: f}}"),
+        ('\n<!-- a -->\n<robot xmlns:xacro="http://www.ros.org/wiki/xacro"/>', "this is XML", "{xacro: f}"),
+        ("<launch/>", "this is XML", ""),
+        ('{"version": 1, "spec_digest": "sha256:0", "processes": [], "rate": null}', "this is a built plan", "verify"),
+    ],
+)
+def test_a_file_for_another_command_is_one_finding_that_says_which(text: str, message: str, advice: str) -> None:
+    with pytest.raises(RejectedError) as rejected:
+        load(text, "f")
+    (found,) = rejected.value.diagnostics
+    assert found.message.startswith(message)
+    assert advice in found.help
+    assert bool(found.help) == bool(advice)
+
+
 def bomb(kind: str) -> str:
     lines = ["a0: &a0 {k: 1}"]
     for n in range(60):

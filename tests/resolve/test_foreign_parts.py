@@ -235,6 +235,12 @@ def test_an_error_of_xacro_in_a_macro_of_another_file_is_found_there(cell: Any, 
     assert line[found.notes[0].span.column - 1 :].startswith("${height}")
 
 
+def test_a_floating_joint_of_somebody_elses_file_is_told_where_it_can_have_an_owner(cell: Any, tmp_path: Path) -> None:
+    (tmp_path / "third/arm/arm.urdf").write_text(ARM.replace('name="end" type="fixed"', 'name="end" type="floating"'))
+    (found,) = cell(LEFT).found
+    assert (found.code, found.help.startswith("tfcompose import")) == ("TF715", True)
+
+
 def test_each_number_of_the_urdf_is_still_there(cell: Any) -> None:
     root = ET.fromstring(files(cell(LEFT))["robot.full.urdf"])  # noqa: S314 (our own text)
     joint = next(one for one in root.findall("joint") if one.get("name") == "left_shoulder")

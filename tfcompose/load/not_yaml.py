@@ -29,3 +29,11 @@ def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Diagnostic:
         at = error.context_mark
         notes = [Note("it began here", Span(file, at.line + 1, at.column + 1, at.line + 1, at.column + 2))]
     return finding("TF002", message, Span(file, line, column, line, column + 1), help=advice, notes=notes)
+
+
+def no_yaml(text: str, file: str) -> Diagnostic:
+    """Return the finding for XML where YAML is expected: most often a URDF as a robot file."""
+    is_xacro = "ros.org/wiki/xacro" in text
+    key = "xacro" if is_xacro else "urdf"
+    advice = f"tfcompose import {file} -o robot.yaml; or take it as a part: parts: {{NAME: {{{key}: {file}}}}}"
+    return finding("TF002", "this is XML, and YAML is expected", Span(file), help=advice if "<robot" in text else "")

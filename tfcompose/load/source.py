@@ -8,6 +8,7 @@ from tfcompose.diagnostic import Allow, Diagnostic, RejectedError, Span, finding
 from tfcompose.frozen import dataclass, field
 from tfcompose.load.comments import allows_in
 from tfcompose.load.nodes import MOST_VALUES, Reader
+from tfcompose.load.not_yaml import no_yaml
 from tfcompose.load.places import Path, Place
 
 __all__ = ["MOST_VALUES", "Path", "Source", "load", "refuse_unreadable"]
@@ -69,6 +70,8 @@ def load(text: str, file: str) -> Source:
         RejectedError: if the text is not YAML, not one document, not a mapping, or too large to be a robot.
     """
     refuse_unreadable(text, file)
+    if (begin := text.lstrip("\ufeff \t\r\n")).startswith("<") and not begin.startswith("<<"):
+        raise RejectedError([no_yaml(text, file)])
     reader = Reader(file)
     reader.read(text)
     data, place = reader.documents[0] if reader.documents else (None, Place(Span(file)))
@@ -76,6 +79,9 @@ def load(text: str, file: str) -> Source:
         what = "a list" if isinstance(data, list) else "a single value" if reader.documents else "empty"
         message = f"the file is {what}, not a mapping of keys and values"
         raise RejectedError([finding("TF002", message, place.span, help="a robot begins with: tfcompose: 1")])
+    if "spec_digest" in data and "tfcompose" not in data:
+        advice = "name the robot file that it was built from; up, verify, doctor and export take a plan too"
+        raise RejectedError([finding("TF002", "this is a built plan, and no robot file", Span(file), help=advice)])
     return Source(file, data, place, tuple(reader.found), allows_in(text, file), has_nulls=reader.has_nulls)
 
 

@@ -25,4 +25,6 @@ def joint_without_owner(robot: Robot) -> Iterator[Diagnostic]:
         if joint and edge.owner in BUILT_IN:
             message = f"the {joint.type} joint {joint.name} has no owner: joint states cannot place {edge.child}"
             advice = "owner: the process that publishes it"
+            if joint.at.file in robot.foreign:  # which cannot say it
+                advice = "tfcompose import makes a robot file of it, where the joint can have an owner: spec: FILE"
             yield finding("TF715", message, edge.owner_at or joint.at, help=advice)

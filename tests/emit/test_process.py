@@ -87,13 +87,13 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "run: 'a | b', shell: true": ("/bin/sh", "-c", "a | b"),
     "run: [a, '|', b]": ("a", "|", "b"),
     "run: [a], env: {B: c}, restart: always, node: n": ("a",),
-    "run: [a, --now], log_level: debug": ("a", "--now", "--ros-args", "--log-level", "debug"),
+    "run: [a, --now], log_level: debug": ("a", "--now", "--ros-args", "-r", "__ns:=/r1", "--log-level", "debug"),
     "run: [a], namespace: front": ("a", "--ros-args", "-r", "__ns:=/r1/front"),
     "run: [a], namespace: front, nodes: {m: {}, n: {}}": ("a", "--ros-args", "-r", "__ns:=/r1/front"),
     "run: [a], namespace: front, params: {x: 1}": (
         "a", "--ros-args", "-r", "__node:=a", "-r", "__ns:=/r1/front", "--params-file", "${params_file}",
     ),
-    "run: [a], remap: {/scan: /front}": ("a", "--ros-args", "-r", "/scan:=/front"),
+    "run: [a], remap: {/scan: /front}": ("a", "--ros-args", "-r", "__ns:=/r1", "-r", "/scan:=/front"),
     "run: [a], params: {x: 1}": (
         "a", "--ros-args", "-r", "__node:=a", "-r", "__ns:=/r1", "--params-file", "${params_file}",
     ),
@@ -102,7 +102,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     ),
     "run: [a, '${params_file}'], params: {x: 1}": ("a", "${params_file}"),
     "run: [a, --ros-args, -p, 'y:=2'], remap: {b: c}": (
-        "a", "--ros-args", "-p", "y:=2", "--ros-args", "-r", "b:=c",
+        "a", "--ros-args", "-p", "y:=2", "--ros-args", "-r", "__ns:=/r1", "-r", "b:=c",
     ),
     "run: 'a | b', shell: true, remap: {/scan: /front}": ("/bin/sh", "-c", "a | b"),
 }  # fmt: skip
@@ -118,7 +118,8 @@ def test_a_command_that_owns_an_edge_is_told_what_all_nodes_are_and_one_that_may
     head = head.replace("{map: {}}", "{map: {}, odom: {parent: map, owner: drive}}")
     plan = read_plan(files_of("drive: {run: [drive]}\n  web: {run: [serve, --port, '80']}", head)["plan.json"], "p")
     remaps = ("-r", "/tf:=/r1/tf", "-r", "/tf_static:=/r1/tf_static")
-    assert plan.process("drive").argv == ("drive", "--ros-args", *remaps, "-p", "use_sim_time:=true")
+    below = ("-r", "__ns:=/r1")
+    assert plan.process("drive").argv == ("drive", "--ros-args", *below, *remaps, "-p", "use_sim_time:=true")
     assert plan.process("web").argv == ("serve", "--port", "80")
 
 

@@ -46,7 +46,7 @@ def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> 
         names = _names(process, robot)
         if "--params-file" in told:  # which is keyed by the node's name
             told = [*names, *told]
-        elif process.namespace is not None:
+        elif process.namespace is not None or (robot.ros.namespace and (told or owns)):
             told = [*names[-2:], *told]
         return (*process.argv, "--ros-args", *told) if told else process.argv
     program = f"${{executable:{process.package}/{process.executable}}}"

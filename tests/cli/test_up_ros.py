@@ -325,6 +325,19 @@ def test_without_ros_it_says_in_one_sentence_what_to_install_and_writes_nothing(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["output0.txt", "rover.yaml", "runtime", "stubs"]
 
 
+def test_an_owner_whose_node_has_another_name_is_told_what_to_write_and_is_live_when_it_stands_there(
+    up: Callable[..., Up], tmp_path: Path
+) -> None:
+    (tmp_path / "driver.py").write_text(ROGUE, encoding="utf-8")
+    stand_in = "simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}"
+    text = ROVER.replace(stand_in, f"run: [{sys.executable}, {tmp_path}/driver.py]")
+    robot = up(text)
+    robot.ends("help: it is drive itself: write node: /strange/rogue there, or have the program name its node /drive")
+    robot = up(text.replace("run:", "node: /strange/rogue, run:"))
+    assert robot.ends("tree complete: 2 edges live") == 0
+    assert "TF801" not in robot.text
+
+
 def test_without_a_guard_edges_are_still_said_to_be_live_and_nobody_is_judged(
     up: Callable[..., Up], rogue: Callable[[], object]
 ) -> None:

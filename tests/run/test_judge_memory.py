@@ -198,3 +198,25 @@ def test_an_offender_whose_process_is_seen_is_of_the_run_or_is_not(*, ours: bool
     (found,) = running.judge.tick(running.now + 0.2)
     assert isinstance(found, Found)
     assert found.process == process
+
+
+@pytest.mark.parametrize(
+    ("process", "edges", "advice"),
+    [
+        ("slam", "map odom", "it is slam itself: write node: /other there, or have the program name its node /slam"),
+        ("slam", "odom base", "end /other, or switch its TF off; tf2 takes whatever came last"),
+        ("", "map odom", "end /other, or switch its TF off; tf2 takes whatever came last"),
+    ],
+)
+def test_an_owner_whose_node_has_another_name_is_told_to_say_so_and_not_to_end_itself(
+    process: str, edges: str, advice: str
+) -> None:
+    processes = [PlanProcess(name, "run", nodes=(f"/{name}",)) for name in ("slam", "drive")]
+    running = History(processes=tuple(processes)).clear()
+    other = running.joins("/other")
+    running.send(other, edges)
+    writer = Writer(other.gid, "/other", static=False, volatile=False, ours=True, process=process)
+    running.judge.graph([writer], running.now)
+    (found,) = running.judge.tick(running.now + 0.2)
+    assert isinstance(found, Found)
+    assert (found.found.code, found.found.help) == ("TF801", advice)

@@ -40,6 +40,20 @@ def carries(gid: bytes, own_gid: bytes, variable: str) -> bool | None:
     return any(variable.encode() in one.split(b"\0") for one in found)
 
 
+def told(gid: bytes, own_gid: bytes, name: str) -> str:
+    """Return an environment variable of the publisher's process; empty where it has none, or nobody can say."""
+    if gid[:4] != own_gid[:4] or gid[:2] != _VENDOR:
+        return ""
+    begin = f"{name}=".encode()
+    found = {
+        word.removeprefix(begin).decode(errors="replace")
+        for pid in _candidates(int.from_bytes(gid[4:6], "little"))
+        for word in _environment(pid).split(b"\0")
+        if word.startswith(begin)
+    }
+    return found.pop() if len(found) == 1 else ""
+
+
 def _environment(pid: int) -> bytes:
     try:
         return Path(f"/proc/{pid}/environ").read_bytes()

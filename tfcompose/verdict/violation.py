@@ -60,6 +60,16 @@ def taken(offences: Sequence[Offence], where: str = "") -> Diagnostic:
     return finding("TF807", message, None, help=advice, notes=notes)
 
 
+def misnamed(offences: Sequence[Offence], plan: Plan, process: str) -> str:
+    """Return what to do where the owner ``process`` itself sends the edges, by a node of another name; else nothing."""
+    first = offences[0]
+    if first.code != "TF801" or first.namesake or len(first.nodes) != 1 or _run_by(first, plan):
+        return ""
+    if not process or first.edge is None or any(one.edge is None or one.edge.owner != process for one in offences):
+        return ""
+    return f"it is {process} itself: write node: {first.who} there, or have the program name its node {first.edge.node}"
+
+
 def _message(offences: Sequence[Offence], plan: Plan) -> str:
     first = offences[0]
     more = _more(offences)

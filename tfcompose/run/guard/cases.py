@@ -10,7 +10,7 @@ from tfcompose.run.events import Found, GuardEvent, Recovered, Taken
 from tfcompose.run.guard.senders import FEWEST_GAPS
 from tfcompose.verdict.driven import drives_of, sensor_of
 from tfcompose.verdict.offence import NAMELESS, Offence
-from tfcompose.verdict.violation import taken, violation
+from tfcompose.verdict.violation import misnamed, taken, violation
 
 if TYPE_CHECKING:
     from tfcompose.plan import Plan, PlanEdge
@@ -117,6 +117,8 @@ class Cases:
             return Taken(taken(offences, where))
         driven = sensor_of(offences[0], self._drives)
         found = violation(offences, self._plan, where, driven)
+        if advice := misnamed(offences, self._plan, self._senders.process(cases[0].gid)):
+            found = replace(found, help=advice)
         if self._plan.guard.mode == "strict" and not offences[0].of_stamps:
             found = replace(found, notes=(*found.notes, Note(_fate(held=self._senders.is_held_back(cases[0].gid)))))
         return Found(found, self._process(offences[0], cases[0].gid))

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 from tfcompose.ros.graph import UNKNOWN_NODE, own_gid, writers, writers_unmapped
 from tfcompose.ros.identity import ids_say_who
-from tfcompose.ros.origin import carries, origin
+from tfcompose.ros.origin import carries, origin, told
 from tfcompose.ros.topics import GLOBAL
 from tfcompose.run.guard.senders import PARTICIPANT, Writer
-from tfcompose.run.place import RUN_ID
+from tfcompose.run.place import PROCESS, RUN_ID
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -43,6 +43,7 @@ class Graph:
         self._node = node
         self._where: dict[bytes, str] = {}
         self._ours: dict[bytes, bool | None] = {}
+        self._process: dict[bytes, str] = {}
         self._run = f"{RUN_ID}={os.environ[RUN_ID]}" if RUN_ID in os.environ else ""
         self._own = b""
 
@@ -96,9 +97,11 @@ class Graph:
         if where is None:
             where = self._where[one.gid] = origin(one.gid, self._own_gid())
             self._ours[one.gid] = carries(one.gid, self._own_gid(), self._run) if self._run else None
+            self._process[one.gid] = told(one.gid, self._own_gid(), PROCESS) if self._ours[one.gid] else ""
         node = None if one.node.endswith(UNKNOWN_NODE) else one.node
+        process = self._process[one.gid]
         volatile, best_effort = one.durability == "volatile", one.reliability == "best_effort"
-        return Writer(one.gid, node, static, volatile, best_effort, where, self._ours[one.gid], fenced)
+        return Writer(one.gid, node, static, volatile, best_effort, where, self._ours[one.gid], fenced, process=process)
 
     def _own_gid(self) -> bytes:
         """Return an id of this process's: that of its reader."""

@@ -45,7 +45,8 @@ class Writer:
 
     ``where`` says on which machine and as which process it runs, as far as that is known. ``ours`` says whether that
     process is of the guard's own run; None: not known. ``fenced`` says whether it sends behind the fence of a strict
-    plan; None: if it is ours. ``others`` are further nodes of which it may be one.
+    plan; None: if it is ours. ``others`` are further nodes of which it may be one. ``process`` is the plan's that it is
+    of, where that was seen.
     """
 
     gid: bytes
@@ -57,6 +58,7 @@ class Writer:
     ours: bool | None = None
     fenced: bool | None = None
     others: tuple[str, ...] = ()
+    process: str = ""
 
 
 @dataclass(slots=True)
@@ -124,6 +126,11 @@ class Senders:
     def where(self, gid: bytes | None) -> str:
         """Return where the publisher runs, empty where that is not known."""
         return "" if gid is None else self._where.get(gid, "")
+
+    def process(self, gid: bytes | None) -> str:
+        """Return the plan's process that the publisher was seen to be of, or nothing."""
+        writer = self.writers.get(gid) if gid is not None else None
+        return writer.process if writer else ""
 
     def is_of_this_run(self, gid: bytes | None) -> bool:
         """Whether the publisher is surely a process of the guard's own run.

@@ -17,11 +17,11 @@ from tfcompose.run.hold import GO, HOLD_FD
 from tfcompose.run.launcher.child import LAST_LINE_LENGTH, Child, Pipe, bury_adopted, has_ended, kill_group, spawn
 from tfcompose.run.launcher.happening import Exited, LogSeen, Started, StartFailed
 from tfcompose.run.launcher.keeper import Keeper
-from tfcompose.run.launcher.leftovers import LAUNCHER, PROCESS, launcher_mark, leftovers, tell, these
+from tfcompose.run.launcher.leftovers import LAUNCHER, launcher_mark, leftovers, tell, these
 from tfcompose.run.launcher.leftovers import end as end_leftovers
 from tfcompose.run.launcher.notice import LogLine
 from tfcompose.run.launcher.processes import descendants
-from tfcompose.run.place import RUN_ID
+from tfcompose.run.place import PROCESS, RUN_ID
 
 if TYPE_CHECKING:
     from collections.abc import Callable

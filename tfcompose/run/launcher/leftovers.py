@@ -13,15 +13,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tfcompose.run.launcher.processes import BEGAN, PROC, STATE, all_pids, began, fields_of
-from tfcompose.run.place import RUN_ID
+from tfcompose.run.place import PROCESS, RUN_ID
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
 
 #: The variable that names the launcher of a run: its process number, and when it began (clock ticks).
 LAUNCHER = "TFCOMPOSE_LAUNCHER"
-#: The variable that names the plan's process that something belongs to.
-PROCESS = "TFCOMPOSE_PROCESS"
 #: The kernel ends a killed process within this time, in seconds, also where much is going on.
 KILLED_WITHIN_S = 5.0
 

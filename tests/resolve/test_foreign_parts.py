@@ -357,6 +357,10 @@ def test_what_is_wrong_with_hardware_of_a_part_is_said_at_its_line_with_every_us
         .startswith('<joint name="shoulder"')
     )
     assert [note.message for note in found.notes][1:] == ["as the part left", "as the part right"]
+    (whole,) = cell(
+        f"{LEFT.replace('root: base, ', '')}\nros2_control: {{mine: {{plugin: a/B, joints: {mine}}}}}"
+    ).found
+    assert (whole.code, whole.span) == ("TF717", found.span)
 
 
 def test_a_block_that_names_nothing_of_its_part_stands_once(cell: Any) -> None:

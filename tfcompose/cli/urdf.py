@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.check import apply, check, idle
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
 #: The rules that make sense without owners, sensors and processes.
 CODES = frozenset(
     {"TF201", "TF202", "TF203", "TF204", "TF205", "TF206", "TF209", "TF401", "TF501", "TF503"}
-    | {"TF701", "TF702", "TF704", "TF705", "TF706", "TF707", "TF708", "TF709", "TF710", "TF711", "TF728"}
+    | {"TF701", "TF702", "TF704", "TF705", "TF706", "TF707", "TF708", "TF709", "TF710", "TF711", "TF713"}
+    | {"TF716", "TF717", "TF718", "TF728"}
 )
 
 #: How a rule says that a frame is missing.
@@ -41,6 +43,7 @@ _HELP = {
     "TF709": 'add <inertial> with <mass value="…"/> and <inertia …/>',
     "TF710": "take the tensor from CAD: in kg m², about the centre of mass",
     "TF711": "give it in kg m², about the centre of mass",
+    "TF713": "another name for one of them",
 }
 
 
@@ -66,7 +69,10 @@ class Read:
     def judged(self) -> list[Diagnostic]:
         """Return what is wrong with it, by place, but for what its comments let stand."""
         allows = allows_in_xml(self.text, self.name)
-        said = (_said(one) for one in check(self.robot, CODES))
+        robot = self.robot
+        if any("<ros2_control" in block.text for block in robot.blocks):
+            robot = import_module("tfcompose.resolve.urdf_control").with_hardware(robot)
+        said = (_said(one) for one in check(robot, CODES))
         kept, used = apply(dict.fromkeys([*self.found, *said]), allows)
         return sorted([*kept, *idle(allows, used)], key=lambda one: one.sort_key)
 

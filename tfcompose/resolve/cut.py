@@ -21,8 +21,6 @@ def below(robot: Robot, root: str) -> Robot:
     edges = tuple(edge for edge in robot.edges if edge.child in frames and edge.child != root)
     sensors = tuple(sensor for sensor in robot.sensors if sensor.mount in frames)
     if robot.hardware or robot.blocks:
-        if any("<ros2_control" in block.text for block in robot.blocks):
-            robot = import_module("tfcompose.resolve.urdf_control").with_hardware(robot)
         joints = {edge.joint_name for edge in edges if edge.joint_name}
         hardware = (_hardware(one, joints) for one in robot.hardware)
         blocks = (_block(one, robot, frames, joints) for one in robot.blocks)

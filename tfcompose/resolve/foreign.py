@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
@@ -64,6 +65,8 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
         macros = dict.fromkeys(MACRO.findall(read(file)))
         advice = f"it defines macros; name one, as xacro: and macro: {', '.join(macros)}" if macros else ""
         raise RejectedError([finding("TF206", f"{file} has no links", at, help=advice)])
+    if any("<ros2_control" in block.text for block in robot.blocks):
+        robot = import_module("tfcompose.resolve.urdf_control").with_hardware(robot)
     parents = {edge.parent for edge in robot.edges}
     implied = frozenset(parents - robot.frames.keys()) if said.macro is not None else frozenset[str]()
     digest = hashlib.sha256(text.encode()).hexdigest()

@@ -17,6 +17,7 @@ from tfcompose.resolve.urdf_words import unknown_words
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from tfcompose.diagnostic import Severity
     from tfcompose.load.urdf import Element
     from tfcompose.resolve.urdf_bodies import Finder
 
@@ -43,6 +44,9 @@ def robot_of_urdf(root: Element, file: str, finder: Finder) -> tuple[Robot, tupl
     joints: dict[str, Element] = {}
     for element in root.all("joint"):
         _add(joints, element, values)
+    materials: dict[str, Element] = {}
+    for element in (one for one in root.all("material") if one.attributes.get("name")):
+        _add(materials, element, values, "warning")
     edges = [edge for element in root.all("joint") if (edge := edge_of(element, values))]
     frames = {link: element.place("name") for link, element in links.items()}
     names = {edge.joint_name: None for edge in edges}
@@ -84,14 +88,16 @@ def _declared(element: Element, root: Element) -> str:
     return raw[:begin] + more + raw[begin:]
 
 
-def _add(known: dict[str, Element], element: Element, values: Values) -> None:
+def _add(known: dict[str, Element], element: Element, values: Values, severity: Severity = "error") -> None:
     """Note the element by its name; a second one of that name is a finding."""
     name = values.text(element, "name", f'<{element.tag} name="…">')
     if name in known:
         note = Note("it stands here first", known[name].place("name"))
         message = f"two {element.tag}s have the name {name}"
-        advice = "another name for one of them"
-        values.found.append(finding("TF722", message, element.place("name"), notes=[note], help=advice))
+        advice = "another name for one of them" if severity == "error" else "remove it: readers of ROS refuse the robot"
+        values.found.append(
+            finding("TF722", message, element.place("name"), notes=[note], help=advice, severity=severity)
+        )
     elif name:
         known[name] = element
 

@@ -116,9 +116,10 @@ misspelt; else it may be somebody's extension, and is a warning.""",
     "TF721": """A value of a URDF is missing, or is none.
 
 Numbers are SI: m, rad, kg. Readers refuse the robot, take a default without a word, or compute with what is there.""",
-    "TF722": """Two links or two joints of a URDF have one name.
+    "TF722": """Two links, two joints or two materials of a URDF have one name.
 
-Readers refuse the robot or keep one of the two. Often a xacro macro was used twice with one prefix.""",
+Readers refuse the robot or keep one of the two. Often a xacro macro was used twice with one prefix, or a file of
+materials was included twice; for materials it is a warning, since what is built of the robot is right.""",
     "TF723": """The file of a mesh or a texture is not there.
 
 The body does not appear, and the collision with it is not checked. A relative path begins at the file that writes

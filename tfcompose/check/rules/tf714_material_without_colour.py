@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 def material_without_colour(robot: Robot) -> Iterator[Diagnostic]:
     """A material is a name that no material with a colour or a texture has.
 
-    URDF readers refuse the whole robot for a material that is defined nowhere. Give it an rgba, or the name of one that
-    has.
+    URDF readers say so in their log, and draw the body in a colour of their own. Give it an rgba, or the name of one
+    that has.
     """
     shapes = [shape for link in robot.links.values() for shape in link.visuals]
     used = [shape.material for shape in shapes if shape.material]

@@ -330,7 +330,8 @@ def test_an_owner_whose_node_has_another_name_is_told_what_to_write_and_is_live_
 ) -> None:
     (tmp_path / "driver.py").write_text(ROGUE, encoding="utf-8")
     stand_in = "simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}"
-    text = ROVER.replace(stand_in, f"run: [{sys.executable}, {tmp_path}/driver.py]")
+    ran = f"run: [{sys.executable}, {tmp_path}/driver.py], stop: {{signal: SIGTERM}}"
+    text = ROVER.replace(stand_in, ran)
     robot = up(text)
     robot.ends("help: it is drive itself: write node: /strange/rogue there, or have the program name its node /drive")
     robot = up(text.replace("run:", "node: /strange/rogue, run:"))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.run.watched import FIXED, LOOK_S, SETTLE_S, History, Publisher
 from tfcompose.plan import GuardPolicy
-from tfcompose.run.events import Clear, Complete, Live, OwnerReady, Recovered
+from tfcompose.run.events import Clear, Complete, Found, Live, OwnerReady, Recovered
 
 
 def test_owners_are_live_and_nothing_is_found(running: History) -> None:
@@ -215,3 +217,21 @@ def test_an_owner_whose_latched_messages_were_all_heard_or_hold_all_replaced_not
     running.send(static, edges).wait(5)
     running.send(static, FIXED).wait(5)
     assert running.said() == []
+
+
+def test_of_who_has_new_frames_again_and_again_is_told_ever_more_rarely_and_of_all_of_them(running: History) -> None:
+    """A tracker that names its frames after what it sees: tag_1, tag_2, …; for a minute, ten a second."""
+    tracker = running.joins("/tracker")
+    for number in range(600):
+        running.send(tracker, f"base tag_{number}").wait(0.1)
+    assert 5 < len(running.said()) < 10
+    running.wait(130)
+    over = [event.message for event in running.events if isinstance(event, Recovered)]
+    for told in (running.said(), over):
+        assert len(told) < 20
+        counted = [re.search(r"and (\d+) more", one) for one in told]
+        assert sum(1 + int(more[1]) if more else 1 for more in counted) == 600
+    found = [event.found for event in running.events if isinstance(event, Found)]
+    assert "child: 'tag_*'}" in (found[-1].help or "")
+    running.send(tracker, "base tag_600").wait(0.5)
+    assert "base → tag_600 is published" in running.said()[-1], "after some quiet it is told at once again"

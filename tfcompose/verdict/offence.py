@@ -64,12 +64,12 @@ class Offence:
         """Whether it is about stamps, and over as soon as these are right."""
         return self.code in {REPEATED, BACK, WRONG_CLOCK}
 
-    @property
-    def over(self) -> str:
-        """The sentence that says that it has ended."""
+    def over(self, more: int = 0) -> str:
+        """Return the sentence that says that it has ended, and that so many ``more`` of its kind have."""
+        named = f"{self.name} and {more} more edges" if more else self.name
         if self.of_stamps:
-            return f"{self.who} stamps {self.name} as it should again"
-        return f"{self.name} is no longer published by {self.who}"
+            return f"{self.who} stamps {named} as it should again"
+        return f"{named} {'are' if more else 'is'} no longer published by {self.who}"
 
 
 def code_of(edge: PlanEdge, parent: str, *, static: bool, owner: bool, sure: bool) -> str:

@@ -38,7 +38,7 @@ def violation(
     severity: Severity = "warning" if mild else "error"
     notes = [*_others(offences), *([] if place else _declared(first)), *_runs(first, where)]
     message = message_of(first, _more(offences), driven) or _message(offences, plan)
-    advice = advice_of(first, driven) or _switch(first, plan) or _help(first, plan)
+    advice = advice_of(first, driven) or _switch(first, plan) or _help(first, plan, _pattern(offences))
     return finding(first.code, message, place, help=advice, notes=notes, severity=severity)
 
 
@@ -131,9 +131,16 @@ def _more(offences: Sequence[Offence]) -> str:
     return f" and {more} more edge{'s' if more > 1 else ''}" if more else ""
 
 
-def _help(first: Offence, plan: Plan) -> str:
+def _pattern(offences: Sequence[Offence]) -> str:
+    """Return the child frame, or what stands for all of them where they are one name with numbers: ``tag_*``."""
+    children = [one.child for one in offences]
+    begins = {child.rstrip("0123456789") for child in children}
+    return f"'{begins.pop()}*'" if len(children) > 1 and len(begins) == 1 and "" not in begins else children[0]
+
+
+def _help(first: Offence, plan: Plan, child: str) -> str:
     if first.code == "TF803":
-        allowed = f"{{parent: {first.parent}, child: {first.child}}}"
+        allowed = f"{{parent: {first.parent}, child: {child}}}"
         return f"declare it under frames, or allow it: guard: {{allow: [{allowed}]}}"
     if first.code in _ADVICE:
         return _ADVICE[first.code]

@@ -24,14 +24,20 @@ COUNTING_S = 0.7
 #: An offence is over when its publisher has left and nothing came for so long, or for longer from one that stays.
 OVER_S = 3.0
 QUIET_S = 30.0
-#: Further edges of an offender that was just reported are collected for so long.
+#: Further edges of an offender that was just reported are collected for so long, and for longer while more come and
+#: come: who names frames after what it tracks has new ones each second.
 COLLECTED_S = 0.5
+COLLECTED_AT_MOST_S = 60.0
+#: So many edges have a line each when they are over; more are told in one.
+OVER_IN_LINES = 3
 #: What a publisher can do before the start that keeps the plan from starting.
 _TAKES = frozenset({"TF801", "TF802", "TF820"})
 #: Offences that ``stop-offender`` ends: who commits them breaks the tree.
 _STOPPED_FOR = frozenset({"TF801", "TF802", "TF803", "TF820"})
 
 Key = tuple[str, str, str, str]
+#: Code and node, and whether it is about the end.
+Group = tuple[str, str, bool]
 
 
 @dataclass(slots=True)
@@ -69,7 +75,8 @@ class Cases:
         self._senders = senders
         self._start = start
         self._drives = drives_of(plan)
-        self._reported: dict[tuple[str, str], float] = {}
+        self._reported: dict[Group, tuple[float, float]] = {}
+        self._ended: dict[Group, list[Offence]] = {}
         self._processes = {
             node: process.name for process in plan.processes if process.kind != "external" for node in process.nodes
         }
@@ -95,20 +102,28 @@ class Cases:
 
     def report(self, now: float) -> list[GuardEvent]:
         """Tell new cases, those of one kind and node in one finding."""
-        grouped: dict[tuple[str, str], list[Case]] = {}
+        grouped: dict[Group, list[Case]] = {}
         for case in self.open.values():
             if not case.told and not self._may_tell_more(case.gid, now):
-                grouped.setdefault((case.offence.code, case.offence.who), []).append(case)
+                grouped.setdefault((case.offence.code, case.offence.who, False), []).append(case)
         events: list[GuardEvent] = []
         for group, cases in grouped.items():
-            if now - self._reported.get(group, -COLLECTED_S) < COLLECTED_S:
+            if not self._is_due(group, now):
                 continue
-            self._reported[group] = now
             self.changes += 1
             events.append(self._event(cases, now))
             for case in cases:
                 case.told = True
         return events
+
+    def _is_due(self, group: Group, now: float) -> bool:
+        """Return whether the group is told now, and note it: the more often it is, the longer the next ones wait."""
+        at, collected_s = self._reported.get(group, (-COLLECTED_AT_MOST_S, 0.0))
+        if now - at < collected_s:
+            return False
+        goes_on = self._start.cleared is not None and now - at < 2 * collected_s
+        self._reported[group] = (now, min(2 * collected_s, COLLECTED_AT_MOST_S) if goes_on else COLLECTED_S)
+        return True
 
     def _event(self, cases: list[Case], now: float) -> GuardEvent:
         offences = [case.offence for case in cases]
@@ -164,7 +179,11 @@ class Cases:
         """Forget offences that have ended, and say so; the next of their kind is a new case."""
         ended = [key for key, case in self.open.items() if case.told and self._has_ended(case, now)]
         self.changes += len(ended)
-        return [Recovered(self.open.pop(key).offence.over) for key in ended]
+        for key in ended:
+            one = self.open.pop(key).offence
+            self._ended.setdefault((one.code, one.who, True), []).append(one)
+        due = [group for group in self._ended if self._is_due(group, now)]
+        return [Recovered(text) for group in due for text in _over(self._ended.pop(group))]
 
     def _has_ended(self, case: Case, now: float) -> bool:
         if self._senders.is_present(case.gid) and not case.offence.of_stamps:
@@ -178,6 +197,13 @@ def _fate(*, held: bool) -> str:
         if held
         else "not behind the fence, so it cannot be held back: listeners get it"
     )
+
+
+def _over(ended: list[Offence]) -> list[str]:
+    """Return in words that these of one kind and node are over."""
+    if len(ended) <= OVER_IN_LINES:
+        return [one.over() for one in ended]
+    return [ended[0].over(len(ended) - 1)]
 
 
 def _to_json(case: Case) -> list[Any]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.check import code_of
 from tfcompose.check.pages import page, rule_table
+from tfcompose.cli.between import edges_between
 from tfcompose.cli.compiling import sources_and_robot
 from tfcompose.cli.options import add_variant
 from tfcompose.cli.provenance import written_values
@@ -62,30 +63,15 @@ def _explain_code(word: str) -> int:
 
 
 def _explain_chain(sources: Sequence[Source], robot: Robot, a: str, b: str) -> int:
-    for frame in (a, b):
-        if frame not in robot.frames:
-            complain(f"no frame {frame}; {did_you_mean(frame, robot.frames, f'{robot.file} has other frames')}")
-            return 1
-    up, down = _ancestry(robot, a), _ancestry(robot, b)
-    shared = {id(edge) for edge in up} & {id(edge) for edge in down}
-    rising = [edge for edge in up if id(edge) not in shared]
-    falling = [edge for edge in down if id(edge) not in shared]
-    if (rising[-1].parent if rising else a) != (falling[-1].parent if falling else b):
-        complain(f"{a} and {b} are in two trees")
+    edges = edges_between(robot, a, b)
+    if edges is None:
         return 1
+    rising, falling = edges
     lines = [f"pose of {b} in {a}\n"]
     lines += [f"  up    {_line(edge, sources)}" for edge in rising]
     lines += [f"  down  {_line(edge, sources)}" for edge in reversed(falling)]
     sys.stdout.write("".join(lines))
     return 0
-
-
-def _ancestry(robot: Robot, frame: str) -> list[Edge]:
-    chain = []
-    while edge := robot.parent_edge(frame):
-        chain.append(edge)
-        frame = edge.parent
-    return chain
 
 
 def _line(edge: Edge, sources: Sequence[Source]) -> str:

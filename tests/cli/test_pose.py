@@ -1,0 +1,87 @@
+"""``tfcompose pose``: what it prints is the pose of B in A, and it says what moves on the way."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tfcompose.cli import main
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+ROBOT = """
+tfcompose: 1
+robot: r
+links: {base_link: {}, arm: {}, hand: {}}
+joints:
+  pan: {type: continuous, parent: base_link, child: arm, xyz: [0, 0, 1], rpy: [0.1, 0.2, 0.3]}
+  tilt: {type: continuous, parent: arm, child: hand, xyz: [0.5, 0, 0], rpy: [-0.4, 0.5, 0.6]}
+frames:
+  odom: {}
+  base_link: {parent: odom, owner: drive, xyz: [3, 0, 0], rate: 50}
+  mast: {parent: base_link, xyz: [1, 2, 3], rpy: [0.7, -0.8, 0.9]}
+  marker: {}
+  corner: {parent: marker, xyz: [0, 1, 0]}
+processes: {drive: {external: true}}
+rules: {TF204: off}
+"""
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> str:
+    (tmp_path / "r.yaml").write_text(ROBOT)
+    return str(tmp_path / "r.yaml")
+
+
+def matrix(xyz: list[float], rotation: Rotation) -> np.ndarray:
+    made = np.eye(4)
+    made[:3, :3], made[:3, 3] = rotation.as_matrix(), xyz
+    return made
+
+
+def test_the_pose_up_one_branch_and_down_another(robot: str, capsys: pytest.CaptureFixture[str]) -> None:
+    def step(xyz: list[float], rpy: list[float]) -> np.ndarray:
+        return matrix(xyz, Rotation.from_euler("xyz", rpy))
+
+    mast = step([1, 2, 3], [0.7, -0.8, 0.9])
+    hand = step([0, 0, 1], [0.1, 0.2, 0.3]) @ step([0.5, 0, 0], [-0.4, 0.5, 0.6])
+    assert main(["pose", robot, "mast", "hand", "--format", "json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert (said["parent"], said["child"]) == ("mast", "hand")
+    meant = np.linalg.inv(mast) @ hand
+    assert matrix(said["xyz"], Rotation.from_quat(said["quat_xyzw"])) == pytest.approx(meant, abs=1e-11)
+    assert matrix(said["xyz"], Rotation.from_euler("xyz", said["rpy"])) == pytest.approx(meant, abs=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "moving"),
+    [
+        ("base_link", "mast", ""),
+        ("mast", "mast", ""),
+        ("mast", "arm", "joint pan at 0"),
+        ("hand", "mast", "joints tilt, pan at 0"),
+        ("odom", "mast", "odom → base_link at its nominal pose"),
+        ("odom", "hand", "joints pan, tilt at 0 and odom → base_link at its nominal pose"),
+    ],
+)
+def test_what_moves_on_the_way_is_said_and_nothing_else(
+    robot: str, a: str, b: str, moving: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["pose", robot, a, b]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == f"pose of {b} in {a}"
+    assert lines[5:] == ([f"  with       {moving}"] if moving else [])
+
+
+@pytest.mark.parametrize("command", ["pose", "explain"])
+def test_between_two_trees_there_is_no_pose(robot: str, command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, robot, "mast", "corner"]) == 1
+    said = capsys.readouterr()
+    assert (said.out, said.err) == ("", "tfcompose: mast and corner are in two trees\n")
+    assert main([command, robot, "mast", "conrer"]) == 1
+    assert "did you mean corner?" in capsys.readouterr().err

@@ -106,6 +106,28 @@ def test_where_simulated_time_goes_slowly_rates_are_judged_by_it(
     assert [found.code for found in running.found()] == codes
 
 
+@pytest.mark.parametrize(("sent", "codes"), [(True, []), (False, ["TF804"])])
+def test_nobody_is_silent_while_simulated_time_stands_unless_nobody_is_there_who_sends_it(
+    *, sent: bool, codes: list[str]
+) -> None:
+    """A simulator that is paused, twice, and one that has crashed."""
+    running = History(clock="sim", edges=(edge("odom base", "drive", rate=20.0),)).clear()
+    drive, sim_s = running.joins("/drive"), 100.0
+    for paused_s in (30.0, 5.0, 0.0):
+        for _ in range(100):
+            running.judge.clock(round(sim_s * 1e9), running.now)
+            running.send(drive, "odom base", stamp_s=sim_s).wait(0.05)
+            sim_s += 0.05
+        running.judge.clocks.sent = sent or not paused_s
+        running.wait(paused_s)
+    assert [found.code for found in running.found()][:1] == codes
+    for _ in range(40):  # time goes on, and the owner does not
+        running.judge.clock(round(sim_s * 1e9), running.now)
+        running.wait(0.05)
+        sim_s += 0.05
+    assert running.found()[-1].code == "TF804"
+
+
 def test_simulated_time_that_begins_again_takes_the_stamps_with_it() -> None:
     running = History(clock="sim").clear()
     drive = running.joins("/drive")

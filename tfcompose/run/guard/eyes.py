@@ -86,6 +86,8 @@ class Eyes:
             self._due = now + LOOK_EVERY_S
             if not strangers:  # after the messages: what a strict guard passes on does not wait for it
                 self._look_round(now)
+            if self._clock:
+                self.judge.clocks.sent = self._graph.sends_clock()
             self._pass_on(self.judge.tick(now))
             if self._leaks_to:
                 self._pass_on(self.judge.leaks(self._graph.global_writers(), self._leaks_to))

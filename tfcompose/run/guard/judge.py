@@ -117,7 +117,8 @@ class Judge:
             over = self.cases.over(now)
             self._law.changes += bool(over)
             replaced = self._endpoints.replaced(self._senders, self.live.partly_missing(), now)
-            return [*events, *self.live.judge(now, self.clocks.speed(now)), *replaced, *over]
+            silence = self.live.judge(now, self.clocks.speed(now), paused=self.clocks.stands(now))
+            return [*events, *silence, *replaced, *over]
         self.live.look(now)
         if now - self.begun >= self.settle_s and not self._streams.waits and not self.cases.untold:
             self._start.clear(now)

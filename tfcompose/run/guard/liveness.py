@@ -157,12 +157,16 @@ class Liveness:
         """Note that the guard looks, and judge nobody."""
         self._watched.look(now)
 
-    def judge(self, now: float, speed: float = 1.0) -> list[GuardEvent]:
+    def judge(self, now: float, speed: float = 1.0, *, paused: bool = False) -> list[GuardEvent]:
         """Return which owners fell silent or slow since the last time, and came back: one event for each owner.
 
-        ``speed`` is how fast time goes by for them: in a simulation that is slow all rates are lower.
+        ``speed`` is how fast time goes by for them: in a simulation that is slow all rates are lower, and in one that
+        is ``paused`` nobody falls silent.
         """
         seen = self._watched.look(now)
+        if paused:
+            for track in self.tracks:
+                track.heard = track.heard if track.silent else seen
         changed: dict[tuple[str, str], list[Track]] = {}
         for track in self.tracks:
             change = _change(track, seen, speed) if track.live and track.silent_after is not None else None

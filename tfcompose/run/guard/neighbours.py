@@ -67,6 +67,10 @@ class Graph:
         ours = self._ours[gid]
         return bool(ours) if self._private is None else ours is not False
 
+    def sends_clock(self) -> bool:
+        """Return whether somebody is there who publishes /clock."""
+        return bool(writers(self._node, "/clock"))
+
     def global_writers(self) -> list[Writer]:
         """Return who publishes on the global topics now."""
         return self._on(writers_unmapped, GLOBAL)

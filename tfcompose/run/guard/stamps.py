@@ -22,21 +22,29 @@ REPEAT_COUNTS, REPEATS = 2, 10
 STEP_COUNTS, BACK_STEPS = 4, 12
 #: How fast simulated time goes by is measured over so long.
 SPEED_OVER_S = 2.0
+#: Simulated time that has not moved for so long stands: the simulator is paused. Less than an edge may be quiet.
+STANDS_S = 0.3
 #: One step back by so much is enough.
 LARGE_STEP_NS = _SECOND_NS
 
 
 @dataclass(slots=True)
 class Clocks:
-    """What time it is: the system's time when a message came, and the newest on /clock (None: nothing came yet)."""
+    """What time it is: the system's time when a message came, and the newest on /clock (None: nothing came yet).
+
+    ``sent`` says whether anybody is there who could send it.
+    """
 
     simulated: bool
     sim_ns: int | None = None
+    sent: bool = True
+    _moved: float = 0.0
     _since: tuple[float, int] | None = None
     _speed: float = 1.0
 
     def take(self, sim_ns: int | None, now: float) -> None:
         """Take the newest time on /clock, and when that was."""
+        self._moved = self._moved if sim_ns == self.sim_ns else now
         self.sim_ns = sim_ns
         if sim_ns is None:
             return
@@ -45,6 +53,10 @@ class Clocks:
         elif now - self._since[0] >= SPEED_OVER_S:
             self._speed = self._passed(now)
             self._since = (now, sim_ns)
+
+    def stands(self, now: float) -> bool:
+        """Return whether time came and does not go on: nobody sends anything then, and nobody is silent."""
+        return self.simulated and self.sent and self.sim_ns is not None and now - self._moved > STANDS_S
 
     def speed(self, now: float) -> float:
         """Return how many seconds go by on /clock in a second, 1 at most: the least of what is, and was a while ago."""

@@ -131,6 +131,7 @@ CODES = {
     "TF728": "joint_named_like_a_frame",
     "TF729": "substitution_in_urdf",
     "TF730": "body_in_no_urdf",
+    "TF731": "negative_damping",
     # a URDF that somebody else wrote; meshes and packages
     "TF720": "unknown_urdf_word",
     "TF721": "bad_urdf_value",

@@ -253,6 +253,8 @@ LEVELS = {
         f'<link name="a"/>{JOINT.format("j", "continuous", LIMIT.format("", "command_effort"))}',
         "warning",
     ),
+    "a safety controller without its gain": (
+        '<link name="a"/>' + JOINT.format("j", "continuous", '<safety_controller soft_upper_limit="1"/>'), "error"),
     "a slip": (f'<link name="a"/>{JOINT.format("j", "continuous", LIMIT.format("", "uper"))}', "error"),
     "a limit without ends": (f'<link name="a"/>{JOINT.format("j", "revolute", f"<limit {RATES}/>")}', "warning"),
     "a limit of the largest float": (

@@ -63,6 +63,7 @@ from tfcompose.check.rules.tf717_interface_claimed_twice import interface_claime
 from tfcompose.check.rules.tf718_mimic_joint_commanded import mimic_joint_commanded
 from tfcompose.check.rules.tf728_joint_named_like_a_frame import joint_named_like_a_frame
 from tfcompose.check.rules.tf730_body_in_no_urdf import body_in_no_urdf
+from tfcompose.check.rules.tf731_negative_damping import negative_damping
 from tfcompose.check.rules.tf812_start_order_loop import start_order_loop
 from tfcompose.check.rules.tf815_process_without_role import process_without_role
 from tfcompose.check.rules.tf818_required_without_role import required_without_role
@@ -154,6 +155,7 @@ RULES: tuple[Rule, ...] = (
     Rule("TF718", mimic_joint_commanded),
     Rule("TF728", joint_named_like_a_frame, WARNING),
     Rule("TF730", body_in_no_urdf, WARNING),
+    Rule("TF731", negative_damping, WARNING),
     Rule("TF812", start_order_loop),
     Rule("TF815", process_without_role, WARNING),
     Rule("TF818", required_without_role, WARNING),

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 CODES = frozenset(
     {"TF201", "TF202", "TF203", "TF204", "TF205", "TF206", "TF209", "TF401", "TF501", "TF503"}
     | {"TF701", "TF702", "TF704", "TF705", "TF706", "TF707", "TF708", "TF709", "TF710", "TF711", "TF713"}
-    | {"TF716", "TF717", "TF718", "TF728"}
+    | {"TF716", "TF717", "TF718", "TF728", "TF731"}
 )
 
 #: How a rule says that a frame is missing.

@@ -83,7 +83,7 @@ def _moving(name: str, kind: Any, element: Element, values: Values) -> Joint:
         joint,
         limit=_limit(name, element.first("limit"), values),
         dynamics=_numbers(Dynamics, element.first("dynamics"), values),
-        safety=_numbers(SafetyController, element.first("safety_controller"), values),
+        safety=_safety(name, element.first("safety_controller"), values),
         reference=_numbers(ReferencePositions, element.first("calibration"), values),
     )
 
@@ -95,6 +95,14 @@ def _limit(name: str, said: Element | None, values: Values) -> Limit | None:
         if key not in said.attributes:
             values.refuse(f"the limit of {name} has no {key}", said.at, f'URDF requires it: {key}="1"')
     return _numbers(Limit, said, values)
+
+
+def _safety(name: str, said: Element | None, values: Values) -> SafetyController | None:
+    if said is not None and "k_velocity" not in said.attributes:
+        values.refuse(
+            f"the safety_controller of {name} has no k_velocity", said.at, 'URDF requires it: k_velocity="10"'
+        )
+    return _numbers(SafetyController, said, values)
 
 
 def _numbers(cls: type[T], element: Element | None, values: Values) -> T | None:

@@ -178,7 +178,6 @@ def _change(tfc: Callable[..., Any], tmp_path: Path) -> None:
     assert "listeners that run keep base_link → lidar" in changed.stdout
 
 
-@pytest.mark.usefixtures("tfc")
 def test_a_robot_whose_folder_was_removed_goes_on_and_refuses_what_cannot_be_started_there(
     tfc: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -218,6 +217,7 @@ sys.exit(main(["up", "-d"]))
     assert "ZeroDivisionError: of a launcher" in said.read_text()
 
 
+@pytest.mark.usefixtures("tfc")
 def test_of_two_that_start_at_the_same_moment_one_wins_and_the_other_says_who() -> None:
     command = [sys.executable, "-m", "tfcompose", "up"]
     start = partial(subprocess.Popen, command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

@@ -107,7 +107,6 @@ def test_the_live_tree_names_nodes_and_what_is_unexpected(running: Path) -> None
 
 
 @pytest.mark.usefixtures("domain")
-@pytest.mark.usefixtures("domain")
 def test_of_a_robot_without_edges_nothing_is_missing_where_nothing_is_sent(tmp_path: Path) -> None:
     robot = tmp_path / "robot.yaml"
     robot.write_text("tfcompose: 1\nrobot: post\nframes: {base_link: {}}\n")
@@ -115,6 +114,7 @@ def test_of_a_robot_without_edges_nothing_is_missing_where_nothing_is_sent(tmp_p
     assert output == "post: 0 of 0 edges as expected, in the running tree\n"
 
 
+@pytest.mark.usefixtures("domain")
 def test_where_nothing_runs_verify_says_so_with_exit_code_1(
     write: Callable[..., Path], edge: Callable[..., PlanEdge]
 ) -> None:

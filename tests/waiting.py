@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from typing import TYPE_CHECKING
@@ -52,6 +53,11 @@ def within(condition: Callable[[], object], seconds: float) -> bool:
             return False
         time.sleep(0.005)
     return True
+
+
+def offences(said: str) -> list[str]:
+    """Return the codes of what was found live, but of silence and slowness: a process may be kept from running."""
+    return re.findall(r"TF8(?!0[45])\d\d", said)
 
 
 def gone(process: int | psutil.Process) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import subprocess
 import sys
 from typing import TYPE_CHECKING
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.run.test_hosts import TWO
-from tests.waiting import until
+from tests.waiting import offences, until
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,11 +30,6 @@ def ps() -> dict[str, dict[str, str]]:
     }
 
 
-def offences(up: Started) -> list[str]:
-    """Return the findings but those of silence and slowness: they are true of a process that is kept from running."""
-    return re.findall(r"TF8(?!0[45])\d\d", up.output)
-
-
 def test_two_hosts_start_their_shares_and_each_sees_the_whole_tree(
     start: Callable[..., Started], tmp_path: Path
 ) -> None:
@@ -53,7 +47,7 @@ def test_two_hosts_start_their_shares_and_each_sees_the_whole_tree(
         "rover.jetson": {"static": "EXPECTED", "drive": "EXPECTED", "arm_drive": "RUNNING", "guard": "RUNNING"},
     }
     assert ps() == shares
-    assert offences(main) + offences(jetson) == []
+    assert offences(main.output + jetson.output) == []
     assert jetson.output.index("live  drive") < jetson.output.index("started arm_drive"), "it waits for another host's"
     assert jetson.end()[0] == 0
     assert until(lambda: "TF804" in main.output), "the guard on one host sees that the other's owner fell silent"
@@ -100,7 +94,7 @@ def test_each_of_two_strict_guards_holds_back_on_its_machine_and_passes_on_to_al
         return done.stdout + done.stderr if done.returncode else ""
 
     assert until(lambda: not wrong()), wrong()
-    assert offences(main) == [], "it was held back"
+    assert offences(main.output) == [], "it was held back"
     jetson.until_says("held back: no listener gets it")
     assert (jetson.end()[0], main.end()[0]) == (0, 0)
 

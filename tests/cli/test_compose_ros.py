@@ -225,7 +225,7 @@ def test_of_two_that_start_at_the_same_moment_one_wins_and_the_other_says_who() 
     assert until(lambda: any(one.poll() is not None for one in both))
     loser, winner = sorted(both, key=lambda one: one.poll() is None)
     output, errors = loser.communicate()
-    assert loser.returncode == 1
+    assert loser.returncode == 1, output + errors
     assert f"runs already: pid {winner.pid}, since " in errors
     assert "started" not in output
     assert winner.stdout

@@ -39,15 +39,26 @@ def kept(plan: Plan, file: Path, place: Place, *, alone: bool) -> Path | int:
         digest = hashlib.sha256(repr(sorted(parts.items())).encode()).hexdigest()[:16]
         folder = place.folder / f"plan-{digest}"
         if alone:
-            for old in place.folder.glob("plan-*"):
+            for old in set(place.folder.glob("plan-*")) - {folder}:
                 shutil.rmtree(old, ignore_errors=True)
-        for name, data in parts.items():
-            (folder / name).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            (folder / name).write_bytes(data)
+        try:
+            _copy(parts, folder)
+        except FileNotFoundError:  # who has won the race for the run removed it as an earlier one's
+            _copy(parts, folder)
     except OSError as error:
         complain(f"the plan cannot be copied to {place.folder}: {error.strerror}")
         return UNREADABLE
     return folder / PLAN
+
+
+def _copy(parts: dict[str, bytes], folder: Path) -> None:
+    """Write the files, each at once: another ``up`` may write the same, and the run's processes read them."""
+    for name, data in parts.items():
+        file = folder / name
+        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        new = file.with_name(f".{file.name}.{os.getpid()}")
+        new.write_bytes(data)
+        new.replace(file)
 
 
 def _addressed(urdf: bytes, folder: Path) -> bytes:

@@ -124,7 +124,7 @@ def _take(descriptor: int) -> None:
 
 
 def _read_holder(descriptor: int) -> Holder | None:
-    for _ in range(20):  # it is written a moment after it is taken
+    for _ in range(500):  # it is written a moment after it is taken
         try:
             return Holder(**json.loads(os.pread(descriptor, 4096, 0)))
         except (ValueError, TypeError):

@@ -1,0 +1,60 @@
+"""Two that start a robot at the same moment copy its plan to the same folder."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.planned import compiled_plan
+from tests.rover import ROVER
+from tfcompose.cli.keeping import kept
+from tfcompose.run.place import Place, place_of
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Place:
+    return place_of(compiled_plan(ROVER), {"XDG_RUNTIME_DIR": str(tmp_path)})
+
+
+def test_the_loser_copies_again_what_the_winner_takes_for_an_earlier_runs(
+    place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, written = compiled_plan(ROVER), Path.write_bytes
+    removed: list[Path] = []
+
+    def late(file: Path, data: Any) -> int:
+        if not removed:
+            removed.append(file.parent)
+            shutil.rmtree(file.parent)
+        return written(file, data)
+
+    monkeypatch.setattr(Path, "write_bytes", late)
+    copy = kept(plan, tmp_path / "plan.json", place, alone=False)
+    assert removed
+    assert isinstance(copy, Path)
+    assert copy.read_text("utf-8")
+
+
+def test_a_copy_is_never_half_written_and_stays_while_its_plan_is_the_one(
+    place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, written = compiled_plan(ROVER), Path.write_bytes
+    copy = kept(plan, tmp_path / "plan.json", place, alone=False)
+    assert isinstance(copy, Path)
+    whole = copy.read_bytes()
+    seen: list[bytes] = []
+
+    def slow(file: Path, data: Any) -> int:
+        written(file, data[:10])
+        seen.append(copy.read_bytes())
+        return written(file, data)
+
+    monkeypatch.setattr(Path, "write_bytes", slow)
+    assert kept(plan, tmp_path / "plan.json", place, alone=True) == copy
+    assert seen == [whole]
+    assert [file.name for file in copy.parent.iterdir()] == ["plan.json"]
+    assert kept(compiled_plan(ROVER.replace("lidar", "lamp")), tmp_path / "plan.json", place, alone=True) != copy
+    assert not copy.exists()

@@ -132,6 +132,20 @@ def test_ids_that_do_not_say_whose_they_are_tell_two_that_take_turns_apart() -> 
     assert len(running.all(Recovered)) == 1
 
 
+def test_where_ids_do_not_say_whose_they_are_who_came_just_now_is_one_of_those_that_may_have_sent_it() -> None:
+    """Messages of a newcomer can be heard before the graph shows it."""
+    running = History(says_who=False).clear()
+    slam, rogue = running.joins("/slam"), running.joins("/rogue", hidden=True)
+    running.joins("/drive")
+    running.repeat(slam, "map odom", 5)
+    for turn in range(20):
+        if turn == 5:
+            running.graph.append(rogue)
+        running.send(slam, "map odom").send(rogue, "map odom").wait(0.1)
+    words = "map → odom is published by one of /drive, /rogue, /slam; the owner is slam (/slam)"
+    assert running.said() == [f"TF801 {words}"]
+
+
 def test_ids_that_do_not_say_whose_they_are_blame_no_owner_and_nobody_who_was_started_anew() -> None:
     running = History(says_who=False).clear()
     slam, drive = running.joins("/slam"), running.joins("/drive")

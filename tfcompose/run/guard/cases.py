@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Note
 from tfcompose.run.events import Found, GuardEvent, Recovered, Taken
-from tfcompose.run.guard.senders import FEWEST_GAPS
+from tfcompose.run.guard.senders import FEWEST_GAPS, NAMELESS_S
 from tfcompose.verdict.driven import drives_of, sensor_of
 from tfcompose.verdict.offence import NAMELESS, Offence
 from tfcompose.verdict.violation import misnamed, taken, violation
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from tfcompose.plan import Plan, PlanEdge
     from tfcompose.run.guard.senders import Senders
 
@@ -57,10 +59,11 @@ class Start:
 
 @dataclass(slots=True)
 class Case:
-    """An offence that was seen; ``last`` is when, ``told`` whether it was reported."""
+    """An offence that was seen first at ``since`` and again at ``last``; ``told`` says whether it was reported."""
 
     offence: Offence
     gid: bytes | None
+    since: float
     last: float
     told: bool = False
 
@@ -84,7 +87,7 @@ class Cases:
     def note(self, offence: Offence, gid: bytes | None, now: float) -> Case:
         """Note that the offence was seen now."""
         key = self._key(offence, gid)
-        case = self.open.setdefault(key, Case(offence, gid, now))
+        case = self.open.setdefault(key, Case(offence, gid, now, now))
         case.gid, case.last = gid, now
         if offence.nodes:  # what was blamed on nobody has a name now
             self.open.pop((offence.code, offence.parent, offence.child, NAMELESS), None)
@@ -103,9 +106,8 @@ class Cases:
     def report(self, now: float) -> list[GuardEvent]:
         """Tell new cases, those of one kind and node in one finding."""
         grouped: dict[Group, list[Case]] = {}
-        for case in self.open.values():
-            if not case.told and not self._may_tell_more(case.gid, now):
-                grouped.setdefault((case.offence.code, case.offence.who, False), []).append(case)
+        for case in self._ripe(now):
+            grouped.setdefault((case.offence.code, case.offence.who, False), []).append(case)
         events: list[GuardEvent] = []
         for group, cases in grouped.items():
             if not self._is_due(group, now):
@@ -115,6 +117,22 @@ class Cases:
             for case in cases:
                 case.told = True
         return events
+
+    def _ripe(self, now: float) -> Iterator[Case]:
+        """Yield the cases to tell: those of which nothing more comes to be known.
+
+        Where ids do not say whose they are, whoever takes turns with the owner may not be in the graph yet; all that it
+        shows a while later are named.
+        """
+        for case in self.open.values():
+            if case.told or self._may_tell_more(case.gid, now):
+                continue
+            if case.offence.namesake and case.gid is not None and not self._senders.is_sure(case.gid):
+                if now - case.since < NAMELESS_S:
+                    continue
+                nodes = self._senders.nodes(case.gid, static=case.offence.static)
+                case.offence = replace(case.offence, nodes=nodes or case.offence.nodes)
+            yield case
 
     def _is_due(self, group: Group, now: float) -> bool:
         """Return whether the group is told now, and note it: the more often it is, the longer the next ones wait."""
@@ -217,4 +235,4 @@ def _from_json(data: list[Any], planned: dict[str, PlanEdge], last: float) -> Ca
     code, parent, child, nodes, static, is_planned, namesake, loop, detail, gid = data
     edge = planned.get(child) if is_planned else None
     offence = Offence(code, parent, child, tuple(nodes), static, edge, namesake, tuple(loop), detail)
-    return Case(offence, None if gid is None else bytes.fromhex(gid), last, told=True)
+    return Case(offence, None if gid is None else bytes.fromhex(gid), last, last, told=True)

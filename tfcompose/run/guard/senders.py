@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 GAPS, FEWEST_GAPS = 5, 2
 #: A gap that was seen may be shorter than usual by this factor.
 UNSURE = 3.0
+#: How long a publisher may stay without a name, or out of the graph, before it is judged all the same.
+NAMELESS_S = 0.7
 UNCOUNTED = 2**64 - 1
 #: So many bytes of an id are its participant's (RTPS: a GUID's prefix).
 PARTICIPANT = 12

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from tfcompose.run.guard.law import Sight
+from tfcompose.run.guard.senders import NAMELESS_S
 from tfcompose.run.guard.stamps import Stamps
 
 if TYPE_CHECKING:
@@ -18,8 +19,7 @@ if TYPE_CHECKING:
     from tfcompose.run.guard.senders import Message, Senders
     from tfcompose.verdict.offence import Offence
 
-#: How long a publisher may stay without a name before it is judged all the same; longer if it may be the owner.
-NAMELESS_S = 0.7
+#: How long a publisher that may be the owner can stay without a name before it is judged all the same.
 NAMELESS_OWNER_S = 5.0
 #: For so many kinds of messages what was judged of them is remembered.
 MOST_STREAMS = 4096

@@ -19,6 +19,8 @@ from tfcompose.run.launcher.told import told_line
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
+    from tfcompose.run.place import Place
+
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
@@ -50,8 +52,17 @@ def run(arguments: Namespace) -> int:
         return 1
     if not ended:
         slow = "tells more than was read here, and did not wait; ask again"
-        complain(f"{place.name} {slow if place.holder() else 'was killed'}")
+        complain(f"{place.name} {slow if _is_held(place) else 'was killed'}")
     return 0 if ended else 1
+
+
+def _is_held(place: Place) -> bool:
+    """Return whether the robot still runs; one that ends hangs up a moment before it gives its lock back."""
+    for _ in range(40):
+        if place.holder() is None:
+            return False
+        time.sleep(0.05)
+    return True
 
 
 class _Timed:

@@ -306,6 +306,7 @@ def test_a_publisher_that_stays_without_a_name_is_blamed_and_one_that_has_just_c
     assert found.message == (
         "base → laser is published by a publisher without a node name; the owner is static (/rover/static)"
     )
+    assert found.help == "end it, or switch its TF off; tf2 takes whatever came last"
     fresh = Tree()
     row = ("base", "laser", 109, 0, *LASER.xyz, *LASER.quat_xyzw)
     fresh.census.take([row], static=True, gid=b"raw", received_ns=110 * S - S // 2)

@@ -46,7 +46,9 @@ class Offence:
 
     @property
     def whom(self) -> str:
-        """The offender, as the one to do something about."""
+        """The offender, as the one to do something about: one without a name was told of just before."""
+        if not self.nodes and not self.recorded and not self.namesake:
+            return "it"
         return f"the other {self.nodes[0]}" if self.namesake and len(self.nodes) == 1 else self.who
 
     @property

@@ -56,6 +56,8 @@ LASTING = frozenset({"up", "echo", "monitor", "verify"})
 
 #: The exit code of a command whose output nobody reads any more: what a shell says of a program ended by SIGPIPE.
 UNREAD = 141
+#: That of one that was ended by Ctrl-C before it had begun what it is for.
+INTERRUPTED = 130
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -66,7 +68,7 @@ def main(argv: list[str] | None = None) -> int:
         code = _main(sys.argv[1:] if argv is None else argv)
         sys.stdout.flush()
     except KeyboardInterrupt:
-        return 130
+        return INTERRUPTED
     except BrokenPipeError:
         return _unwritten()
     except OSError as error:
@@ -153,8 +155,11 @@ def _run(command: str, words: list[str]) -> int:
         gc.disable()
         atexit.unregister(gc.freeze)
         atexit.register(gc.freeze)  # nor does the interpreter when it ends
+    interrupt = import_module("tfcompose.interrupt")
     try:
-        return _run_command(command, words)
+        with interrupt.Remembered():
+            code = _run_command(command, words)
+        return INTERRUPTED if interrupt.taken() else code
     finally:
         gc.enable()
 

@@ -10,6 +10,8 @@ import signal
 import threading
 from typing import TYPE_CHECKING, Protocol
 
+from tfcompose import interrupt
+
 if TYPE_CHECKING:
     from collections.abc import Callable
     from types import FrameType
@@ -80,6 +82,8 @@ class Stop:
         self._thread = threading.Thread(target=self._watch, name="signals", daemon=True)
         self._thread.start()
         self._previous_mask = signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+        if interrupt.taken():
+            self.request()
         return self
 
     def __exit__(self, *_: object) -> None:

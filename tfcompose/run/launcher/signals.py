@@ -8,6 +8,8 @@ import signal
 from collections import deque
 from typing import TYPE_CHECKING, final
 
+from tfcompose import interrupt
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import FrameType, TracebackType
@@ -42,6 +44,9 @@ class Signals:
                 continue
             handler = signal.signal(number, self._append)
             self._stack.callback(signal.signal, number, signal.SIG_DFL if handler is None else handler)
+        if interrupt.taken():
+            self._taken.append(signal.SIGINT)
+            os.write(write_fd, b"\0")
         return self
 
     def __exit__(

@@ -1,0 +1,67 @@
+"""Ctrl-C while a command loads, also where Python throws away what a signal's handler raises."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import weakref
+
+import pytest
+
+from tfcompose import interrupt
+from tfcompose.ros.stop import Stop
+from tfcompose.run.launcher.signals import Signals
+
+
+class Loaded:
+    """Something that Python forgets, and calls back then, as it does with the locks of its imports."""
+
+
+def send_an_interrupt(*_: object) -> None:
+    os.kill(os.getpid(), signal.SIGINT)
+    for _step in range(10):  # the handler runs between two steps of the interpreter
+        pass
+
+
+def lose_an_interrupt() -> None:
+    """Let SIGINT come in a callback, in which no exception gets through."""
+    loaded = Loaded()
+    kept = weakref.ref(loaded, send_an_interrupt)
+    del loaded
+    assert kept() is None
+
+
+@pytest.fixture(autouse=True)
+def lost(monkeypatch: pytest.MonkeyPatch) -> list[object]:
+    found: list[object] = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda what: found.append(what.exc_type))
+    return found
+
+
+def test_the_launcher_takes_an_interrupt_that_python_threw_away(lost: list[object]) -> None:
+    with interrupt.Remembered():
+        lose_an_interrupt()
+        assert lost == [KeyboardInterrupt]
+        with Signals() as signals:
+            assert os.read(signals.fd, 10)
+            assert list(signals.taken()) == [signal.SIGINT]
+    assert not interrupt.taken()
+
+
+def test_who_waits_in_ros_takes_it_once(lost: list[object]) -> None:
+    with interrupt.Remembered():
+        lose_an_interrupt()
+        with Stop() as stop:
+            assert stop.requested
+        with Stop() as stop:
+            assert not stop.requested
+    assert lost == [KeyboardInterrupt]
+
+
+def test_elsewhere_an_interrupt_ends_the_command_as_ever() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt), interrupt.Remembered():
+        send_an_interrupt()
+    assert signal.getsignal(signal.SIGINT) is before
+    assert interrupt.taken()

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.check import apply, check, levelled, unknown_rules, with_edits, with_replaced
 from tfcompose.diagnostic import Allow, Diagnostic, RejectedError
-from tfcompose.frozen import dataclass, replace
 from tfcompose.load import Source, composed, load, with_includes
 from tfcompose.resolve import Disk, Library, Whole, resolve
 from tfcompose.validate import validate

@@ -6,11 +6,11 @@ was seen read alike. A code is never used again for something else.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from tfcompose.codes import CODES
-from tfcompose.frozen import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -7,11 +7,11 @@ robot to build.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.codes import CODES
 from tfcompose.diagnostic import Allow, Diagnostic, did_you_mean, finding
-from tfcompose.frozen import replace
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

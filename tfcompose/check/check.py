@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.check.rules.tf201_two_parents import two_parents
@@ -70,7 +71,6 @@ from tfcompose.check.rules.tf818_required_without_role import required_without_r
 from tfcompose.check.rules.tf847_needed_but_optional import needed_but_optional
 from tfcompose.check.rules.tf848_gate_never_opens import gate_never_opens
 from tfcompose.diagnostic import Diagnostic, Severity, Span, finding
-from tfcompose.frozen import dataclass, replace
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

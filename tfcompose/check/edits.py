@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Edit, Span
-from tfcompose.frozen import replace
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

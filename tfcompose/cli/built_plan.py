@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
 from tfcompose.diagnostic import RejectedError
-from tfcompose.frozen import replace
 from tfcompose.plan import Plan
 from tfcompose.plan.file import read_plan
 from tfcompose.run.events import SETTLE

@@ -12,12 +12,12 @@ import re
 import stat
 import tempfile
 from collections import Counter
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.terminal import read_text
-from tfcompose.frozen import dataclass, field
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

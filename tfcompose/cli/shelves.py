@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 
 from tfcompose.cli.terminal import read_text
-from tfcompose.frozen import dataclass
 from tfcompose.resolve import Library
 
 PRESETS = os.path.join(os.path.dirname(os.path.dirname(__file__)), "presets")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from contextlib import ExitStack
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +14,6 @@ from tfcompose.cli.built_plan import PLAN, as_asked, plan_in
 from tfcompose.cli.console import Console
 from tfcompose.cli.status import Status, columns_of
 from tfcompose.cli.terminal import UNREADABLE, coloured, complain, draws, print_findings
-from tfcompose.frozen import replace
 from tfcompose.ros.environment import child_environment
 from tfcompose.ros.settings import no_ros, ros_trouble
 from tfcompose.run.launcher.control import listen

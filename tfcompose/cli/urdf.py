@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,6 @@ from tfcompose.cli.disk import disk
 from tfcompose.cli.terminal import read_text
 from tfcompose.cli.xacro import expanded
 from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
-from tfcompose.frozen import dataclass, replace
 from tfcompose.load.comments import allows_in_xml
 from tfcompose.load.urdf import MACRO, load_xml
 from tfcompose.resolve.packages import Packages

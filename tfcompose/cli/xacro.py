@@ -5,13 +5,13 @@ from __future__ import annotations
 import contextlib
 import os
 import re
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.terminal import read_text
 from tfcompose.diagnostic import Diagnostic, RejectedError, Span, did_you_mean, finding
-from tfcompose.frozen import replace
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Note, Span
-from tfcompose.frozen import replace
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tfcompose.draw.letters import shown, width_of
 from tfcompose.draw.style import STYLES
-from tfcompose.frozen import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -6,12 +6,12 @@ two boxes can overlap. The cost grows with the number of frames.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tfcompose.draw.areas import PAD, Area, Place, areas_of
 from tfcompose.draw.letters import shown, width_of
 from tfcompose.draw.style import STYLES
-from tfcompose.frozen import dataclass
 
 if TYPE_CHECKING:
     from tfcompose.draw.graph import Forest, Graph

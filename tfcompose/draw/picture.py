@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tfcompose.draw.areas import PAD
@@ -11,7 +12,6 @@ from tfcompose.draw.legend import legend
 from tfcompose.draw.letters import shown, width_of
 from tfcompose.draw.shapes import Box, Curve, Drawing, Text, hanging, level
 from tfcompose.draw.style import STYLES, colour_of
-from tfcompose.frozen import dataclass
 
 if TYPE_CHECKING:
     from tfcompose.draw.areas import Area, Place

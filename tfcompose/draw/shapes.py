@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Union
-
-from tfcompose.frozen import dataclass
 
 Point = tuple[float, float]
 

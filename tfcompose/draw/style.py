@@ -6,7 +6,7 @@ has a number as well, for print without colour and for robots with more owners t
 
 from __future__ import annotations
 
-from tfcompose.frozen import dataclass
+from dataclasses import dataclass
 
 SANS = "Arial, Helvetica, 'Liberation Sans', sans-serif"
 

@@ -6,10 +6,10 @@
 from __future__ import annotations
 
 import posixpath
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, finding
-from tfcompose.frozen import replace
 from tfcompose.load.overlay import lay_over, without
 from tfcompose.load.places import Path, Place
 from tfcompose.load.source import Source, load

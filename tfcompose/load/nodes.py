@@ -8,12 +8,12 @@ names, so a bomb of aliases stays small here, and what reads the data can see th
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass, field
 from typing import Any
 
 import yaml
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, finding
-from tfcompose.frozen import dataclass, field
 from tfcompose.load.not_yaml import no_character, no_syntax
 from tfcompose.load.places import Place
 from tfcompose.load.scalars import MAP, SCALAR_TAGS, SEQ, STR, TAG, plain, scalar

@@ -7,10 +7,10 @@ drops the others.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, did_you_mean, finding
-from tfcompose.frozen import replace
 from tfcompose.load.choices import choices_at
 from tfcompose.load.places import Path, Place
 from tfcompose.load.source import Source

@@ -5,12 +5,12 @@ rcl reads these files by rules of its own (``on`` is true, 012 is ten), so value
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Any
 
 import yaml
 
 from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
-from tfcompose.frozen import dataclass, field
 from tfcompose.load.source import MOST_VALUES, refuse_unreadable
 
 PARAMETERS = "ros__parameters"

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Any
 
 from tfcompose.diagnostic import Allow, Diagnostic, RejectedError, Span, finding
-from tfcompose.frozen import dataclass, field
 from tfcompose.load.comments import allows_in
 from tfcompose.load.nodes import MOST_VALUES, Reader
 from tfcompose.load.not_yaml import no_yaml

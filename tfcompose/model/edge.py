@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.frozen import dataclass
 from tfcompose.pose import angle_between
 
 if TYPE_CHECKING:

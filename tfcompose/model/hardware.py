@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING
-
-from tfcompose.frozen import dataclass, field, replace
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.frozen import dataclass, field
 from tfcompose.plan import ProcessKind, Ready, Simulation, StopRule
 
 STATIC, JOINTS, GUARD = "static", "joints", "guard"

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import slip_of
-from tfcompose.frozen import dataclass, field
 from tfcompose.plan import GuardPolicy, RosSettings
 
 if TYPE_CHECKING:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
-
-from tfcompose.frozen import dataclass, field
 
 #: How names of optical frames end: REP-103's suffix, the spelling of newer ZED wrappers, and a short one.
 OPTICAL_ENDINGS = ("_optical_frame", "_frame_optical", "_optical")

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
-from tfcompose.frozen import dataclass
 from tfcompose.pose import Pose  # noqa: TC001 (the schema reads the types)
 
 EdgeKind = Literal["static", "joint", "dynamic"]

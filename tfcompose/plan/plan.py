@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 
-from tfcompose.frozen import dataclass, field
 from tfcompose.plan.edge import PlanEdge  # noqa: TC001 (the schema reads the types)
 from tfcompose.plan.policy import Claim, GuardPolicy, RosSettings
 from tfcompose.plan.process import PlanProcess  # noqa: TC001 (the schema reads the types)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from typing import Any, Literal
-
-from tfcompose.frozen import dataclass
 
 GuardMode = Literal["off", "watch", "strict"]
 UnknownEdges = Literal["ignore", "warn", "error"]

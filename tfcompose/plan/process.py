@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from tfcompose.frozen import dataclass, field
 from tfcompose.pose import Pose
 
 ProcessKind = Literal["static", "joints", "guard", "simulate", "external", "run"]

@@ -6,10 +6,10 @@ A raw block is text of the user's; its places are lines of the robot file.
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, RejectedError, Span, did_you_mean, finding, nearest
-from tfcompose.frozen import replace
 from tfcompose.load.urdf import load_xml
 from tfcompose.model import Block, Component, Hardware, Interface
 

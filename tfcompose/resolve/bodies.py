@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, finding
-from tfcompose.frozen import dataclass, field, replace
 from tfcompose.model import Inertial, Link, Material, Shape
 from tfcompose.pose import Pose
 from tfcompose.resolve.moments import Moments, Tensor, joined, of_primitive

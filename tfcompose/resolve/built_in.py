@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
-from tfcompose.frozen import replace
 from tfcompose.model import BUILT_IN, GUARD, JOINTS, STATIC, Node, Process
 from tfcompose.resolve.nodes import full_name
 

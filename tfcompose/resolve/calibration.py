@@ -7,10 +7,10 @@ handed in; what is wrong with them is said at the place in the robot file, with 
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, did_you_mean, finding, nearest
-from tfcompose.frozen import dataclass, field, replace
 from tfcompose.load.choices import ROTATIONS
 from tfcompose.model import Calibration
 from tfcompose.resolve.beside import beside

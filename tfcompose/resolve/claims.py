@@ -5,11 +5,11 @@ A claim that cannot be settled by parameters of a process that tfcompose starts 
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, RejectedError, Span, did_you_mean, finding
-from tfcompose.frozen import dataclass, field, replace
 from tfcompose.model import BUILT_IN, Claim, Edge, Node, Process
 from tfcompose.plan import switch_text
 from tfcompose.resolve.node_presets import node_preset, node_preset_names

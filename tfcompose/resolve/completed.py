@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
-from tfcompose.frozen import replace
 from tfcompose.resolve.filling import Filler
 from tfcompose.resolve.isolation import isolate
 from tfcompose.resolve.nodes import has_claims

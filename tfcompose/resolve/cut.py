@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING
-
-from tfcompose.frozen import replace
 
 if TYPE_CHECKING:
     from tfcompose.model import Block, Hardware, Robot

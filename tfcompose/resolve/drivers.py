@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
-from tfcompose.frozen import replace
 from tfcompose.model import BUILT_IN, Node, Process
 from tfcompose.resolve.isolation import settings_of
 from tfcompose.resolve.nodes import full_name, namespace_of

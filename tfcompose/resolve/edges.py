@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, Span, finding
-from tfcompose.frozen import dataclass, field
 from tfcompose.model import JOINTS, STATIC, Edge, Joint, Link, MountedSensor, Process
 from tfcompose.resolve.joints import FREE, idle_keys, joint_of
 from tfcompose.resolve.poses import Draft, pose_of

@@ -8,10 +8,10 @@ together with the files that it names.
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
-from tfcompose.frozen import dataclass, field, replace
 from tfcompose.model import SHELL
 from tfcompose.plan import told_at_start
 from tfcompose.resolve.beside import beside

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import re
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, did_you_mean, finding
-from tfcompose.frozen import dataclass, replace
 from tfcompose.load.urdf import MACRO, load_xml
 from tfcompose.model import BUILT_IN, Node, Process, Robot
 from tfcompose.pose import rpy_from_quat

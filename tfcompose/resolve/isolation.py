@@ -7,10 +7,10 @@ remapped below the namespace for every process at once.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
-from tfcompose.frozen import replace
 from tfcompose.plan import RosSettings
 from tfcompose.resolve.filling import Filler
 

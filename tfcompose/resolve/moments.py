@@ -8,9 +8,9 @@ C r²/2 + 2/5 S r², across C (r²/4 + l²/12) + S (2/5 r² + l²/4 + 3/8 l r). 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.frozen import dataclass
 from tfcompose.pose import Pose, matrix_from_quat, normalised, rotate
 
 if TYPE_CHECKING:

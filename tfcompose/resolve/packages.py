@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import posixpath
 import re
+from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Span, finding, nearest, slip_of
-from tfcompose.frozen import dataclass, field
 from tfcompose.model import Asset
 from tfcompose.resolve.beside import beside
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, finding, nearest
-from tfcompose.frozen import dataclass, field, replace
 from tfcompose.load.params import NodeParams, ParamsFile, Word, load_params
 from tfcompose.model import AsInFile
 from tfcompose.resolve.beside import beside

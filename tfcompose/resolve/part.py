@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, did_you_mean, finding
-from tfcompose.frozen import dataclass, field, replace
 from tfcompose.load import Place, Source, lay_over
 from tfcompose.model import Part
 from tfcompose.plan import RosSettings

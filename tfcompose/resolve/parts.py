@@ -6,11 +6,11 @@ prefix, the namespace, the shared frames and the isolation. Then a part gets the
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, did_you_mean, finding
-from tfcompose.frozen import dataclass, field, replace
 from tfcompose.load import composed, load, with_includes
 from tfcompose.resolve.beside import beside
 from tfcompose.resolve.part import Joined, PartEntry

@@ -6,10 +6,10 @@ its mount. Both are solved through fixed edges only: what moves has no pose befo
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, did_you_mean, finding
-from tfcompose.frozen import dataclass, field, replace
 from tfcompose.model import STATIC, is_optical
 from tfcompose.pose import IDENTITY_XYZW, OPTICAL_XYZW, Pose, multiply
 

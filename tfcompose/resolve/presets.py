@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, did_you_mean, finding
-from tfcompose.frozen import dataclass
 
 if TYPE_CHECKING:
     from tfcompose.load import Path, Source

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 from tfcompose.diagnostic import Diagnostic, Note, did_you_mean, finding
-from tfcompose.frozen import replace
 from tfcompose.load.choices import SIMULATIONS
 from tfcompose.model import BUILT_IN, Node, Process
 from tfcompose.plan import Simulation

@@ -10,10 +10,10 @@ from __future__ import annotations
 import itertools
 import math
 import re
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import RejectedError
-from tfcompose.frozen import dataclass, field
 from tfcompose.imported import Recognised
 from tfcompose.pose import Pose, angle_between
 from tfcompose.resolve.poses import rotation_of

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from tfcompose.frozen import dataclass, replace
 from tfcompose.model import BUILT_IN
 
 if TYPE_CHECKING:

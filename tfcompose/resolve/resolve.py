@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, cast
 
 from tfcompose.diagnostic import Diagnostic, finding
-from tfcompose.frozen import dataclass, field, replace
 from tfcompose.model import Edge, Process, Robot
 from tfcompose.plan import GuardPolicy
 from tfcompose.resolve.beside import beside

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import did_you_mean, finding
-from tfcompose.frozen import dataclass, field
 from tfcompose.model import STATIC, Edge, Link, MountedSensor
 from tfcompose.pose import Pose
 from tfcompose.resolve.bodies import inertial_of

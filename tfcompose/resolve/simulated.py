@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
-from tfcompose.frozen import replace
 from tfcompose.plan import Sweep
 from tfcompose.validate.running import SWEEP
 

@@ -7,10 +7,10 @@ second, 20 unless told otherwise, a joint state is passed on; ``robot_descriptio
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, finding
-from tfcompose.frozen import replace
 from tfcompose.model import JOINTS, STATIC, Node
 from tfcompose.resolve.nodes import full_name
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.frozen import dataclass, field
 from tfcompose.model import SHELL, AsInFile, Node, Process
 
 if TYPE_CHECKING:

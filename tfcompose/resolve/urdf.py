@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, finding
-from tfcompose.frozen import replace
 from tfcompose.model import Block, Robot
 from tfcompose.resolve.blocks import REFERRING, references
 from tfcompose.resolve.urdf_bodies import Bodies

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.diagnostic import Span
-from tfcompose.frozen import replace
 from tfcompose.load.urdf import load_xml
 from tfcompose.model import Component, Hardware, Interface
 

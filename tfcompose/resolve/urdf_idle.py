@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.frozen import replace
 from tfcompose.load.urdf import load_xml
 from tfcompose.resolve.blocks import references
 

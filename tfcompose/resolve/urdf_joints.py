@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from tfcompose.diagnostic import did_you_mean
-from tfcompose.frozen import replace
 from tfcompose.model import (
     JOINTS,
     STATIC,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.frozen import replace
 from tfcompose.resolve.bodies import materials
 
 if TYPE_CHECKING:

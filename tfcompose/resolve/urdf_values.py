@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Severity, Span, finding
-from tfcompose.frozen import dataclass, field
 from tfcompose.pose import Pose, normalised, quat_from_rpy, rpy_from_quat
 
 if TYPE_CHECKING:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
-from tfcompose.frozen import dataclass, field
 from tfcompose.pose import Pose
 from tfcompose.validate.fields import NUMBER_
 from tfcompose.validate.rotation import MATRIX, QUAT_XYZW

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.diagnostic import Diagnostic, Edit, Note, RejectedError, finding
-from tfcompose.frozen import dataclass, field
 from tfcompose.load.choices import CHOICES
 from tfcompose.validate.claims import NodePresetSpec
 from tfcompose.validate.joint_units import refuse_units_of_others

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.check.envelope import envelope, is_near
 from tfcompose.diagnostic import Diagnostic, Note, finding
-from tfcompose.frozen import replace
 from tfcompose.pose import Pose, norm
 
 if TYPE_CHECKING:

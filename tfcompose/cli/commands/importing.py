@@ -10,6 +10,7 @@ import os
 import posixpath
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +22,6 @@ from tfcompose.compile import Compiled, compile_robot
 from tfcompose.diagnostic import RejectedError, Span
 from tfcompose.emit import Target
 from tfcompose.emit.spec import robot_name, spec
-from tfcompose.frozen import replace
 from tfcompose.imported import Imported
 from tfcompose.resolve.packages import Packages
 from tfcompose.resolve.recognise import recognised

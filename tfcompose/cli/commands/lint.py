@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 import sys
+from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,6 @@ from tfcompose.cli.options import DEFAULT_FILE, add_variant
 from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
 from tfcompose.compile import compile_source, profiles_of
 from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, finding
-from tfcompose.frozen import replace
 from tfcompose.load import load, with_includes
 from tfcompose.render.text import summary
 

@@ -20,9 +20,9 @@ from hypothesis import HealthCheck, settings
 
 from tests.domains import reserved_domain
 from tests.waiting import TIMEOUT_S, until
+from tfcompose.geometry import Pose
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.plan.file import write_plan
-from tfcompose.pose import Pose
 from tfcompose.ros.environment import missing_ros
 
 if TYPE_CHECKING:

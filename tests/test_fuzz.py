@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
-from tfcompose.diagnostic import RejectedError
 from tfcompose.emit import emit
+from tfcompose.findings import RejectedError
 from tfcompose.plan.file import read_plan
 from tfcompose.render.json import render_json
 from tfcompose.render.text import render_text
@@ -128,7 +128,7 @@ def test_any_change_of_a_plan_is_read_or_refused(data: Any) -> None:
     try:
         read_plan(json.dumps(data), "plan.json")
     except RejectedError as error:
-        assert [one.code for one in error.diagnostics] == ["TF902"]  # noqa: PT017 (being read is fine too)
+        assert [one.code for one in error.findings] == ["TF902"]  # noqa: PT017 (being read is fine too)
 
 
 @pytest.mark.parametrize("value", [10**400, -(10**400), 1e308, float("nan"), float("inf"), True, None, "1", [], {}])
@@ -139,7 +139,7 @@ def test_a_plan_with_a_wrong_value_in_an_edge_is_refused_or_read_and_never_crash
     try:
         read_plan(json.dumps(data), "plan.json")
     except RejectedError as error:
-        assert [one.code for one in error.diagnostics] == ["TF902"]  # noqa: PT017 (being read is fine too)
+        assert [one.code for one in error.findings] == ["TF902"]  # noqa: PT017 (being read is fine too)
 
 
 @given(st.text())

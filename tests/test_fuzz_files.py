@@ -16,7 +16,7 @@ WORK = r"""
 import random, resource, sys, time
 from tfcompose.cli.shelves import library
 from tfcompose.compile import compile_robot
-from tfcompose.diagnostic import RejectedError, Span, finding
+from tfcompose.findings import RejectedError, Span, finding
 from tfcompose.emit import emit
 from tfcompose.resolve.packages import Disk
 

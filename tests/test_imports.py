@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "tfcompose"
 
-FOUNDATIONS = {"__init__", "codes", "diagnostic", "pose", "model", "plan"}
+FOUNDATIONS = {"__init__", "codes", "findings", "geometry", "model", "plan"}
 STAGES = {"load", "validate", "resolve", "check"}
 
 #: Which parts of the package each part may import, besides itself.
@@ -20,22 +20,22 @@ MAY_IMPORT: dict[str, set[str]] = {
     "__init__": set(),
     "codes": set(),
     "interrupt": set(),
-    "diagnostic": {"codes"},
-    "pose": set(),
-    "plan": {"diagnostic", "pose"},
-    "model": {"diagnostic", "plan", "pose"},
-    "imported": {"model", "pose"},
-    "load": {"diagnostic"},
-    "render": {"codes", "diagnostic", "pose"},
-    "validate": {"diagnostic", "load", "pose"},
-    "resolve": {"diagnostic", "imported", "load", "model", "plan", "pose", "validate"},
-    "check": {"codes", "diagnostic", "load", "model", "pose"},
+    "findings": {"codes"},
+    "geometry": set(),
+    "plan": {"findings", "geometry"},
+    "model": {"findings", "plan", "geometry"},
+    "imported": {"model", "geometry"},
+    "load": {"findings"},
+    "render": {"codes", "findings", "geometry"},
+    "validate": {"findings", "load", "geometry"},
+    "resolve": {"findings", "imported", "load", "model", "plan", "geometry", "validate"},
+    "check": {"codes", "findings", "load", "model", "geometry"},
     "draw": set(),
-    "emit": {"draw", "imported", "model", "plan", "pose"},
-    "ros": {"diagnostic", "interrupt", "plan", "pose"},
-    "verdict": {"diagnostic", "plan", "pose"},
-    "run": {"diagnostic", "interrupt", "plan", "pose", "ros", "verdict"},
-    "observe": {"diagnostic", "model", "plan", "pose", "ros", "verdict"},
+    "emit": {"draw", "imported", "model", "plan", "geometry"},
+    "ros": {"findings", "interrupt", "plan", "geometry"},
+    "verdict": {"findings", "plan", "geometry"},
+    "run": {"findings", "interrupt", "plan", "geometry", "ros", "verdict"},
+    "observe": {"findings", "model", "plan", "geometry", "ros", "verdict"},
     "compile": FOUNDATIONS | STAGES,
     "cli": {"*"},
     "__main__": {"cli"},
@@ -209,7 +209,7 @@ def test_reading_and_supervising_a_plan_loads_nothing_from_elsewhere_and_no_comp
 
 
 def test_the_buffer_loads_neither_ros_nor_numpy_until_arrays_are_asked_for(bare: set[str]) -> None:
-    one = "from tfcompose.observe import Buffer; from tfcompose.pose import Pose; b = Buffer(); "
+    one = "from tfcompose.observe import Buffer; from tfcompose.geometry import Pose; b = Buffer(); "
     one += "b.set('a', 'b', Pose(), 1, static=False); b.lookup_transform('a', 'b', 0)"
     assert not foreign(loaded_by(one), bare)
     assert "numpy" in foreign(loaded_by(one + "; b.lookup_many('a', 'b', [1])"), bare)

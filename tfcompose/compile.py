@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.check import apply, check, levelled, unknown_rules, with_edits, with_replaced
-from tfcompose.diagnostic import Allow, Diagnostic, RejectedError
+from tfcompose.findings import Allow, Finding, RejectedError
 from tfcompose.load import Source, composed, load, with_includes
 from tfcompose.resolve import Disk, Library, Whole, resolve
 from tfcompose.validate import validate
@@ -33,13 +33,13 @@ class Compiled:
     """
 
     robot: Robot | None
-    found: tuple[Diagnostic, ...]
+    found: tuple[Finding, ...]
     allows: tuple[Allow, ...] = ()
     used: frozenset[tuple[Allow, str]] = frozenset()
     sources: tuple[Source, ...] = ()
 
     @property
-    def errors(self) -> tuple[Diagnostic, ...]:
+    def errors(self) -> tuple[Finding, ...]:
         """The findings that stand in the way of a build."""
         return tuple(found for found in self.found if found.severity == "error")
 
@@ -63,7 +63,7 @@ def compile_robot(  # noqa: PLR0913 (text, and what is laid over it)
         source = load(text, file)
         source = with_includes(source, read) if read else source
     except RejectedError as error:
-        return Compiled(None, error.diagnostics)
+        return Compiled(None, error.findings)
     return compile_source(source, library, profiles, overlays, read, disk)
 
 
@@ -79,7 +79,7 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     try:
         validated = validate(composed(source, profiles, overlays), source.data.get("profiles"))
     except RejectedError as error:
-        return Compiled(None, error.diagnostics)
+        return Compiled(None, error.findings)
     resolved = resolve(validated, library, read, disk)
     later = [*resolved.found, *_about_parts(check(resolved.robot), resolved.whole)]
     source = validated.source
@@ -96,9 +96,9 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     return Compiled(resolved.robot, tuple(ordered), source.allows, frozenset(used), sources)
 
 
-def _once(found: list[Diagnostic]) -> list[Diagnostic]:
+def _once(found: list[Finding]) -> list[Finding]:
     """Return each finding once; where two differ in their notes only, as of a part that is there twice, with all."""
-    first: dict[Diagnostic, Diagnostic] = {}
+    first: dict[Finding, Finding] = {}
     for one in found:
         alone = replace(one, notes=()) if one.notes else one
         before = first.setdefault(alone, one)
@@ -108,7 +108,7 @@ def _once(found: list[Diagnostic]) -> list[Diagnostic]:
     return list(first.values())
 
 
-def _about_parts(found: list[Diagnostic], whole: Whole) -> list[Diagnostic]:
+def _about_parts(found: list[Finding], whole: Whole) -> list[Finding]:
     """Return the findings; those about the files of parts with a note that says which part it is.
 
     Warnings about files that somebody else wrote are left out: who holds the part cannot mend them, and ``lint`` of
@@ -125,7 +125,7 @@ def _about_parts(found: list[Diagnostic], whole: Whole) -> list[Diagnostic]:
     return said
 
 
-def _stands(found: Diagnostic, validated: Validated) -> bool:
+def _stands(found: Finding, validated: Validated) -> bool:
     """Whether a later finding is not merely a consequence of an entry that was refused already."""
     if found.code not in _FROM_A_POSE:
         return True

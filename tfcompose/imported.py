@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tfcompose.geometry import Quaternion, Vector
     from tfcompose.model import Edge, Robot
-    from tfcompose.pose import Quaternion, Vector
 
 #: A section of the robot file and the name of an entry in it; of the whole file both are empty.
 Entry = tuple[str, str]

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.observe import Buffer
-from tfcompose.pose import Pose, quat_from_rpy
 from tfcompose.ros.decoder import Decoder
 from tfcompose.ros.message import Transform, encode
 

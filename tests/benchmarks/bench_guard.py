@@ -17,9 +17,9 @@ from statistics import median
 import psutil
 import pytest
 
+from tfcompose.geometry import Pose
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.plan.file import write_plan
-from tfcompose.pose import Pose
 
 EDGES, TOGETHER, HERTZ = 1000, 100, 50.0
 ROUNDS, ROUND_S = 3, 4.0

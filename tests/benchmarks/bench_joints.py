@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from tfcompose.geometry import Pose
 from tfcompose.plan import Joint, Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.plan.file import write_plan
-from tfcompose.pose import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from tfcompose.pose import Pose
+from tfcompose.geometry import Pose
 
 EDGES = 500
 MESSAGES = 2000

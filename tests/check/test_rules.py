@@ -17,13 +17,13 @@ from tfcompose.cli.disk import moments as measured
 from tfcompose.cli.terminal import read_text
 from tfcompose.codes import CODES
 from tfcompose.compile import Compiled, compile_robot
-from tfcompose.diagnostic import Diagnostic, Span
+from tfcompose.findings import Finding, Span
 from tfcompose.resolve import Disk
 
 if TYPE_CHECKING:
     from tfcompose.check import Rule
+    from tfcompose.geometry import Vector
     from tfcompose.model import Robot
-    from tfcompose.pose import Vector
     from tfcompose.resolve.moments import Moments
 
 SPECS = sorted((Path(__file__).parent / "specs").glob("*.yaml"))
@@ -65,7 +65,7 @@ def moments(name: str, scale: Vector) -> Moments:
     return measured(str(SPECS[0].parent / name), scale)
 
 
-def places(found: tuple[Diagnostic, ...]) -> set[tuple[int, str]]:
+def places(found: tuple[Finding, ...]) -> set[tuple[int, str]]:
     return {(one.span.line, one.code) for one in found if one.span}
 
 
@@ -166,7 +166,7 @@ def test_the_nearest_known_name_is_the_advice() -> None:
 
 
 def test_a_rule_that_crashes_is_a_finding_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    def crash(robot: Robot) -> list[Diagnostic]:
+    def crash(robot: Robot) -> list[Finding]:
         raise RuntimeError(robot.name)
 
     monkeypatch.setattr(sys.modules["tfcompose.check.check"], "RULES", (type(RULES[0])("TF299", crash), *RULES))  # type: ignore[arg-type]

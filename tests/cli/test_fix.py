@@ -17,13 +17,13 @@ from hypothesis import strategies as st
 from tfcompose.cli.compiling import library
 from tfcompose.cli.fixing import Fixer, edited, rewrite
 from tfcompose.compile import compile_robot
-from tfcompose.diagnostic import Edit, RejectedError, Span, finding, slip_of
+from tfcompose.findings import Edit, RejectedError, Span, finding, slip_of
 from tfcompose.load import load, with_includes
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
 
 HEAD = "tfcompose: 1  # version\nrobot: r\n"
 PRESETS = library()
@@ -32,7 +32,7 @@ EXAMPLES_OF_ROBOTS = [file.read_text("utf-8") for file in (Path(__file__).parent
 ROBOTS = [text for text in EXAMPLES_OF_ROBOTS if "\nparts:" not in text]
 
 
-def lint(file: str, read: Callable[[str], str]) -> list[Diagnostic]:
+def lint(file: str, read: Callable[[str], str]) -> list[Finding]:
     return list(compile_robot(read(file), file, PRESETS, read=read).found)
 
 

@@ -17,8 +17,8 @@ from tfcompose.cli.compiling import library
 from tfcompose.cli.disk import disk
 from tfcompose.cli.urdf import CODES, lint_urdf
 from tfcompose.compile import compile_robot
-from tfcompose.diagnostic import Diagnostic, RejectedError, Span
 from tfcompose.emit import emit
+from tfcompose.findings import Finding, RejectedError, Span
 from tfcompose.load.urdf import load_xml
 from tfcompose.resolve.packages import Packages
 from tfcompose.resolve.urdf import robot_of_urdf
@@ -34,11 +34,11 @@ def marks(text: str) -> list[tuple[int, str]]:
     return [(number, code) for number, line in lines for hit in MARK.findall(line) for code in hit.split()]
 
 
-def lint_text(text: str) -> tuple[Diagnostic, ...]:
+def lint_text(text: str) -> tuple[Finding, ...]:
     try:
         return robot_of_urdf(load_xml(text, "r.urdf"), "r.urdf", Packages().asset)[1]
     except RejectedError as error:
-        return error.diagnostics
+        return error.findings
 
 
 def run(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
@@ -167,7 +167,7 @@ def test_a_package_is_looked_for_where_ros_looks(tmp_path: Path, monkeypatch: py
     mesh.touch()
     monkeypatch.setenv("AMENT_PREFIX_PATH", f"/nowhere:{tmp_path}")
 
-    def missing(name: str) -> Diagnostic | None:
+    def missing(name: str) -> Finding | None:
         return Packages(disk()).asset(name, Span(str(tmp_path / "a.urdf")))[1]
 
     assert missing("package://mine/meshes/a.stl") is None

@@ -8,9 +8,9 @@ import pytest
 
 from tfcompose.cli import main
 from tfcompose.cli.live_graph import graph_of_censuses
+from tfcompose.geometry import Pose
 from tfcompose.observe.census import Census, Publisher
 from tfcompose.plan import Plan, PlanEdge, RosSettings
-from tfcompose.pose import Pose
 
 SECOND = 1_000_000_000
 

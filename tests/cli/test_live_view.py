@@ -22,10 +22,10 @@ from tests.waiting import TIMEOUT_S, until
 from tfcompose.cli.console import Console
 from tfcompose.cli.printable import coloured_only, plain
 from tfcompose.cli.status import Status
-from tfcompose.diagnostic import finding
+from tfcompose.findings import finding
+from tfcompose.geometry import Pose
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.plan.file import write_plan
-from tfcompose.pose import Pose
 from tfcompose.run.launcher.notice import Ended, FindingShown, LogLine, OwnerLive, ProcessState, Stopping
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import jsonschema
 import pytest
 
 from tfcompose.cli.commands.schema import schema_text
-from tfcompose.diagnostic import RejectedError
+from tfcompose.findings import RejectedError
 from tfcompose.plan.file import read_plan
 
 if TYPE_CHECKING:

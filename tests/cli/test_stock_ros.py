@@ -50,7 +50,7 @@ import sys, xml.etree.ElementTree as ET
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
-from tfcompose.pose import Pose, quat_from_rpy
+from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.ros.message import Transform, encode
 from tfcompose.ros.node import JOINT_STATES, latch, open_node
 from tfcompose.ros.stop import Stop

@@ -12,8 +12,8 @@ import yaml
 from tfcompose.cli.compiling import library
 from tfcompose.cli.disk import disk
 from tfcompose.compile import compile_robot
-from tfcompose.diagnostic import RejectedError
 from tfcompose.emit import Target, emit
+from tfcompose.findings import RejectedError
 from tfcompose.plan import PlanProcess, Ready, StopRule
 from tfcompose.plan.file import read_plan, write_plan
 from tfcompose.run.launcher.executable import filled_in, folder_of, own_env
@@ -21,7 +21,7 @@ from tfcompose.run.launcher.executable import filled_in, folder_of, own_env
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
 
 HEAD = "tfcompose: 1\nrobot: r\nros: {namespace: r1}\nframes: {map: {}}\nrules: {TF818: off, TF848: off}\nprocesses:\n"
 EXE = "run: {package: p, executable: e}"
@@ -207,7 +207,7 @@ processes:
 """
 
 
-def built_at(tmp_path: Path, folder: str, text: str = FILES) -> list[Diagnostic] | tuple[str, PlanProcess]:
+def built_at(tmp_path: Path, folder: str, text: str = FILES) -> list[Finding] | tuple[str, PlanProcess]:
     """Return the plan's text and its process, built to a folder beside the robot's; or what was found."""
     (tmp_path / "robots/maps").mkdir(parents=True, exist_ok=True)
     (tmp_path / "robots/maps/a.yaml").touch()

@@ -23,12 +23,12 @@ from tfcompose.emit import emit
 from tfcompose.emit.markup import quoted
 from tfcompose.emit.numbers import clean_quat, clean_rpy, number
 from tfcompose.emit.urdf import urdf
+from tfcompose.geometry import Pose, angle_between, quat_from_axis_angle, quat_from_rpy
 from tfcompose.model import JOINTS, STATIC
-from tfcompose.pose import Pose, angle_between, quat_from_axis_angle, quat_from_rpy
 
 if TYPE_CHECKING:
+    from tfcompose.geometry import Quaternion
     from tfcompose.model import Robot
-    from tfcompose.pose import Quaternion
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 CASES = [("my_robot", ()), ("autonomous_robot", ()), ("autonomous_robot", ("demo",))]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
+from tfcompose.findings import Finding, RejectedError, Span, finding
 from tfcompose.load import Source, composed, load, set_value, with_includes
 
 
@@ -17,10 +17,10 @@ def included(files: dict[str, str], file: str = "robot.yaml") -> Source:
     return with_includes(load(files[file], file), read)
 
 
-def refused(files: dict[str, str]) -> tuple[Diagnostic, ...]:
+def refused(files: dict[str, str]) -> tuple[Finding, ...]:
     with pytest.raises(RejectedError) as rejected:
         included(files)
-    return rejected.value.diagnostics
+    return rejected.value.findings
 
 
 def test_a_file_is_laid_over_what_it_includes() -> None:
@@ -132,7 +132,7 @@ def test_an_included_file_may_be_completed_by_what_stands_there_already() -> Non
 def test_a_setting_cannot_include() -> None:
     with pytest.raises(RejectedError) as refused:
         set_value("include=[a.yaml]")
-    assert [one.code for one in refused.value.diagnostics] == ["TF016"]
+    assert [one.code for one in refused.value.findings] == ["TF016"]
 
 
 def test_true_is_not_one() -> None:
@@ -158,7 +158,7 @@ def test_a_setting_is_a_path_and_a_yaml_value(setting: str, data: dict[str, obje
 def test_what_is_no_setting_is_refused(setting: str) -> None:
     with pytest.raises(RejectedError) as rejected:
         set_value(setting)
-    assert [found.code for found in rejected.value.diagnostics] == ["TF016"]
+    assert [found.code for found in rejected.value.findings] == ["TF016"]
 
 
 def test_a_fault_in_a_setting_is_placed_at_the_setting() -> None:

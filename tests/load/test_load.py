@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tfcompose.diagnostic import RejectedError, Span
+from tfcompose.findings import RejectedError, Span
 from tfcompose.load import Source, composed, load
 from tfcompose.load.places import Place
 
@@ -179,7 +179,7 @@ def test_what_yaml_allows_and_a_robot_does_not_is_one_finding(text: str, code: s
 def test_what_is_no_yaml_is_one_finding_with_its_place(text: str, code: str, line: int, column: int) -> None:
     with pytest.raises(RejectedError) as rejected:
         load(text, "f")
-    (found,) = rejected.value.diagnostics
+    (found,) = rejected.value.findings
     assert (found.code, found.span and (found.span.line, found.span.column)) == (code, (line, column))
 
 
@@ -195,7 +195,7 @@ def test_what_is_no_yaml_is_one_finding_with_its_place(text: str, code: str, lin
 def test_a_file_for_another_command_is_one_finding_that_says_which(text: str, message: str, advice: str) -> None:
     with pytest.raises(RejectedError) as rejected:
         load(text, "f")
-    (found,) = rejected.value.diagnostics
+    (found,) = rejected.value.findings
     assert found.message.startswith(message)
     assert advice in found.help
     assert bool(found.help) == bool(advice)
@@ -233,7 +233,7 @@ def test_what_is_too_large_for_a_robot_is_refused_soon(case: str) -> None:
     began = time.process_time()
     with pytest.raises(RejectedError) as rejected:
         load(LARGE[case], "f")
-    assert [one.code for one in rejected.value.diagnostics] == ["TF008"]
+    assert [one.code for one in rejected.value.findings] == ["TF008"]
     assert time.process_time() - began < 10
 
 
@@ -315,7 +315,7 @@ def test_profiles_of_a_wrong_form_are_found_without_choosing_one(profiles: str) 
 def test_an_unknown_profile_is_refused_once_with_the_nearest_name() -> None:
     with pytest.raises(RejectedError) as rejected:
         laid(BASE, "merg", "merg")
-    (found,) = rejected.value.diagnostics
+    (found,) = rejected.value.findings
     assert (found.code, found.help) == ("TF009", "did you mean merge?")
 
 

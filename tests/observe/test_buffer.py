@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
+from tfcompose.geometry import OPTICAL_XYZW, Pose, Quaternion, angle_between, quat_from_rpy
 from tfcompose.observe.buffer import (
     CACHE_NS,
     Buffer,
@@ -18,7 +19,6 @@ from tfcompose.observe.buffer import (
     LookupException,
 )
 from tfcompose.observe.rotation import IDENTITY, between, unit
-from tfcompose.pose import OPTICAL_XYZW, Pose, Quaternion, angle_between, quat_from_rpy
 
 S = 1_000_000_000
 

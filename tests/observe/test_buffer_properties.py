@@ -12,8 +12,8 @@ from pytransform3d.transform_manager import TransformManager
 from pytransform3d.transformations import transform_from_pq
 from scipy.spatial.transform import Rotation, Slerp
 
+from tfcompose.geometry import Pose, Quaternion, angle_between, normalised
 from tfcompose.observe import Buffer, TransformException
-from tfcompose.pose import Pose, Quaternion, angle_between, normalised
 from tfcompose.ros.decoder import Decoder
 from tfcompose.ros.message import Transform, encode
 

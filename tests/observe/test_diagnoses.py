@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from tfcompose.geometry import Pose
 from tfcompose.observe.census import Census, Publisher
 from tfcompose.observe.diagnose import diagnose
 from tfcompose.observe.diagnose.surroundings import differences
 from tfcompose.observe.joint_list import joints_of
 from tfcompose.observe.seen import RosProcess, Seen, Stamped, Topic
 from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
-from tfcompose.pose import Pose
 from tfcompose.ros.settings import RANGE
 from tfcompose.verdict.clock import seconds
 

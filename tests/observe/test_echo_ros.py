@@ -16,10 +16,10 @@ from builtin_interfaces.msg import Time
 from rosgraph_msgs.msg import Clock
 
 from tests.waiting import until
+from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.observe.asked import Asked
 from tfcompose.observe.echo import echo as run_echo
 from tfcompose.plan import PlanProcess, Simulation
-from tfcompose.pose import Pose, quat_from_rpy
 from tfcompose.ros.clock import SimClock
 from tfcompose.ros.message import Transform, encode
 from tfcompose.ros.node import Stop, open_node

@@ -14,8 +14,8 @@ from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
 from tests.waiting import none_but
+from tfcompose.geometry import Pose
 from tfcompose.observe import Buffer, Listener, TransformListener
-from tfcompose.pose import Pose
 from tfcompose.ros.message import Transform, encode
 from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFPublisher
@@ -134,7 +134,7 @@ def test_a_node_with_use_sim_time_clears_the_buffer_that_it_was_given_to_once(do
 import rclpy, sys
 from rclpy.time import Time
 from tfcompose.observe import Buffer, TransformListener
-from tfcompose.pose import Pose
+from tfcompose.geometry import Pose
 rclpy.init(args=["--ros-args", "-p", "use_sim_time:=true"])
 node = rclpy.create_node("asks")
 buffer = Buffer(node=node)

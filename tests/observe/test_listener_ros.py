@@ -18,9 +18,9 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.time import Time
 
 from tests.waiting import none_but
+from tfcompose.geometry import Pose
 from tfcompose.observe import Buffer, LookupException, TransformException, TransformListener
 from tfcompose.plan import PlanProcess, Simulation
-from tfcompose.pose import Pose
 from tfcompose.ros.graph import writers
 from tfcompose.ros.message import Transform, encode
 from tfcompose.ros.node import open_node

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.observe import Buffer, ConnectivityException, ExtrapolationException, InvalidArgumentException
-from tfcompose.pose import Pose, quat_from_rpy
 
 S = 1_000_000_000
 

@@ -20,8 +20,8 @@ from rclpy.time import Time
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import PointCloud2, PointField
 
+from tfcompose.geometry import Pose, normalised
 from tfcompose.observe import Buffer, TypeException
-from tfcompose.pose import Pose, normalised
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

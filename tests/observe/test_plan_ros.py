@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.observe.stage import LOOKS_S, doctor, finds_nothing, message, said, says
-from tfcompose.pose import OPTICAL_XYZW
+from tfcompose.geometry import OPTICAL_XYZW
 from tfcompose.ros.tf import TFPublisher
 
 if TYPE_CHECKING:

@@ -16,6 +16,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tfcompose import observe
+from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.observe import (
     Buffer,
     BufferInterface,
@@ -32,7 +33,6 @@ from tfcompose.observe import (
     stamped,
 )
 from tfcompose.observe.stamped import Header, Time, Vector3
-from tfcompose.pose import Pose, quat_from_rpy
 
 S = 1_000_000_000
 

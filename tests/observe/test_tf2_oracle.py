@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
+from tfcompose.geometry import Pose, Quaternion, angle_between, normalised
 from tfcompose.observe import Buffer, TransformException
-from tfcompose.pose import Pose, Quaternion, angle_between, normalised
 
 tf2 = pytest.importorskip("tf2_py")
 messages = pytest.importorskip("geometry_msgs.msg")

@@ -15,8 +15,8 @@ from typing import Any
 
 import pytest
 
+from tfcompose.geometry import angle_between, normalised
 from tfcompose.observe import Buffer, TransformException
-from tfcompose.pose import angle_between, normalised
 
 FILE = Path(__file__).with_name("tf2_answers.jsonl")
 S = 1_000_000_000

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from tfcompose.geometry import Pose, angle_between, quat_from_rpy
 from tfcompose.observe import (
     Buffer,
     ConnectivityException,
@@ -17,7 +18,6 @@ from tfcompose.observe import (
 )
 from tfcompose.observe.refusal import Refusal
 from tfcompose.observe.stamped import Header, Quaternion, Time, Transform, TransformStamped, Vector3
-from tfcompose.pose import Pose, angle_between, quat_from_rpy
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

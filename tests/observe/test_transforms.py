@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tfcompose.geometry import Pose, normalised, quat_from_rpy
 from tfcompose.observe import Buffer, InvalidArgumentException
 from tfcompose.observe.exceptions import TypeException
 from tfcompose.observe.stamped import Header, Quaternion, Time, Vector3
 from tfcompose.observe.transforms import do_transform_cloud, transform_covariance
-from tfcompose.pose import Pose, normalised, quat_from_rpy
 
 S = 1_000_000_000
 QUAT = normalised((0.1, -0.7, 0.3, 0.6))

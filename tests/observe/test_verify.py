@@ -11,17 +11,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.observe.census import Census, Publisher
 from tfcompose.observe.verify import verify
 from tfcompose.plan import Driven, GuardPolicy, Joint, Plan, PlanEdge, PlanProcess, RosSettings
-from tfcompose.pose import Pose, quat_from_rpy
 from tfcompose.ros.topics import parts_of
 from tfcompose.verdict.offset import Offset, offset_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
 
 S = 10**9
 TOPICS = ("/tf", "/tf_static")
@@ -75,7 +75,7 @@ class Tree:
             row = (parent, child, *divmod(stamp, S), *pose.xyz, *pose.quat_xyzw)
             self.census.take([row], static=static, gid=gid, received_ns=received)
 
-    def told(self, plan: Plan, *, graph: bool = True) -> list[Diagnostic]:
+    def told(self, plan: Plan, *, graph: bool = True) -> list[Finding]:
         for child, words in self.sent.items():
             self.send(child, **words)
         if graph:
@@ -91,7 +91,7 @@ def tree() -> Tree:
     return Tree()
 
 
-def only(found: list[Diagnostic]) -> tuple[str, str]:
+def only(found: list[Finding]) -> tuple[str, str]:
     [one] = found
     return one.code, one.message
 

@@ -11,7 +11,7 @@ import pytest
 
 from tests.observe.bags import write_bag
 from tests.observe.test_bag import UP, drive, tfcompose
-from tfcompose.pose import quat_from_rpy
+from tfcompose.geometry import quat_from_rpy
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -12,9 +12,9 @@ import pytest
 
 from tests.observe.stage import at_last
 from tests.observe.test_monitor_ros import sending
+from tfcompose.geometry import Pose
 from tfcompose.plan import PlanProcess, Simulation
 from tfcompose.plan.file import read_plan, write_plan
-from tfcompose.pose import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Callable

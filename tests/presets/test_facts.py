@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from tfcompose.cli.shelves import library
-from tfcompose.pose import IDENTITY_XYZW, OPTICAL_XYZW, angle_between, quat_from_rpy
+from tfcompose.geometry import IDENTITY_XYZW, OPTICAL_XYZW, angle_between, quat_from_rpy
 from tfcompose.resolve.poses import rotation_of
 from tfcompose.resolve.presets import filled
 

@@ -13,11 +13,11 @@ import pytest
 
 from tfcompose.cli.shelves import library
 from tfcompose.compile import compile_robot
-from tfcompose.pose import Pose, rotate
+from tfcompose.geometry import Pose, rotate
 
 if TYPE_CHECKING:
+    from tfcompose.geometry import Vector
     from tfcompose.model import Robot
-    from tfcompose.pose import Vector
 
 KNOWN = library()
 HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"

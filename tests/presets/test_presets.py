@@ -13,8 +13,8 @@ import pytest
 
 from tfcompose.cli.shelves import library
 from tfcompose.compile import compile_robot
+from tfcompose.geometry import angle_between, rotate
 from tfcompose.model import is_optical
-from tfcompose.pose import angle_between, rotate
 from tfcompose.resolve.presets import filled
 
 if TYPE_CHECKING:

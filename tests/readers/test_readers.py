@@ -21,9 +21,9 @@ from tests.readers.readers import Body, Drake, MuJoCo, Pinocchio, Reader, Yourdf
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
+from tfcompose.geometry import Pose
 from tfcompose.plan import RosSettings
 from tfcompose.plan.file import read_plan
-from tfcompose.pose import Pose
 from tfcompose.ros.joint_message import encode_names, fill
 from tfcompose.ros.message import decode
 from tfcompose.run.publishing.joint_mover import JointMover, Told

@@ -19,7 +19,7 @@ from tfcompose.check.pages import page
 from tfcompose.cli.compiling import library
 from tfcompose.codes import CODES
 from tfcompose.compile import compile_robot
-from tfcompose.diagnostic import Diagnostic, Note, Span
+from tfcompose.findings import Finding, Note, Span
 from tfcompose.render.sarif import render_sarif
 
 SPECS = sorted((Path(__file__).parents[1] / "check" / "specs").glob("*.yaml"))
@@ -32,7 +32,7 @@ PAGES = {code: page(code) for code in CODES}
 VALIDATOR = Draft4Validator(SCHEMA)
 
 
-def written(found: list[Diagnostic]) -> Any:
+def written(found: list[Finding]) -> Any:
     """Return the one run that is written of the findings; what the schema refuses is an error."""
     log = json.loads(render_sarif(found, __version__, PAGES))
     VALIDATOR.validate(log)
@@ -40,7 +40,7 @@ def written(found: list[Diagnostic]) -> Any:
     return run
 
 
-def findings(spec: Path) -> list[Diagnostic]:
+def findings(spec: Path) -> list[Finding]:
     return list(compile_robot(spec.read_text("utf-8"), spec.name, library()).found)
 
 
@@ -87,7 +87,7 @@ def test_each_rule_stands_once_with_its_page_and_in_one_line_what_it_says() -> N
     "file", ["a b.yaml", "ü/r#1.yaml", "50%.yaml", "--set a=b c", "../r.yaml", "/abs/r.yaml", "\udcff.yaml"]
 )
 def test_a_file_with_any_name_is_a_uri_that_leads_back_to_it(file: str) -> None:
-    one = Diagnostic(
+    one = Finding(
         "TF101", "unknown_key", "error", "m", Span(file, 2, 3, 2, 4), (Note("n", Span(file)), Note("no place"))
     )
     (result,) = written([one])["results"]
@@ -101,7 +101,7 @@ def test_a_file_with_any_name_is_a_uri_that_leads_back_to_it(file: str) -> None:
 
 
 def test_a_finding_without_a_place_and_no_findings_are_said_too() -> None:
-    (result,) = written([Diagnostic("TF801", "foreign_publisher", "warning", "m")])["results"]
+    (result,) = written([Finding("TF801", "foreign_publisher", "warning", "m")])["results"]
     assert "locations" not in result
     run = written([])
     assert (run["results"], run["tool"]["driver"]["rules"]) == ([], [])

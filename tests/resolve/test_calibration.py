@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
-from tfcompose.diagnostic import RejectedError, Span, finding
-from tfcompose.pose import Pose, angle_between
+from tfcompose.findings import RejectedError, Span, finding
+from tfcompose.geometry import Pose, angle_between
 from tfcompose.validate.calibration_file import read_calibration
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
-from tfcompose.diagnostic import RejectedError, Span, finding
 from tfcompose.emit import emit
+from tfcompose.findings import RejectedError, Span, finding
 from tfcompose.load.params import load_params
 from tfcompose.plan.file import read_plan
 from tfcompose.resolve.param_files import matches

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
-from tfcompose.diagnostic import RejectedError, Span, finding
 from tfcompose.emit import emit
+from tfcompose.findings import RejectedError, Span, finding
 from tfcompose.plan.file import read_plan
 
 ROVER = """

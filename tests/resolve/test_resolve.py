@@ -14,8 +14,8 @@ from tfcompose.cli.commands.diff import differences
 from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
+from tfcompose.geometry import Pose, angle_between
 from tfcompose.plan.file import read_plan
-from tfcompose.pose import Pose, angle_between
 
 if TYPE_CHECKING:
     from tfcompose.model import Edge, Robot

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tfcompose.pose import Pose
+from tfcompose.geometry import Pose
 from tfcompose.ros.message import Template, Transform, decode, encode
 
 doubles = st.floats(allow_nan=False)

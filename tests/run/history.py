@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from tfcompose.geometry import Pose
 from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
-from tfcompose.pose import Pose
 from tfcompose.run.launcher.action import Action, Finish, Kill, Order, Start, Tell, TellLate
 from tfcompose.run.launcher.happening import Begin, Event, Started, Tick
 from tfcompose.run.launcher.machine import step
@@ -17,7 +17,7 @@ from tfcompose.run.launcher.timing import wake_time
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.run.orders import GuardOrder
 
 N = TypeVar("N", bound=Notice)
@@ -50,7 +50,7 @@ class History:
     killed: list[tuple[str, int]] = field(default_factory=list)
     told: list[Any] = field(default_factory=list)
     orders: list[GuardOrder] = field(default_factory=list)
-    late: list[Diagnostic] = field(default_factory=list)
+    late: list[Finding] = field(default_factory=list)
     exit_code: int | None = None
     starts: bool = True
     state: State = field(init=False)
@@ -97,7 +97,7 @@ class History:
     def all(self, kind: type[N]) -> list[N]:
         return [notice for notice in self.told if isinstance(notice, kind)]
 
-    def found(self) -> list[Diagnostic]:
+    def found(self) -> list[Finding]:
         return [notice.found for notice in self.all(FindingShown)]
 
     def states(self, name: str) -> list[str]:

@@ -245,7 +245,7 @@ def test_a_lifecycle_node_that_was_started_again_is_activated_again(exported: Ca
 STOCK = """#!{python}
 import sys, yaml
 import xml.etree.ElementTree as ET
-from tfcompose.pose import quat_from_rpy
+from tfcompose.geometry import quat_from_rpy
 from tfcompose.ros.message import Transform, encode
 from tfcompose.ros.node import open_node
 from tfcompose.ros.stop import Stop

@@ -14,8 +14,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tfcompose.geometry import Pose
 from tfcompose.plan import FenceWay, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
-from tfcompose.pose import Pose
 from tfcompose.ros.environment import child_environment
 from tfcompose.run.fenced import REMAPPED, private_topics
 from tfcompose.run.launcher.launch_wrapper import LAUNCH
@@ -24,7 +24,7 @@ from tfcompose.run.launcher.preflight import commands_of
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.run.launcher.command import Command
 
 GUARD = PlanProcess("guard", "guard", argv=("true",))
@@ -42,7 +42,7 @@ def plan_of(*processes: PlanProcess, fence: FenceWay = "auto") -> Plan:
 
 def look(
     tmp_path: Path, *processes: PlanProcess, fence: FenceWay = "auto", **env: str
-) -> tuple[dict[str, Command], list[Diagnostic]]:
+) -> tuple[dict[str, Command], list[Finding]]:
     base = {"PATH": os.environ["PATH"]} | env
     plan = plan_of(*processes, fence=fence)
     return commands_of(plan, list(processes), tmp_path / "plan.json", base, child_environment)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from tfcompose.geometry import Pose
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, Ready, RosSettings, Simulation
 from tfcompose.plan.file import write_plan
-from tfcompose.pose import Pose
 from tfcompose.run.launcher.notice import AllReady, FindingShown, Notice, ProcessReady
 from tfcompose.run.launcher.supervisor import supervise
 

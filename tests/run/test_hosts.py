@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.planned import compiled_plan
-from tfcompose.diagnostic import Diagnostic
+from tfcompose.findings import Finding
 from tfcompose.plan import Plan, Ready
 from tfcompose.plan.file import read_plan, write_plan
 from tfcompose.run.fenced import partition_of
@@ -35,7 +35,7 @@ processes:
 NAMED = TWO + "  static: {host: main}\n"
 
 
-def started(plan: Plan | Diagnostic) -> set[str]:
+def started(plan: Plan | Finding) -> set[str]:
     assert isinstance(plan, Plan), plan
     return {process.name for process in plan.processes if process.kind != "external"}
 
@@ -99,7 +99,7 @@ def test_a_host_that_the_plan_does_not_know_is_a_finding(
     text: str, asked: str | None, message: str, advice: str
 ) -> None:
     found = share_of(compiled_plan(text), asked, "desk")
-    assert isinstance(found, Diagnostic)
+    assert isinstance(found, Finding)
     assert (found.code, found.message) == ("TF819", message)
     assert advice in found.help
 
@@ -121,7 +121,7 @@ def test_behind_a_strict_guard_each_machine_hears_the_others_guard_and_has_a_fen
 
 def test_a_strict_guard_on_one_of_several_machines_passes_nothing_on_of_the_others() -> None:
     found = share_of(compiled_plan(TWO + "  guard: {host: jetson}\n" + STRICT), "jetson", "x")
-    assert isinstance(found, Diagnostic)
+    assert isinstance(found, Finding)
     assert (found.code, found.help) == ("TF819", "remove the guard's host, or watch: guard: {mode: watch}")
 
 

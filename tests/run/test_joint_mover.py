@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from tfcompose.geometry import Pose, angle_between, normalised
 from tfcompose.plan import Joint, PlanEdge
-from tfcompose.pose import Pose, angle_between, normalised
 from tfcompose.ros.joint_message import encode_names, fill
 from tfcompose.ros.message import Transform, decode
 from tfcompose.run.publishing.joint_mover import JointMover, Told

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.run.watched import EDGES, FIXED, History, edge, wall
+from tfcompose.geometry import Pose
 from tfcompose.plan import Claim, GuardPolicy, PlanEdge, PlanProcess
-from tfcompose.pose import Pose
 from tfcompose.run.events import Clear, Found, Live, Recovered
 from tfcompose.run.guard.health import statuses
 from tfcompose.run.guard.judge import Writer

@@ -19,7 +19,7 @@ from tfcompose.run.launcher.supervisor import supervise
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.run.launcher.command import Command
 
 NAV2 = PlanProcess(
@@ -57,9 +57,7 @@ def env(tmp_path: Path) -> dict[str, str]:
     return dict(os.environ) | {"PATH": path, "AMENT_PREFIX_PATH": str(tmp_path / "ros")}
 
 
-def look(
-    tmp_path: Path, env: dict[str, str], process: PlanProcess = NAV2
-) -> tuple[dict[str, Command], Diagnostic | None]:
+def look(tmp_path: Path, env: dict[str, str], process: PlanProcess = NAV2) -> tuple[dict[str, Command], Finding | None]:
     plan = Plan("rover", "", None, RosSettings(), (), (process,))
     commands, found = commands_of(plan, [process], tmp_path / "plan.json", env, child_environment)
     return commands, found[0] if found else None

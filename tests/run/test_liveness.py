@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tfcompose.geometry import Pose
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
-from tfcompose.pose import Pose
 from tfcompose.run.events import Complete, Found, GuardEvent, Live, OwnerReady, Recovered, from_line, to_line
 from tfcompose.run.guard.liveness import Liveness
 

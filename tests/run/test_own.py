@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tfcompose.diagnostic import RejectedError
+from tfcompose.findings import RejectedError
 from tfcompose.plan import PlanProcess, Simulation
 from tfcompose.run import joints, static
 from tfcompose.run.own import read_own

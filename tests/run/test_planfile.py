@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from tfcompose.diagnostic import RejectedError
+from tfcompose.findings import RejectedError
+from tfcompose.geometry import Pose
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.plan.file import read_plan, write_plan
-from tfcompose.pose import Pose
 
 EDGES = [PlanEdge("base", child, "static", "static", "/s", Pose(), None, ("r.yaml", 1)) for child in ("a", "b")]
 PLAN = Plan("rover", "", "base", RosSettings(), tuple(EDGES), (PlanProcess("static", "static"),))
@@ -43,4 +43,4 @@ def test_the_edge_or_process_is_named(section: str, change: Any, message: str) -
                 row[key] = value
     with pytest.raises(RejectedError) as rejected:
         read_plan(json.dumps(data), "plan.json")
-    assert [one.message for one in rejected.value.diagnostics] == [f"not a whole plan: {message}"]
+    assert [one.message for one in rejected.value.findings] == [f"not a whole plan: {message}"]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.run.launcher.command import Command
 
 
@@ -33,7 +33,7 @@ def prefix(tmp_path: Path) -> Path:
 
 def look(
     tmp_path: Path, *processes: PlanProcess, env: Mapping[str, str] | None = None, ros: RosSettings | None = None
-) -> tuple[dict[str, Command], list[Diagnostic]]:
+) -> tuple[dict[str, Command], list[Finding]]:
     plan = Plan("rover", "", None, ros or RosSettings(), (), processes)
     base = {"PATH": os.environ["PATH"]} | dict(env or {})
     return commands_of(plan, list(processes), tmp_path / "plan.json", base, child_environment)

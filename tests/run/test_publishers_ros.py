@@ -19,8 +19,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from tests.waiting import in_one_of_a_few
+from tfcompose.geometry import Pose, angle_between, normalised, quat_from_rpy
 from tfcompose.plan import Joint, PlanProcess, Simulation, Sweep
-from tfcompose.pose import Pose, angle_between, normalised, quat_from_rpy
 from tfcompose.ros.graph import writers
 from tfcompose.ros.message import Transform, decode
 from tfcompose.ros.node import JOINT_STATES, LATCHED, latch, open_node

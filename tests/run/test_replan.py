@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from tfcompose.geometry import Pose
 from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
-from tfcompose.pose import Pose
 from tfcompose.run.launcher.replan import Change, change
 
 if TYPE_CHECKING:

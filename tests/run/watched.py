@@ -6,13 +6,13 @@ import json
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+from tfcompose.geometry import Pose
 from tfcompose.plan import Claim, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
-from tfcompose.pose import Pose
 from tfcompose.run.events import Clear, Found, GuardEvent, Taken
 from tfcompose.run.guard.judge import Judge, Message, Writer
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.plan import EdgeKind
 
 
@@ -157,7 +157,7 @@ class History:
         self.events = self.judge.recall(memory, self.now)
         return self
 
-    def found(self) -> list[Diagnostic]:
+    def found(self) -> list[Finding]:
         return [event.found for event in self.events if isinstance(event, (Found, Taken))]
 
     def said(self) -> list[str]:

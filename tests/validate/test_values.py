@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from tfcompose.geometry import angle_between
 from tfcompose.load import composed, load
-from tfcompose.pose import angle_between
 from tfcompose.validate import Validated, validate
 from tfcompose.validate.arithmetic import ExpressionError
 from tfcompose.validate.expression import evaluate

@@ -11,12 +11,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.codes import CODES
-from tfcompose.diagnostic import Allow, Diagnostic, did_you_mean, finding
+from tfcompose.findings import Allow, Finding, did_you_mean, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
 
 
 #: No tree, edges that nobody publishes, processes that never start.
@@ -28,9 +28,9 @@ def can_be_allowed(code: str) -> bool:
     return code in CODES and code[:3] not in {"TF0", "TF1"} and code not in NOTHING_TO_BUILD
 
 
-def apply(found: Iterable[Diagnostic], allows: Sequence[Allow]) -> tuple[list[Diagnostic], set[tuple[Allow, str]]]:
+def apply(found: Iterable[Finding], allows: Sequence[Allow]) -> tuple[list[Finding], set[tuple[Allow, str]]]:
     """Return the findings that are not allowed, and which comments let something stand, by code."""
-    kept: list[Diagnostic] = []
+    kept: list[Finding] = []
     used: set[tuple[Allow, str]] = set()
     for one in found:
         allowing = [allow for allow in allows if _covers(allow, one)]
@@ -41,7 +41,7 @@ def apply(found: Iterable[Diagnostic], allows: Sequence[Allow]) -> tuple[list[Di
     return kept, used
 
 
-def levelled(found: Iterable[Diagnostic], rules: Mapping[str, str]) -> list[Diagnostic]:
+def levelled(found: Iterable[Finding], rules: Mapping[str, str]) -> list[Finding]:
     """Return the findings with the severities that the robot's ``rules`` set; those that are ``off`` are left out."""
     levels = {code_of(word): level for word, level in rules.items()}
     result = []
@@ -54,7 +54,7 @@ def levelled(found: Iterable[Diagnostic], rules: Mapping[str, str]) -> list[Diag
     return result
 
 
-def unknown_rules(rules: Mapping[str, Span]) -> list[Diagnostic]:
+def unknown_rules(rules: Mapping[str, Span]) -> list[Finding]:
     """Return a finding for each entry of ``rules``, with its place, that is no code or cannot be set."""
     found = []
     for word, at in rules.items():
@@ -73,14 +73,14 @@ def code_of(word: str) -> str | None:
     return upper if upper in CODES else next((code for code, name in CODES.items() if name == word), None)
 
 
-def _covers(allow: Allow, found: Diagnostic) -> bool:
+def _covers(allow: Allow, found: Finding) -> bool:
     at = found.span
     if at is None or at.file != allow.at.file or found.code not in allow.codes:
         return False
     return allow.line <= at.line <= max(allow.line, allow.last)
 
 
-def idle(allows: Sequence[Allow], used: set[tuple[Allow, str]]) -> list[Diagnostic]:
+def idle(allows: Sequence[Allow], used: set[tuple[Allow, str]]) -> list[Finding]:
     """Return a finding for each comment that allows nothing, cannot allow what it names, or does not say why."""
     found = []
     for allow in allows:

@@ -70,7 +70,7 @@ from tfcompose.check.rules.tf815_process_without_role import process_without_rol
 from tfcompose.check.rules.tf818_required_without_role import required_without_role
 from tfcompose.check.rules.tf847_needed_but_optional import needed_but_optional
 from tfcompose.check.rules.tf848_gate_never_opens import gate_never_opens
-from tfcompose.diagnostic import Diagnostic, Severity, Span, finding
+from tfcompose.findings import Finding, Severity, Span, finding
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -86,7 +86,7 @@ class Rule:
     """A code and the function that finds it; the function's name is the rule's, its docstring the rule's page."""
 
     code: str
-    check: Callable[[Robot], Iterator[Diagnostic]]
+    check: Callable[[Robot], Iterator[Finding]]
     severity: Severity = "error"
 
     @property
@@ -164,14 +164,14 @@ RULES: tuple[Rule, ...] = (
 )
 
 
-def as_severe(found: Diagnostic, severity: Severity) -> Diagnostic:
+def as_severe(found: Finding, severity: Severity) -> Finding:
     """Return the finding as a rule of that severity gives it: a rule of errors may warn, one of warnings only warns."""
     return replace(found, severity=WARNING) if severity == WARNING else found
 
 
-def check(robot: Robot, codes: frozenset[str] | None = None) -> list[Diagnostic]:
+def check(robot: Robot, codes: frozenset[str] | None = None) -> list[Finding]:
     """Return what the rules find, in no particular order; with ``codes`` only the rules of these."""
-    found: list[Diagnostic] = []
+    found: list[Finding] = []
     for rule in RULES:
         if codes is not None and rule.code not in codes:
             continue

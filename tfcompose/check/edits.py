@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, Edit, Span
+from tfcompose.findings import Edit, Finding, Span
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -27,12 +27,12 @@ _ELSEWHERE = ("relative_to", "place", "calibration")
 _SECTIONS = ("frames", "links", "joints")
 
 
-def with_edits(found: Iterable[Diagnostic], source: Source) -> list[Diagnostic]:
+def with_edits(found: Iterable[Finding], source: Source) -> list[Finding]:
     """Return the findings; those about optical frames with the edits that turn them, where that is safe."""
     return [replace(one, edits=_turned(one, source)) if one.code == "TF401" else one for one in found]
 
 
-def _turned(found: Diagnostic, source: Source) -> tuple[Edit, ...]:
+def _turned(found: Finding, source: Source) -> tuple[Edit, ...]:
     entry = _entry(found.span, source)
     if entry is None or any(key in entry[1] for key in _ELSEWHERE):
         return ()

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from tfcompose.pose import Pose
+from tfcompose.geometry import Pose
 
 if TYPE_CHECKING:
+    from tfcompose.geometry import Vector
     from tfcompose.model import Robot, Shape
-    from tfcompose.pose import Vector
 
 Box = tuple[list[float], list[float]]
 

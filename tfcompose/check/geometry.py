@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from tfcompose.pose import Pose
+from tfcompose.geometry import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

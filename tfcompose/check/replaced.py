@@ -5,25 +5,25 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note
+from tfcompose.findings import Finding, Note
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
     from tfcompose.load import Path, Source
 
 _OF_AN_ENTRY = 2  # its section and its name
 
 
-def with_replaced(found: Iterable[Diagnostic], source: Source) -> list[Diagnostic]:
+def with_replaced(found: Iterable[Finding], source: Source) -> list[Finding]:
     """Return the findings; one that is about a value which replaced another has a note with the other's place."""
     if not source.replaced:
         return list(found)
     return [replace(one, notes=(*one.notes, *_notes(one, source))) for one in found]
 
 
-def _notes(found: Diagnostic, source: Source) -> list[Note]:
+def _notes(found: Finding, source: Source) -> list[Note]:
     """Return notes about the value at the finding's place; if none is there, about those of the entry as a whole."""
     said = {note.span for note in found.notes}
     exact, around = [], []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.terminal import complain
-from tfcompose.diagnostic import did_you_mean
+from tfcompose.findings import did_you_mean
 
 if TYPE_CHECKING:
     from tfcompose.model import Edge, Robot

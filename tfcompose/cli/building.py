@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.compiling import robot_or_code
 from tfcompose.cli.output import write_all
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings
-from tfcompose.diagnostic import Diagnostic, finding
 from tfcompose.emit import Target, emit, unaddressed
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -53,14 +53,14 @@ def destination(arguments: Namespace, robot: Robot) -> tuple[Path, Target]:
     return folder, Target(form, folder.as_posix(), Path.cwd().as_posix())
 
 
-def _otherwise(path: str, what: str) -> Diagnostic:
+def _otherwise(path: str, what: str) -> Finding:
     """Return the finding that a description is not the robot's."""
     return finding(
         "TF910", f"{path}: {what}", None, help="nothing was written; this is a fault of tfcompose: report it"
     )
 
 
-def _no_address(asset: Asset, form: Form) -> Diagnostic:
+def _no_address(asset: Asset, form: Form) -> Finding:
     """Return the finding that a file cannot be addressed as the command line asks for."""
     if form != "package":
         return finding("TF724", f"{asset.uri} was not found, and has no path", asset.at, help="build without --mesh")

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
-from tfcompose.diagnostic import RejectedError
+from tfcompose.findings import RejectedError
 from tfcompose.plan import Plan
 from tfcompose.plan.file import read_plan
 from tfcompose.run.events import SETTLE
@@ -26,8 +26,8 @@ def plan_in(file: Path) -> Plan | int:
     try:
         return read_plan(read_text(str(file)), str(file))
     except RejectedError as error:
-        print_findings(error.diagnostics, sys.stderr)
-        return UNREADABLE if unreadable(error.diagnostics) else 1
+        print_findings(error.findings, sys.stderr)
+        return UNREADABLE if unreadable(error.findings) else 1
 
 
 def as_asked(plan: Plan, arguments: Namespace) -> Plan | int:

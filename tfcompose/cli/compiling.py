@@ -9,7 +9,7 @@ from tfcompose.cli.disk import disk
 from tfcompose.cli.shelves import library
 from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
 from tfcompose.compile import compile_robot
-from tfcompose.diagnostic import RejectedError
+from tfcompose.findings import RejectedError
 from tfcompose.load import load, set_value, with_includes
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def sources_and_robot(file: str, arguments: Namespace) -> tuple[tuple[Source, ..
         )
         found = compiled.found
     except RejectedError as error:
-        found = error.diagnostics
+        found = error.findings
     print_findings(found, sys.stderr)
     if compiled is None or compiled.robot is None or compiled.errors:
         return UNREADABLE if unreadable(found) else 1

@@ -18,7 +18,7 @@ from tfcompose.resolve.packages import FETCH, Disk, UnmeasurableError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from tfcompose.pose import Vector
+    from tfcompose.geometry import Vector
     from tfcompose.resolve.packages import Packages
 
 _POINTER = b"version https://git-lfs.github.com/spec/"

@@ -12,7 +12,7 @@ from tfcompose.ros.topics import parts_of
 if TYPE_CHECKING:
     from argparse import Namespace
 
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
     from tfcompose.plan import Plan
 
     Topics = tuple[str, str]

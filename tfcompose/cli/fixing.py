@@ -22,10 +22,10 @@ from tfcompose.cli.terminal import read_text
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from tfcompose.diagnostic import Diagnostic, Edit
+    from tfcompose.findings import Edit, Finding
 
     Reader = Callable[[str], str]
-    Lint = Callable[[str, Reader], list[Diagnostic]]
+    Lint = Callable[[str, Reader], list[Finding]]
 
 _BREAK = re.compile("\r\n|[\r\n\x85\u2028\u2029]")  # as YAML counts lines
 
@@ -43,11 +43,11 @@ class Fixer:
 
     files: Sequence[str]
     lint: Lint
-    fixed: list[Diagnostic] = field(default_factory=list)
+    fixed: list[Finding] = field(default_factory=list)
     texts: dict[str, str] = field(default_factory=dict)
     _read: dict[str, str] = field(default_factory=dict)
 
-    def fix(self, file: str) -> list[Diagnostic]:
+    def fix(self, file: str) -> list[Finding]:
         """Fix one file in memory and return the findings that remain."""
         found = self._findings([file])
         while True:
@@ -79,10 +79,10 @@ class Fixer:
         path = os.path.realpath(file)
         return path in map(os.path.realpath, self.files) and Path(path).is_file()
 
-    def _findings(self, files: Iterable[str]) -> list[Diagnostic]:
+    def _findings(self, files: Iterable[str]) -> list[Finding]:
         return [one for file in files for one in self.lint(file, self.read)]
 
-    def _sound(self, file: str, kept: list[Diagnostic], todo: list[Diagnostic]) -> list[Diagnostic]:
+    def _sound(self, file: str, kept: list[Finding], todo: list[Finding]) -> list[Finding]:
         """Return ``kept`` and those of ``todo`` that can be fixed with it, halving what is not sound as a whole."""
         if not todo:
             return kept
@@ -93,7 +93,7 @@ class Fixer:
         half = len(todo) // 2
         return self._sound(file, self._sound(file, kept, todo[:half]), todo[half:])
 
-    def _is_sound(self, file: str, fixed: list[Diagnostic]) -> bool:
+    def _is_sound(self, file: str, fixed: list[Finding]) -> bool:
         """Whether with these edits the findings are gone, and no others have come."""
         files = dict.fromkeys([file, *(edit.span.file for one in fixed for edit in one.edits)])
         before, texts = _counted(self._findings(files)), self._edited(fixed)
@@ -104,7 +104,7 @@ class Fixer:
         self.texts = old
         return not after - before and not _counted(fixed) - (before - after)
 
-    def _edited(self, fixed: list[Diagnostic]) -> dict[str, str] | None:
+    def _edited(self, fixed: list[Finding]) -> dict[str, str] | None:
         """Return the new texts by file, or None where edits meet."""
         by_file: dict[str, dict[Edit, None]] = {}
         for edit in (edit for one in fixed for edit in one.edits):
@@ -114,7 +114,7 @@ class Fixer:
         return whole if len(whole) == len(texts) == len(by_file) else None
 
 
-def _counted(found: Iterable[Diagnostic]) -> Counter[tuple[str, str]]:
+def _counted(found: Iterable[Finding]) -> Counter[tuple[str, str]]:
     return Counter((one.code, one.message) for one in found)
 
 

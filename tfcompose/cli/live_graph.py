@@ -9,8 +9,8 @@ from tfcompose.cli.expected import where_to_look
 from tfcompose.cli.looking import from_bag, from_live
 from tfcompose.draw import Arrow, Graph
 from tfcompose.emit.tree import pose_words
+from tfcompose.geometry import Pose, norm, normalised
 from tfcompose.observe.census import SETTLE_S, Census
-from tfcompose.pose import Pose, norm, normalised
 
 if TYPE_CHECKING:
     from argparse import Namespace

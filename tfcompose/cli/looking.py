@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from tfcompose.cli.options import namespace, positive
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings
-from tfcompose.diagnostic import Note, finding
+from tfcompose.findings import Note, finding
 from tfcompose.plan import RosSettings
 from tfcompose.ros.environment import RosError, child_environment
 from tfcompose.ros.settings import ros_trouble

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.compiling import library, overlays_of
 from tfcompose.cli.terminal import read_text
 from tfcompose.compile import compile_robot
-from tfcompose.diagnostic import RejectedError
 from tfcompose.emit.plan import plan_of
+from tfcompose.findings import RejectedError
 from tfcompose.load import load, with_includes
 from tfcompose.ros.environment import child_environment
 from tfcompose.run.launcher.preflight import commands_of, started_by_us

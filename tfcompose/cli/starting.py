@@ -27,7 +27,7 @@ from tfcompose.run.place import Lock, PlaceError, place_of
 if TYPE_CHECKING:
     from argparse import Namespace
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.plan import Plan
     from tfcompose.run.place import Place
 
@@ -109,7 +109,7 @@ def _in_the_background(plan: Plan, place: Place, lock: Lock, session: Session, a
     return code
 
 
-def _with_profile(found: Diagnostic, arguments: Namespace) -> Diagnostic:
+def _with_profile(found: Finding, arguments: Namespace) -> Finding:
     """Return the finding; if programs are missing, with the profiles that can do without them."""
     if found.code != "TF810" or arguments.file.endswith(".json"):
         return found

@@ -11,7 +11,7 @@ from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
+from tfcompose.findings import Finding, RejectedError, Span, finding
 from tfcompose.render.text import render_text
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def _declared(path: str, data: bytes, error: UnicodeDecodeError) -> str:
     raise RejectedError([finding("TF001", message, place, help=advice)]) from None
 
 
-def _unreadable(path: str, error: OSError) -> Diagnostic:
+def _unreadable(path: str, error: OSError) -> Finding:
     advice = ""
     if isinstance(error, FileNotFoundError):
         folder = import_module("pathlib").Path(path).parent
@@ -77,12 +77,12 @@ def _unreadable(path: str, error: OSError) -> Diagnostic:
     return finding("TF001", f"cannot be read: {error.strerror}", Span(path), help=advice)
 
 
-def unreadable(found: Sequence[Diagnostic]) -> bool:
+def unreadable(found: Sequence[Finding]) -> bool:
     """Return whether the findings say that a file cannot be read at all."""
     return any(one.code == "TF001" for one in found)
 
 
-def print_findings(found: Sequence[Diagnostic], stream: TextIO) -> None:
+def print_findings(found: Sequence[Finding], stream: TextIO) -> None:
     """Print findings for people, with the lines that they are about."""
     stream.write(render_text(found, line_of, colour=coloured(stream)))
 

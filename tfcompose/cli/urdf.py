@@ -11,7 +11,7 @@ from tfcompose.check import apply, check, idle
 from tfcompose.cli.disk import disk
 from tfcompose.cli.terminal import read_text
 from tfcompose.cli.xacro import expanded
-from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
+from tfcompose.findings import Finding, RejectedError, Span, finding
 from tfcompose.load.comments import allows_in_xml
 from tfcompose.load.urdf import MACRO, load_xml
 from tfcompose.resolve.packages import Packages
@@ -47,12 +47,12 @@ _HELP = {
 }
 
 
-def lint_urdf(file: str) -> list[Diagnostic]:
+def lint_urdf(file: str) -> list[Finding]:
     """Return what is wrong with the file, by place. A xacro file is expanded, and places are those of the result."""
     try:
         read = read_urdf(file, Packages(disk(), otherwise="source the workspace's setup file"))
     except RejectedError as error:
-        return list(error.diagnostics)
+        return list(error.findings)
     return read.judged()
 
 
@@ -64,9 +64,9 @@ class Read:
     text: str
     root: Element
     robot: Robot
-    found: tuple[Diagnostic, ...]
+    found: tuple[Finding, ...]
 
-    def judged(self) -> list[Diagnostic]:
+    def judged(self) -> list[Finding]:
         """Return what is wrong with it, by place, but for what its comments let stand."""
         allows = allows_in_xml(self.text, self.name)
         robot = self.robot
@@ -99,7 +99,7 @@ def read_urdf(file: str, packages: Packages, arguments: Mapping[str, str] | None
     return Read(name, text, root, robot, found)
 
 
-def _said(found: Diagnostic) -> Diagnostic:
+def _said(found: Finding) -> Finding:
     """Return the finding with its advice in URDF's words."""
     if found.help.startswith("did you mean"):
         return found

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.terminal import read_text
-from tfcompose.diagnostic import Diagnostic, RejectedError, Span, did_you_mean, finding
+from tfcompose.findings import Finding, RejectedError, Span, did_you_mean, finding
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -53,12 +53,12 @@ def expanded(file: str, packages: Packages, arguments: Mapping[str, str] | None 
 class _MissingError(LookupError):
     """A package is not to be found; ``found`` says where it was looked for."""
 
-    def __init__(self, found: Diagnostic) -> None:
+    def __init__(self, found: Finding) -> None:
         super().__init__(found.message)
         self.found = found
 
 
-def _refused(error: Exception, file: str, xacro: Any) -> Diagnostic:
+def _refused(error: Exception, file: str, xacro: Any) -> Finding:
     """Return what xacro, or something that it called, did not like, and where, or in which other file."""
     chain: list[Any] = [error]
     while getattr(chain[-1], "exc", None) is not None:  # xacro wraps what it calls, again and again
@@ -80,7 +80,7 @@ def _refused(error: Exception, file: str, xacro: Any) -> Diagnostic:
     files, macros = list(xacro.filestack or ()), list(xacro.macrostack or ())
     whole = finding("TF018", f"xacro: {said}", Span(file))
     places: Any = import_module("tfcompose.cli.xacro_places")
-    exact: Diagnostic = places.seen_from(file, places.placed(whole, root, files, macros))
+    exact: Finding = places.seen_from(file, places.placed(whole, root, files, macros))
     others = [name for name in files[-1:] if name and Path(name).absolute() != Path(file).absolute()]
     if others and exact.span == whole.span:
         return replace(exact, message=f"{exact.message} (in {os.path.relpath(others[0])})")
@@ -107,7 +107,7 @@ def _refuse_unknown(given: Mapping[str, str], files: list[str], file: str) -> No
         raise RejectedError([_no_argument(name, known, file) for name in wrong])
 
 
-def _no_argument(name: str, known: Collection[str], file: str) -> Diagnostic:
+def _no_argument(name: str, known: Collection[str], file: str) -> Finding:
     there = f"there is {', '.join(known)}" if known else "it takes none"
     return finding("TF106", f"no argument {name}", Span(file), help=did_you_mean(name, known, there))
 

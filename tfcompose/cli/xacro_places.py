@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, Note, Span
+from tfcompose.findings import Finding, Note, Span
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,7 +23,7 @@ _MACRO = r"""<xacro:macro\s[^>]*?\bname\s*=\s*["'](?:xacro:)?{}["']"""
 _MOST = 5
 
 
-def placed(found: Diagnostic, error: Any, files: list[str], macros: list[Any]) -> Diagnostic:
+def placed(found: Finding, error: Any, files: list[str], macros: list[Any]) -> Finding:
     """Return the finding at the words that it is about, with notes about the macros that were expanded then.
 
     ``files`` are those that were being read, the innermost last, and so are ``macros``. The finding stays where it is
@@ -68,7 +68,7 @@ def _position(text: str, index: int) -> tuple[int, int]:
     return text.count("\n", 0, index) + 1, index - text.rfind("\n", 0, index)
 
 
-def seen_from(file: str, found: Diagnostic) -> Diagnostic:
+def seen_from(file: str, found: Finding) -> Finding:
     """Return the finding with its places in files as seen from the working folder, and ``file`` as it is named."""
 
     def shown(span: Span | None) -> Span | None:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 from tfcompose.emit.flow import Bare
 from tfcompose.emit.numbers import clean_rpy, number
-from tfcompose.pose import Pose, angle_between, quat_from_rpy
+from tfcompose.geometry import Pose, angle_between, quat_from_rpy
 
 if TYPE_CHECKING:
-    from tfcompose.pose import Quaternion, Vector
+    from tfcompose.geometry import Quaternion, Vector
 
 #: A whole number of degrees, or one of few decimals, is what was meant if the angle (rad) is so near.
 MEANT_RAD = 5e-13

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.emit.markup import quoted
 from tfcompose.emit.numbers import clean_rpy, clean_tensor, clean_xyz, number, numbers
-from tfcompose.pose import Pose
+from tfcompose.geometry import Pose
 
 if TYPE_CHECKING:
     from tfcompose.emit.target import Target

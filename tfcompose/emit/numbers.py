@@ -6,10 +6,10 @@ import math
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from tfcompose.pose import Pose, angle_between, matrix_from_quat, multiply, quat_from_rpy, rpy_from_quat
+from tfcompose.geometry import Pose, angle_between, matrix_from_quat, multiply, quat_from_rpy, rpy_from_quat
 
 if TYPE_CHECKING:
-    from tfcompose.pose import Quaternion, Vector
+    from tfcompose.geometry import Quaternion, Vector
 
 METRE_DECIMALS = 12
 QUATERNION_DECIMALS = 14

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.emit.emit import described
 from tfcompose.emit.urdf import joint_type
+from tfcompose.geometry import Pose, angle_between, quat_from_rpy
 from tfcompose.model import JOINTS, STATIC
 from tfcompose.plan import DESCRIPTION
-from tfcompose.pose import Pose, angle_between, quat_from_rpy
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

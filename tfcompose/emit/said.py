@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tfcompose.emit.target import Target
+    from tfcompose.geometry import Pose, Quaternion, Vector
     from tfcompose.model import Edge, Inertial, Joint, Link, Material, Robot, Shape
-    from tfcompose.pose import Pose, Quaternion, Vector
 
 _TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _SOFT_LIMITS = ("soft_lower_limit", "soft_upper_limit")

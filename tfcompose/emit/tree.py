@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from tfcompose.emit.numbers import clean_rpy, clean_xyz, number
 
 if TYPE_CHECKING:
+    from tfcompose.geometry import Pose
     from tfcompose.model import Edge, Robot
-    from tfcompose.pose import Pose
 
 
 def tree(robot: Robot) -> str:

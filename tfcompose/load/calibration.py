@@ -11,7 +11,7 @@ from bisect import bisect_right
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any, Literal
 
-from tfcompose.diagnostic import Span, finding
+from tfcompose.findings import Span, finding
 from tfcompose.load.nodes import Reader
 from tfcompose.load.places import Place
 from tfcompose.load.scalars import FLOAT, INT, implicit_tag, scalar

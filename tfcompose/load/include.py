@@ -9,7 +9,7 @@ import posixpath
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, finding
+from tfcompose.findings import Finding, Note, RejectedError, Span, finding
 from tfcompose.load.overlay import lay_over, without
 from tfcompose.load.places import Path, Place
 from tfcompose.load.source import Source, load
@@ -70,10 +70,10 @@ class _Includer:
         try:
             return load(self.read(file), file)
         except RejectedError as error:
-            raise RejectedError([*source.found, *(_included(one, at) for one in error.diagnostics)]) from None
+            raise RejectedError([*source.found, *(_included(one, at) for one in error.findings)]) from None
 
 
-def _included(found: Diagnostic, at: Span) -> Diagnostic:
+def _included(found: Finding, at: Span) -> Finding:
     """Return the finding about an included file, with the place that includes it."""
     return replace(found, notes=(*found.notes, Note("included here", at)))
 

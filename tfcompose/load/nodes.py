@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, finding
+from tfcompose.findings import Finding, Note, RejectedError, Span, finding
 from tfcompose.load.not_yaml import no_character, no_syntax
 from tfcompose.load.places import Place
 from tfcompose.load.scalars import MAP, SCALAR_TAGS, SEQ, STR, TAG, plain, scalar
@@ -35,7 +35,7 @@ class _Part:
     place: Place
     size: int = 1
     height: int = 0
-    found: list[Diagnostic] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -68,7 +68,7 @@ class Reader:
 
     def __init__(self, file: str) -> None:
         self.file = file
-        self.found: list[Diagnostic] = []
+        self.found: list[Finding] = []
         self.has_nulls = False
         self.documents: list[tuple[Any, Place]] = []
         self._anchors: dict[str, _Part | None] = {}

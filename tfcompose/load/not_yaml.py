@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import yaml
 
-from tfcompose.diagnostic import Diagnostic, Note, Span, finding
+from tfcompose.findings import Finding, Note, Span, finding
 
 
-def no_character(error: yaml.reader.ReaderError, text: str, file: str) -> Diagnostic:
+def no_character(error: yaml.reader.ReaderError, text: str, file: str) -> Finding:
     """Return the finding for a character that must not stand in YAML."""
     hit = yaml.reader.Reader.NON_PRINTABLE.search(text)  # the C parser's position counts bytes
     position = hit.start() if hit else error.position
@@ -15,7 +15,7 @@ def no_character(error: yaml.reader.ReaderError, text: str, file: str) -> Diagno
     return finding("TF002", "a character that YAML does not allow", Span(file, line, column, line, column + 1))
 
 
-def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Diagnostic:
+def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Finding:
     """Return the finding for text that the parser refuses, with where it began."""
     mark = error.problem_mark or error.context_mark
     line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
@@ -31,7 +31,7 @@ def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Diagnostic:
     return finding("TF002", message, Span(file, line, column, line, column + 1), help=advice, notes=notes)
 
 
-def no_yaml(text: str, file: str) -> Diagnostic:
+def no_yaml(text: str, file: str) -> Finding:
     """Return the finding for XML where YAML is expected: most often a URDF as a robot file."""
     is_xacro = "ros.org/wiki/xacro" in text
     key = "xacro" if is_xacro else "urdf"

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, Note, RejectedError, did_you_mean, finding
+from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, finding
 from tfcompose.load.choices import choices_at
 from tfcompose.load.places import Path, Place
 from tfcompose.load.source import Source
@@ -18,7 +18,7 @@ from tfcompose.load.source import Source
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
 
 
 def composed(source: Source, profiles: Sequence[str] = (), overlays: Sequence[Source] = ()) -> Source:
@@ -80,7 +80,7 @@ class _Merger:
         self.below = below
         self.above = above
         self.replaced = below | above
-        self.found: list[Diagnostic] = []
+        self.found: list[Finding] = []
 
     def merge(self, base: Part, overlay: Part, path: Path) -> Part:
         """Return ``base`` with ``overlay`` laid over it."""
@@ -129,7 +129,7 @@ class _Merger:
             self.found.append(_idle(message, place, old_place))
 
 
-def _idle(message: str, place: Place, old: Place | None = None) -> Diagnostic:
+def _idle(message: str, place: Place, old: Place | None = None) -> Finding:
     notes = [Note("here", old.span)] if old else []
     return finding("TF014", message, place.span, notes=notes, help="remove it", severity="warning")
 
@@ -167,7 +167,7 @@ def _without_nulls(source: Source) -> Source:
     """Report what is null after all overlays: a key without a value says nothing."""
     if not source.has_nulls:
         return source
-    found: list[Diagnostic] = []
+    found: list[Finding] = []
 
     def clean(value: Any, path: Path) -> Any:
         if isinstance(value, list):
@@ -190,7 +190,7 @@ def _without_nulls(source: Source) -> Source:
     return replace(source, data=data, found=(*source.found, *found))
 
 
-def _wrong_profiles(source: Source) -> list[Diagnostic]:
+def _wrong_profiles(source: Source) -> list[Finding]:
     """Return a finding for each profile that is no mapping, or that holds profiles itself."""
     profiles = source.data.get("profiles", {})
     if not isinstance(profiles, dict):
@@ -207,7 +207,7 @@ def _wrong_profiles(source: Source) -> list[Diagnostic]:
     return found
 
 
-def _unknown_profile(source: Source, name: str, known: list[str]) -> Diagnostic:
+def _unknown_profile(source: Source, name: str, known: list[str]) -> Finding:
     there = f"there is {', '.join(known)}" if known else "the file has no profiles"
     span = source.at_key(("profiles",))
     return finding("TF009", f"no profile {name}", span, help=did_you_mean(name, known, there))

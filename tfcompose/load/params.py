@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
+from tfcompose.findings import Finding, RejectedError, Span, finding
 from tfcompose.load.source import MOST_VALUES, refuse_unreadable
 
 PARAMETERS = "ros__parameters"
@@ -38,7 +38,7 @@ class ParamsFile:
     """A parameter file: its nodes in the order of the file, and what is wrong with it."""
 
     nodes: list[NodeParams] = field(default_factory=list)
-    found: list[Diagnostic] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
 
 
 def load_params(text: str, file: str) -> ParamsFile:

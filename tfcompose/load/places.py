@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Span
+from tfcompose.findings import Span
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

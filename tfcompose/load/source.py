@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from tfcompose.diagnostic import Allow, Diagnostic, RejectedError, Span, finding
+from tfcompose.findings import Allow, Finding, RejectedError, Span, finding
 from tfcompose.load.comments import allows_in
 from tfcompose.load.nodes import MOST_VALUES, Reader
 from tfcompose.load.not_yaml import no_yaml
@@ -27,7 +27,7 @@ class Source:
     file: str
     data: dict[str, Any]
     places: Place
-    found: tuple[Diagnostic, ...] = field(default=(), compare=False)
+    found: tuple[Finding, ...] = field(default=(), compare=False)
     allows: tuple[Allow, ...] = field(default=(), compare=False)
     replaced: dict[Path, tuple[Span, ...]] = field(default_factory=dict, compare=False)
     has_nulls: bool = field(default=True, compare=False)

@@ -12,7 +12,7 @@ from itertools import accumulate
 from typing import TYPE_CHECKING
 from xml.parsers import expat
 
-from tfcompose.diagnostic import RejectedError, Span, finding
+from tfcompose.findings import RejectedError, Span, finding
 from tfcompose.load.source import MOST_VALUES, refuse_unreadable
 
 if TYPE_CHECKING:

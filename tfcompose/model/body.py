@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Span
-    from tfcompose.pose import Pose
+    from tfcompose.findings import Span
+    from tfcompose.geometry import Pose
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.pose import angle_between
+from tfcompose.geometry import angle_between
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
+    from tfcompose.geometry import Pose
     from tfcompose.model.joint import Joint
     from tfcompose.plan import EdgeKind
-    from tfcompose.pose import Pose
 
 
 @dataclass(frozen=True, slots=True)

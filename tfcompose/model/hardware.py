@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Span
-    from tfcompose.pose import Vector
+    from tfcompose.findings import Span
+    from tfcompose.geometry import Vector
 
 
 @dataclass(frozen=True, slots=True)

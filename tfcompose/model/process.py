@@ -13,7 +13,7 @@ BUILT_IN = (STATIC, JOINTS, GUARD)
 SHELL = ("/bin/sh", "-c")
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
 
 
 class AsInFile(str):

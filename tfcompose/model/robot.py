@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import slip_of
+from tfcompose.findings import slip_of
 from tfcompose.plan import GuardPolicy, RosSettings
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
     from tfcompose.model.body import Link
     from tfcompose.model.edge import Edge
     from tfcompose.model.hardware import Block, Hardware

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 OPTICAL_ENDINGS = ("_optical_frame", "_frame_optical", "_optical")
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
 
 
 def is_optical(frame: str) -> bool:

@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from tfcompose.geometry import Pose
     from tfcompose.observe.trajectory import Trajectory
-    from tfcompose.pose import Pose
 
 __all__ = ["CACHE_NS", "Buffer", "BufferCore", "FrameInfo", "Refusal", "Row"]
 __all__ += ["ConnectivityException", "ExtrapolationException", "InvalidArgumentException", "LookupException"]

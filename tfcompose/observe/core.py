@@ -6,6 +6,7 @@ from math import isfinite, sqrt
 from threading import Condition, RLock
 from typing import TYPE_CHECKING
 
+from tfcompose.geometry import Pose
 from tfcompose.observe import reasons
 from tfcompose.observe.chain import Chain
 from tfcompose.observe.exceptions import (
@@ -19,7 +20,6 @@ from tfcompose.observe.history import History, pack_pose
 from tfcompose.observe.refusal import Refusal, refusal
 from tfcompose.observe.rotation import IDENTITY, Seven
 from tfcompose.observe.walk import newest_ways, ways_at
-from tfcompose.pose import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import did_you_mean
+from tfcompose.findings import did_you_mean
+from tfcompose.geometry import Pose
 from tfcompose.plan import SLOW_BELOW
-from tfcompose.pose import Pose
 from tfcompose.verdict.offence import SELF, Offence, code_of, may_be_owners, relays_of
 from tfcompose.verdict.offset import DEFAULT_TOLERANCE, Offset, offset_of
 from tfcompose.verdict.poses import Expected, expected_of, is_off

@@ -24,7 +24,7 @@ from tfcompose.ros.topics import GLOBAL
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.observe.live import Heard
     from tfcompose.plan import Plan
     from tfcompose.ros.stop import Stop
@@ -48,7 +48,7 @@ class Found:
     ``elsewhere`` are topics with TF that were not looked at.
     """
 
-    findings: list[Diagnostic]
+    findings: list[Finding]
     edges: int
     nodes: int
     seconds: float

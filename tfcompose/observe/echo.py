@@ -18,7 +18,7 @@ from tfcompose.ros.tf import TFSubscription, wait
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tfcompose.pose import Pose
+    from tfcompose.geometry import Pose
     from tfcompose.ros.stop import Stop
 
 TOO_EARLY = "echo hears the tree from its own start on; for a time before, look into a recording: --bag"

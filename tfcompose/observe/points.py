@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tfcompose.geometry import matrix_from_quat
 from tfcompose.observe.exceptions import InvalidArgumentException
-from tfcompose.pose import matrix_from_quat
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import nearest
+from tfcompose.findings import nearest
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 from tfcompose.observe.refusal import Refusal
 from tfcompose.observe.seen import who
 
@@ -22,7 +22,7 @@ _NORMALISE = (
 )
 
 
-def refused_transform(edge: EdgeSeen) -> Iterator[Diagnostic]:
+def refused_transform(edge: EdgeSeen) -> Iterator[Finding]:
     """Give the finding for an edge of which tf2 drops transforms, unless it is a frame in itself."""
     strand = edge.strand
     if strand.refused is None or strand.refused is Refusal.SELF:

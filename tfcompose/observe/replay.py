@@ -12,7 +12,7 @@ from tfcompose.observe.census import topics_below
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tfcompose.pose import Pose
+    from tfcompose.geometry import Pose
 
 _SECOND_NS = 1_000_000_000
 

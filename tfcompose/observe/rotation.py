@@ -1,6 +1,7 @@
 """Poses as seven numbers, x y z and the quaternion x y z w, for what is computed many times a second.
 
-``tfcompose.pose`` is the same arithmetic with types; its quaternions are normalised at every step, these at the end.
+``tfcompose.geometry`` is the same arithmetic with types; its quaternions are normalised at every step, these at the
+end.
 """
 
 from __future__ import annotations

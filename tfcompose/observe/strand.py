@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING
 
+from tfcompose.geometry import Pose
 from tfcompose.observe.refusal import DENORMALISED, Refusal, refusal
-from tfcompose.pose import Pose
 
 if TYPE_CHECKING:
     from tfcompose.observe.tally import Tally

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note
+from tfcompose.findings import Finding, Note
 from tfcompose.observe.differences import missing_help
 from tfcompose.verdict.driven import drives_of, sensor_of
 from tfcompose.verdict.poses import driver_pose_differs, pose_differs
@@ -15,7 +15,7 @@ from tfcompose.verdict.violation import violation
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from tfcompose.diagnostic import Severity, Span
+    from tfcompose.findings import Severity, Span
     from tfcompose.observe.differences import Difference
     from tfcompose.observe.seen import Seen
     from tfcompose.plan import Plan
@@ -34,7 +34,7 @@ def grouped(found: Iterable[Difference]) -> list[list[Difference]]:
     return list(groups.values())
 
 
-def told(group: Group, seen: Seen, plan: Plan, place: Span | None = None, slow_is: Severity = "warning") -> Diagnostic:
+def told(group: Group, seen: Seen, plan: Plan, place: Span | None = None, slow_is: Severity = "warning") -> Finding:
     """Return the finding for differences of one group; ``place`` is where the first edge stands in the robot's file."""
     first = group[0]
     found = _offences(group, seen, plan, place) if first.offence else _told(group, seen, plan, place, slow_is)
@@ -42,7 +42,7 @@ def told(group: Group, seen: Seen, plan: Plan, place: Span | None = None, slow_i
     return replace(found, help="") if seen.recorded and first.code in {"TF804", "TF805", "TF846"} else found
 
 
-def _told(group: Group, seen: Seen, plan: Plan, place: Span | None, slow_is: Severity) -> Diagnostic:
+def _told(group: Group, seen: Seen, plan: Plan, place: Span | None, slow_is: Severity) -> Finding:
     first = group[0]
     edges = [one.edge for one in group if one.edge is not None]
     if first.seen is None:
@@ -73,7 +73,7 @@ def _key(one: Difference) -> tuple[object, ...]:
     return one.code, edge.owner, rate, one.over, sensor, one.seen.publisher if one.off and one.seen else None
 
 
-def _offences(group: Group, seen: Seen, plan: Plan, place: Span | None) -> Diagnostic:
+def _offences(group: Group, seen: Seen, plan: Plan, place: Span | None) -> Finding:
     offences = [one.offence for one in group if one.offence is not None]
     first = group[0]
     where = seen.where(first.seen) if first.seen else ""
@@ -94,7 +94,7 @@ def _elsewhere(group: Group) -> list[Note]:
     return [*notes, Note(f"and {len(off) - len(notes)} more are off")] if len(off) > len(notes) else notes
 
 
-def _poses(group: Group, place: Span | None) -> Diagnostic:
+def _poses(group: Group, place: Span | None) -> Finding:
     off = [(one.edge, one.seen.strand.parent, one.seen.strand.pose) for one in group if one.edge and one.seen]
     publisher = group[0].seen.publisher if group[0].seen else ""
     return pose_differs(off, publisher, place)

@@ -12,8 +12,8 @@ from importlib.util import find_spec
 from math import hypot
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.geometry import matrix_from_quat
 from tfcompose.observe.rotation import Seven, product, unit
-from tfcompose.pose import matrix_from_quat
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -14,7 +14,7 @@ from tfcompose.ros.topics import parts_of
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from tfcompose.diagnostic import Diagnostic, Span
+    from tfcompose.findings import Finding, Span
     from tfcompose.observe.census import Census
     from tfcompose.plan import Plan
     from tfcompose.verdict.offset import Offset
@@ -28,7 +28,7 @@ class Verdict:
 
     edge: str
     owner: str | None
-    found: tuple[Diagnostic, ...]
+    found: tuple[Finding, ...]
 
 
 def verify(
@@ -43,7 +43,7 @@ def verify(
     ``now_ns`` is the time of the last look, by the clock of the arrivals; ``places`` is where the edges stand in the
     robot's file, by child.
     """
-    found: dict[str, list[Diagnostic]] = {edge.child: [] for edge in plan.edges}
+    found: dict[str, list[Finding]] = {edge.child: [] for edge in plan.edges}
     extra = []
     for topics, part in parts_of(plan).items():
         seen = seen_of(censuses[topics], now_ns, topics)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from tfcompose.pose import Pose  # noqa: TC001 (the schema reads the types)
+from tfcompose.geometry import Pose  # noqa: TC001 (the schema reads the types)
 
 EdgeKind = Literal["static", "joint", "dynamic"]
 EDGE_KINDS: tuple[EdgeKind, ...] = ("static", "joint", "dynamic")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from tfcompose.diagnostic import Diagnostic, RejectedError, Span, finding
+from tfcompose.findings import Finding, RejectedError, Span, finding
 from tfcompose.plan import VERSION, GuardPolicy, Plan, PlanEdge, PlanProcess
 from tfcompose.plan.reading import plan_from_json
 
@@ -52,7 +52,7 @@ def read_plan(text: str, file: str) -> Plan:
         raise RejectedError([_bad(f"not a whole plan: {what}", Span(file))]) from None
 
 
-def _bad(message: str, span: Span) -> Diagnostic:
+def _bad(message: str, span: Span) -> Finding:
     return finding("TF902", message, span, help="build it again: tfcompose build robot.yaml")
 
 

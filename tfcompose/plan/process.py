@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from tfcompose.pose import Pose
+from tfcompose.geometry import Pose
 
 ProcessKind = Literal["static", "joints", "guard", "simulate", "external", "run"]
 PROCESS_KINDS: tuple[ProcessKind, ...] = ("static", "joints", "guard", "simulate", "external", "run")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from tfcompose.geometry import Pose, norm
 from tfcompose.plan import (
     EDGE_KINDS,
     FENCES,
@@ -27,7 +28,6 @@ from tfcompose.plan import (
     Sweep,
 )
 from tfcompose.plan.fields import floats, get, one_of, optional, pairs, rows, strings, texts, there
-from tfcompose.pose import Pose, norm
 
 
 def _pose_from_json(data: dict[str, Any], where: str) -> Pose:

@@ -7,8 +7,8 @@ import types
 from dataclasses import fields, is_dataclass
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
+from tfcompose.geometry import Pose
 from tfcompose.plan import LIFECYCLE_STATES, LOG_LEVELS, STOP_SIGNALS, VERSION, Plan
-from tfcompose.pose import Pose
 
 _NUMBER = {"type": "number"}
 _TEXT = {"type": "string"}

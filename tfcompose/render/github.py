@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
 
 
-def render_github(found: Sequence[Diagnostic]) -> str:
+def render_github(found: Sequence[Finding]) -> str:
     """Return the findings as workflow commands."""
     return "".join(_one(one) for one in found)
 
 
-def _one(found: Diagnostic) -> str:
+def _one(found: Finding) -> str:
     properties: dict[str, object] = {"title": f"{found.code} {found.name}"}
     if found.span:
         at = found.span

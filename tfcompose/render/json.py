@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tfcompose.diagnostic import Diagnostic, Span
+    from tfcompose.findings import Finding, Span
 
 
-def render_json(found: Sequence[Diagnostic]) -> str:
+def render_json(found: Sequence[Finding]) -> str:
     """Return the findings as a JSON list; a place that is not known is null."""
     return json.dumps([_one(one) for one in found], indent=2, ensure_ascii=False) + "\n"
 
 
-def _one(found: Diagnostic) -> dict[str, Any]:
+def _one(found: Finding) -> dict[str, Any]:
     end = {"end_line": found.span.end_line, "end_column": found.span.end_column} if found.span else {}
     return {
         "code": found.code,

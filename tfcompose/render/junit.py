@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
 
 # XML 1.0 has no place for these, not even escaped.
 _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -17,7 +17,7 @@ _CHARACTER = re.compile('[&<>"\n\r\t]')
 
 
 def render_junit(
-    suite: str, cases: Iterable[tuple[str, str, tuple[Diagnostic, ...]]], *, failing: frozenset[str], seconds: float
+    suite: str, cases: Iterable[tuple[str, str, tuple[Finding, ...]]], *, failing: frozenset[str], seconds: float
 ) -> str:
     """Return a test suite of cases (group, name, findings); one fails whose findings are of a ``failing`` severity.
 
@@ -44,7 +44,7 @@ def render_junit(
     )
 
 
-def _text(found: Diagnostic) -> str:
+def _text(found: Finding) -> str:
     where = f"{found.span}: " if found.span else ""
     lines = [
         f"{where}{found.severity}[{found.code}] {found.message}",

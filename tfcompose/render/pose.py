@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tfcompose.pose import Pose
+    from tfcompose.geometry import Pose
 
 
 def pose_text(parent: str, child: str, pose: Pose, when: str = "", decimals: int = 4) -> str:

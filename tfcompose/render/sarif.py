@@ -11,12 +11,12 @@ from tfcompose.codes import CODES
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from tfcompose.diagnostic import Diagnostic, Span
+    from tfcompose.findings import Finding, Span
 
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
-def render_sarif(found: Sequence[Diagnostic], version: str, pages: Mapping[str, str]) -> str:
+def render_sarif(found: Sequence[Finding], version: str, pages: Mapping[str, str]) -> str:
     """Return the findings as one run of tfcompose; ``pages`` holds what there is to say about a code."""
     codes = sorted({one.code for one in found})
     run = {
@@ -36,7 +36,7 @@ def _rule(code: str, pages: Mapping[str, str]) -> dict[str, Any]:
     return rule
 
 
-def _result(found: Diagnostic, index: int) -> dict[str, Any]:
+def _result(found: Finding, index: int) -> dict[str, Any]:
     advice = f"\n{found.help}" if found.help else ""
     result: dict[str, Any] = {
         "ruleId": found.code,

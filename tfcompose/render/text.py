@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from tfcompose.diagnostic import Diagnostic, Span
+    from tfcompose.findings import Finding, Span
 
 RED, YELLOW, BLUE, GREEN, BOLD, PLAIN = "\033[31m", "\033[33m", "\033[34m", "\033[32m", "\033[1m", "\033[0m"
 
@@ -15,7 +15,7 @@ _LONGEST = 160
 _LONGEST_SAID = 1000
 
 
-def render_text(found: Sequence[Diagnostic], line_of: Callable[[str, int], str | None], *, colour: bool) -> str:
+def render_text(found: Sequence[Finding], line_of: Callable[[str, int], str | None], *, colour: bool) -> str:
     """Return the findings as text; ``line_of`` gives a file's line (from 1), or None where it cannot be had."""
     return "".join(_one(one, line_of, _Paint(colour=colour)) for one in found)
 
@@ -28,7 +28,7 @@ class _Paint:
         return f"{''.join(codes)}{text}{PLAIN}" if self.colour else text
 
 
-def _one(found: Diagnostic, line_of: Callable[[str, int], str | None], paint: _Paint) -> str:
+def _one(found: Finding, line_of: Callable[[str, int], str | None], paint: _Paint) -> str:
     shade = RED if found.severity == "error" else YELLOW
     place = _printable(f"{found.span}: ") if found.span else ""
     said = _printable(found.message)
@@ -67,7 +67,7 @@ def _excerpt(span: Span, line_of: Callable[[str, int], str | None], paint: _Pain
     return [f"{span.line:>5} | {shown}", f"      | {lead}{paint('^' * width, shade, BOLD)}"]
 
 
-def summary(found: Sequence[Diagnostic], files: int) -> str:
+def summary(found: Sequence[Finding], files: int) -> str:
     """Return the last line: how much was found in how many files."""
     errors = sum(one.severity == "error" for one in found)
     warnings = len(found) - errors

@@ -6,7 +6,7 @@ import posixpath
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
 
 
 def beside(named: str, at: Span) -> str:

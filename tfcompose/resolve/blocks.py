@@ -9,7 +9,7 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, RejectedError, Span, did_you_mean, finding, nearest
+from tfcompose.findings import Finding, RejectedError, Span, did_you_mean, finding, nearest
 from tfcompose.load.urdf import load_xml
 from tfcompose.model import Block, Component, Hardware, Interface
 
@@ -56,7 +56,7 @@ def _component(kind: str, name: str, said: ComponentSpec, at: Span) -> Component
     return Component(kind, name, at, tuple(command), tuple(state), said.params)
 
 
-def unknown_joints(hardware: tuple[Hardware, ...], joints: Collection[str]) -> Iterator[Diagnostic]:
+def unknown_joints(hardware: tuple[Hardware, ...], joints: Collection[str]) -> Iterator[Finding]:
     """Yield a finding for each joint that no moving joint of the robot is."""
     for component in hardware:
         for one in component.components:
@@ -64,7 +64,7 @@ def unknown_joints(hardware: tuple[Hardware, ...], joints: Collection[str]) -> I
                 yield _no_joint(one.name, one.at, joints)
 
 
-def _no_joint(name: str, at: Span, joints: Collection[str]) -> Diagnostic:
+def _no_joint(name: str, at: Span, joints: Collection[str]) -> Finding:
     more = f" and {len(joints) - _LISTED} more" if len(joints) > _LISTED else ""
     there = f"there is {', '.join(list(joints)[:_LISTED])}{more}"
     advice = did_you_mean(name, joints, there if joints else "no joint moves")
@@ -73,9 +73,9 @@ def _no_joint(name: str, at: Span, joints: Collection[str]) -> Diagnostic:
 
 def blocks_of(
     given: dict[str, str], source: Source, frames: Collection[str], joints: Collection[str]
-) -> tuple[tuple[Block, ...], list[Diagnostic]]:
+) -> tuple[tuple[Block, ...], list[Finding]]:
     """Return the raw blocks, and what is wrong with them. ``joints`` are the names of all joints of the robot."""
-    found: list[Diagnostic] = []
+    found: list[Finding] = []
     blocks = []
     for name, text in given.items():
         at: Path = ("xml", name)
@@ -83,7 +83,7 @@ def blocks_of(
         try:
             root = load_xml(f"<robot>\n{text}\n</robot>", source.file)
         except RejectedError as error:
-            found += [replace(one, span=_in_file(one.span, text, source, at)) for one in error.diagnostics]
+            found += [replace(one, span=_in_file(one.span, text, source, at)) for one in error.findings]
             continue
         blocks.append(Block(name, place, text))
         for one in (*_misplaced(root, frames, joints), *_unexpanded(text, source.file)):
@@ -91,7 +91,7 @@ def blocks_of(
     return tuple(blocks), found
 
 
-def _unexpanded(text: str, file: str) -> Iterator[Diagnostic]:
+def _unexpanded(text: str, file: str) -> Iterator[Finding]:
     """Yield a finding for each substitution of xacro's or a launch file's, with its place below the line <robot>."""
     for found in _SUBSTITUTION.finditer(_COMMENT.sub(_blank, text)):
         before = text[: found.start()]
@@ -120,7 +120,7 @@ def _in_file(span: Span | None, text: str, source: Source, at: Path) -> Span:
     return Span(whole.file, line, span.column + indent, line, max(span.end_column, span.column + 1) + indent)
 
 
-def _misplaced(root: Element, frames: Collection[str], joints: Collection[str]) -> Iterator[Diagnostic]:
+def _misplaced(root: Element, frames: Collection[str], joints: Collection[str]) -> Iterator[Finding]:
     if not root.children:
         yield finding("TF719", "a block without an element", root.at, help="remove it")
     for element in root.children:
@@ -137,7 +137,7 @@ def _misplaced(root: Element, frames: Collection[str], joints: Collection[str]) 
         yield from _undeclared(element)
 
 
-def _undeclared(top: Element) -> Iterator[Diagnostic]:
+def _undeclared(top: Element) -> Iterator[Finding]:
     """Yield a finding for each prefix that no element around it declares: xacro, and other readers, stop there."""
     waiting = [(top, frozenset({"xml", "xmlns"}))]
     while waiting:
@@ -151,7 +151,7 @@ def _undeclared(top: Element) -> Iterator[Diagnostic]:
         waiting += [(child, known) for child in element.children]
 
 
-def references(element: Element, frames: Collection[str], joints: Collection[str]) -> Iterator[Diagnostic]:
+def references(element: Element, frames: Collection[str], joints: Collection[str]) -> Iterator[Finding]:
     """Yield a finding for each link or joint that a block names and the robot has not."""
     reference = element.attributes.get("reference")
     if element.tag == "gazebo" and reference is not None and reference not in frames and reference not in joints:

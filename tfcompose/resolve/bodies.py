@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
+from tfcompose.geometry import Pose
 from tfcompose.model import Inertial, Link, Material, Shape
-from tfcompose.pose import Pose
 from tfcompose.resolve.moments import Moments, Tensor, joined, of_primitive
 from tfcompose.resolve.packages import Packages, UnmeasurableError
 from tfcompose.resolve.poses import pose_of, rotation_of
@@ -15,7 +15,7 @@ from tfcompose.resolve.poses import pose_of, rotation_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
     from tfcompose.load import Path, Source
     from tfcompose.validate import bodies as said
 
@@ -30,7 +30,7 @@ class Bodies:
 
     source: Source
     packages: Packages = field(default_factory=Packages)
-    found: list[Diagnostic] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
     _known: dict[int, tuple[tuple[Shape, ...], tuple[Shape, ...], Inertial | None]] = field(default_factory=dict)
 
     def link(self, name: str, body: said.LinkSpec) -> Link:

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.model import BUILT_IN, GUARD, JOINTS, STATIC, Node, Process
 from tfcompose.resolve.nodes import full_name
 
@@ -39,7 +39,7 @@ def built_in(spec: RobotSpec, source: Source) -> list[Process]:
     return own
 
 
-def built_in_keys(name: str, said: ProcessSpec, source: Source) -> list[Diagnostic]:
+def built_in_keys(name: str, said: ProcessSpec, source: Source) -> list[Finding]:
     """Return findings about what stands under the name of one of tfcompose's own processes."""
     at: Path = ("processes", name)
     known = _BUILT_IN_KEYS | ({"params"} if name == JOINTS else set())
@@ -52,7 +52,7 @@ def built_in_keys(name: str, said: ProcessSpec, source: Source) -> list[Diagnost
     return found + (_joints_params(said.params, source) if name == JOINTS else [])
 
 
-def _joints_params(params: dict[str, Any], source: Source) -> list[Diagnostic]:
+def _joints_params(params: dict[str, Any], source: Source) -> list[Finding]:
     """Return findings about the parameters of ``joints``."""
     found = []
     for name, value in params.items():

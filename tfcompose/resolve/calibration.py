@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, did_you_mean, finding, nearest
+from tfcompose.findings import Finding, Note, RejectedError, Span, did_you_mean, finding, nearest
 from tfcompose.load.choices import ROTATIONS
 from tfcompose.model import Calibration
 from tfcompose.resolve.beside import beside
@@ -33,7 +33,7 @@ _DEFAULT_LIMIT = CalibrationLimit()
 
 def calibrated(
     drafts: Sequence[Draft], frames: Collection[str], spec: RobotSpec, source: Source, read: Reader | None
-) -> tuple[list[Draft], list[Diagnostic]]:
+) -> tuple[list[Draft], list[Finding]]:
     """Return the drafts, those with a calibration measured, and what is wrong with the calibrations."""
     work = _Work(_Files(read), frozenset(frames), source)
     for draft in drafts:
@@ -51,7 +51,7 @@ class _Files:
     """Calibration files, each read once."""
 
     read: Reader | None
-    found: list[Diagnostic] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
     _known: dict[tuple[str, str], CalibrationFile] = field(default_factory=dict)
 
     def get(self, named: str, at: Span, form: str = "auto") -> CalibrationFile:
@@ -70,7 +70,7 @@ class _Files:
             wrong = loaded.found
         except RejectedError as error:
             whole = Span(path)  # no place in it
-            found = error.diagnostics
+            found = error.findings
             wrong = tuple(replace(one, code="TF610", span=None if one.span == whole else one.span) for one in found)
             loaded = CalibrationFile(path, form, (), wrong)
         for one in wrong:
@@ -106,7 +106,7 @@ class _Work:
     files: _Files
     frames: frozenset[str]
     source: Source
-    found: list[Diagnostic] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
     used: set[int] = field(default_factory=set)
     inside: dict[tuple[str, str], set[str]] = field(default_factory=dict)
 

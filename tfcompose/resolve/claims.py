@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, RejectedError, Span, did_you_mean, finding
+from tfcompose.findings import Finding, RejectedError, Span, did_you_mean, finding
 from tfcompose.model import BUILT_IN, Claim, Edge, Node, Process
 from tfcompose.plan import switch_text
 from tfcompose.resolve.node_presets import node_preset, node_preset_names
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from tfcompose.validate.spec import RobotSpec
 
 
-def settled(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Diagnostic]]:
+def settled(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Finding]]:
     """Return the robot with each node told what to publish and under which names, and what cannot be settled."""
     work = _Work(robot, spec, source)
     processes = tuple(work.process(process) for process in robot.processes)
@@ -36,7 +36,7 @@ class _Work:
     robot: Robot
     spec: RobotSpec
     source: Source
-    found: list[Diagnostic] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
     claims: list[Claim] = field(default_factory=list)
     publishers: dict[tuple[str, str], str] = field(default_factory=dict)
     known: set[str] = field(default_factory=set)
@@ -101,7 +101,7 @@ class _Work:
             advice = did_you_mean(name, names, f"there is {', '.join(names)}")
             self.found.append(finding("TF601", f"no preset {name} of a node", self.source.at(path), help=advice))
         except RejectedError as error:
-            self.found += error.diagnostics
+            self.found += error.findings
         return None
 
     def _of_one(self, told: Told) -> tuple[ClaimSpec, ...]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.resolve.filling import Filler
 from tfcompose.resolve.isolation import isolate
 from tfcompose.resolve.nodes import has_claims
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from tfcompose.validate.spec import RobotSpec
 
 
-def completed(robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None) -> tuple[Robot, list[Diagnostic]]:
+def completed(robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None) -> tuple[Robot, list[Finding]]:
     """Return the robot with what stands beside links and joints, its base, and its processes' topics and publishers."""
-    found: list[Diagnostic] = []
+    found: list[Finding] = []
     if spec.ros2_control or spec.xml:
         robot, refused = _with_blocks(robot, spec, source)
         found += refused
@@ -38,7 +38,7 @@ def completed(robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None) 
     return robot, found
 
 
-def _with_blocks(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Diagnostic]]:
+def _with_blocks(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Finding]]:
     """Return the robot with its hardware and raw blocks; what reads XML is loaded only here."""
     work = import_module("tfcompose.resolve.blocks")
     moving = [edge.joint.name for edge in robot.edges if edge.joint]
@@ -51,7 +51,7 @@ def _with_blocks(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, 
     return replace(robot, hardware=(*hardware, *robot.hardware), blocks=(*blocks, *robot.blocks)), found
 
 
-def _base(robot: Robot, spec: RobotSpec, source: Source, found: list[Diagnostic]) -> str | None:
+def _base(robot: Robot, spec: RobotSpec, source: Source, found: list[Finding]) -> str | None:
     """Return where the URDF begins: as said; base_link, or a fixed base_footprint above it; else the only root."""
     if spec.base is not None:
         if spec.base in robot.frames:

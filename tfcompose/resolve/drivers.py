@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.model import BUILT_IN, Node, Process
 from tfcompose.resolve.isolation import settings_of
 from tfcompose.resolve.nodes import full_name, namespace_of
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 PARAMS_FILE = "${params_file}"
 
 
-def driver_process(sensor: Sensor, spec: RobotSpec, source: Source) -> tuple[Process | None, list[Diagnostic]]:
+def driver_process(sensor: Sensor, spec: RobotSpec, source: Source) -> tuple[Process | None, list[Finding]]:
     """Return the process of a sensor's driver, with the parameters that make it do what the spec says.
 
     It is the preset's with the user's keys over it, the user's alone where the preset has none, or None.
@@ -139,7 +139,7 @@ def _plain(value: Any) -> str:
     return {True: "true", False: "false"}[value] if isinstance(value, bool) else str(value)
 
 
-def _unreached(sensor: Sensor, spec: RobotSpec, source: Source) -> list[Diagnostic]:
+def _unreached(sensor: Sensor, spec: RobotSpec, source: Source) -> list[Finding]:
     """Return findings about names that the driver makes itself, and that the spec wants otherwise."""
     driver, said = sensor.preset.driver, sensor.spec
     if driver is None or (said.driver and (said.driver.run or said.driver.external)):
@@ -167,7 +167,7 @@ def _unreached(sensor: Sensor, spec: RobotSpec, source: Source) -> list[Diagnost
     return found
 
 
-def _named_driver(sensor: Sensor, name: str, source: Source) -> list[Diagnostic]:
+def _named_driver(sensor: Sensor, name: str, source: Source) -> list[Finding]:
     """Return findings about a driver that is the name of a process: it must be one, and has its own keys."""
     at: Path = ("sensors", sensor.name, "driver")
     known = [*source.data.get("processes", {}), *source.data["sensors"], *BUILT_IN]
@@ -186,7 +186,7 @@ def _named_driver(sensor: Sensor, name: str, source: Source) -> list[Diagnostic]
     return found
 
 
-def _given_parameters(sensor: Sensor, computed: dict[str, Any], source: Source) -> list[Diagnostic]:
+def _given_parameters(sensor: Sensor, computed: dict[str, Any], source: Source) -> list[Finding]:
     """Return a finding for each parameter that the user gives and tfcompose computes."""
     found = []
     for key in sensor.spec.driver.params if sensor.spec.driver else ():

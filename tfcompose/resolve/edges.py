@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, Span, finding
+from tfcompose.findings import Finding, Note, Span, finding
 from tfcompose.model import JOINTS, STATIC, Edge, Joint, Link, MountedSensor, Process
 from tfcompose.resolve.joints import FREE, idle_keys, joint_of
 from tfcompose.resolve.poses import Draft, pose_of
@@ -36,7 +36,7 @@ class Drafts:
     links: dict[str, Link] = field(default_factory=dict)
     drivers: list[Process] = field(default_factory=list)
     sensors: list[MountedSensor] = field(default_factory=list)
-    found: list[Diagnostic] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
 
     def add_frames(self) -> None:
         """Take the bare frames; one without a parent is a root, said so."""

@@ -11,7 +11,7 @@ import re
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.model import SHELL
 from tfcompose.plan import told_at_start
 from tfcompose.resolve.beside import beside
@@ -37,7 +37,7 @@ class Filler:
     robot: Robot
     source: Source
     disk: Disk | None
-    found: list[Diagnostic] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
 
     def filled(self, process: Process) -> Process:
         """Return the process with every ``${frame(NAME)}`` and ``${file(PATH)}`` replaced."""
@@ -56,7 +56,7 @@ class Filler:
             self._check_paths(done, node)
         return done
 
-    def needless(self, process: Process) -> list[Diagnostic]:
+    def needless(self, process: Process) -> list[Finding]:
         """Return what is said and reaches nobody: a file of no parameters, and keys beside a shell's text."""
         at: Path = ("processes", process.name, "run")
         asked = any("${params_file}" in word for word in (*process.argv, *process.env.values()))
@@ -67,7 +67,7 @@ class Filler:
         message = f"{process.name} is given ${{params_file}}, and has no parameters"
         return [finding("TF816", message, self.source.at(at), help="params: {…}")]
 
-    def _not_reached(self, process: Process, *, asked: bool) -> list[Diagnostic]:
+    def _not_reached(self, process: Process, *, asked: bool) -> list[Finding]:
         """Return a warning for each key that would be told by arguments, which end before the text's programs."""
         found = []
         for key in ("remap", "log_level", "namespace", *(() if asked else ("params",))):

@@ -9,10 +9,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
-from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, did_you_mean, finding
+from tfcompose.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
+from tfcompose.geometry import rpy_from_quat
 from tfcompose.load.urdf import MACRO, load_xml
 from tfcompose.model import BUILT_IN, Node, Process, Robot
-from tfcompose.pose import rpy_from_quat
 from tfcompose.resolve.beside import beside
 from tfcompose.resolve.isolation import topics_below
 from tfcompose.resolve.nodes import full_name
@@ -42,7 +42,7 @@ class Foreign:
 
     robot: Robot
     file: str
-    found: tuple[Diagnostic, ...]
+    found: tuple[Finding, ...]
     implied: frozenset[str] = frozenset()
 
 
@@ -103,11 +103,11 @@ def _expanded(part: PartEntry, file: str, at: Span, packages: Packages) -> str:
     except RejectedError as error:
         if said.macro is None:
             place = part.source.at((*part.at, "xacro"))
-            raise RejectedError([_at(place, one) for one in error.diagnostics]) from None
-        raise RejectedError([_in_call(part, file, one, disk.read) for one in error.diagnostics]) from None
+            raise RejectedError([_at(place, one) for one in error.findings]) from None
+        raise RejectedError([_in_call(part, file, one, disk.read) for one in error.findings]) from None
 
 
-def _in_call(part: PartEntry, file: str, found: Diagnostic, read: Callable[[str], str]) -> Diagnostic:
+def _in_call(part: PartEntry, file: str, found: Finding, read: Callable[[str], str]) -> Finding:
     """Return the finding about a call of a macro, at the parameter that it names, with what the macro takes."""
     said, macro = part.said, part.said.macro or ""
     place = part.source.at((*part.at, "macro"))
@@ -127,7 +127,7 @@ def _in_call(part: PartEntry, file: str, found: Diagnostic, read: Callable[[str]
     return replace(_at(place, found), help=advice)
 
 
-def _at(place: Span, found: Diagnostic) -> Diagnostic:
+def _at(place: Span, found: Finding) -> Finding:
     """Return the finding about a file that has no better place in it, at the place that names the file."""
     if found.span is None or found.code == "TF001":
         return found
@@ -156,7 +156,7 @@ def _refuse_broken(name: str, text: str, at: Span) -> None:
     try:
         load_xml(f"<block>{text}</block>", at.file)
     except RejectedError as error:
-        found = (replace(one, span=at, message=f"the block {name}: {one.message}") for one in error.diagnostics)
+        found = (replace(one, span=at, message=f"the block {name}: {one.message}") for one in error.findings)
         raise RejectedError(found) from None
 
 

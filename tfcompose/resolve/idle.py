@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 from tfcompose.load.choices import RUNNING
 from tfcompose.model import JOINTS, STATIC
 from tfcompose.resolve.running import EXTERNAL_KEYS, SIMULATED_KEYS
@@ -29,12 +29,12 @@ _READ = {
 }
 
 
-def idle_keys(spec: RobotSpec, source: Source) -> list[Diagnostic]:
+def idle_keys(spec: RobotSpec, source: Source) -> list[Finding]:
     """Return a finding for each key of a process that does nothing there."""
     said: dict[Path, tuple[str, Started | None]] = {}
     said |= {("processes", name): (name, process) for name, process in spec.processes.items()}
     said |= {("sensors", name, "driver"): (f"the driver of {name}", s.driver) for name, s in spec.sensors.items()}
-    found: list[Diagnostic] = []
+    found: list[Finding] = []
     for path, (name, process) in said.items():
         if process is not None:
             found += _idle_rate(path, name, process, source)
@@ -42,7 +42,7 @@ def idle_keys(spec: RobotSpec, source: Source) -> list[Diagnostic]:
     return found
 
 
-def _idle_rate(path: Path, name: str, process: Started, source: Source) -> Iterator[Diagnostic]:
+def _idle_rate(path: Path, name: str, process: Started, source: Source) -> Iterator[Finding]:
     """Yield a finding about a rate: only ``joints`` has one."""
     if process.rate is None or path == ("processes", JOINTS):
         return
@@ -55,7 +55,7 @@ def _idle_rate(path: Path, name: str, process: Started, source: Source) -> Itera
     yield finding("TF101", message, source.at_key((*path, "rate")), help=advice)
 
 
-def _idle(path: Path, name: str, process: Started, source: Source) -> Iterator[Diagnostic]:
+def _idle(path: Path, name: str, process: Started, source: Source) -> Iterator[Finding]:
     """Yield a finding for each key beside external or simulate that does nothing.
 
     Where an overlay puts that in the place of something else, the keys below it are meant for what they stood beside.

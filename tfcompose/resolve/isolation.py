@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.plan import RosSettings
 from tfcompose.resolve.filling import Filler
 
@@ -38,7 +38,7 @@ def topics_below(namespace: str, isolate: str) -> dict[str, str]:
     return {topic: f"/{namespace}{topic}" for topic in TF_TOPICS} if moves else {}
 
 
-def isolate(robot: Robot, ros: RosSpec, source: Source, disk: Disk | None = None) -> tuple[Robot, list[Diagnostic]]:
+def isolate(robot: Robot, ros: RosSpec, source: Source, disk: Disk | None = None) -> tuple[Robot, list[Finding]]:
     """Return the robot with its processes' topics moved, and frames and files in them named; and what is wrong."""
     found = _wrong(robot, ros, source)
     remap = topics_below(robot.ros.namespace, ros.isolate)
@@ -50,7 +50,7 @@ def isolate(robot: Robot, ros: RosSpec, source: Source, disk: Disk | None = None
     return replace(robot, processes=tuple(processes)), [*found, *filler.found]
 
 
-def _wrong(robot: Robot, ros: RosSpec, source: Source) -> list[Diagnostic]:
+def _wrong(robot: Robot, ros: RosSpec, source: Source) -> list[Finding]:
     found = []
     named = robot.ros.namespace or source.data.get("parts") or (ros.isolate == "frames" and ros.frame_prefix)
     if ros.isolate != "none" and not named:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
+from tfcompose.geometry import norm
 from tfcompose.model import Dynamics, Joint, Limit, ReferencePositions, SafetyController
-from tfcompose.pose import norm
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
     from tfcompose.load import Path, Source
     from tfcompose.validate import Validated
     from tfcompose.validate.joints import JointSpec
@@ -54,7 +54,7 @@ def joint_of(name: str, written: JointSpec, at: Span) -> Joint | None:
     )
 
 
-def idle_keys(name: str, kind: str, said: dict[str, Any], source: Source) -> Iterator[Diagnostic]:
+def idle_keys(name: str, kind: str, said: dict[str, Any], source: Source) -> Iterator[Finding]:
     """Yield a finding where a joint says what joints of its type do not have; ``said`` is what is written."""
     at: Path = ("joints", name)
     idle = [key for key in said if key in _IDLE.get(kind, ())]

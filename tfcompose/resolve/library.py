@@ -10,7 +10,7 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
-from tfcompose.diagnostic import RejectedError, finding
+from tfcompose.findings import RejectedError, finding
 from tfcompose.load import load
 from tfcompose.load.overlay import lay_over, without
 from tfcompose.validate import validate_preset

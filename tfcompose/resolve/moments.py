@@ -11,13 +11,13 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.pose import Pose, matrix_from_quat, normalised, rotate
+from tfcompose.geometry import Pose, matrix_from_quat, normalised, rotate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from tfcompose.geometry import Vector
     from tfcompose.model import Shape
-    from tfcompose.pose import Vector
 
 _UNMOVED = Pose()
 

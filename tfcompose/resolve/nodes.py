@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 from tfcompose.model import Node
 from tfcompose.resolve.node_presets import node_preset, node_preset_names
 
@@ -48,7 +48,7 @@ def _usual(said: ProcessSpec) -> str | None:
     return node_preset(said.node.preset).node if said.node.preset in node_preset_names() else None
 
 
-def nodes_of(name: str, said: ProcessSpec, namespace: str, source: Source) -> tuple[tuple[Node, ...], list[Diagnostic]]:
+def nodes_of(name: str, said: ProcessSpec, namespace: str, source: Source) -> tuple[tuple[Node, ...], list[Finding]]:
     """Return the nodes of a process, at least one, and what is wrong with them."""
     at: Path = ("processes", name)
     if not said.nodes:

@@ -11,14 +11,14 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, Span, finding, nearest, slip_of
+from tfcompose.findings import Finding, Span, finding, nearest, slip_of
 from tfcompose.model import Asset
 from tfcompose.resolve.beside import beside
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from tfcompose.pose import Vector
+    from tfcompose.geometry import Vector
     from tfcompose.resolve.moments import Moments
 
 _PACKAGE_NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
@@ -90,7 +90,7 @@ class Packages:
         around, folder = ("", "") if there is not None else self._around(posixpath.dirname(file))
         return (folder or ".") if around == name else there
 
-    def not_found(self, name: str, at: Span | None) -> Diagnostic:
+    def not_found(self, name: str, at: Span | None) -> Finding:
         """Return the finding that a package is nowhere, with the list of where it was looked for."""
         places = self.places(name)
         looked = f"looked in {', '.join(places)}" if places else "AMENT_PREFIX_PATH is empty"
@@ -98,7 +98,7 @@ class Packages:
         advice = f"{looked}; {f'did you mean {near}?' if near else self.otherwise.format(name=name)}"
         return finding("TF724", f"no package {name}", at, help=advice, severity="warning")
 
-    def asset(self, uri: str, at: Span) -> tuple[Asset, Diagnostic | None]:
+    def asset(self, uri: str, at: Span) -> tuple[Asset, Finding | None]:
         """Return the file that is addressed at a place, and what is wrong with the address, if anything is.
 
         ``package://NAME/PATH`` is in a package, ``file:///PATH`` and plain paths are files, the relative ones beside
@@ -121,7 +121,7 @@ class Packages:
         package, inside = self._package_above(path)
         return Asset(uri, at, path, package, inside), self._missing(path, f"no file {uri}", at)
 
-    def _in_package(self, uri: str, at: Span) -> tuple[Asset, Diagnostic | None]:
+    def _in_package(self, uri: str, at: Span) -> tuple[Asset, Finding | None]:
         name, _, inside = _unquoted(uri.partition("://")[2]).partition("/")
         if not name or not inside:
             advice = f"a slash too many: package://{inside}" if "/" in inside else "package://NAME/PATH"
@@ -136,7 +136,7 @@ class Packages:
         path = posixpath.join(folder, inside)
         return Asset(uri, at, path, name, inside), self._missing(path, f"no file {inside} in {name}", at)
 
-    def _missing(self, path: str, message: str, at: Span) -> Diagnostic | None:
+    def _missing(self, path: str, message: str, at: Span) -> Finding | None:
         if self.disk is None:
             return None
         if "\0" in path or not self.disk.is_file(path):

@@ -6,7 +6,7 @@ import hashlib
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, Note, RejectedError, finding, nearest
+from tfcompose.findings import Finding, Note, RejectedError, finding, nearest
 from tfcompose.load.params import NodeParams, ParamsFile, Word, load_params
 from tfcompose.model import AsInFile
 from tfcompose.resolve.beside import beside
@@ -15,12 +15,12 @@ from tfcompose.resolve.nodes import FILE_KEY, full_name, names_files
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
     from tfcompose.load import Source
     from tfcompose.model import Node, Process, Robot
 
 
-def with_param_files(robot: Robot, source: Source, read: Callable[[str], str] | None) -> tuple[Robot, list[Diagnostic]]:
+def with_param_files(robot: Robot, source: Source, read: Callable[[str], str] | None) -> tuple[Robot, list[Finding]]:
     """Return the robot whose nodes have the parameters of the files that they name, and what is wrong with these."""
     work = _Work(source, read, robot.ros.namespace)
     processes = tuple(work.process(process) for process in robot.processes)
@@ -33,7 +33,7 @@ class _Work:
     source: Source
     read: Callable[[str], str] | None
     namespace: str
-    found: list[Diagnostic] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
     digests: dict[str, str] = field(default_factory=dict)
     _known: dict[str, ParamsFile] = field(default_factory=dict)
 
@@ -81,7 +81,7 @@ class _Work:
             text = self.read(path)
             loaded = load_params(text, path)
         except RejectedError as error:
-            self.found += [replace(one, notes=(*one.notes, note)) for one in error.diagnostics]
+            self.found += [replace(one, notes=(*one.notes, note)) for one in error.findings]
             return None
         self.found += [replace(one, notes=(*one.notes, note)) for one in loaded.found]
         self.digests[path] = hashlib.sha256(text.encode()).hexdigest()
@@ -89,7 +89,7 @@ class _Work:
         return loaded
 
 
-def _nothing(path: str, at: Span, node: Node, process: Process, there: Sequence[NodeParams]) -> Diagnostic:
+def _nothing(path: str, at: Span, node: Node, process: Process, there: Sequence[NodeParams]) -> Finding:
     names = [one.name for one in there]
     near = nearest(node.name.rpartition("/")[2], [name.rpartition("/")[2] for name in names])
     meant = next((one for one in there if near and one.name.endswith(near)), None)

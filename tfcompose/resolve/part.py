@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, Note, RejectedError, did_you_mean, finding
+from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, finding
 from tfcompose.load import Place, Source, lay_over
 from tfcompose.model import Part
 from tfcompose.plan import RosSettings
@@ -14,7 +14,7 @@ from tfcompose.resolve.cut import below
 from tfcompose.resolve.renamed import Names, renamed
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
     from tfcompose.load import Path
     from tfcompose.model import Edge, Robot
     from tfcompose.validate.part import PartSpec
@@ -55,7 +55,7 @@ class PartEntry:
     source: Source
     outer_prefix: str
     is_broken: bool = False
-    found: list[Diagnostic] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
 
     @property
     def at(self) -> Path:

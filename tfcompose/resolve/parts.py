@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, RejectedError, did_you_mean, finding
+from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, finding
 from tfcompose.load import composed, load, with_includes
 from tfcompose.resolve.beside import beside
 from tfcompose.resolve.part import Joined, PartEntry
@@ -45,7 +45,7 @@ class Parts:
     resolve: Callable[..., Resolved]
     files: tuple[str, ...] = ()
     whole: Whole = field(default_factory=Whole)
-    found: list[Diagnostic] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
     missing: list[tuple[str, str]] = field(default_factory=list)
 
     def join(self, validated: Validated, prefix: str, packages: Packages) -> list[Joined]:
@@ -57,7 +57,7 @@ class Parts:
                 joined.append(part.joined(*self._robot(part, packages)))
                 self.found += part.found
             except RejectedError as error:
-                self.found += [*part.found, *error.diagnostics]
+                self.found += [*part.found, *error.findings]
                 self.missing += [("parts", f"{name}/"), ("parts", part.prefix)]
         return joined
 
@@ -76,7 +76,7 @@ class Parts:
                 return self._resolved(part, part.said.spec, self.read), frozenset()
             made = import_module("tfcompose.resolve.foreign").foreign(part, packages, self.read)
         except RejectedError as error:
-            raise RejectedError([_noted(one, part) for one in error.diagnostics]) from None
+            raise RejectedError([_noted(one, part) for one in error.findings]) from None
         self.whole.foreign.setdefault(made.file, []).append(_note(part))
         self.found += [_noted(one, part) for one in made.found if one.severity == "error" or one.code in _TELLING]
         return made.robot, made.implied
@@ -99,7 +99,7 @@ class Parts:
         return resolved.robot
 
 
-def _noted(found: Diagnostic, part: PartEntry) -> Diagnostic:
+def _noted(found: Finding, part: PartEntry) -> Finding:
     return replace(found, notes=(*found.notes, _note(part)))
 
 
@@ -107,7 +107,7 @@ def _note(part: PartEntry) -> Note:
     return Note(f"as the part {part.name}", part.place)
 
 
-def _useless(part: PartEntry, file: str, validated: Validated, loaded: Source) -> list[Diagnostic]:
+def _useless(part: PartEntry, file: str, validated: Validated, loaded: Source) -> list[Finding]:
     """Return a finding for each variable that the part is given, does not have, and does not use."""
     known = loaded.data.get("vars") or {}
     found = []

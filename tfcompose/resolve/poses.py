@@ -9,12 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, did_you_mean, finding
+from tfcompose.findings import Finding, Note, did_you_mean, finding
+from tfcompose.geometry import IDENTITY_XYZW, OPTICAL_XYZW, Pose, multiply
 from tfcompose.model import STATIC, is_optical
-from tfcompose.pose import IDENTITY_XYZW, OPTICAL_XYZW, Pose, multiply
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
     from tfcompose.load import Path
     from tfcompose.model import Calibration, Edge
     from tfcompose.validate.posed import Posed, Turned
@@ -73,7 +73,7 @@ class _DeeperError(Exception):
 
 
 class _UnsolvableError(Exception):
-    def __init__(self, found: Diagnostic) -> None:
+    def __init__(self, found: Finding) -> None:
         self.found = found
         super().__init__(found.message)
 
@@ -84,7 +84,7 @@ class Solver:
 
     drafts: list[Draft]
     frames: dict[str, Span]
-    found: list[Diagnostic] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
     _solved: dict[int, Edge] = field(default_factory=dict)
     _open: list[int] = field(default_factory=list)
     _above: dict[str, int] = field(default_factory=dict)
@@ -109,7 +109,7 @@ class Solver:
                 self._open.clear()
         return tuple(self._solved[index] for index in range(len(self.drafts)))
 
-    def _give_up(self, index: int, found: Diagnostic) -> None:
+    def _give_up(self, index: int, found: Finding) -> None:
         if found not in self.found:
             self.found.append(found)
         self._solved[index] = self.drafts[index].edge
@@ -215,7 +215,7 @@ class Solver:
         return pose
 
 
-def _circle(drafts: list[Draft]) -> Diagnostic:
+def _circle(drafts: list[Draft]) -> Finding:
     names = ", ".join(draft.edge.name for draft in drafts)
     at = next((at for draft in drafts if (at := draft.relative_at or draft.place_at)), drafts[0].edge.at)
     return finding("TF404", f"these poses are given relative to each other: {names}", at)

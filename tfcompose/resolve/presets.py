@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, did_you_mean, finding
+from tfcompose.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
 
 if TYPE_CHECKING:
     from tfcompose.load import Path, Source
@@ -67,7 +67,7 @@ def holds(condition: dict[str, Any], options: dict[str, Any], tf: str) -> bool:
     return True
 
 
-def sensor_of(name: str, spec: SensorSpec, library: Library, source: Source) -> tuple[Sensor | None, list[Diagnostic]]:
+def sensor_of(name: str, spec: SensorSpec, library: Library, source: Source) -> tuple[Sensor | None, list[Finding]]:
     """Return the sensor with its preset and options, or None and why not."""
     at: Path = ("sensors", name)
     span = source.at((*at, "preset"))
@@ -79,7 +79,7 @@ def sensor_of(name: str, spec: SensorSpec, library: Library, source: Source) -> 
     except KeyError:
         return None, [_no_preset(spec.preset, library, span)]
     except RejectedError as error:
-        return None, list(error.diagnostics)
+        return None, list(error.findings)
     hidden = library.hides(spec.preset)
     if hidden:
         message = f"{spec.preset} is {library.file(spec.preset)}, which stands before tfcompose's own preset"
@@ -91,7 +91,7 @@ def sensor_of(name: str, spec: SensorSpec, library: Library, source: Source) -> 
     return sensor, found
 
 
-def _no_preset(name: str, library: Library, span: Span) -> Diagnostic:
+def _no_preset(name: str, library: Library, span: Span) -> Finding:
     names = library.names
     vendor = name.partition("/")[0]
     same = [one for one in names if one.startswith(f"{vendor}/")]
@@ -109,7 +109,7 @@ def _publisher(sensor: Sensor) -> str:
     return sensor.spec.tf or driver.tf
 
 
-def decided(preset: PresetSpec, spec: SensorSpec, at: Path, source: Source) -> tuple[dict[str, Any], list[Diagnostic]]:
+def decided(preset: PresetSpec, spec: SensorSpec, at: Path, source: Source) -> tuple[dict[str, Any], list[Finding]]:
     """Return the value of each of the preset's options, and what is wrong with those that are given."""
     options = {key: option.default for key, option in preset.options.items()}
     found = []
@@ -136,7 +136,7 @@ def _as_text(value: Any) -> Any:
     return f"{value:g}" if isinstance(value, (int, float)) else value
 
 
-def _refusal(option: Option, key: str, value: Any, place: Span) -> Diagnostic | None:
+def _refusal(option: Option, key: str, value: Any, place: Span) -> Finding | None:
     if option.type == "bool" and not isinstance(value, bool):
         return finding("TF603", f"the option {key} is {value!r}", place, help="true or false")
     if option.type == "text" and not isinstance(value, str):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeGuard
 
-from tfcompose.diagnostic import Diagnostic, Note, did_you_mean, finding
+from tfcompose.findings import Finding, Note, did_you_mean, finding
 from tfcompose.load.choices import SIMULATIONS
 from tfcompose.model import BUILT_IN, Node, Process
 from tfcompose.plan import Simulation
@@ -21,9 +21,7 @@ if TYPE_CHECKING:
     from tfcompose.validate.spec import RobotSpec
 
 
-def user_process(
-    name: str, said: ProcessSpec, spec: RobotSpec, source: Source
-) -> tuple[Process | None, list[Diagnostic]]:
+def user_process(name: str, said: ProcessSpec, spec: RobotSpec, source: Source) -> tuple[Process | None, list[Finding]]:
     """Return the process that the user describes, or None and what is missing."""
     at: Path = ("processes", name)
     place = source.at_key(at)
@@ -52,7 +50,7 @@ def user_process(
     return None, [finding("TF102", f"{name} does not say how it runs", place, help=advice)]
 
 
-def _simulated(process: Process, simulate: Simulate, source: Source) -> tuple[Process | None, list[Diagnostic]]:
+def _simulated(process: Process, simulate: Simulate, source: Source) -> tuple[Process | None, list[Finding]]:
     if simulate.circle:
         circle = simulate.circle
         simulation = Simulation("circle", simulate.rate, radius=circle.radius, speed=circle.speed)
@@ -80,7 +78,7 @@ def _was_refused(run: Any) -> bool:
     )
 
 
-def name_clashes(processes: list[Process], spec: RobotSpec, source: Source) -> list[Diagnostic]:
+def name_clashes(processes: list[Process], spec: RobotSpec, source: Source) -> list[Finding]:
     """Return a finding for each name that a sensor and a process, or two processes, share.
 
     A sensor may have the name of the process that drives it.
@@ -105,7 +103,7 @@ def name_clashes(processes: list[Process], spec: RobotSpec, source: Source) -> l
 
 def unknown_names(
     processes: list[Process], source: Source, known: frozenset[str], missing: tuple[str, ...]
-) -> list[Diagnostic]:
+) -> list[Finding]:
     """Return a finding for each name under ``after`` that is no process, and for each end that never comes.
 
     ``known`` are those that are there or were refused, ``missing`` how the names of those begin that are not known.

@@ -13,9 +13,9 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import RejectedError
+from tfcompose.findings import RejectedError
+from tfcompose.geometry import Pose, angle_between
 from tfcompose.imported import Recognised
-from tfcompose.pose import Pose, angle_between
 from tfcompose.resolve.poses import rotation_of
 from tfcompose.resolve.presets import TFCOMPOSE, filled, holds
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, cast
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 from tfcompose.model import Edge, Process, Robot
 from tfcompose.plan import GuardPolicy
 from tfcompose.resolve.beside import beside
@@ -47,7 +47,7 @@ class Resolved:
     """The robot, right or wrong, and what was found while resolving it."""
 
     robot: Robot
-    found: tuple[Diagnostic, ...]
+    found: tuple[Finding, ...]
     whole: Whole = field(default_factory=Whole)
 
 
@@ -79,8 +79,8 @@ class _Work:
     read: Callable[[str], str] | None
     disk: Disk | None
     holder: Parts | None
-    found: list[Diagnostic] = field(default_factory=list)
-    of_parts: list[Diagnostic] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
+    of_parts: list[Finding] = field(default_factory=list)
     broken: set[tuple[str, str]] = field(default_factory=set)
     whole: Whole = field(default_factory=Whole)
     joined: list[Joined] = field(default_factory=list)
@@ -115,12 +115,12 @@ class _Work:
         found = [one for one in self.found if not self._may_follow(one)] if self.broken else self.found
         return Resolved(robot, (*self.of_parts, *found), self.whole)
 
-    def _may_follow(self, found: Diagnostic) -> bool:
+    def _may_follow(self, found: Finding) -> bool:
         """Return whether it may be there only because an edge on the way, or a part with that name, was refused."""
         in_parts = any(section == "parts" for section, _ in self.broken)
         return found.code == "TF404" or (in_parts and found.code in _UNKNOWN_NAMES)
 
-    def _take(self, done: tuple[Robot, list[Diagnostic]]) -> Robot:
+    def _take(self, done: tuple[Robot, list[Finding]]) -> Robot:
         robot, found = done
         self.found += found
         return robot
@@ -183,7 +183,7 @@ class _Work:
         self.found += refused
         return cast("list[Draft]", measured)
 
-    def _wrong_names(self, own: list[Process]) -> list[Diagnostic]:
+    def _wrong_names(self, own: list[Process]) -> list[Finding]:
         everybody = self._everybody(own)
         known = frozenset(name for _, name in self.broken) | {process.name for process in everybody}
         missing = tuple(name for section, name in self.broken if section == "parts" and name)
@@ -235,7 +235,7 @@ def _has_calibrations(spec: RobotSpec) -> bool:
     return bool(spec.calibrations) or any(entry.calibration for entry in entries)
 
 
-def _processes(spec: RobotSpec, source: Source, found: list[Diagnostic]) -> list[Process]:
+def _processes(spec: RobotSpec, source: Source, found: list[Finding]) -> list[Process]:
     processes = built_in(spec, source)
     for name, said in spec.processes.items():
         process, refused = user_process(name, said, spec, source)

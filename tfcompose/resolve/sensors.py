@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import did_you_mean, finding
+from tfcompose.findings import did_you_mean, finding
+from tfcompose.geometry import Pose
 from tfcompose.model import STATIC, Edge, Link, MountedSensor
-from tfcompose.pose import Pose
 from tfcompose.resolve.bodies import inertial_of
 from tfcompose.resolve.drivers import claims_of, driver_process
 from tfcompose.resolve.poses import Draft, rotation_of
 from tfcompose.resolve.presets import DRIVER, TFCOMPOSE
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
     from tfcompose.load import Path
     from tfcompose.resolve.edges import Drafts
     from tfcompose.resolve.presets import Sensor

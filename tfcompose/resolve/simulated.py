@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.plan import Sweep
 from tfcompose.validate.running import SWEEP
 
@@ -22,7 +22,7 @@ PERIOD_S = 6.0
 
 
 def with_positions(
-    process: Process, spec: RobotSpec, edges: tuple[Edge, ...], source: Source, found: list[Diagnostic]
+    process: Process, spec: RobotSpec, edges: tuple[Edge, ...], source: Source, found: list[Finding]
 ) -> Process:
     """Give a stand-in for joint states what it says of every joint that has a position of its own.
 
@@ -46,9 +46,7 @@ def with_positions(
     return replace(process, simulate=replace(process.simulate, joints=positions, sweep=moving))
 
 
-def _findings(
-    wanted: dict[str, Any], joints: dict[str, Joint], process: Process, source: Source
-) -> Iterator[Diagnostic]:
+def _findings(wanted: dict[str, Any], joints: dict[str, Joint], process: Process, source: Source) -> Iterator[Finding]:
     """Give a finding for each joint that is not there, or cannot move as it should."""
     movable = [name for name, joint in joints.items() if _has_position(joint)]
     for name, what in wanted.items():

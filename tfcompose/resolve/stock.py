@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 from tfcompose.model import JOINTS, STATIC, Node
 from tfcompose.resolve.nodes import full_name
 
@@ -22,7 +22,7 @@ NAME = "robot_state_publisher"
 MOST_HZ = 1000.0
 
 
-def with_stock(robot: Robot) -> tuple[Robot, list[Diagnostic]]:
+def with_stock(robot: Robot) -> tuple[Robot, list[Finding]]:
     """Return the robot in which ``joints`` is a stock publisher that owns what is ours below base; and what it cannot.
 
     Fixed edges elsewhere stay with ``static``, which then sends the description too.

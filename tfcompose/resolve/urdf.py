@@ -6,7 +6,7 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, RejectedError, finding
+from tfcompose.findings import Finding, Note, RejectedError, finding
 from tfcompose.model import Block, Robot
 from tfcompose.resolve.blocks import REFERRING, references
 from tfcompose.resolve.urdf_bodies import Bodies
@@ -17,7 +17,7 @@ from tfcompose.resolve.urdf_words import unknown_words
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.diagnostic import Severity
+    from tfcompose.findings import Severity
     from tfcompose.load.urdf import Element
     from tfcompose.resolve.urdf_bodies import Finder
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _READ = frozenset({"link", "joint", "material"})
 
 
-def robot_of_urdf(root: Element, file: str, finder: Finder) -> tuple[Robot, tuple[Diagnostic, ...]]:
+def robot_of_urdf(root: Element, file: str, finder: Finder) -> tuple[Robot, tuple[Finding, ...]]:
     """Return the robot that the URDF describes, right or wrong, and what was found while reading it.
 
     Raises:

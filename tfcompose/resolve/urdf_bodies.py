@@ -11,12 +11,12 @@ from tfcompose.resolve.bodies import name_of_colour, traces
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tfcompose.diagnostic import Diagnostic, Severity, Span
+    from tfcompose.findings import Finding, Severity, Span
     from tfcompose.load.urdf import Element
     from tfcompose.resolve.urdf_values import Values
 
     #: Takes the address of a file and its place; returns the file, and what is wrong with the address, if anything is.
-    Finder = Callable[[str, Span], tuple[Asset, Diagnostic | None]]
+    Finder = Callable[[str, Span], tuple[Asset, Finding | None]]
 
 _FORMS: dict[str, tuple[tuple[str, int], ...]] = {
     "box": (("size", 3),),
@@ -35,7 +35,7 @@ class Bodies:
     values: Values
     finder: Finder
     root: Element
-    found: list[Diagnostic] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
     _materials: dict[str, Material | None] = field(default_factory=dict)
 
     def link(self, name: str, element: Element) -> Link:

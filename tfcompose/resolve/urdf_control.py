@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Span
+from tfcompose.findings import Span
 from tfcompose.load.urdf import load_xml
 from tfcompose.model import Component, Hardware, Interface
 

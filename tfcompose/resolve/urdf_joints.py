@@ -6,7 +6,8 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from tfcompose.diagnostic import did_you_mean
+from tfcompose.findings import did_you_mean
+from tfcompose.geometry import norm
 from tfcompose.model import (
     JOINTS,
     STATIC,
@@ -17,12 +18,11 @@ from tfcompose.model import (
     ReferencePositions,
     SafetyController,
 )
-from tfcompose.pose import norm
 from tfcompose.resolve.joints import FREE
 
 if TYPE_CHECKING:
+    from tfcompose.geometry import Vector
     from tfcompose.load.urdf import Element
-    from tfcompose.pose import Vector
     from tfcompose.resolve.urdf_values import Values
 
 T = TypeVar("T", Dynamics, Limit, ReferencePositions, SafetyController)

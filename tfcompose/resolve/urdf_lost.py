@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.pose import normalised, quat_from_rpy
+from tfcompose.geometry import normalised, quat_from_rpy
 from tfcompose.resolve.urdf_words import OPAQUE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from tfcompose.diagnostic import Diagnostic, Span
+    from tfcompose.findings import Finding, Span
+    from tfcompose.geometry import Quaternion, Vector
     from tfcompose.imported import Entry
     from tfcompose.load.urdf import Element
     from tfcompose.model import Robot
-    from tfcompose.pose import Quaternion, Vector
 
 #: Known attributes that nothing here holds.
 _NOT_HELD = {
@@ -30,7 +30,7 @@ _SAID_ELSEWHERE = frozenset({"TF203", "TF703", "TF723", "TF724"})
 _OF_MOTION = ("axis", "limit", "mimic", "dynamics", "calibration", "safety_controller")
 
 
-def lost(root: Element, robot: Robot, found: Iterable[Diagnostic]) -> dict[Entry, list[str]]:
+def lost(root: Element, robot: Robot, found: Iterable[Finding]) -> dict[Entry, list[str]]:
     """Return what is left out of each link and joint, ``found`` by reading included; of the whole under no name."""
     notes: dict[Entry, list[str]] = {}
     entries: list[tuple[Span, Entry]] = []

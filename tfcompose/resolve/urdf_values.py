@@ -7,12 +7,12 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, Severity, Span, finding
-from tfcompose.pose import Pose, normalised, quat_from_rpy, rpy_from_quat
+from tfcompose.findings import Finding, Severity, Span, finding
+from tfcompose.geometry import Pose, normalised, quat_from_rpy, rpy_from_quat
 
 if TYPE_CHECKING:
+    from tfcompose.geometry import Quaternion
     from tfcompose.load.urdf import Element
-    from tfcompose.pose import Quaternion
 
 
 #: Beyond this, products of four such numbers leave the range of floats.
@@ -26,7 +26,7 @@ class Values:
     ``refused`` counts what is no value; what is a warning only leaves a value as it is.
     """
 
-    found: list[Diagnostic] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
     has_quaternions: bool = False
     refused: int = 0
 

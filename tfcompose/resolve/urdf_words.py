@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding, nearest, slip_of
+from tfcompose.findings import Finding, finding, nearest, slip_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -51,7 +51,7 @@ _XACRO = frozenset({"insert_block", "include", "property", "if", "unless", "macr
 OPAQUE = frozenset({"transmission", "gazebo", "ros2_control", "sensor"})
 
 
-def unknown_words(root: Element) -> Iterator[Diagnostic]:
+def unknown_words(root: Element) -> Iterator[Finding]:
     """Yield a finding for each element and attribute that URDF does not have: an error where a known one is misspelt.
 
     Others may be somebody's extension, and are warnings; beside links and joints they are let through.
@@ -72,7 +72,7 @@ def unknown_words(root: Element) -> Iterator[Diagnostic]:
                 yield _unknown(f"element <{child.tag}> in <{element.tag}>", child.tag, inside, child)
 
 
-def _unexpanded(element: Element) -> Diagnostic:
+def _unexpanded(element: Element) -> Finding:
     """Return the finding about what xacro should have replaced, and what readers pass over."""
     if element.tag in _XACRO:
         message = f"<{element.tag}> is xacro's, and without its prefix nobody expands it"
@@ -81,7 +81,7 @@ def _unexpanded(element: Element) -> Diagnostic:
     return finding("TF720", f"<{element.tag}> was not expanded", element.at, help=advice)
 
 
-def _unknown(what: str, word: str, known: list[str], at: Element, attribute: str = "") -> Diagnostic:
+def _unknown(what: str, word: str, known: list[str], at: Element, attribute: str = "") -> Finding:
     near = nearest(word, known)
     advice = f"did you mean {near}?" if near else f"known here: {', '.join(known)}" if known else "nothing stands here"
     place = at.place(attribute) if attribute else at.at

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Allow, Note
+    from tfcompose.findings import Allow, Note
     from tfcompose.load import Source
 
 

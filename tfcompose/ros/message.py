@@ -11,7 +11,7 @@ import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.pose import Pose, Quaternion, Vector
+from tfcompose.geometry import Pose, Quaternion, Vector
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -10,7 +10,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 from tfcompose.ros.environment import missing_ros
 
 if TYPE_CHECKING:
@@ -21,12 +21,12 @@ DOMAIN, RANGE, RMW = "ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "RMW_IMPL
 LAST_DOMAIN = 232
 
 
-def ros_trouble(environment: Mapping[str, str]) -> Diagnostic | None:
+def ros_trouble(environment: Mapping[str, str]) -> Finding | None:
     """Return what keeps a process with this environment from starting a node, or None."""
     return no_ros() or _domain(environment.get(DOMAIN, "")) or _middleware(environment.get(RMW, ""))
 
 
-def no_ros() -> Diagnostic | None:
+def no_ros() -> Finding | None:
     """Return the finding that there is no ROS, with what to install, or None."""
     missing = missing_ros()
     if not missing:
@@ -35,14 +35,14 @@ def no_ros() -> Diagnostic | None:
     return finding("TF901", message, None, help=advice)
 
 
-def _domain(domain: str) -> Diagnostic | None:
+def _domain(domain: str) -> Finding | None:
     if not domain or (domain.isascii() and domain.isdigit() and int(domain) <= LAST_DOMAIN):
         return None
     advice = f"unset {DOMAIN}, which is domain 0, or set it to the robot's"
     return finding("TF909", f"{DOMAIN}={domain} is no domain: they go from 0 to {LAST_DOMAIN}", None, help=advice)
 
 
-def _middleware(name: str) -> Diagnostic | None:
+def _middleware(name: str) -> Finding | None:
     """Look for the library as ROS does; where it is not, ROS ends the process as soon as it is imported."""
     if not name:
         return None

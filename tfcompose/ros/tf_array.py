@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from tfcompose.pose import Pose
+    from tfcompose.geometry import Pose
 
 _SECOND_NS = 1_000_000_000
 _HEADER = 4

@@ -10,7 +10,7 @@ import sys
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import RejectedError
+from tfcompose.findings import RejectedError
 from tfcompose.ros.environment import RosError, child_environment, missing_ros
 from tfcompose.ros.stop import Stop
 from tfcompose.run.hold import wait_for_go

@@ -10,7 +10,7 @@ import json
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from tfcompose.diagnostic import Diagnostic, Note
+from tfcompose.findings import Finding, Note
 
 EVENTS_FD = "TFCOMPOSE_EVENTS_FD"
 #: The descriptor of what the guard before this one left, in JSON; see ``tfcompose.run.guard.memory``.
@@ -28,7 +28,7 @@ class Clear:
 class Taken:
     """A planned edge was published before the start: the plan must not start, or must end."""
 
-    found: Diagnostic
+    found: Finding
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ class Complete:
 class Found:
     """A violation, once per case; ``process`` is the plan's process that did it, where it can be stopped for it."""
 
-    found: Diagnostic
+    found: Finding
     process: str = ""
 
 
@@ -134,11 +134,11 @@ def from_line(line: str) -> GuardEvent:
     if "children" in data:
         data["children"] = tuple(data["children"])
     if "found" in data:
-        data["found"] = diagnostic(data["found"])
+        data["found"] = finding_of(data["found"])
     return kind(**data)
 
 
-def diagnostic(data: dict[str, Any]) -> Diagnostic:
+def finding_of(data: dict[str, Any]) -> Finding:
     """Return the finding that ``asdict`` took apart, without places."""
     notes = tuple(Note(note["message"]) for note in data["notes"])
-    return Diagnostic(data["code"], data["name"], data["severity"], data["message"], None, notes, data["help"])
+    return Finding(data["code"], data["name"], data["severity"], data["message"], None, notes, data["help"])

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.plan import PlanProcess, Ready
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def without_host(plan: Plan) -> tuple[str, ...]:
     return tuple(process.name for process in own if process.host is None)
 
 
-def share_of(plan: Plan, asked: str | None, machine: str) -> Plan | Diagnostic:
+def share_of(plan: Plan, asked: str | None, machine: str) -> Plan | Finding:
     """Return the plan as one machine starts it: what others start is expected there, not started.
 
     ``asked`` is the host that the user says this is; without it, it is the one with this ``machine``'s name, whole or

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import RejectedError, Span, finding
+from tfcompose.findings import RejectedError, Span, finding
 from tfcompose.plan.file import read_plan
 
 if TYPE_CHECKING:

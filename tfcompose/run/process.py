@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import RejectedError
+from tfcompose.findings import RejectedError
 from tfcompose.plan.file import read_plan
 from tfcompose.ros.environment import child_environment
 from tfcompose.run.launcher.preflight import commands_of
@@ -21,7 +21,7 @@ from tfcompose.run.orders import JOINS
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.run.launcher.command import Command
 
 _ARGUMENTS = 2
@@ -63,7 +63,7 @@ def main(argv: Sequence[str]) -> int:
         return _fail(f"{argv[1]} cannot be started: {error}", 1)
 
 
-def _text(found: Diagnostic) -> str:
+def _text(found: Finding) -> str:
     return "\n".join(
         [found.message, *(f"  {note.message}" for note in found.notes), *([found.help] if found.help else [])]
     )

@@ -10,8 +10,8 @@ from tfcompose.validate.posed import Posed, Turned
 from tfcompose.validate.schema import Model, Problems, Type, key, listing, record
 
 if TYPE_CHECKING:
+    from tfcompose.geometry import Vector
     from tfcompose.load import Path
-    from tfcompose.pose import Vector
 
 
 class Cylinder(Model):

@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
-from tfcompose.pose import Pose
+from tfcompose.findings import Finding, did_you_mean, finding
+from tfcompose.geometry import Pose
 from tfcompose.validate.fields import NUMBER_
 from tfcompose.validate.rotation import MATRIX, QUAT_XYZW
 from tfcompose.validate.schema import Problems, Type, shown
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
+    from tfcompose.geometry import Quaternion, Vector
     from tfcompose.load import Path, Source
-    from tfcompose.pose import Quaternion, Vector
 
 _LAST_ROW = (0.0, 0.0, 0.0, 1.0)
 _EXACT = 1e-9
@@ -49,7 +49,7 @@ class Entries:
     """Collects a file's entries, and what is wrong with those that cannot be read."""
 
     entries: list[Entry] = field(default_factory=list)
-    found: list[Diagnostic] = field(default_factory=list)
+    found: list[Finding] = field(default_factory=list)
 
     def refuse(self, source: Source, path: Path, message: str, advice: str = "", code: str = "TF610") -> RefusedError:
         """Note what is wrong at the path, and return the error to raise."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import did_you_mean
-from tfcompose.pose import norm
+from tfcompose.findings import did_you_mean
+from tfcompose.geometry import norm
 from tfcompose.validate.quantity import (
     ANGLE,
     DAMPING,
@@ -34,8 +34,8 @@ from tfcompose.validate.quantity import (
 from tfcompose.validate.schema import BROKEN, Problems, Type, listing, shown, then
 
 if TYPE_CHECKING:
+    from tfcompose.geometry import Vector
     from tfcompose.load import Path
-    from tfcompose.pose import Vector
 
 
 def text(pattern: str | None = None, means: str = "") -> Type:

@@ -18,7 +18,7 @@ from tfcompose.validate.fields import (
 from tfcompose.validate.schema import Model, key, record
 
 if TYPE_CHECKING:
-    from tfcompose.pose import Vector
+    from tfcompose.geometry import Vector
 
 
 class Limit(Model):

@@ -9,7 +9,7 @@ from tfcompose.validate.rotation import AXIS_ANGLE, LOOK, MATRIX, QUAT_XYZW, RPY
 from tfcompose.validate.schema import Model, key
 
 if TYPE_CHECKING:
-    from tfcompose.pose import Quaternion, Vector
+    from tfcompose.geometry import Quaternion, Vector
 
 
 class Turned(Model):

@@ -14,8 +14,8 @@ from tfcompose.validate.posed import Turned
 from tfcompose.validate.schema import Model, Problems, Type, key, listing, mapping, record
 
 if TYPE_CHECKING:
+    from tfcompose.geometry import Vector
     from tfcompose.load import Path
-    from tfcompose.pose import Vector
 
 KINDS = ("camera", "stereo", "rgbd", "lidar2d", "lidar3d", "imu", "gnss", "radar", "ultrasonic")
 UNKNOWN = "unknown"

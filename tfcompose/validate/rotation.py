@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.pose import (
+from tfcompose.geometry import (
     Matrix,
     Quaternion,
     Vector,

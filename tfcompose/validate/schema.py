@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from tfcompose.diagnostic import did_you_mean, slip_of
+from tfcompose.findings import did_you_mean, slip_of
 from tfcompose.validate.quantity import Quantity
 
 if TYPE_CHECKING:

@@ -26,7 +26,7 @@ from tfcompose.validate.process import DriverSpec, ProcessSpec, process
 from tfcompose.validate.schema import Model, key, listing, mapping, record
 
 if TYPE_CHECKING:
-    from tfcompose.pose import Vector
+    from tfcompose.geometry import Vector
 
 
 class FrameSpec(MountKeys):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, Edit, Note, RejectedError, finding
+from tfcompose.findings import Edit, Finding, Note, RejectedError, finding
 from tfcompose.load.choices import CHOICES
 from tfcompose.validate.claims import NodePresetSpec
 from tfcompose.validate.joint_units import refuse_units_of_others
@@ -29,7 +29,7 @@ class Validated:
 
     spec: RobotSpec
     source: Source
-    found: tuple[Diagnostic, ...]
+    found: tuple[Finding, ...]
     broken: frozenset[tuple[str, str]]
     data: dict[str, Any] = field(default_factory=dict)
     unused: tuple[str, ...] = ()
@@ -100,7 +100,7 @@ def _in_a_copy(problem: Problem, data: dict[str, Any]) -> bool:
     return section == "links" and key == "collision" and data["links"][name]["collision"] == "same"
 
 
-def _finding(problem: Problem, source: Source) -> Diagnostic:
+def _finding(problem: Problem, source: Source) -> Finding:
     span = source.at_key(problem.path) if problem.on_key else source.at(problem.path)
     notes = [Note("the other one", source.at_key(problem.other))] if problem.other else []
     edits = [Edit(span, problem.instead)] if problem.instead is not None else []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import did_you_mean
+from tfcompose.findings import did_you_mean
 from tfcompose.validate.arithmetic import ExpressionError, Value
 from tfcompose.validate.expression import IDENTIFIER, RESERVED, fill, names_in
 from tfcompose.validate.quantity import NUMBER, Quantity, UnitError, quantity

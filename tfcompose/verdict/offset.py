@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from tfcompose.pose import Pose, angle_between, normalised
+from tfcompose.geometry import Pose, angle_between, normalised
 
 
 class Offset(NamedTuple):

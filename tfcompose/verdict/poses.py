@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from math import isfinite, radians
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
-from tfcompose.pose import Pose, norm
+from tfcompose.findings import Finding, Note, finding
+from tfcompose.geometry import Pose, norm
 from tfcompose.verdict.offset import Offset, compared, offset_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
     from tfcompose.plan import Driven, Plan, PlanEdge
 
 #: How far a frame may be from its value: a nominal one, and one that is exact.
@@ -55,7 +55,7 @@ def is_off(expected: Expected, sent: Pose) -> bool:
     return offset_of(expected.edge.pose, sent).beyond(NOMINAL if expected.nominal else EXACT)
 
 
-def pose_differs(off: Sequence[tuple[PlanEdge, str, Pose]], publisher: str, place: Span | None = None) -> Diagnostic:
+def pose_differs(off: Sequence[tuple[PlanEdge, str, Pose]], publisher: str, place: Span | None = None) -> Finding:
     """Return the finding for edges that come with another pose than the plan's: each with its parent, as it was sent.
 
     ``publisher`` is empty where it is not known; ``place`` is where the first edge stands in the robot's file.
@@ -73,7 +73,7 @@ def pose_differs(off: Sequence[tuple[PlanEdge, str, Pose]], publisher: str, plac
     return finding("TF846", f"{message}: {compared(edge.pose, pose)}", place, notes=notes, help=advice)
 
 
-def driver_pose_differs(node: str, off: Sequence[tuple[Expected, Pose]], place: Span | None = None) -> Diagnostic:
+def driver_pose_differs(node: str, off: Sequence[tuple[Expected, Pose]], place: Span | None = None) -> Finding:
     """Return the finding for frames of one sensor that its driver ``node``, empty if not known, sends elsewhere."""
     (expected, sent), *others = off
     driven, edge = expected.driven, expected.edge

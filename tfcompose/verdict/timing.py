@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tfcompose.diagnostic import Severity, Span
+    from tfcompose.findings import Severity, Span
     from tfcompose.plan import PlanEdge
 
 NAMED_AT_MOST = 6
@@ -26,7 +26,7 @@ def first_of(names: Sequence[str]) -> str:
     return ", ".join(names[:NAMED_AT_MOST]) + (f" and {more} more" if more > 0 else "")
 
 
-def never_seen(edges: Sequence[PlanEdge], advice: str, place: Span | None = None) -> Diagnostic:
+def never_seen(edges: Sequence[PlanEdge], advice: str, place: Span | None = None) -> Finding:
     """Return the finding for edges of one owner that did not come; ``place`` is where the first stands."""
     first = edges[0]
     more = f" and {len(edges) - 1} more edge{'s' if len(edges) > 2 else ''}" if len(edges) > 1 else ""  # noqa: PLR2004 (one, or several)
@@ -37,7 +37,7 @@ def never_seen(edges: Sequence[PlanEdge], advice: str, place: Span | None = None
 
 def silent(
     edges: Sequence[PlanEdge], quiet_s: float, place: Span | None = None, *, over: bool = False, gone: bool = False
-) -> Diagnostic:
+) -> Finding:
     """Return the finding for edges of one owner that did not come for so long.
 
     ``over`` says that they came again after that, ``gone`` that the owner's publisher has left.
@@ -53,21 +53,19 @@ def silent(
     return finding("TF804", message, place, notes=_rated(first, place), help=advice)
 
 
-def left(edges: Sequence[PlanEdge], place: Span | None = None) -> Diagnostic:
+def left(edges: Sequence[PlanEdge], place: Span | None = None) -> Finding:
     """Return the finding for fixed edges whose owner has left."""
     return gone(_owner(edges[0]), [edge.name for edge in edges], place)
 
 
-def gone(publisher: str, names: Sequence[str], place: Span | None = None) -> Diagnostic:
+def gone(publisher: str, names: Sequence[str], place: Span | None = None) -> Finding:
     """Return the finding for fixed edges, by name, whose publisher has left."""
     message = f"{publisher} is gone: nobody latches {first_of(names)} any more"
     advice = "listeners that are there keep these frames; those that join later do not get them"
     return finding("TF804", message, place, help=advice)
 
 
-def slow(
-    edges: Sequence[PlanEdge], rate: float, place: Span | None = None, severity: Severity = "warning"
-) -> Diagnostic:
+def slow(edges: Sequence[PlanEdge], rate: float, place: Span | None = None, severity: Severity = "warning") -> Finding:
     """Return the finding for edges of one owner that come with ``rate`` hertz."""
     first = edges[0]
     come = "comes" if len(edges) == 1 else "come"

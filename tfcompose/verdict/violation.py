@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, Severity, finding
+from tfcompose.findings import Finding, Note, Severity, finding
 from tfcompose.verdict.driven import advice_of, message_of
 from tfcompose.verdict.offence import BACK, REPEATED, SELF, TWO_WRITERS, WRONG_CLOCK
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
     from tfcompose.plan import Driven, Plan, PlanEdge
     from tfcompose.verdict.offence import Offence
 
@@ -28,7 +28,7 @@ _ADVICE = {
 
 def violation(
     offences: Sequence[Offence], plan: Plan, where: str = "", driven: Driven | None = None, place: Span | None = None
-) -> Diagnostic:
+) -> Finding:
     """Return the finding for offences of one kind by one node, that runs ``where`` and may drive a sensor.
 
     ``place`` is where the edge stands in the robot's file, if that is at hand.
@@ -42,7 +42,7 @@ def violation(
     return finding(first.code, message, place, help=advice, notes=notes, severity=severity)
 
 
-def taken(offences: Sequence[Offence], where: str = "") -> Diagnostic:
+def taken(offences: Sequence[Offence], where: str = "") -> Finding:
     """Return the finding for edges that a node, that runs ``where``, published before the start."""
     first = offences[0]
     message = f"{first.name}{_more(offences)}: published by {first.who} before the start"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Edge, Robot
 
 
-def two_parents(robot: Robot) -> Iterator[Diagnostic]:
+def two_parents(robot: Robot) -> Iterator[Finding]:
     """A frame hangs on two parents.
 
     tf2 keeps one parent for each frame, that of the newest message, and says nothing: the frame jumps between the two.

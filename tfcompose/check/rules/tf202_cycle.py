@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def cycle(robot: Robot) -> Iterator[Diagnostic]:
+def cycle(robot: Robot) -> Iterator[Finding]:
     """Frames are each other's ancestors.
 
     A transform tree has no loops: a lookup through one never ends, and URDF refuses it. One of the edges points the

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import count
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.findings import Finding, did_you_mean, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 MOST_SEARCHES = 50
 
 
-def unknown_frame(robot: Robot) -> Iterator[Diagnostic]:
+def unknown_frame(robot: Robot) -> Iterator[Finding]:
     """An edge names a frame that nothing declares.
 
     A frame is declared under ``frames`` or ``links``, or by a sensor. A misspelt parent would give a second tree that

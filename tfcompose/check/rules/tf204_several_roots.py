@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.check.forest import main_root, trees
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def several_roots(robot: Robot) -> Iterator[Diagnostic]:
+def several_roots(robot: Robot) -> Iterator[Finding]:
     """The robot falls into several trees.
 
     Between frames of two trees there is no transform, so that nobody can reach the frames of the one from the other.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Edge, Robot
 
 
-def edge_given_twice(robot: Robot) -> Iterator[Diagnostic]:
+def edge_given_twice(robot: Robot) -> Iterator[Finding]:
     """One edge stands in two places.
 
     Both would be published, and which value counts depends on who joins when. Keep the one that is measured.

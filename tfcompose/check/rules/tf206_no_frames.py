@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Span, finding
+from tfcompose.findings import Finding, Span, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def no_frames(robot: Robot) -> Iterator[Diagnostic]:
+def no_frames(robot: Robot) -> Iterator[Finding]:
     """The robot has no frames.
 
     There is nothing to publish and nothing to describe. A robot has at least a ``base_link``, under ``links``.

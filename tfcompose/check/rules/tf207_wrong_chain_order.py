@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,7 +19,7 @@ LEVELS = {"earth": 0, "map": 1, "odom": 2, "base_footprint": 3, "base_link": 3}
 FARTHEST = 100
 
 
-def wrong_chain_order(robot: Robot) -> Iterator[Diagnostic]:
+def wrong_chain_order(robot: Robot) -> Iterator[Finding]:
     """The frames earth, map, odom and base_link hang on each other in another order than REP-105 gives.
 
     Localisation publishes map → odom and odometry odom → base_link; navigation, SLAM and recorded data expect it so. A

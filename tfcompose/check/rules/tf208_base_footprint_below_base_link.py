@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def base_footprint_below_base_link(robot: Robot) -> Iterator[Diagnostic]:
+def base_footprint_below_base_link(robot: Robot) -> Iterator[Finding]:
     """The frame base_footprint hangs on base_link, and should be above it.
 
     base_footprint is the robot's place on the ground, which stays level while the robot pitches and rolls. Fixed below

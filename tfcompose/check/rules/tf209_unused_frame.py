@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.check.forest import main_root, trees
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def unused_frame(robot: Robot) -> Iterator[Diagnostic]:
+def unused_frame(robot: Robot) -> Iterator[Finding]:
     """A link or a frame hangs on nothing, and nothing hangs on it.
 
     No joint and no mount uses it, nobody can ask where it is, and a URDF with it is refused. Give it a parent, or

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Edge, Robot
 
 
-def edge_with_two_owners(robot: Robot) -> Iterator[Diagnostic]:
+def edge_with_two_owners(robot: Robot) -> Iterator[Finding]:
     """Two processes would publish one edge.
 
     tf2 takes the last writer without a word, so the frame flickers between two values. Each edge has one owner: leave

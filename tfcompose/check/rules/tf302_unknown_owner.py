@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.findings import Finding, did_you_mean, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
     from tfcompose.model import Edge, Robot
 
 
-def unknown_owner(robot: Robot) -> Iterator[Diagnostic]:
+def unknown_owner(robot: Robot) -> Iterator[Finding]:
     """An edge names an owner that is no process.
 
     An owner is a process of the plan: one under ``processes``, a sensor with a driver, or the built-in ``static`` and

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 from tfcompose.model import BUILT_IN
 
 if TYPE_CHECKING:
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def owner_cannot_publish(robot: Robot) -> Iterator[Diagnostic]:
+def owner_cannot_publish(robot: Robot) -> Iterator[Finding]:
     """The owner is a process that does not publish edges of this kind.
 
     ``static`` publishes what never moves, ``joints`` what moves by joint states, ``guard`` and a source of joint states

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def static_edge_with_rate(robot: Robot) -> Iterator[Diagnostic]:
+def static_edge_with_rate(robot: Robot) -> Iterator[Finding]:
     """An edge that is sent once says how often it is sent.
 
     Fixed edges go out once on /tf_static and are kept by every listener; a rate has no meaning there, and the edge's

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Edge, Robot
 
 
-def one_node_two_levels(robot: Robot) -> Iterator[Diagnostic]:
+def one_node_two_levels(robot: Robot) -> Iterator[Finding]:
     """One node publishes both map → odom and odom → base_link.
 
     REP-105 keeps the two apart: odometry is continuous and drifts, localisation corrects it in jumps. A node that

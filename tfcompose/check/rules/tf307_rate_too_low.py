@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,7 +20,7 @@ LEAST = {
 }
 
 
-def rate_too_low(robot: Robot) -> Iterator[Diagnostic]:
+def rate_too_low(robot: Robot) -> Iterator[Finding]:
     """Odometry comes with less than 20 Hz, or map → odom with less than 5 Hz.
 
     Between two messages tf2 interpolates, and after the last one it refuses: scans are dropped with "extrapolation into

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import MountedSensor, Process, Robot
 
 
-def driver_publishes_too(robot: Robot) -> Iterator[Diagnostic]:
+def driver_publishes_too(robot: Robot) -> Iterator[Finding]:
     """A sensor's driver publishes frames by default that tfcompose owns, and tfcompose cannot switch it off.
 
     With ``tf: tfcompose`` the frames inside a sensor are published by tfcompose, and a driver that tfcompose starts is
@@ -49,7 +49,7 @@ def _told(process: Process, switch: dict[str, Any]) -> bool:
     )
 
 
-def _finding(sensor: MountedSensor, process: Process, message: str, off: dict[str, Any], instead: str) -> Diagnostic:
+def _finding(sensor: MountedSensor, process: Process, message: str, off: dict[str, Any], instead: str) -> Finding:
     switch = ", ".join(f"{key}: {str(value).lower()}" for key, value in off.items())
     advice = f"start {process.name} with the parameter {switch}{instead}"
     notes = [Note(f"{process.name} is declared here", process.at)] if process.at != sensor.at else []

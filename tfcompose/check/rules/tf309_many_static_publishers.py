@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 MOST = 50
 
 
-def many_static_publishers(robot: Robot) -> Iterator[Diagnostic]:
+def many_static_publishers(robot: Robot) -> Iterator[Finding]:
     """More than 50 processes publish fixed edges.
 
     Every listener keeps the last 100 messages on /tf_static and gets one from each publisher when it joins: from about

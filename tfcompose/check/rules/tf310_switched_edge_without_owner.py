@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 from tfcompose.model import BUILT_IN
 
 if TYPE_CHECKING:
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def switched_edge_without_owner(robot: Robot) -> Iterator[Diagnostic]:
+def switched_edge_without_owner(robot: Robot) -> Iterator[Finding]:
     """An edge has several parents and nobody who changes between them.
 
     With ``parent: [tool0, rack_1]`` a tool hangs now on the arm and now in its rack. Who knows which is a process of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 from tfcompose.model import BUILT_IN
 
 if TYPE_CHECKING:
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def switched_edge_static(robot: Robot) -> Iterator[Diagnostic]:
+def switched_edge_static(robot: Robot) -> Iterator[Finding]:
     """An edge that changes its parent is sent on /tf_static.
 
     What came on /tf_static holds at every time, also before the change: a lookup in the past finds the tool where it

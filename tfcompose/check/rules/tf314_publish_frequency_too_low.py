@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -15,7 +15,7 @@ STOCK = "robot_state_publisher"
 STOCK_HZ = 20.0
 
 
-def publish_frequency_too_low(robot: Robot) -> Iterator[Diagnostic]:
+def publish_frequency_too_low(robot: Robot) -> Iterator[Finding]:
     """Joint states are left out, because they come more often than they are published.
 
     ``publish_frequency`` is the most that tfcompose's ``joints`` and the stock robot_state_publisher publish of joint

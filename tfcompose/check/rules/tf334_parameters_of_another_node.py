@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 _PARAMETERS = "ros__parameters"
 
 
-def parameters_of_another_node(robot: Robot) -> Iterator[Diagnostic]:
+def parameters_of_another_node(robot: Robot) -> Iterator[Finding]:
     """Parameters are for a node that the process does not have.
 
     ROS gives a node the parameters that stand under its full name, and drops all others without a word. In a parameter

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 _TRUE = frozenset({"true", "yes", "on", "y"})
 
 
-def clocks_mixed(robot: Robot) -> Iterator[Diagnostic]:
+def clocks_mixed(robot: Robot) -> Iterator[Finding]:
     """A node is told another clock than the robot has.
 
     Transforms are found by their stamps. Where one node stamps with the wall clock and another with /clock, every

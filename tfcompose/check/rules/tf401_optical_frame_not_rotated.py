@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
+from tfcompose.geometry import IDENTITY_XYZW, OPTICAL_XYZW, angle_between
 from tfcompose.model import OPTICAL_ENDINGS, is_optical
-from tfcompose.pose import IDENTITY_XYZW, OPTICAL_XYZW, angle_between
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 TOLERANCE_RAD = 2e-3
 
 
-def optical_frame_not_rotated(robot: Robot) -> Iterator[Diagnostic]:
+def optical_frame_not_rotated(robot: Robot) -> Iterator[Finding]:
     """An optical frame is not turned into the viewing direction.
 
     By REP-103 an optical frame has z forward, x right and y down, and its body frame x forward, y left and z up. The

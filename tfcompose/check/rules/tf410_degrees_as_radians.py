@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,7 +20,7 @@ ROUND_LIMITS = ROUND | {150.0, 165.0, 170.0, 175.0, 180.0, 185.0, 190.0, 270.0, 
 TURN_RAD = 6.29
 
 
-def degrees_as_radians(robot: Robot) -> Iterator[Diagnostic]:
+def degrees_as_radians(robot: Robot) -> Iterator[Finding]:
     """An angle without a unit is probably meant in degrees.
 
     A bare number is in radians: 90 is fourteen turns and a bit. The frame ends up turned somehow, and nothing else

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,7 +19,7 @@ QUARTERS = {1: "pi/2", 2: "pi", 3: "3*pi/2", 4: "2*pi"}
 MOST_DECIMALS = 6
 
 
-def rounded_right_angle(robot: Robot) -> Iterator[Diagnostic]:
+def rounded_right_angle(robot: Robot) -> Iterator[Finding]:
     """An angle is π/2 or π with too few digits.
 
     −1.57 misses the right angle by 0.05 degrees: 0.8 mm at one metre. Two such frames no longer cancel out, and every

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 SMALL_TURN_W = 0.85
 
 
-def quaternion_w_first(robot: Robot) -> Iterator[Diagnostic]:
+def quaternion_w_first(robot: Robot) -> Iterator[Finding]:
     """A quaternion looks as if it had w in front; the order is x, y, z, w.
 
     Eigen's constructor, MATLAB and many papers put w first. [1, 0, 0, 0] is no turn there, and a half turn about x

@@ -6,9 +6,9 @@ import math
 from typing import TYPE_CHECKING
 
 from tfcompose.check.geometry import CAMERAS, placed
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
+from tfcompose.geometry import rotate
 from tfcompose.model import is_optical
-from tfcompose.pose import rotate
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -33,7 +33,7 @@ WORDS = {
 OVERHEAD_M = 1.5
 
 
-def camera_looks_away(robot: Robot) -> Iterator[Diagnostic]:
+def camera_looks_away(robot: Robot) -> Iterator[Finding]:
     """A camera looks up and its name says floor, or looks down and its name says ceiling.
 
     By REP-103 looking down is *positive* pitch, which many get wrong once. Write what is meant:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.check.geometry import placed
-from tfcompose.diagnostic import Diagnostic, finding
-from tfcompose.pose import norm
+from tfcompose.findings import Finding, finding
+from tfcompose.geometry import norm
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,7 +21,7 @@ LARGEST_M = 100.0
 TIMES = 3
 
 
-def far_from_the_robot(robot: Robot) -> Iterator[Diagnostic]:
+def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
     """A mount or a body is far larger than the robot; it is probably written in millimetres.
 
     A bare number is in metres. Drawings are in millimetres, and 250 becomes a sensor that floats a quarter of a

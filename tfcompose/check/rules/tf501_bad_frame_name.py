@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Span, finding
+from tfcompose.findings import Finding, Span, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.diagnostic import Severity
+    from tfcompose.findings import Severity
     from tfcompose.model import Robot
 
 
@@ -24,7 +24,7 @@ _LAUNCHER = "tfcompose"
 _NODE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
-def bad_frame_name(robot: Robot) -> Iterator[Diagnostic]:
+def bad_frame_name(robot: Robot) -> Iterator[Finding]:
     """A frame, joint, process or node has a name that tf2, URDF, ROS or a file system takes differently.
 
     tf2 strips a leading slash, a process's name is also that of its parameter file, and spaces, quotes and ``&`` break
@@ -53,7 +53,7 @@ def bad_frame_name(robot: Robot) -> Iterator[Diagnostic]:
             yield _bad(process.node, process.at, "name for a node")
 
 
-def _bad(name: str, at: Span, what: str, severity: Severity = "error") -> Diagnostic:
+def _bad(name: str, at: Span, what: str, severity: Severity = "error") -> Finding:
     bare = name.lstrip("/")
     if what == "name" and bare != name and _GOOD.fullmatch(bare):
         return finding("TF501", f"{name!r} is no good {what}", at, help=f"tf2 drops a leading slash: write {bare}")

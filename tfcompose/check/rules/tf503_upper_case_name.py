@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def upper_case_name(robot: Robot) -> Iterator[Diagnostic]:
+def upper_case_name(robot: Robot) -> Iterator[Finding]:
     """A frame's name has upper case letters.
 
     tf2 tells ``Base_link`` from ``base_link``, people do not: a lookup fails, and the two names look the same. ROS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def unused_variable(robot: Robot) -> Iterator[Diagnostic]:
+def unused_variable(robot: Robot) -> Iterator[Finding]:
     """Nothing uses a variable.
 
     Probably the number still stands where the variable was meant to go, and changing the variable changes nothing. Use

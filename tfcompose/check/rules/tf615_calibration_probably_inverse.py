@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.check.envelope import envelope, is_near
-from tfcompose.diagnostic import Diagnostic, Note, finding
-from tfcompose.pose import Pose, norm
+from tfcompose.findings import Finding, Note, finding
+from tfcompose.geometry import Pose, norm
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 NEARER = 0.9
 
 
-def calibration_probably_inverse(robot: Robot) -> Iterator[Diagnostic]:
+def calibration_probably_inverse(robot: Robot) -> Iterator[Finding]:
     """A calibration is probably the wrong way round.
 
     Turned round it is near the pose written beside it; or, where none is, it puts the sensor outside the robot's bodies

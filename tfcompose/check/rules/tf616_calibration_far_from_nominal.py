@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.check.rules.tf615_calibration_probably_inverse import why_inverse
 from tfcompose.check.rules.tf617_calibration_all_zero import is_all_zero
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def calibration_far_from_nominal(robot: Robot) -> Iterator[Diagnostic]:
+def calibration_far_from_nominal(robot: Robot) -> Iterator[Finding]:
     """A calibration is farther from the pose written beside it than its limit.
 
     The sensor was moved, the file is of another robot, the frames are others than meant, or the nominal pose is rough.

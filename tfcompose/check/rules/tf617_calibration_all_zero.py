@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
-from tfcompose.pose import Pose
+from tfcompose.findings import Finding, Note, finding
+from tfcompose.geometry import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Calibration, Robot
 
 
-def calibration_all_zero(robot: Robot) -> Iterator[Diagnostic]:
+def calibration_all_zero(robot: Robot) -> Iterator[Finding]:
     """A calibration is all zero, and the pose written beside it is not.
 
     So a file looks that was prepared and never filled. Calibrate, or leave calibration out: then the

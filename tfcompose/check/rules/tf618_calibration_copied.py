@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
-from tfcompose.pose import Pose
+from tfcompose.findings import Finding, Note, finding
+from tfcompose.geometry import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Calibration, Robot
 
 
-def calibration_copied(robot: Robot) -> Iterator[Diagnostic]:
+def calibration_copied(robot: Robot) -> Iterator[Finding]:
     """Two mounts have the very same calibration values.
 
     Two measurements never agree to the last digit: one was copied and not changed, or both name one entry. Name each

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.check.geometry import CAMERAS
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 from tfcompose.model import is_optical
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def camera_without_optical_frame(robot: Robot) -> Iterator[Diagnostic]:
+def camera_without_optical_frame(robot: Robot) -> Iterator[Finding]:
     """A camera has no optical frame.
 
     By REP-103 images are stamped with a frame whose z points forward and y down, named ``…_optical_frame``. Without it

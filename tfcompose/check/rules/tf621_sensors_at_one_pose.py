@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.check.geometry import are_mirrored
-from tfcompose.diagnostic import Diagnostic, Note, finding
-from tfcompose.pose import Pose, angle_between
+from tfcompose.findings import Finding, Note, finding
+from tfcompose.geometry import Pose, angle_between
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,7 +19,7 @@ BUILT_IN_KINDS = frozenset({"imu", "gnss"})
 NEAR_M, NEAR_RAD = 1e-6, 1e-6
 
 
-def sensors_at_one_pose(robot: Robot) -> Iterator[Diagnostic]:
+def sensors_at_one_pose(robot: Robot) -> Iterator[Finding]:
     """Two sensors are mounted at exactly one pose.
 
     Two bodies cannot be in one place: a mount was copied, and its numbers not changed. Measure the second one. An IMU

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.check.geometry import are_mirrored, twins
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Edge, Robot
 
 
-def mount_copied(robot: Robot) -> Iterator[Diagnostic]:
+def mount_copied(robot: Robot) -> Iterator[Finding]:
     """The left one is where the right one is, or the front one where the rear one is.
 
     Both have the same position in the same parent, away from the middle: the entry was copied, and its sign forgotten.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 APART = ("serial", "usb_port", "device_type", "device_id", "mxid", "guid", "mac", "ip")
 
 
-def serial_missing(robot: Robot) -> Iterator[Diagnostic]:
+def serial_missing(robot: Robot) -> Iterator[Finding]:
     """Two sensors have the same driver, and one of them does not say which device is its.
 
     Each driver takes the first device that it finds, so after the next start left and right may be exchanged, or both

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import MountedSensor, Robot
 
 
-def serial_used_twice(robot: Robot) -> Iterator[Diagnostic]:
+def serial_used_twice(robot: Robot) -> Iterator[Finding]:
     """Two sensors have one serial number.
 
     There is one such device, and the second driver does not get it. Read the number off the device or from the vendor's

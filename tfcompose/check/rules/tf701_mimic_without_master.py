@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.findings import Finding, did_you_mean, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def mimic_without_master(robot: Robot) -> Iterator[Diagnostic]:
+def mimic_without_master(robot: Robot) -> Iterator[Finding]:
     """A joint follows a joint that is not there or does not move.
 
     Its frame would never appear: nobody sends a position for a joint that is fixed or misspelt. Name a joint that

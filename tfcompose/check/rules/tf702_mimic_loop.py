@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def mimic_loop(robot: Robot) -> Iterator[Diagnostic]:
+def mimic_loop(robot: Robot) -> Iterator[Finding]:
     """Joints follow each other in a circle.
 
     None of them has a position of its own.

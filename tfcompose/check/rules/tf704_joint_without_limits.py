@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.diagnostic import Severity
+    from tfcompose.findings import Severity
     from tfcompose.model import Robot
 
 
-def joint_without_limits(robot: Robot) -> Iterator[Diagnostic]:
+def joint_without_limits(robot: Robot) -> Iterator[Finding]:
     """A revolute or prismatic joint does not say how far it goes.
 
     URDF requires a limit for these types, and readers refuse the whole robot without it. A joint that turns without

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def inverted_limits(robot: Robot) -> Iterator[Diagnostic]:
+def inverted_limits(robot: Robot) -> Iterator[Finding]:
     """A joint's lower limit is above its upper one.
 
     No position is allowed: planners find nothing, and simulators refuse the robot or clamp the joint to one end.

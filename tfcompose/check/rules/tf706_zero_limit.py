@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def zero_limit(robot: Robot) -> Iterator[Diagnostic]:
+def zero_limit(robot: Robot) -> Iterator[Finding]:
     """A joint's greatest velocity or effort is 0.
 
     With velocity 0 it never moves: MoveIt refuses to time a path, and simulators hold the joint. With effort 0 a motor

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 TOLERANCE = 0.02
 
 
-def axis_not_unit(robot: Robot) -> Iterator[Diagnostic]:
+def axis_not_unit(robot: Robot) -> Iterator[Finding]:
     """A joint's axis does not have length 1.
 
     An axis is a direction. tfcompose normalises it; other readers of a URDF scale the motion by its length, and often a

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 LONGEST = 100
 
 
-def mimic_chain(robot: Robot) -> Iterator[Diagnostic]:
+def mimic_chain(robot: Robot) -> Iterator[Finding]:
     """A joint follows a joint that follows another one.
 
     tfcompose follows such a chain to its end. The stock robot_state_publisher goes through the joints once, in

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def inertia_missing(robot: Robot) -> Iterator[Diagnostic]:
+def inertia_missing(robot: Robot) -> Iterator[Finding]:
     """A part that moves has no mass, though others have.
 
     Simulators drop a link without inertia, with everything on it, or refuse the robot; dynamics treat it as nothing.

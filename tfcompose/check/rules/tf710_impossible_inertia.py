@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 TOLERANCE = 0.01
 
 
-def impossible_inertia(robot: Robot) -> Iterator[Diagnostic]:
+def impossible_inertia(robot: Robot) -> Iterator[Finding]:
     """No body has such an inertia: it is not positive definite, or one moment exceeds the sum of the others.
 
     Simulators refuse it (MuJoCo, Gazebo), or the joint explodes. Usually a sign was lost, moments were exchanged with

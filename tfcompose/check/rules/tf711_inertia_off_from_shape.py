@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 TIMES = 10
 
 
-def inertia_off_from_shape(robot: Robot) -> Iterator[Diagnostic]:
+def inertia_off_from_shape(robot: Robot) -> Iterator[Finding]:
     """A link's inertia is ten times, or a tenth of, what its mass and shape give.
 
     Usually it is in g mm² or kg cm², about another point than the centre of mass, or copied from another link: arms

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 READERS = frozenset({"robot_state_publisher", "moveit_ros_move_group"})
 
 
-def root_link_with_inertia(robot: Robot) -> Iterator[Diagnostic]:
+def root_link_with_inertia(robot: Robot) -> Iterator[Finding]:
     """The root link has an inertia, and a program of the plan reads the robot with KDL.
 
     KDL takes no inertia for a tree's root: it warns at each start, and leaves the mass out of dynamics. Put a bodiless

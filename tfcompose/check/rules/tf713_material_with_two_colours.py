@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Material, Robot
 
 
-def material_with_two_colours(robot: Robot) -> Iterator[Diagnostic]:
+def material_with_two_colours(robot: Robot) -> Iterator[Finding]:
     """Two materials have one name and different colours.
 
     URDF readers keep one material of a name, mostly the first, and draw both bodies with it. Give one of them another

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.findings import Finding, did_you_mean, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def material_without_colour(robot: Robot) -> Iterator[Diagnostic]:
+def material_without_colour(robot: Robot) -> Iterator[Finding]:
     """A material is a name that no material with a colour or a texture has.
 
     URDF readers say so in their log, and draw the body in a colour of their own. Give it an rgba, or the name of one

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 from tfcompose.model import BUILT_IN
 
 if TYPE_CHECKING:
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def joint_without_owner(robot: Robot) -> Iterator[Diagnostic]:
+def joint_without_owner(robot: Robot) -> Iterator[Finding]:
     """A planar or floating joint is nobody's.
 
     Joint states hold one position a joint, and these have two and six: neither tfcompose nor robot_state_publisher can

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def soft_limit_outside(robot: Robot) -> Iterator[Diagnostic]:
+def soft_limit_outside(robot: Robot) -> Iterator[Finding]:
     """A safety controller's soft limits are not inside the joint's limits, or leave no room.
 
     The controller begins to hold the joint back at the soft limits; beyond the hard ones it does so too late, or never.

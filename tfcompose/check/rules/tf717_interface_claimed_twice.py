@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.diagnostic import Span
+    from tfcompose.findings import Span
     from tfcompose.model import Robot
 
 
-def interface_claimed_twice(robot: Robot) -> Iterator[Diagnostic]:
+def interface_claimed_twice(robot: Robot) -> Iterator[Finding]:
     """Two hardware components of ros2_control have one interface of one joint.
 
     The controller manager refuses the second, and no controller starts. A joint is driven by one component; a second

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def mimic_joint_commanded(robot: Robot) -> Iterator[Diagnostic]:
+def mimic_joint_commanded(robot: Robot) -> Iterator[Finding]:
     """A joint that follows another one has a command interface of its own.
 
     It cannot do both, and ros2_control refuses the whole hardware. Leave its state interfaces, and command the joint

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 SHOWN = 5
 
 
-def joint_named_like_a_frame(robot: Robot) -> Iterator[Diagnostic]:
+def joint_named_like_a_frame(robot: Robot) -> Iterator[Finding]:
     """A joint has the name of a link or frame.
 
     URDF lets both stand. Gazebo makes SDF of it, where links, joints and frames share one name space, and refuses the

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 SHOWN = 5
 
 
-def body_in_no_urdf(robot: Robot) -> Iterator[Diagnostic]:
+def body_in_no_urdf(robot: Robot) -> Iterator[Finding]:
     """A link has a body, and is not below the base.
 
     The URDF holds what hangs below ``base``, so nobody draws this body or collides with it; the frame is published all

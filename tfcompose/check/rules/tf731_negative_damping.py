@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def negative_damping(robot: Robot) -> Iterator[Diagnostic]:
+def negative_damping(robot: Robot) -> Iterator[Finding]:
     """A joint's damping or friction is negative.
 
     It would drive the joint instead of slowing it down. Drake refuses such damping, and pinocchio such friction, with

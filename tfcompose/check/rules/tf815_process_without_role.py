@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def process_without_role(robot: Robot) -> Iterator[Diagnostic]:
+def process_without_role(robot: Robot) -> Iterator[Finding]:
     """A process that somebody else starts, or a stand-in, has nothing to do with the robot.
 
     It owns no edge, no sensor is driven by it and nothing waits for it: probably an ``owner`` was meant to name it.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def required_without_role(robot: Robot) -> Iterator[Diagnostic]:
+def required_without_role(robot: Robot) -> Iterator[Finding]:
     """A process is required, owns no edge, and nothing waits for it.
 
     When it ends, the whole robot is stopped; yet nothing here needs it. Leave ``required`` out, or say who needs it:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def needed_but_optional(robot: Robot) -> Iterator[Diagnostic]:
+def needed_but_optional(robot: Robot) -> Iterator[Finding]:
     """A process that the robot needs waits for one with ``required: false``.
 
     When the optional one fails, the other is never started, and that ends everything: then it is not optional at all.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
 
 
-def gate_never_opens(robot: Robot) -> Iterator[Diagnostic]:
+def gate_never_opens(robot: Robot) -> Iterator[Finding]:
     """A process is ready by what cannot come: the edges of one that owns none, or the end of one that always runs.
 
     It stays not ready, and so does what waits for it. Say by what it is ready, leave ``ready`` out, or take

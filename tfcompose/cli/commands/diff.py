@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import robot_or_code
 from tfcompose.cli.options import add_variant
-from tfcompose.pose import angle_between, norm
+from tfcompose.geometry import angle_between, norm
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace

@@ -19,7 +19,7 @@ from tfcompose.cli.expected import expected
 from tfcompose.cli.looking import ended_early
 from tfcompose.cli.options import add_variant, namespace, positive
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings
-from tfcompose.diagnostic import finding
+from tfcompose.findings import finding
 from tfcompose.observe.census import topics_below
 from tfcompose.observe.seen import counted
 from tfcompose.plan import RosSettings
@@ -31,7 +31,7 @@ from tfcompose.ros.topics import parts_of
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.plan import Plan
 
 #: So many trees are named by their roots.
@@ -80,7 +80,7 @@ def run(arguments: Namespace) -> int:
     return code
 
 
-def _say(found: list[Diagnostic], arguments: Namespace, looked: str) -> int:
+def _say(found: list[Finding], arguments: Namespace, looked: str) -> int:
     """Print the findings and return the exit code."""
     if arguments.format == "json":
         sys.stdout.write(import_module("tfcompose.render.json").render_json(found))
@@ -91,7 +91,7 @@ def _say(found: list[Diagnostic], arguments: Namespace, looked: str) -> int:
     return int(bool(found))
 
 
-def _summary(found: list[Diagnostic]) -> str:
+def _summary(found: list[Finding]) -> str:
     errors = sum(one.severity == "error" for one in found)
     counts = ((errors, "error"), (len(found) - errors, "warning"))
     return " and ".join(counted(n, word) for n, word in counts if n) or "nothing is wrong"

@@ -17,8 +17,8 @@ from tfcompose.cli.built_plan import PLAN, plan_in
 from tfcompose.cli.options import DEFAULT_FILE, add_variant
 from tfcompose.cli.output import write_all
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings, read_text
-from tfcompose.diagnostic import RejectedError
 from tfcompose.emit.supervised import Machine, started
+from tfcompose.findings import RejectedError
 from tfcompose.plan import Plan
 from tfcompose.run.hosts import share_of
 from tfcompose.run.launcher.fencing import not_remapped
@@ -96,7 +96,7 @@ def _export(plan: Plan, file: Path, arguments: Namespace) -> int:
         files, said = _made(plan, file, folder, arguments)
         write_all(folder, files)
     except RejectedError as error:
-        print_findings(error.diagnostics, sys.stderr)
+        print_findings(error.findings, sys.stderr)
         return UNREADABLE
     except OSError as error:
         complain(f"nothing was written to {folder}: {error.strerror}")

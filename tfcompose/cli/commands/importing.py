@@ -19,9 +19,9 @@ from tfcompose.cli.disk import disk
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings, read_text, unreadable
 from tfcompose.cli.urdf import read_urdf
 from tfcompose.compile import Compiled, compile_robot
-from tfcompose.diagnostic import RejectedError, Span
 from tfcompose.emit import Target
 from tfcompose.emit.spec import robot_name, spec
+from tfcompose.findings import RejectedError, Span
 from tfcompose.imported import Imported
 from tfcompose.resolve.packages import Packages
 from tfcompose.resolve.recognise import recognised
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from tfcompose.cli.urdf import Read
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
 
 _ROBOT = re.compile(r"[a-z][a-z0-9_]*")
 
@@ -73,8 +73,8 @@ def run(arguments: Namespace) -> int:
         known = Packages(disk(), named, otherwise="--package {name}=FOLDER, or source the workspace's setup file")
         read = read_urdf(arguments.file, known, given)
     except RejectedError as error:
-        print_findings(error.diagnostics, sys.stderr)
-        return UNREADABLE if unreadable(error.diagnostics) else 1
+        print_findings(error.findings, sys.stderr)
+        return UNREADABLE if unreadable(error.findings) else 1
     errors = [one for one in read.judged() if one.severity == "error"]
     print_findings(errors, sys.stderr)
     if errors and not arguments.keep_going:
@@ -106,7 +106,7 @@ def _refusal(arguments: Namespace) -> str:
     return ""
 
 
-def _written(read: Read, arguments: Namespace, packages: dict[str, str]) -> tuple[str, list[Diagnostic]]:
+def _written(read: Read, arguments: Namespace, packages: dict[str, str]) -> tuple[str, list[Finding]]:
     """Return the robot file, and the errors that it has where the source has none."""
     robot, idle = without_idle_blocks(with_hardware(read.robot))
     robot, renamed = with_material_names(robot)
@@ -145,7 +145,7 @@ def _compiled(text: str, output: str | None) -> Compiled:
 
 def _faults(compiled: Compiled) -> Iterable[str]:
     """Yield what lint says of the result, each rule once: these are faults of the source."""
-    several: dict[str, list[Diagnostic]] = {}
+    several: dict[str, list[Finding]] = {}
     for one in compiled.found:
         several.setdefault(one.code, []).append(one)
     if several:

@@ -19,7 +19,7 @@ from tfcompose.cli.disk import disk
 from tfcompose.cli.options import DEFAULT_FILE, add_variant
 from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
 from tfcompose.compile import compile_source, profiles_of
-from tfcompose.diagnostic import Diagnostic, Note, RejectedError, Span, finding
+from tfcompose.findings import Finding, Note, RejectedError, Span, finding
 from tfcompose.load import load, with_includes
 from tfcompose.render.text import summary
 
@@ -61,7 +61,7 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Lint the files; exit code 0, 1 with findings that count, 2 where a file cannot be read."""
     presets = library()
-    found: list[Diagnostic] = []
+    found: list[Finding] = []
     names = arguments.files or ([] if arguments.urdfs else [DEFAULT_FILE])
     files = dict.fromkeys(file for name in names for file in robots_in(name))
     urdfs = dict.fromkeys([*arguments.urdfs, *(file for file in files if file.endswith(URDF_ENDINGS))])
@@ -82,7 +82,7 @@ def run(arguments: Namespace) -> int:
     return int(any(one.severity == "error" or arguments.fail_on == "warning" for one in found))
 
 
-def _fixed(fixer: Fixer, form: str) -> list[Diagnostic]:
+def _fixed(fixer: Fixer, form: str) -> list[Finding]:
     """Fix the files, say what was fixed, and return what remains: everything, where a file cannot be written."""
     found = [one for file in fixer.files for one in fixer.fix(file)]
     try:
@@ -114,7 +114,7 @@ def _is_robot(path: str) -> bool:
         return bool(_ROBOT.search(file.read()))
 
 
-def _print(found: list[Diagnostic], form: str, files: int) -> None:
+def _print(found: list[Finding], form: str, files: int) -> None:
     if form == "text":
         print_findings(found, sys.stdout)
         sys.stdout.write(summary(found, files))
@@ -130,13 +130,13 @@ def _print(found: list[Diagnostic], form: str, files: int) -> None:
 
 def lint_file(
     file: str, presets: Library, arguments: Namespace, read: Callable[[str], str] = read_text
-) -> list[Diagnostic]:
+) -> list[Finding]:
     """Return the findings of one file: alone and with each of its profiles, or with what is asked for only."""
     try:
         source = with_includes(load(read(file), file), read)
         overlays = overlays_of(arguments)
     except RejectedError as error:
-        return list(error.diagnostics)
+        return list(error.findings)
     if arguments.profiles or overlays:
         return list(compile_source(source, presets, arguments.profiles, overlays, read, disk()).found)
     alone = compile_source(source, presets, read=read, disk=disk())

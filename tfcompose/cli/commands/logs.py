@@ -18,7 +18,7 @@ from tfcompose.cli.printable import head_of, width_of
 from tfcompose.cli.reader import is_read
 from tfcompose.cli.running import add_robot, chosen, running
 from tfcompose.cli.terminal import coloured, complain
-from tfcompose.diagnostic import did_you_mean
+from tfcompose.findings import did_you_mean
 from tfcompose.render.text import PLAIN
 from tfcompose.run.launcher.logs import Follower, last_written, logged, read_logs
 from tfcompose.run.place import places

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.cli import node_page as _nodes
 from tfcompose.cli.shelves import library
 from tfcompose.cli.terminal import complain, print_findings
-from tfcompose.diagnostic import RejectedError, did_you_mean
+from tfcompose.findings import RejectedError, did_you_mean
 from tfcompose.resolve.node_presets import node_preset_names
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def run(arguments: Namespace) -> int:
             return _show(_nodes.facts(name), arguments.format)
         return _list(name, known, arguments.format)
     except RejectedError as error:
-        print_findings(error.diagnostics, sys.stderr)
+        print_findings(error.findings, sys.stderr)
         return 1
 
 

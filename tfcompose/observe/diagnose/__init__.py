@@ -9,11 +9,11 @@ from tfcompose.observe.diagnose import data, expected, joints, rates, senders, s
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.observe.seen import Seen
 
 #: In the order in which one looks: is there anything, who sends it, what is its shape, and its time.
-DIAGNOSES: tuple[Callable[[Seen], Iterator[Diagnostic]], ...] = (
+DIAGNOSES: tuple[Callable[[Seen], Iterator[Finding]], ...] = (
     surroundings.settings_contradict,
     surroundings.no_tf,
     surroundings.other_settings,
@@ -53,7 +53,7 @@ DIAGNOSES: tuple[Callable[[Seen], Iterator[Diagnostic]], ...] = (
 )
 
 
-def diagnose(seen: Seen) -> list[Diagnostic]:
+def diagnose(seen: Seen) -> list[Finding]:
     """Return everything that is wrong, errors first, else in the order in which one looks."""
     found = [one for diagnosis in DIAGNOSES for one in diagnosis(seen)]
     return sorted(dict.fromkeys(found), key=lambda one: one.severity)

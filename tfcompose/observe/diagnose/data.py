@@ -5,7 +5,7 @@ from __future__ import annotations
 from statistics import median
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.observe.seen import listed, who
 from tfcompose.verdict.clock import WRONG_BY_NS, other_clock, seconds
 
@@ -26,7 +26,7 @@ HOUR_S = 3600.0
 FEWEST = 3
 
 
-def data_frame_unknown(seen: Seen) -> Iterator[Diagnostic]:
+def data_frame_unknown(seen: Seen) -> Iterator[Finding]:
     """Data come in a frame that is not in the tree."""
     frames = {frame for edge in seen.taken for frame in (edge.strand.parent, edge.strand.child)}
     for each in seen.stamped:
@@ -50,7 +50,7 @@ def data_frame_unknown(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF840", message, None, help=advice)
 
 
-def data_beyond_tf(seen: Seen) -> Iterator[Diagnostic]:
+def data_beyond_tf(seen: Seen) -> Iterator[Finding]:
     """The stamps of data and of the tree do not meet: every lookup for them extrapolates."""
     simulated = seen.simulated
     for each in seen.stamped:

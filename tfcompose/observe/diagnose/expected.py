@@ -11,11 +11,11 @@ from tfcompose.verdict.offence import SELF
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.observe.seen import Seen
 
 
-def differs_from_plan(seen: Seen) -> Iterator[Diagnostic]:
+def differs_from_plan(seen: Seen) -> Iterator[Finding]:
     """What comes is not what the plan says."""
     if seen.plan is None or not (seen.edges or seen.publishers):
         return  # nobody publishes at all, which is said

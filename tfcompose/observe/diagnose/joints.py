@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 from tfcompose.observe.seen import listed
 from tfcompose.ros.message import TF_MESSAGE
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 JOINT_STATE = "sensor_msgs/msg/JointState"
 
 
-def joint_states_unheard(seen: Seen) -> Iterator[Diagnostic]:
+def joint_states_unheard(seen: Seen) -> Iterator[Finding]:
     """Joint states come, and nobody makes transforms of them."""
     missing = _missing(seen)
     for topic in _joint_topics(seen):
@@ -28,7 +28,7 @@ def joint_states_unheard(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF842", message, None, severity="warning", notes=notes, help=advice)
 
 
-def no_joint_states(seen: Seen) -> Iterator[Diagnostic]:
+def no_joint_states(seen: Seen) -> Iterator[Finding]:
     """A robot state publisher waits for joint states that nobody sends."""
     missing = _missing(seen)
     for topic in _joint_topics(seen):
@@ -41,7 +41,7 @@ def no_joint_states(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF843", message, None, help=advice)
 
 
-def joint_without_state(seen: Seen) -> Iterator[Diagnostic]:
+def joint_without_state(seen: Seen) -> Iterator[Finding]:
     """Joint states come, and a joint of the description is not in them."""
     if not seen.joint_names:
         return

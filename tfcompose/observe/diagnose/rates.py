@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 from tfcompose.observe.seen import who
 from tfcompose.verdict.clock import WRONG_BY_NS, seconds
 from tfcompose.verdict.timing import gone
@@ -32,7 +32,7 @@ SURE_S = 1.0
 PERIODS, SILENT_S = 4.0, 0.6
 
 
-def low_rate(seen: Seen) -> Iterator[Diagnostic]:
+def low_rate(seen: Seen) -> Iterator[Finding]:
     """An edge comes so seldom that lookups fail between two messages, and frames jump."""
     inside, rated = {edge.strand.parent for edge in seen.taken}, seen.rated
     for edge in seen.moving:
@@ -48,7 +48,7 @@ def low_rate(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF838", message, None, severity="warning", notes=notes, help=advice)
 
 
-def gap(seen: Seen) -> Iterator[Diagnostic]:
+def gap(seen: Seen) -> Iterator[Finding]:
     """An edge comes often, and then not at all for a while."""
     rated = seen.rated
     parents = Counter(child for _, child in {(edge.strand.parent, edge.strand.child) for edge in seen.moving})
@@ -61,7 +61,7 @@ def gap(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF839", message, None, severity="warning", help=advice)
 
 
-def fell_silent(seen: Seen) -> Iterator[Diagnostic]:
+def fell_silent(seen: Seen) -> Iterator[Finding]:
     """An edge came, and does not come any more."""
     alive = {(edge.strand.parent, edge.strand.child) for edge in seen.moving if not is_silent(edge)}
     elsewhere = {edge.strand.child for edge in seen.moving if not is_silent(edge)}
@@ -77,7 +77,7 @@ def fell_silent(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF804", message, None, help=advice)
 
 
-def fixed_left(seen: Seen) -> Iterator[Diagnostic]:
+def fixed_left(seen: Seen) -> Iterator[Finding]:
     """Fixed edges were there, and the publisher that held them for those who come later has left."""
     held = {edge.strand.child for edge in seen.taken if edge.strand.static and edge.present is not False}
     held |= seen.planned

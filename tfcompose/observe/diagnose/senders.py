@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 from tfcompose.observe.seen import NAMELESS, counted, listed, who
 from tfcompose.ros.message import TF_MESSAGE
 from tfcompose.ros.misfits import best_effort_writer, leak, volatile_writer
@@ -26,7 +26,7 @@ _SAME = Offset(1e-6, 2e-5)
 TOGETHER_S = 0.3
 
 
-def two_writers(seen: Seen) -> Iterator[Diagnostic]:
+def two_writers(seen: Seen) -> Iterator[Finding]:
     """Two publishers send the same edge."""
     same: dict[tuple[str, str], list[EdgeSeen]] = {}
     for edge in seen.taken:
@@ -52,7 +52,7 @@ def two_writers(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF822", message, None, severity="warning", notes=notes, help=advice)
 
 
-def both_topics(seen: Seen) -> Iterator[Diagnostic]:
+def both_topics(seen: Seen) -> Iterator[Finding]:
     """A frame comes on /tf and on /tf_static."""
     kinds: dict[str, dict[bool, EdgeSeen]] = {}
     for edge in seen.taken:
@@ -67,7 +67,7 @@ def both_topics(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF809", message, None, help=advice)
 
 
-def volatile_static(seen: Seen) -> Iterator[Diagnostic]:
+def volatile_static(seen: Seen) -> Iterator[Finding]:
     """Fixed frames are sent so that no listener can receive them."""
     for one in seen.publishers:
         if one.static and not one.latched and one.node and one.type in {"", TF_MESSAGE}:
@@ -75,7 +75,7 @@ def volatile_static(seen: Seen) -> Iterator[Diagnostic]:
             yield volatile_writer(one.node, one.topic or seen.topics[1], owned)
 
 
-def volatile_reader(seen: Seen) -> Iterator[Diagnostic]:
+def volatile_reader(seen: Seen) -> Iterator[Finding]:
     """A node listens to fixed frames so that it misses those that were sent before it came."""
     if seen.forgetful and any(one.static for one in seen.publishers):
         listen = "listens" if len(seen.forgetful) == 1 else "listen"
@@ -87,14 +87,14 @@ def volatile_reader(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF849", message, None, severity="warning", help=advice)
 
 
-def best_effort(seen: Seen) -> Iterator[Diagnostic]:
+def best_effort(seen: Seen) -> Iterator[Finding]:
     """Frames are sent best effort, and listeners ask for reliable."""
     for one in seen.publishers:
         if not one.reliable and one.node and one.type in {"", TF_MESSAGE}:
             yield best_effort_writer(one.node, one.topic or seen.topics[one.static])
 
 
-def other_type(seen: Seen) -> Iterator[Diagnostic]:
+def other_type(seen: Seen) -> Iterator[Finding]:
     """Something else than transforms is published on a topic of TF."""
     for topic in seen.graph:
         if topic.name in seen.topics and topic.type != TF_MESSAGE and topic.publishers:
@@ -103,7 +103,7 @@ def other_type(seen: Seen) -> Iterator[Diagnostic]:
             yield finding("TF832", message, None, help=f"publish {TF_MESSAGE}, or give the topic another name")
 
 
-def unreadable(seen: Seen) -> Iterator[Diagnostic]:
+def unreadable(seen: Seen) -> Iterator[Finding]:
     """Bytes come that are no TFMessage."""
     named = {one.gid: one for one in seen.publishers}
     for gid, number in seen.malformed.items():
@@ -113,7 +113,7 @@ def unreadable(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF832", message, None, help="does it send bytes of its own making, or with another definition?")
 
 
-def many_static(seen: Seen) -> Iterator[Diagnostic]:
+def many_static(seen: Seen) -> Iterator[Finding]:
     """So many nodes publish fixed frames that listeners lose some."""
     fixed = [one for one in seen.publishers if one.static]
     if len(fixed) >= MOST_STATIC:
@@ -123,7 +123,7 @@ def many_static(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF309", message, None, notes=[Note(listed(nodes))], help=advice)
 
 
-def isolation_leak(seen: Seen) -> Iterator[Diagnostic]:
+def isolation_leak(seen: Seen) -> Iterator[Finding]:
     """A node of a robot with TF topics of its own writes the global ones."""
     topics = {topic.name: topic for topic in seen.typed(TF_MESSAGE)}
     own = {node for process in seen.plan.processes for node in process.nodes} if seen.plan else set()

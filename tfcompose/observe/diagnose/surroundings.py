@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 from tfcompose.observe.elsewhere import namespace_words, said
 from tfcompose.observe.seen import counted, listed
 from tfcompose.ros.message import TF_MESSAGE
@@ -22,7 +22,7 @@ DEFAULTS = {DOMAIN: "0", RANGE: "SUBNET", LOCALHOST_ONLY: "0", RMW: "", SERVER: 
 MOST_SETTINGS = MOST_PROCESSES = 3
 
 
-def no_tf(seen: Seen) -> Iterator[Diagnostic]:
+def no_tf(seen: Seen) -> Iterator[Finding]:
     """Nobody publishes TF here."""
     if seen.publishers or seen.edges or seen.malformed:
         return
@@ -49,7 +49,7 @@ def no_tf(seen: Seen) -> Iterator[Diagnostic]:
     yield finding("TF845", message, None, notes=notes, help=advice)
 
 
-def other_settings(seen: Seen) -> Iterator[Diagnostic]:
+def other_settings(seen: Seen) -> Iterator[Finding]:
     """Where frames are missing: processes of this machine that cannot be heard, because ROS is set up otherwise."""
     complete = not seen.planned - {edge.strand.child for edge in seen.edges}
     if (seen.edges and complete) or (not seen.edges and _elsewhere(seen)):
@@ -81,7 +81,7 @@ def _elsewhere(seen: Seen) -> list[str]:
     return [topic.name for topic in seen.typed(TF_MESSAGE) if topic.publishers and topic.name not in seen.topics]
 
 
-def settings_contradict(seen: Seen) -> Iterator[Diagnostic]:
+def settings_contradict(seen: Seen) -> Iterator[Finding]:
     """Variables that set up ROS say what cannot be, or contradict each other."""
     settings = seen.settings
     value = settings.get(RANGE, "")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 from tfcompose.observe.diagnose.data import keeps_data_waiting
 from tfcompose.observe.seen import counted, listed, who
 from tfcompose.verdict.clock import WRONG_BY_NS, other_clock, seconds
@@ -35,7 +35,7 @@ FEWEST, PART = 5, 0.3
 LARGE_STEP_S = 1.0
 
 
-def stamp_repeated(seen: Seen) -> Iterator[Diagnostic]:
+def stamp_repeated(seen: Seen) -> Iterator[Finding]:
     """A publisher sends an edge with the same stamp again and again."""
 
     def repeats(edge: EdgeSeen) -> bool:
@@ -50,7 +50,7 @@ def stamp_repeated(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF823", message, None, severity="warning", notes=notes, help=advice)
 
 
-def stamp_went_back(seen: Seen) -> Iterator[Diagnostic]:
+def stamp_went_back(seen: Seen) -> Iterator[Finding]:
     """A publisher's stamps go back in time."""
     for edges in _by_publisher(seen, _went_back):
         strand = edges[0].strand
@@ -64,7 +64,7 @@ def stamp_went_back(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF824", message, None, severity="warning", help=advice)
 
 
-def wrong_clock(seen: Seen) -> Iterator[Diagnostic]:
+def wrong_clock(seen: Seen) -> Iterator[Finding]:
     """Stamps are of another clock than the others': simulated and system time mixed, or no stamp at all."""
     simulated = seen.simulated
     for edges in _by_publisher(seen, lambda edge: bool(_clock_said(seen, edge, simulated=simulated))):
@@ -74,7 +74,7 @@ def wrong_clock(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF825", message, None, notes=[Note(f"it runs {where}")] if where else [], help=_clock_help(said))
 
 
-def host_clock_off(seen: Seen) -> Iterator[Diagnostic]:
+def host_clock_off(seen: Seen) -> Iterator[Finding]:
     """The clock of another machine is not this one's."""
     machines: dict[tuple[bool, str], tuple[float, list[str]]] = {}
     for one in seen.publishers:
@@ -95,7 +95,7 @@ def host_clock_off(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF834", message, None, help=advice)
 
 
-def late_stamps(seen: Seen) -> Iterator[Diagnostic]:
+def late_stamps(seen: Seen) -> Iterator[Finding]:
     """An edge's stamps are old when they come: lookups of new data extrapolate into the future."""
     told = keeps_data_waiting(seen)
 
@@ -114,7 +114,7 @@ def late_stamps(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF833", message, None, severity="warning", notes=notes, help=advice)
 
 
-def stamps_ahead(seen: Seen) -> Iterator[Diagnostic]:
+def stamps_ahead(seen: Seen) -> Iterator[Finding]:
     """An edge's stamps are ahead of time."""
 
     def ahead(edge: EdgeSeen) -> bool:
@@ -131,7 +131,7 @@ def stamps_ahead(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF835", message, None, severity="warning", help=advice)
 
 
-def clock_missing(seen: Seen) -> Iterator[Diagnostic]:
+def clock_missing(seen: Seen) -> Iterator[Finding]:
     """Nodes wait for simulated time, and it does not come."""
     for topic in seen.graph:
         if topic.name != "/clock" or not (topic.readers or (seen.plan and seen.plan.ros.clock == "sim")):
@@ -148,7 +148,7 @@ def clock_missing(seen: Seen) -> Iterator[Diagnostic]:
             yield finding("TF836", message, None, help="is the simulator paused, or the bag at its end?")
 
 
-def two_clocks(seen: Seen) -> Iterator[Diagnostic]:
+def two_clocks(seen: Seen) -> Iterator[Finding]:
     """Two nodes publish the time."""
     for topic in seen.graph:
         if topic.name == "/clock" and len(topic.publishers) > 1:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding, slip_of
+from tfcompose.findings import Finding, Note, finding, slip_of
 from tfcompose.observe.refused import refused_transform
 from tfcompose.observe.seen import counted, listed, who
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 MOST_NOTES = 8
 
 
-def self_transform(seen: Seen) -> Iterator[Diagnostic]:
+def self_transform(seen: Seen) -> Iterator[Finding]:
     """A frame is published in itself."""
     for edge in seen.edges:
         if edge.strand.parent == edge.strand.child:
@@ -28,13 +28,13 @@ def self_transform(seen: Seen) -> Iterator[Diagnostic]:
             yield finding("TF821", message, None, severity="warning", help=advice)
 
 
-def drops(seen: Seen) -> Iterator[Diagnostic]:
+def drops(seen: Seen) -> Iterator[Finding]:
     """Transforms come that no listener takes: a quaternion that is none, a NaN, an empty name."""
     for edge in seen.edges:
         yield from refused_transform(edge)
 
 
-def slash_in_front(seen: Seen) -> Iterator[Diagnostic]:
+def slash_in_front(seen: Seen) -> Iterator[Finding]:
     """Names come with a slash in front, which tf2 drops, and does not take in lookups."""
     found: dict[str, list[EdgeSeen]] = {}
     for edge in seen.taken:
@@ -49,7 +49,7 @@ def slash_in_front(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF501", message, None, severity="warning", help=advice)
 
 
-def loop(seen: Seen) -> Iterator[Diagnostic]:
+def loop(seen: Seen) -> Iterator[Finding]:
     """Frames are each other's ancestors, so that tf2 finds no way through them."""
     above = _above(seen)
     for frames in _loops(above):
@@ -66,7 +66,7 @@ def loop(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF820", message, None, notes=notes, help=advice)
 
 
-def second_parent(seen: Seen) -> Iterator[Diagnostic]:
+def second_parent(seen: Seen) -> Iterator[Finding]:
     """A frame hangs on two parents; tf2 takes whichever came last."""
     above, planned = _above(seen), seen.planned
     in_loops = {frame for frames in _loops(above) for frame in frames}
@@ -85,7 +85,7 @@ def second_parent(seen: Seen) -> Iterator[Diagnostic]:
         yield finding("TF802", message, None, notes=notes, help=advice)
 
 
-def two_trees(seen: Seen) -> Iterator[Diagnostic]:
+def two_trees(seen: Seen) -> Iterator[Finding]:
     """Frames are in trees that nothing connects."""
     trees = trees_of(seen)
     expected = {edge.parent for edge in seen.plan.edges} - seen.planned if seen.plan else frozenset()

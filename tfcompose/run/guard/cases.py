@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Note
+from tfcompose.findings import Note
 from tfcompose.run.events import Found, GuardEvent, Recovered, Taken
 from tfcompose.run.guard.senders import FEWEST_GAPS, NAMELESS_S
 from tfcompose.verdict.driven import drives_of, sensor_of

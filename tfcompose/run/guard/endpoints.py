@@ -14,7 +14,7 @@ from tfcompose.run.guard.senders import UNCOUNTED
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.plan import Plan
     from tfcompose.run.guard.senders import Senders, Writer
 
@@ -45,7 +45,7 @@ class Endpoints:
             for found in self._once(code, writer, wrong)
         ]
 
-    def _misfit(self, writer: Writer, node: str) -> Iterator[tuple[str, Diagnostic]]:
+    def _misfit(self, writer: Writer, node: str) -> Iterator[tuple[str, Finding]]:
         topic = "/tf_static" if writer.static else "/tf"
         if writer.static and writer.volatile:
             owned = [edge.name for edge in self._plan.edges if edge.node == node and edge.kind == "static"]
@@ -88,7 +88,7 @@ class Endpoints:
         """Take this as told by the guard before."""
         self._told = {(code, bytes.fromhex(gid)) for code, gid in memory}
 
-    def _once(self, code: str, writer: Writer, found: Diagnostic) -> list[Found]:
+    def _once(self, code: str, writer: Writer, found: Finding) -> list[Found]:
         if (code, writer.gid) in self._told:
             return []
         self._told.add((code, writer.gid))

@@ -10,7 +10,7 @@ from tfcompose.ros.diagnostics import ERROR, OK, STALE, WARN, Status
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.plan import PlanEdge
 
 _NAMES = {OK: "ok", WARN: "warning", ERROR: "error", STALE: "not seen"}
@@ -57,7 +57,7 @@ def held_status(robot: str, held: Mapping[tuple[str, str, str], int]) -> Status:
     return Status(f"tfcompose {robot}: strict", WARN if held else OK, message, said)
 
 
-def statuses(robot: str, edges: Sequence[EdgeHealth], found: Sequence[Diagnostic]) -> list[Status]:
+def statuses(robot: str, edges: Sequence[EdgeHealth], found: Sequence[Finding]) -> list[Status]:
     """Return one status for the tree, with what is wrong now, and one for each owner, with its edges."""
     severe = any(one.severity == "error" for one in found)
     level = ERROR if severe else WARN if found else OK

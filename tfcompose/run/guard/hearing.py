@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.pose import Pose
+from tfcompose.geometry import Pose
 from tfcompose.ros.message import Layout, decode
 from tfcompose.run.guard.senders import Message
 

@@ -25,7 +25,7 @@ from tfcompose.verdict.violation import violation
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.plan import Plan
 
 __all__ = ["Judge", "Message", "Writer"]
@@ -139,7 +139,7 @@ class Judge:
                 )
         return [found[edge.child] for edge in self.plan.edges]
 
-    def wrong(self) -> list[Diagnostic]:
+    def wrong(self) -> list[Finding]:
         """Return what was told and is not over, worst first; silence and low rates are part of ``health``."""
         told = [violation([case.offence], self.plan) for case in self.cases.open.values() if case.told]
         return sorted(told, key=lambda one: (one.severity, one.code))

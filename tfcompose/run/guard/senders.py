@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tfcompose.pose import Pose
+    from tfcompose.geometry import Pose
 
 #: How many gaps between messages tell surely when a publisher began; so many at least, when time is short.
 GAPS, FEWEST_GAPS = 5, 2

@@ -12,8 +12,8 @@ from tfcompose.run.events import Found
 from tfcompose.verdict.poses import Expected, driver_pose_differs, expected_of, is_off
 
 if TYPE_CHECKING:
+    from tfcompose.geometry import Pose
     from tfcompose.plan import Plan
-    from tfcompose.pose import Pose
     from tfcompose.run.events import GuardEvent
     from tfcompose.run.guard.senders import Message, Senders
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 from tfcompose.run.events import Found
 from tfcompose.run.guard.judge import FINDING_S
 
@@ -99,7 +99,7 @@ class Switches:
 
 def not_taken(
     node: str, wanted: dict[str, Value], found: dict[str, Value | None], drives: tuple[Driven, ...] = ()
-) -> list[Diagnostic]:
+) -> list[Finding]:
     """Return a finding for each parameter of the node that is not what the plan wrote; None: it has no such one."""
     return [
         _not_taken(node, name, value, found[name], drives)
@@ -108,7 +108,7 @@ def not_taken(
     ]
 
 
-def _not_taken(node: str, name: str, wanted: Value, found: Value | None, drives: tuple[Driven, ...]) -> Diagnostic:
+def _not_taken(node: str, name: str, wanted: Value, found: Value | None, drives: tuple[Driven, ...]) -> Finding:
     plan = f"the plan wrote {name}: {json.dumps(wanted)}"
     of = "".join(f" for {one.sensor} ({one.preset})" for one in drives[:1])
     if found is None:

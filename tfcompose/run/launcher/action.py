@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.run.launcher.notice import Notice
     from tfcompose.run.orders import GuardOrder
 
@@ -52,7 +52,7 @@ class TellLate:
     """Tell the person that a process is not ready in time, with what it said last."""
 
     name: str
-    found: Diagnostic
+    found: Finding
 
 
 Action = Start | Kill | Tell | TellLate | Order | Finish

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import RejectedError
+from tfcompose.findings import RejectedError
 from tfcompose.plan.file import read_plan
 from tfcompose.run.launcher.gates import is_ready, waits_for
 from tfcompose.run.launcher.happening import Asked, Down, NewPlan

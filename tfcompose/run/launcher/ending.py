@@ -13,7 +13,7 @@ from tfcompose.run.launcher.state import UNREAD, Stop
 from tfcompose.run.launcher.timing import by_owner, stop_level, stop_signals
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.run.launcher.happening import Event
     from tfcompose.run.launcher.turn import Turn
 
@@ -53,7 +53,7 @@ def _time_up(turn: Turn) -> None:
     turn.stop(Stop("time", 1 if failed else 0), "the time is up")
 
 
-def taken(turn: Turn, found: Diagnostic) -> None:
+def taken(turn: Turn, found: Finding) -> None:
     """Stop everything, because somebody publishes an edge of the plan already; each such edge is told."""
     stop = turn.state.stop
     if stop is None or stop.cause == "taken":

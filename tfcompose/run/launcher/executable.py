@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, did_you_mean, finding
+from tfcompose.findings import Finding, Note, did_you_mean, finding
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -68,7 +68,7 @@ class NotFound:
     advice: str = ""
 
 
-def not_found(missing: Sequence[NotFound]) -> Diagnostic:
+def not_found(missing: Sequence[NotFound]) -> Finding:
     """Return the one finding for all programs that were not found."""
     what = ", ".join(f"{one.program} of {one.process}" for one in missing)
     message = f"{len(missing)} executables were not found: {what}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, Note, finding
+from tfcompose.findings import Finding, Note, finding
 
 if TYPE_CHECKING:
     from tfcompose.plan import PlanEdge
@@ -30,19 +30,19 @@ def how_ended(returncode: int) -> str:
     return signal_name(-returncode) if returncode < 0 else f"exit code {returncode}"
 
 
-def in_short(found: Diagnostic) -> str:
+def in_short(found: Finding) -> str:
     """Return what a finding is called, for a line that follows it: "TF808 process_failed"."""
     return f"{found.code} {found.name}"
 
 
-def ended_by_itself(name: str, returncode: int, when: str, last_lines: tuple[str, ...]) -> Diagnostic:
+def ended_by_itself(name: str, returncode: int, when: str, last_lines: tuple[str, ...]) -> Finding:
     """Return the finding for a process that should not have ended; ``when`` ends the sentence."""
     verb = "was ended by" if returncode < 0 else "ended with"
     notes = [Note(f"{name}: {line}") for line in last_lines]
     return finding("TF808", f"{name} {verb} {how_ended(returncode)}{when}", None, notes=notes)
 
 
-def guard_lost(name: str, event: Exited, *, strict: bool) -> Diagnostic:
+def guard_lost(name: str, event: Exited, *, strict: bool) -> Finding:
     """Return the finding for a guard that ended while the others run, and is started again."""
     verb = "was ended by" if event.returncode < 0 else "ended with"
     blind = "nothing of the plan passes to /tf" if strict else "nobody watches the tree"
@@ -52,30 +52,30 @@ def guard_lost(name: str, event: Exited, *, strict: bool) -> Diagnostic:
     return finding("TF808", message, None, severity="warning", notes=notes, help=advice)
 
 
-def guard_hangs(name: str, seconds: float, *, strict: bool) -> Diagnostic:
+def guard_hangs(name: str, seconds: float, *, strict: bool) -> Finding:
     """Return the finding for a guard that runs and does nothing."""
     blind = "passed nothing on" if strict else "watched nothing"
     message = f"{name} hangs: it has {blind} for {seconds:.0f} s"
     return finding("TF808", message, None, severity="warning", help="it is ended and started again")
 
 
-def not_started(name: str, why: str) -> Diagnostic:
+def not_started(name: str, why: str) -> Finding:
     """Return the finding for a process that the operating system would not start."""
     return finding("TF808", f"{name} could not be started: {why}", None)
 
 
-def waits_in_vain(name: str, other: str, what: str, why: str) -> Diagnostic:
+def waits_in_vain(name: str, other: str, what: str, why: str) -> Finding:
     """Return the finding for a process that is not started, because it waits for what cannot come any more."""
     return finding("TF808", f"{name} is not started: it waits for {other} to be {what}, and {other} {why}", None)
 
 
-def never_clear(name: str, seconds: float) -> Diagnostic:
+def never_clear(name: str, seconds: float) -> Finding:
     """Return the finding for a guard that does not say what it heard before the start."""
     message = f"{name} did not say within {seconds:g} s whether somebody publishes the plan's edges already"
     return finding("TF808", message, None, help="its own log says how far it came; --guard off starts without it")
 
 
-def never_seen(owner: Tracked, edges: tuple[PlanEdge, ...]) -> Diagnostic:
+def never_seen(owner: Tracked, edges: tuple[PlanEdge, ...]) -> Finding:
     """Return the finding for the edges of one owner that nobody published until the time was up."""
     names = ", ".join(edge.name for edge in edges[:NAMED_AT_MOST])
     more = f" and {len(edges) - NAMED_AT_MOST} more" if len(edges) > NAMED_AT_MOST else ""

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 from tfcompose.ros.environment import PROFILE_VARIABLES, RosError
 from tfcompose.ros.fence import can_fence, profile
 from tfcompose.ros.topics import GLOBAL
@@ -55,7 +55,7 @@ def remapped(plan: Plan, process: PlanProcess) -> PlanProcess:
     return replace(process, argv=(*process.argv[:at], "--ros-args", *words, *process.argv[at + 1 :]))
 
 
-def not_remapped(plan: Plan) -> list[Diagnostic]:
+def not_remapped(plan: Plan) -> list[Finding]:
     """Return a finding for the owners that no remapping reaches."""
     missed = [
         process.name
@@ -69,9 +69,7 @@ def not_remapped(plan: Plan) -> list[Diagnostic]:
     return [finding("TF902", message, None, help=advice)]
 
 
-def by_partition(
-    plan: Plan, commands: Mapping[str, Command], folder: Path
-) -> tuple[dict[str, Command], list[Diagnostic]]:
+def by_partition(plan: Plan, commands: Mapping[str, Command], folder: Path) -> tuple[dict[str, Command], list[Finding]]:
     """Return the commands with profiles that move what they send on TF into a partition, and why that cannot be."""
     judged = judged_topics(plan)
     fenced: dict[str, Command] = {}

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Note, finding
+from tfcompose.findings import Note, finding
 from tfcompose.run.launcher.action import Order, TellLate
 from tfcompose.run.launcher.notice import AllReady, AllStarted, ProcessReady, StartRow
 from tfcompose.run.launcher.prerequisites import unmet_in_words
 from tfcompose.run.orders import Gate
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.plan import PlanProcess
     from tfcompose.run.launcher.state import State, Tracked
     from tfcompose.run.launcher.turn import Turn
@@ -125,7 +125,7 @@ def waits_for(state: State, one: Tracked) -> str:
     }.get(kind_of(one.process), "")
 
 
-def _late(state: State, one: Tracked, seconds: float) -> Diagnostic:
+def _late(state: State, one: Tracked, seconds: float) -> Finding:
     notes = [Note(f"seen instead: {one.seen}")] if one.seen else []
     message = f"{one.process.name} is not ready after {seconds:g} s: {waits_for(state, one)}"
     return finding("TF817", message, None, notes=notes)

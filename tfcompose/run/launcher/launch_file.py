@@ -13,7 +13,7 @@ import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Diagnostic, did_you_mean, finding
+from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.run.launcher import launch_wrapper
 from tfcompose.run.launcher.executable import NotFound
 
@@ -34,7 +34,7 @@ def is_launch(word: str) -> bool:
 
 def launch_command(
     process: PlanProcess, ros: RosSettings, argv: tuple[str, ...], env: Mapping[str, str]
-) -> tuple[tuple[str, ...], dict[str, str]] | NotFound | Diagnostic:
+) -> tuple[tuple[str, ...], dict[str, str]] | NotFound | Finding:
     """Return the command and what its environment needs besides, or what is missing or wrong."""
     meant = _LAUNCH.fullmatch(argv[0])
     package, name = (meant[1], meant[2]) if meant else ("", "")

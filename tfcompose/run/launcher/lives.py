@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import did_you_mean
+from tfcompose.findings import did_you_mean
 from tfcompose.run.launcher.action import Order
 from tfcompose.run.launcher.failures import ended_by_itself, guard_lost, how_ended
 from tfcompose.run.launcher.notice import Replanned

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
 
 #: supervisord's names, and EXPECTED for a process that somebody else starts.
 StateName = Literal["STOPPED", "STARTING", "RUNNING", "BACKOFF", "STOPPING", "EXITED", "FATAL", "EXPECTED"]
@@ -117,7 +117,7 @@ class Waiting:
 class FindingShown:
     """Something is wrong."""
 
-    found: Diagnostic
+    found: Finding
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.diagnostic import Note
+from tfcompose.findings import Note
 from tfcompose.run.launcher.failures import in_short
 from tfcompose.run.launcher.happening import Asked
 from tfcompose.run.launcher.lives import asked, refusal
 from tfcompose.run.launcher.state import Stop
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.run.launcher.turn import Turn
 
 
-def judged(turn: Turn, found: Diagnostic, process: str) -> None:
+def judged(turn: Turn, found: Finding, process: str) -> None:
     """Take what the guard found; ``process`` is the plan's own that surely did it, or empty."""
     policy = turn.state.plan.guard.on_violation
     if found.severity != "error" or policy == "report":
@@ -33,5 +33,5 @@ def judged(turn: Turn, found: Diagnostic, process: str) -> None:
         asked(turn, Asked(process, "stop"))
 
 
-def _noted(found: Diagnostic, text: str) -> Diagnostic:
+def _noted(found: Finding, text: str) -> Finding:
     return replace(found, notes=(*found.notes, Note(text)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
-from tfcompose.diagnostic import Diagnostic, finding
+from tfcompose.findings import Finding, finding
 from tfcompose.ros.environment import RosError
 from tfcompose.run.fenced import REMAPPED
 from tfcompose.run.launcher.command import Command
@@ -43,7 +43,7 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
     base: Mapping[str, str],
     environment: Environment,
     built_in: Path | None = None,
-) -> tuple[dict[str, Command], list[Diagnostic]]:
+) -> tuple[dict[str, Command], list[Finding]]:
     """Return each process's command, and what is wrong; with anything wrong, nothing should be started.
 
     ``built_in`` is the folder that the plan was built in, where ``plan_file`` is a copy of it.
@@ -58,7 +58,7 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
         processes = [remapped(plan, process) for process in processes]
     for process in processes:
         command = _command_of(process, plan.ros, (plan_file.absolute(), folder), base, environment)
-        if isinstance(command, Diagnostic):
+        if isinstance(command, Finding):
             found.append(command)
         elif isinstance(command, NotFound):
             missing.append(command)
@@ -80,7 +80,7 @@ def _command_of(
     files: tuple[Path, Path],
     base: Mapping[str, str],
     environment: Environment,
-) -> Command | NotFound | Diagnostic:
+) -> Command | NotFound | Finding:
     own = process.kind != "run"
     try:
         env = environment(base, ros, own=own) | own_env(process, *files)
@@ -94,7 +94,7 @@ def _command_of(
         lost = f"the folder {folder} that {process.name} runs in is not there"
         optional = process.required is False
         return Command(argv, env, folder, missing=lost) if optional else finding("TF810", lost, None)
-    command: Command | NotFound | Diagnostic
+    command: Command | NotFound | Finding
     if is_launch(argv[0]):
         launched = launch_command(process, ros, argv, env)
         command = Command(launched[0], env | launched[1], folder) if isinstance(launched, tuple) else launched
@@ -112,7 +112,7 @@ def _told_of_remapping(plan: Plan, name: str, command: Command) -> Command:
     return replace(command, env=command.env | {REMAPPED: "1"})
 
 
-def _never_started(plan: Plan) -> list[Diagnostic]:
+def _never_started(plan: Plan) -> list[Finding]:
     """Return a finding for each process that waits for what cannot come."""
     known = {process.name: process for process in plan.processes}
     found = []

@@ -16,7 +16,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.diagnostic import Note
+from tfcompose.findings import Note
 from tfcompose.ros.environment import child_environment
 from tfcompose.run.launcher.action import Finish, Kill, Order, Start, Tell, TellLate
 from tfcompose.run.launcher.answers import answer
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
     from tfcompose.plan import Plan
     from tfcompose.run.launcher.action import Action
     from tfcompose.run.launcher.command import Command
@@ -209,6 +209,6 @@ class _Supervisor:
             return
         self._events.append(self._children.start(state.tracked[name].process, self._commands[name], guard))
 
-    def _tell_late(self, name: str, found: Diagnostic) -> None:
+    def _tell_late(self, name: str, found: Finding) -> None:
         notes = [Note(f"{name}: {line}") for line in self._children.last_lines(name)]
         self._tell(FindingShown(replace(found, notes=(*found.notes, *notes))))

@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict
 from typing import Any
 
-from tfcompose.run.events import diagnostic
+from tfcompose.run.events import finding_of
 from tfcompose.run.launcher.notice import (
     AllReady,
     AllStarted,
@@ -52,7 +52,7 @@ def notice_of(line: str) -> tuple[Notice, float]:
         raise ValueError(f"not an event: {line!r}")
     at = float(data.pop("at"))
     if "found" in data:
-        data["found"] = diagnostic(data["found"])
+        data["found"] = finding_of(data["found"])
     if "missing" in data:
         data["missing"] = tuple(Missing(**one | {"edges": tuple(one["edges"])}) for one in data["missing"])
     if "rows" in data:

@@ -12,7 +12,7 @@ from tfcompose.run.launcher.state import State, Stop, Tracked
 from tfcompose.run.orders import Present
 
 if TYPE_CHECKING:
-    from tfcompose.diagnostic import Diagnostic
+    from tfcompose.findings import Finding
 
 
 class Turn:
@@ -53,13 +53,13 @@ class Turn:
             self.actions.append(Order(Present(name)))
         self.actions.append(Start(name))
 
-    def show(self, found: Diagnostic) -> None:
+    def show(self, found: Finding) -> None:
         """Show the finding, and remember an error."""
         if found.severity == "error":
             self.know(shown=self.state.shown | {found.code})
         self.tell(FindingShown(found))
 
-    def failed(self, name: str, found: Diagnostic) -> None:
+    def failed(self, name: str, found: Finding) -> None:
         """Show that the process has failed for good, and stop everything, unless the run goes on without it."""
         one = self.state.tracked[name]
         if one.process.required is not False:
@@ -69,7 +69,7 @@ class Turn:
             self.show(replace(found, severity="warning", help=advice))
             self.track(name, replace(one, failed=(found.message, *(note.message for note in found.notes))))
 
-    def fail(self, found: Diagnostic) -> None:
+    def fail(self, found: Finding) -> None:
         """Show the finding and stop everything; once that is under way, further failures follow from it."""
         if self.state.stop is None:
             self.show(found)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from tfcompose.pose import Pose, quat_from_rpy
+from tfcompose.geometry import Pose, quat_from_rpy
 
 if TYPE_CHECKING:
     from tfcompose.plan import Sweep

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tfcompose.pose import multiply, rotate
+from tfcompose.geometry import multiply, rotate
 from tfcompose.ros.tf_array import TFArray
 from tfcompose.run.publishing.follow import SLIDING
 

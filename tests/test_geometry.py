@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from tfcompose.pose import (
+from tfcompose.geometry import (
     IDENTITY_XYZW,
     OPTICAL_XYZW,
     Matrix,

@@ -56,7 +56,7 @@ class Edit:
 
 
 @dataclass(frozen=True, slots=True)
-class Diagnostic:
+class Finding:
     """One finding.
 
     ``message`` is one line with the names and values involved and holds no advice; advice is ``help``; the other
@@ -94,9 +94,9 @@ class Allow:
 class RejectedError(Exception):
     """Raised by a stage that cannot go on; it holds everything that the stage found, in order."""
 
-    def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
-        self.diagnostics = tuple(sorted(diagnostics, key=lambda found: found.sort_key))
-        super().__init__("; ".join(found.message for found in self.diagnostics))
+    def __init__(self, findings: Iterable[Finding]) -> None:
+        self.findings = tuple(sorted(findings, key=lambda found: found.sort_key))
+        super().__init__("; ".join(found.message for found in self.findings))
 
 
 def finding(  # noqa: PLR0913 (a finding has that many parts; all but three are named)
@@ -108,9 +108,9 @@ def finding(  # noqa: PLR0913 (a finding has that many parts; all but three are 
     notes: Iterable[Note] = (),
     severity: Severity = "error",
     edits: Iterable[Edit] = (),
-) -> Diagnostic:
+) -> Finding:
     """Return the finding with the name that ``CODES`` gives its code."""
-    return Diagnostic(code, CODES[code], severity, message, span, tuple(notes), help, tuple(edits))
+    return Finding(code, CODES[code], severity, message, span, tuple(notes), help, tuple(edits))
 
 
 def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
-    from tfcompose.plan import Joint
+    from tfcompose.plan import Clock, Joint
 
 NO_ROS = missing_ros()
 collect_ignore_glob = ["*_ros.py"] if NO_ROS else []
@@ -191,7 +191,7 @@ def edge() -> Callable[..., PlanEdge]:
 def write(tmp_path: Path) -> Callable[..., Path]:
     """Write a plan of these edges and processes, and its description, and return the plan's file."""
 
-    def make(edges: list[PlanEdge], *processes: PlanProcess, clock: str = "wall") -> Path:
+    def make(edges: list[PlanEdge], *processes: PlanProcess, clock: Clock = "wall") -> Path:
         named = tuple(p if p.nodes else _with_node(p) for p in processes)
         plan = Plan("rover", "0", "base_link", RosSettings("/rover", clock=clock), tuple(edges), named)
         file = tmp_path / "rover.plan.json"

@@ -27,7 +27,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "imported": {"model", "geometry"},
     "load": {"findings"},
     "render": {"codes", "findings", "geometry"},
-    "validate": {"findings", "load", "geometry"},
+    "validate": {"findings", "load", "geometry", "plan"},
     "resolve": {"findings", "imported", "load", "model", "plan", "geometry", "validate"},
     "check": {"codes", "findings", "load", "model", "geometry"},
     "draw": set(),

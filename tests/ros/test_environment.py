@@ -11,7 +11,6 @@ from tfcompose.plan import RosSettings
 from tfcompose.ros.environment import (
     FASTDDS_PROFILE,
     FASTDDS_PROFILE_LOCALHOST,
-    RosError,
     child_environment,
     missing_ros,
 )
@@ -52,11 +51,6 @@ def test_own_processes_announce_themselves_by_the_packaged_profile() -> None:
 def test_a_profile_that_the_user_set_stays(name: str) -> None:
     found = child_environment({name: "/etc/mine.xml"}, RosSettings(), own=True)
     assert {key: value for key, value in found.items() if "PROFILES" in key} == {name: "/etc/mine.xml"}
-
-
-def test_an_unknown_discovery_is_refused() -> None:
-    with pytest.raises(RosError, match="'everywhere'"):
-        child_environment({}, RosSettings(discovery="everywhere"), own=True)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from tfcompose.plan import RosSettings
+from tfcompose.plan import Discovery, RosSettings
 from tfcompose.ros.environment import child_environment
 
 pytestmark = pytest.mark.ros
@@ -27,7 +27,7 @@ print(*sorted(one for one in held if "fastrtps_port" in one))
 @pytest.mark.parametrize("discovery", ["localhost", "subnet"])
 @pytest.mark.parametrize("own", [True, False])
 def test_tfcomposes_own_processes_read_no_shared_memory_and_others_do(
-    domain: object, discovery: str, *, own: bool
+    domain: object, discovery: Discovery, *, own: bool
 ) -> None:
     assert domain
     env = child_environment(os.environ, RosSettings(discovery=discovery), own=own)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from tfcompose.findings import Finding
+    from tfcompose.plan import RestartPolicy, StartCondition
     from tfcompose.run.orders import GuardOrder
 
 N = TypeVar("N", bound=Notice)
@@ -36,7 +37,9 @@ def plan_of(*processes: PlanProcess, guard: GuardPolicy | None = None) -> Plan:
     return Plan("rover", "", "base_link", RosSettings(), edges, processes, guard or GuardPolicy())
 
 
-def run_process(name: str, restart: str = "no", after: Mapping[str, str] | None = None, **more: Any) -> PlanProcess:
+def run_process(
+    name: str, restart: RestartPolicy = "no", after: Mapping[str, StartCondition] | None = None, **more: Any
+) -> PlanProcess:
     return PlanProcess(name, "run", restart=restart, after=dict(after or {}), **more)
 
 

@@ -17,6 +17,8 @@ from tfcompose.run.launcher.supervisor import supervise
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from tfcompose.plan import LifecycleState
+
 pytestmark = pytest.mark.ros
 
 NODE = """
@@ -50,7 +52,9 @@ except BaseException:
 GUARD = PlanProcess("guard", "guard", ("${python}", "-m", "tfcompose.run.guard", "${plan}", "guard"), nodes=("/guard",))
 
 
-def node(name: str, *words: str, ready: Ready | None = None, lifecycle: dict[str, str] | None = None) -> PlanProcess:
+def node(
+    name: str, *words: str, ready: Ready | None = None, lifecycle: dict[str, LifecycleState] | None = None
+) -> PlanProcess:
     argv = (sys.executable, "-c", NODE, *words)
     return PlanProcess(name, "run", argv, ready=ready, lifecycle=lifecycle or {}, nodes=(f"/robot/{name}",))
 

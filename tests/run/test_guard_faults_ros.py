@@ -17,7 +17,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from tests.run.nameless import nameless_guard
 from tests.waiting import TIMEOUT_S, in_one_of_a_few, until, whole_lines
-from tfcompose.plan.edge import SILENT_PERIODS
+from tfcompose.plan import SILENT_PERIODS
 from tfcompose.run.guard.judge import FINDING_S
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests.run.history import GUARD, SLAM, STATIC, begin, plan_of, run_process
-from tfcompose.plan import GuardPolicy, Plan, PlanProcess, Ready, StopRule
+from tfcompose.plan import GuardPolicy, Plan, PlanProcess, Ready, RestartPolicy, StopRule
 from tfcompose.run.events import Alive, Clear, Complete, GateOpen, GateShut, Live, OwnerReady, Remember, Silent
 from tfcompose.run.launcher.answers import status
 from tfcompose.run.launcher.happening import Asked, Down, Exited, LogSeen, NewPlan, Signalled
@@ -102,7 +102,7 @@ def test_who_sends_on_tf_is_looked_at_while_an_edges_gate_is_shut_and_no_longer(
 
 
 @pytest.mark.parametrize("restart", ["no", "on-failure"])
-def test_one_that_was_ready_and_is_done_stays_what_others_wait_for(restart: str) -> None:
+def test_one_that_was_ready_and_is_done_stays_what_others_wait_for(restart: RestartPolicy) -> None:
     both = run_process("both", after={"map": "ready", "lidar": "ready"})
     history = begin(run_process("map", restart), gated(kind="log"), both).feed(Exited("map", 0), LogSeen("lidar", "up"))
     assert history.started[-1] == "both"

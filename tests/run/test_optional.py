@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests.run.history import GUARD, SLAM, STATIC, History, begin, run_process
-from tfcompose.plan import PlanProcess, Ready
+from tfcompose.plan import PlanProcess, Ready, RestartPolicy
 from tfcompose.run.events import Clear, Live, OwnerReady
 from tfcompose.run.launcher.answers import status
 from tfcompose.run.launcher.happening import Asked, Exited, Signalled, StartFailed, TimeUp
@@ -28,7 +28,9 @@ def failed(*others: PlanProcess) -> History:
 
 
 @pytest.mark.parametrize("restart", ["no", "on-failure"])
-def test_an_optional_process_that_fails_is_named_with_its_last_lines_and_the_rest_goes_on(restart: str) -> None:
+def test_an_optional_process_that_fails_is_named_with_its_last_lines_and_the_rest_goes_on(
+    restart: RestartPolicy,
+) -> None:
     history = begin(STATIC, replace(optional(), restart=restart, max_restarts=0)).feed(
         Exited("camera", 3, ("no device",))
     )

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from tfcompose.findings import Finding
+    from tfcompose.plan import StartCondition
     from tfcompose.run.launcher.command import Command
 
 
@@ -123,11 +124,6 @@ def test_a_placeholder_in_a_value_is_not_replaced_again(tmp_path: Path) -> None:
     assert commands["lidar"].argv[1] == f"{tmp_path}/${{plan}}.yaml"
 
 
-def test_a_discovery_that_ros_does_not_know_is_one_finding(tmp_path: Path) -> None:
-    _, found = look(tmp_path, lidar("true"), PlanProcess("b", "run", argv=("true",)), ros=RosSettings(discovery="moon"))
-    assert [one.code for one in found] == ["TF902"]
-
-
 def test_a_process_that_the_plan_does_not_say_how_to_start_is_a_finding(tmp_path: Path) -> None:
     _, (found,) = look(tmp_path, PlanProcess("lidar", "run"))
     assert found.message == "the plan does not say how lidar is started"
@@ -139,11 +135,10 @@ def test_a_process_that_the_plan_does_not_say_how_to_start_is_a_finding(tmp_path
         ({"nobody": "started"}, "TF902", "lidar waits for nobody, which is not in the plan"),
         ({"static": "done"}, "TF902", "lidar waits until static is done: that never comes"),
         ({"lidar": "ready"}, "TF812", "lidar wait for each other"),
-        ({"static": "born"}, "TF902", "lidar waits until static is born: that never comes"),
     ],
 )
 def test_a_process_that_waits_for_what_cannot_come_is_a_finding(
-    tmp_path: Path, after: dict[str, str], code: str, message: str
+    tmp_path: Path, after: dict[str, StartCondition], code: str, message: str
 ) -> None:
     waiting = PlanProcess("lidar", "run", argv=("true",), after=after)
     _, found = look(tmp_path, waiting, PlanProcess("static", "static", argv=("true",)))

@@ -13,7 +13,7 @@ from tfcompose.run.guard.judge import Judge, Message, Writer
 
 if TYPE_CHECKING:
     from tfcompose.findings import Finding
-    from tfcompose.plan import EdgeKind
+    from tfcompose.plan import Clock, EdgeKind
 
 
 LOOK_S = 0.1
@@ -68,7 +68,7 @@ class History:
 
     guard: GuardPolicy = field(default_factory=GuardPolicy)
     processes: tuple[PlanProcess, ...] = PROCESSES
-    clock: str = "wall"
+    clock: Clock = "wall"
     settle_s: float = SETTLE_S
     gids: bool = True
     says_who: bool = True

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tfcompose.model import MountedSensor, Process, Robot
+    from tfcompose.plan import PoseKnowledge
 
 
 def driven_of(process: Process, robot: Robot) -> tuple[Driven, ...]:
@@ -48,5 +49,7 @@ def _claimed(sensor: MountedSensor) -> dict[str, Any]:
 def _driven(sensor: MountedSensor, robot: Robot) -> Driven:
     switch = _claimed(sensor) if sensor.publishes else _switch(sensor)
     inside = (edge for edge in robot.edges if edge.sensor == sensor.name and not edge.given)
-    frames = {edge.child: "nominal" if edge.nominal else "exact" for edge in inside if edge.owner == sensor.driver}
+    frames: dict[str, PoseKnowledge] = {
+        edge.child: "nominal" if edge.nominal else "exact" for edge in inside if edge.owner == sensor.driver
+    }
     return Driven(sensor.name, sensor.preset, sensor.publishes, switch, frames)

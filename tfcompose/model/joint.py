@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from tfcompose.findings import Span
     from tfcompose.geometry import Vector
+    from tfcompose.plan import JointType
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +52,7 @@ class Joint:
     """A joint that can move; ``axis`` is a unit vector in the child's frame, for planar the plane's normal."""
 
     name: str
-    type: Literal["revolute", "continuous", "prismatic", "planar", "floating"]
+    type: JointType
     at: Span
     axis: Vector = (1.0, 0.0, 0.0)
     limit: Limit | None = None

@@ -5,7 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.plan import ProcessKind, Ready, Simulation, StopRule
+from tfcompose.plan import (
+    LifecycleState,
+    LogLevel,
+    ProcessKind,
+    Ready,
+    RestartPolicy,
+    Simulation,
+    StartCondition,
+    StopRule,
+)
 
 STATIC, JOINTS, GUARD = "static", "joints", "guard"
 BUILT_IN = (STATIC, JOINTS, GUARD)
@@ -33,7 +42,7 @@ class Node:
     at: Span
     path: tuple[str | int, ...] = ()
     params: dict[str, Any] = field(default_factory=dict)
-    lifecycle: str | None = None
+    lifecycle: LifecycleState | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,14 +65,14 @@ class Process:
     remap: dict[str, str] = field(default_factory=dict)
     env: dict[str, str] = field(default_factory=dict)
     cwd: str | None = None
-    log_level: str | None = None
+    log_level: LogLevel | None = None
     host: str | None = None
     required: bool | None = None
-    restart: str = "no"
+    restart: RestartPolicy = "no"
     max_restarts: int | None = None
     stop: StopRule = field(default_factory=StopRule)
     ready: Ready | None = None
-    after: dict[str, str] = field(default_factory=dict)
+    after: dict[str, StartCondition] = field(default_factory=dict)
     simulate: Simulation | None = None
     rate: float | None = None
     part: str = ""

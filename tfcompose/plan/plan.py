@@ -1,14 +1,257 @@
-"""A plan as a whole."""
+"""What a plan holds: edges, processes, what all of them share, and the guard's policy."""
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from typing import Any
 
-from tfcompose.plan.edge import PlanEdge  # noqa: TC001 (the schema reads the types)
-from tfcompose.plan.policy import Claim, GuardPolicy, RosSettings
-from tfcompose.plan.process import PlanProcess  # noqa: TC001 (the schema reads the types)
+from tfcompose.geometry import Pose
+from tfcompose.plan.words import (  # noqa: TC001 (plan.json is read by these types)
+    Clock,
+    Discovery,
+    EdgeKind,
+    FenceWay,
+    GuardMode,
+    JointType,
+    LifecycleState,
+    LogLevel,
+    OnViolation,
+    PoseKnowledge,
+    ProcessKind,
+    ReadyKind,
+    RestartPolicy,
+    SimulationKind,
+    StartCondition,
+    StopSignal,
+    UnknownEdges,
+)
+
+#: An edge is silent after four periods, and never before this: what a loaded machine can delay.
+SILENT_AT_LEAST_S = 0.6
+SILENT_PERIODS = 4.0
+#: It is too slow below this part of the rate that is declared.
+SLOW_BELOW = 0.8
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A moving joint: its edge's pose at position q is the edge's ``pose`` followed by the motion along ``axis``.
+
+    ``axis`` is a unit vector in the child's frame at q = 0. With ``mimic`` the position is
+    ``multiplier`` · q(mimic) + ``offset``. Positions are radians, or metres for a prismatic joint.
+    """
+
+    name: str
+    type: JointType
+    axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    mimic: str | None = None
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class PlanEdge:
+    """One TF edge and the process that publishes it. ``node`` is the publishing node's full name.
+
+    ``switched`` holds the further parents between which the owner may change the child; ``parent`` is the nominal one.
+    """
+
+    parent: str
+    child: str
+    kind: EdgeKind
+    owner: str
+    node: str
+    pose: Pose
+    rate: float | None
+    source: tuple[str, int]
+    joint: Joint | None = None
+    switched: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The edge as people read it."""
+        return f"{self.parent} → {self.child}"
+
+    @property
+    def silent_after_s(self) -> float | None:
+        """How long a moving edge may be quiet, in seconds, or None if it says no rate."""
+        if not self.rate or self.kind == "static":
+            return None
+        return max(SILENT_AT_LEAST_S, SILENT_PERIODS / self.rate)
+
+    def may_hang_on(self, parent: str) -> bool:
+        """Return whether the owner may publish the child below this parent."""
+        return parent == self.parent or parent in self.switched
+
+
+#: In an ``argv``, ``${python}``, ``${plan}``, ``${build_dir}`` and ``${params_file}`` stand for what only the starting
+#: machine knows. As its first word ``${executable:PACKAGE/NAME}`` is a package's program, and
+#: ``${launch:PACKAGE/FILE}`` a package's launch file; the words after that are the launch file's arguments,
+#: ``name:=value``.
+_AT_START = re.compile(r"\$\{(?:file:|build_dir\}|params_file\})")
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """How a simulated joint moves: to and fro between two positions (rad or m) once in ``period_s``.
+
+    Without them it turns round and round, once in that time.
+    """
+
+    period_s: float
+    lower: float | None = None
+    upper: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Simulation:
+    """A stand-in for an owner: a body on a circle, one that stays, or joint states.
+
+    ``joints`` are where joints begin (rad or m), and stay unless ``sweep`` says how they move.
+    """
+
+    kind: SimulationKind
+    rate: float
+    radius: float = 0.0
+    speed: float = 0.0
+    pose: Pose = field(default_factory=Pose)
+    joints: dict[str, float] = field(default_factory=dict)
+    sweep: dict[str, Sweep] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Ready:
+    """When a process counts as ready.
+
+    ``text`` is the full name of the topic or the service, the lifecycle state of the process's nodes, or the regular
+    expression that a line of the output holds; ``number`` the exit code, or the seconds after the start. Without
+    ``timeout_s`` the launcher's own time holds.
+    """
+
+    kind: ReadyKind
+    text: str = ""
+    number: float = 0.0
+    timeout_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class StopRule:
+    """How a process is ended: the first signal, and the time until a firmer one; None: the launcher's own."""
+
+    signal: StopSignal = "SIGINT"
+    timeout_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Driven:
+    """A sensor that a process drives. ``publishes`` says that the frames inside the sensor are the driver's.
+
+    ``switch`` holds the parameters, or arguments, that keep the driver from publishing what is not its own. ``frames``
+    says of the frames that the driver publishes inside the sensor whether their poses are exact or nominal.
+    """
+
+    sensor: str
+    preset: str
+    publishes: bool
+    switch: dict[str, str | int | float | bool] = field(default_factory=dict)
+    frames: dict[str, PoseKnowledge] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class PlanProcess:
+    """What is started, or, with kind ``external``, expected to run.
+
+    ``nodes`` are full names; ``lifecycle`` says of some of them into which state they are brought after the start.
+    ``required`` says what ends the plan: True, this process's end; None, its failure; False, neither.
+    ``max_restarts`` None is the launcher's default, as is ``ready`` None: the edges that the process owns, or that it
+    was started.
+    ``drives`` are the sensors that it is the driver of, by their presets. ``switches`` holds, by the full names of its
+    nodes, the parameters that were written for them and decide what they publish.
+    ``description`` is the file beside the plan that a publisher sends as ``robot_description``; None: the plan's.
+    ``namespace`` is that of its nodes, without a leading slash; None: the plan's.
+    """
+
+    name: str
+    kind: ProcessKind
+    argv: tuple[str, ...] = ()
+    env: dict[str, str] = field(default_factory=dict)
+    cwd: str | None = None
+    params_file: str | None = None
+    remap: dict[str, str] = field(default_factory=dict)
+    nodes: tuple[str, ...] = ()
+    restart: RestartPolicy = "no"
+    max_restarts: int | None = None
+    required: bool | None = None
+    stop: StopRule = field(default_factory=StopRule)
+    log_level: LogLevel | None = None
+    lifecycle: dict[str, LifecycleState] = field(default_factory=dict)
+    after: dict[str, StartCondition] = field(default_factory=dict)
+    ready: Ready | None = None
+    host: str | None = None
+    owns: tuple[tuple[str, str], ...] = ()
+    simulate: Simulation | None = None
+    description: str | None = None
+    drives: tuple[Driven, ...] = ()
+    switches: dict[str, dict[str, str | int | float | bool]] = field(default_factory=dict)
+    namespace: str | None = None
+
+    @property
+    def topics(self) -> tuple[str, str]:
+        """The topics (moving, fixed) on which it publishes TF."""
+        return self.remap.get("/tf", "/tf"), self.remap.get("/tf_static", "/tf_static")
+
+
+def told_at_start(value: Any) -> bool:
+    """Return whether a value holds a path that only the launcher knows."""
+    if isinstance(value, str):
+        return bool(_AT_START.search(value))
+    items = value.values() if isinstance(value, dict) else value if isinstance(value, (list, tuple)) else ()
+    return any(told_at_start(item) for item in items)
+
+
+@dataclass(frozen=True, slots=True)
+class RosSettings:
+    """What every process of the plan shares. ``shared_frames`` are those that do not begin with ``frame_prefix``."""
+
+    namespace: str = ""
+    domain_id: int | None = None
+    discovery: Discovery | None = None
+    clock: Clock = "wall"
+    frame_prefix: str = ""
+    shared_frames: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class GuardPolicy:
+    """What the guard does. ``allow`` holds (parent, child) patterns of edges that need no declaration.
+
+    ``fence`` says how a strict guard fences processes off.
+    """
+
+    mode: GuardMode = "watch"
+    unknown_edges: UnknownEdges = "warn"
+    on_violation: OnViolation = "report"
+    allow: tuple[tuple[str, str], ...] = ()
+    fence: FenceWay = "auto"
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """An edge that a node publishes by default and somebody else owns; ``switch`` stops it, empty: nothing does."""
+
+    node: str
+    parent: str
+    child: str
+    switch: str
+
+
+def switch_text(switch: dict[str, Any]) -> str:
+    """Return parameters as they are written in YAML."""
+    return ", ".join(f"{key}: {json.dumps(value, ensure_ascii=False)}" for key, value in switch.items())
+
 
 VERSION = 1
 

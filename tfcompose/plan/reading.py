@@ -2,30 +2,39 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, get_args
 
 from tfcompose.geometry import Pose, norm
 from tfcompose.plan import (
-    EDGE_KINDS,
-    FENCES,
-    KNOWN,
-    LIFECYCLE_STATES,
-    LOG_LEVELS,
-    PROCESS_KINDS,
-    READY_KINDS,
-    STOP_SIGNALS,
     Claim,
+    Clock,
+    Discovery,
     Driven,
+    EdgeKind,
+    FenceWay,
+    GuardMode,
     GuardPolicy,
     Joint,
+    JointType,
+    LifecycleState,
+    LogLevel,
+    OnViolation,
     Plan,
     PlanEdge,
     PlanProcess,
+    PoseKnowledge,
+    ProcessKind,
     Ready,
+    ReadyKind,
+    RestartPolicy,
     RosSettings,
     Simulation,
+    SimulationKind,
+    StartCondition,
     StopRule,
+    StopSignal,
     Sweep,
+    UnknownEdges,
 )
 from tfcompose.plan.fields import floats, get, one_of, optional, pairs, rows, strings, texts, there
 
@@ -42,7 +51,7 @@ def _joint_from_json(data: dict[str, Any], where: str) -> Joint:
     ax, ay, az = floats(data, "axis", 3, where)
     return Joint(
         name=get(data, "name", str, where),
-        type=get(data, "type", str, where),
+        type=one_of(data, "type", get_args(JointType), where),
         axis=(ax, ay, az),
         mimic=optional(data, "mimic", str, where),
         multiplier=get(data, "multiplier", float, where),
@@ -56,7 +65,7 @@ def _edge_from_json(data: dict[str, Any], where: str) -> PlanEdge:
     return PlanEdge(
         parent=get(data, "parent", str, where),
         child=get(data, "child", str, where),
-        kind=one_of(data, "kind", EDGE_KINDS, where),
+        kind=one_of(data, "kind", get_args(EdgeKind), where),
         owner=get(data, "owner", str, where),
         node=get(data, "node", str, where),
         pose=_pose_from_json(data, where),
@@ -70,7 +79,7 @@ def _edge_from_json(data: dict[str, Any], where: str) -> PlanEdge:
 def _simulation_from_json(data: dict[str, Any], where: str) -> Simulation:
     joints, sweeps = get(data, "joints", dict, where), get(data, "sweep", dict, where)
     return Simulation(
-        kind=one_of(data, "kind", ("circle", "fixed", "joints"), where),
+        kind=one_of(data, "kind", get_args(SimulationKind), where),
         rate=get(data, "rate", float, where),
         radius=get(data, "radius", float, where),
         speed=get(data, "speed", float, where),
@@ -89,41 +98,41 @@ def _sweep_from_json(data: dict[str, Any], where: str) -> Sweep:
 
 
 def _stop_from_json(data: dict[str, Any], where: str) -> StopRule:
-    return StopRule(one_of(data, "signal", STOP_SIGNALS, where), optional(data, "timeout_s", float, where))
+    return StopRule(one_of(data, "signal", get_args(StopSignal), where), optional(data, "timeout_s", float, where))
 
 
 def _ready_from_json(data: dict[str, Any], where: str) -> Ready:
     return Ready(
-        kind=one_of(data, "kind", READY_KINDS, where),
+        kind=one_of(data, "kind", get_args(ReadyKind), where),
         text=get(data, "text", str, where),
         number=get(data, "number", float, where),
         timeout_s=optional(data, "timeout_s", float, where),
     )
 
 
-def _states(data: dict[str, Any], where: str) -> dict[str, str]:
-    states = texts(data, "lifecycle", where)
-    return {node: one_of(states, node, LIFECYCLE_STATES, where) for node in states}
+def _words(data: dict[str, Any], key: str, words: tuple[str, ...], where: str) -> dict[str, Any]:
+    values = get(data, key, dict, where)
+    return {name: one_of(values, name, words, where) for name in values}
 
 
 def _process_from_json(data: dict[str, Any], where: str) -> PlanProcess:
     where += f", {data.get('name')}"
     return PlanProcess(
         name=get(data, "name", str, where),
-        kind=one_of(data, "kind", PROCESS_KINDS, where),
+        kind=one_of(data, "kind", get_args(ProcessKind), where),
         argv=strings(data, "argv", where),
         env=texts(data, "env", where),
         cwd=optional(data, "cwd", str, where),
         params_file=optional(data, "params_file", str, where),
         remap=texts(data, "remap", where),
         nodes=strings(data, "nodes", where),
-        restart=one_of(data, "restart", ("no", "on-failure", "always"), where),
+        restart=one_of(data, "restart", get_args(RestartPolicy), where),
         max_restarts=optional(data, "max_restarts", int, where),
         required=optional(data, "required", bool, where),
         stop=_stop_from_json(get(data, "stop", dict, where), where),
-        log_level=one_of(data, "log_level", (None, *LOG_LEVELS), where),
-        lifecycle=_states(data, where),
-        after=texts(data, "after", where),
+        log_level=one_of(data, "log_level", (None, *get_args(LogLevel)), where),
+        lifecycle=_words(data, "lifecycle", get_args(LifecycleState), where),
+        after=_words(data, "after", get_args(StartCondition), where),
         ready=None if there(data, "ready", where) is None else _ready_from_json(get(data, "ready", dict, where), where),
         host=optional(data, "host", str, where),
         owns=pairs(data, "owns", where),
@@ -136,15 +145,12 @@ def _process_from_json(data: dict[str, Any], where: str) -> PlanProcess:
 
 
 def _driven_from_json(data: dict[str, Any], where: str) -> Driven:
-    frames = texts(data, "frames", where)
-    if not set(frames.values()) <= set(KNOWN):
-        raise ValueError(f"{where}: frames are {' or '.join(KNOWN)}")
     return Driven(
         sensor=get(data, "sensor", str, where),
         preset=get(data, "preset", str, where),
         publishes=get(data, "publishes", bool, where),
         switch=_parameters(get(data, "switch", dict, where), f"{where}: switch"),
-        frames=frames,
+        frames=_words(data, "frames", get_args(PoseKnowledge), where),
     )
 
 
@@ -161,11 +167,11 @@ def _parameters(values: dict[str, Any], where: str) -> dict[str, Any]:
 
 def _guard_from_json(data: dict[str, Any]) -> GuardPolicy:
     return GuardPolicy(
-        mode=one_of(data, "mode", ("off", "watch", "strict"), "guard"),
-        unknown_edges=one_of(data, "unknown_edges", ("ignore", "warn", "error"), "guard"),
-        on_violation=one_of(data, "on_violation", ("report", "stop-offender", "stop"), "guard"),
+        mode=one_of(data, "mode", get_args(GuardMode), "guard"),
+        unknown_edges=one_of(data, "unknown_edges", get_args(UnknownEdges), "guard"),
+        on_violation=one_of(data, "on_violation", get_args(OnViolation), "guard"),
         allow=rows(data, "allow", _allowed_from_json),
-        fence=one_of(data, "fence", FENCES, "guard") if "fence" in data else "auto",
+        fence=one_of(data, "fence", get_args(FenceWay), "guard") if "fence" in data else "auto",
     )
 
 
@@ -191,8 +197,8 @@ def plan_from_json(data: dict[str, Any]) -> Plan:
         ros=RosSettings(
             namespace=get(ros, "namespace", str, "ros"),
             domain_id=optional(ros, "domain_id", int, "ros"),
-            discovery=optional(ros, "discovery", str, "ros"),
-            clock=one_of(ros, "clock", ("wall", "sim"), "ros"),
+            discovery=one_of(ros, "discovery", (None, *get_args(Discovery)), "ros"),
+            clock=one_of(ros, "clock", get_args(Clock), "ros"),
             frame_prefix=get(ros, "frame_prefix", str, "ros"),
             shared_frames=strings(ros, "shared_frames", "ros"),
         ),

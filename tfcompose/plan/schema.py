@@ -8,7 +8,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from tfcompose.geometry import Pose
-from tfcompose.plan import LIFECYCLE_STATES, LOG_LEVELS, STOP_SIGNALS, VERSION, Plan
+from tfcompose.plan import VERSION, Plan
 
 _NUMBER = {"type": "number"}
 _TEXT = {"type": "string"}
@@ -34,11 +34,6 @@ _WRITTEN: dict[tuple[str, str], dict[str, Any]] = {
         "properties": {"file": _TEXT, "line": {"type": "integer"}},
         "required": ["file", "line"],
     },
-    ("PlanProcess", "restart"): {"enum": ["no", "on-failure", "always"]},
-    ("PlanProcess", "log_level"): {"enum": [None, *LOG_LEVELS]},
-    ("PlanProcess", "lifecycle"): {"type": "object", "additionalProperties": {"enum": list(LIFECYCLE_STATES)}},
-    ("StopRule", "signal"): {"enum": list(STOP_SIGNALS)},
-    ("RosSettings", "clock"): {"enum": ["wall", "sim"]},
     ("GuardPolicy", "allow"): {"type": "array", "items": _EDGE},
 }
 #: Fields that are left out where there is nothing to say.

@@ -21,8 +21,6 @@ FASTDDS_PROFILE_LOCALHOST = Path(__file__).with_name("fastdds_localhost.xml")
 # Fast DDS 2 reads the first, Fast DDS 3 the second. A user who sets either has decided.
 PROFILE_VARIABLES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
 
-_DISCOVERY = {"localhost": "LOCALHOST", "subnet": "SUBNET", "off": "OFF"}
-
 
 class RosError(Exception):
     """Raised when ROS is there and cannot be used as needed; the message is one sentence for the user."""
@@ -45,17 +43,12 @@ def child_environment(base: Mapping[str, str], ros: RosSettings, *, own: bool) -
     What the plan leaves open stays as it is in ``base``. With ``own`` the process is one of tfcompose's and announces
     itself by ``FASTDDS_PROFILE``, or the one for this machine alone, unless ``base`` names a profile file already.
     Other processes keep their profile.
-
-    Raises:
-        RosError: if the plan's ``discovery`` is none of localhost, subnet, off.
     """
     environment = {**base, "PYTHONUNBUFFERED": "1"}
     if ros.domain_id is not None:
         environment["ROS_DOMAIN_ID"] = str(ros.domain_id)
     if ros.discovery is not None:
-        if ros.discovery not in _DISCOVERY:
-            raise RosError(f"ros: discovery is {ros.discovery!r}, not one of {', '.join(_DISCOVERY)}")
-        environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = _DISCOVERY[ros.discovery]
+        environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = ros.discovery.upper()
     if own and not any(base.get(name) for name in PROFILE_VARIABLES):
         alone = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "LOCALHOST"
         environment[PROFILE_VARIABLES[0]] = str(FASTDDS_PROFILE_LOCALHOST if alone else FASTDDS_PROFILE)

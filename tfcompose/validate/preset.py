@@ -16,6 +16,7 @@ from tfcompose.validate.schema import Model, Problems, Type, key, listing, mappi
 if TYPE_CHECKING:
     from tfcompose.geometry import Vector
     from tfcompose.load import Path
+    from tfcompose.plan import LifecycleState
 
 KINDS = ("camera", "stereo", "rgbd", "lidar2d", "lidar3d", "imu", "gnss", "radar", "ultrasonic")
 UNKNOWN = "unknown"
@@ -112,7 +113,9 @@ class PresetDriver(Model):
     launch: str | None = key(TEXT, None, "or a launch file of the package, which gets arguments")
     node: str = key(TEXT, about="the name of the node that publishes")
     namespace: str = key(TEXT, "")
-    lifecycle: str | None = key(choice("active"), None, "a lifecycle node, which does nothing until it is active")
+    lifecycle: LifecycleState | None = key(
+        choice("active"), None, "a lifecycle node, which does nothing until it is active"
+    )
     versions: str = key(TEXT, "", "for which the preset was read")
     params: dict[str, Any] = key(PARAMETERS, {}, "parameters of the node; left out if they hold an empty {prefix}")
     args: dict[str, Any] = key(PARAMETERS, {}, "arguments of the launch file")

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tfcompose.load import Path
+    from tfcompose.plan import LifecycleState, LogLevel, RestartPolicy, StartCondition, StopSignal
 
 _NODE = r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*"
 _NODE_MEANS = "a node's name: letters, digits and _"
@@ -40,7 +41,7 @@ def _environment(value: Any, path: Path, problems: Problems) -> Any:
 class StopSpec(Model):
     """How a process is ended: a first signal to its whole group; then firmer ones."""
 
-    signal: str = key(
+    signal: StopSignal = key(
         choice("SIGINT", "SIGTERM", "SIGQUIT", "SIGHUP", "SIGKILL", "SIGUSR1", "SIGUSR2"), "SIGINT", "the first signal"
     )
     timeout: float | None = key(DURATION, None, "how long it has until the next, firmer one", ("5 s",))
@@ -62,7 +63,9 @@ class ReadySpec(Model):
         TEXT, None, "somebody publishes it; below the process's namespace unless it begins with /", ("scan",)
     )
     service: str | None = key(TEXT, None, "it is there; below the process's namespace unless it begins with /")
-    lifecycle: str | None = key(choice("inactive", "active"), None, "its nodes are in this state, whoever did it")
+    lifecycle: LifecycleState | None = key(
+        choice("inactive", "active"), None, "its nodes are in this state, whoever did it"
+    )
     log: str | None = key(then(TEXT, _regular), None, "a regular expression that a line of its output holds")
     exit: int | None = key(integer(0, 255), None, "it has ended with this exit code")
     time: float | None = key(DURATION, None, "so long after its start", ("2 s",))
@@ -97,7 +100,9 @@ class NodeSpec(Model):
     preset: str | None = key(TEXT, None, "what is known of this node: its edges and parameters", ("slam_toolbox",))
     publishes: tuple[ClaimSpec, ...] = key(PUBLISHES, (), _PUBLISHES_ABOUT)
     params: dict[str, Any] = key(mapping(ANYTHING), {}, _PARAMS_ABOUT)
-    lifecycle: str | None = key(LIFECYCLE, None, "a lifecycle node is brought into this state after the start")
+    lifecycle: LifecycleState | None = key(
+        LIFECYCLE, None, "a lifecycle node is brought into this state after the start"
+    )
 
 
 def _nodes(value: Any, path: Path, problems: Problems) -> Any:
@@ -143,8 +148,10 @@ class Started(Model):
     )
     publishes: tuple[ClaimSpec, ...] = key(PUBLISHES, (), _PUBLISHES_ABOUT)
     params: dict[str, Any] = key(mapping(ANYTHING), {}, _PARAMS_ABOUT)
-    lifecycle: str | None = key(LIFECYCLE, None, "the lifecycle node is brought into this state after the start")
-    log_level: str | None = key(choice("debug", "info", "warn", "error", "fatal"), None, "of its nodes' loggers")
+    lifecycle: LifecycleState | None = key(
+        LIFECYCLE, None, "the lifecycle node is brought into this state after the start"
+    )
+    log_level: LogLevel | None = key(choice("debug", "info", "warn", "error", "fatal"), None, "of its nodes' loggers")
     remap: dict[str, str] = key(mapping(TEXT), {}, "topic names: from, to")
     env: dict[str, str] = key(Type(_environment, mapping(TEXT).schema), {})
     cwd: str | None = key(TEXT, None, "the folder that it runs in, seen from this file's; left out: where up is called")
@@ -155,11 +162,11 @@ class Started(Model):
         None,
         "true: its end stops everything; false: the rest goes on when it fails; left out: its failure stops everything",
     )
-    restart: str = key(choice("no", "on-failure", "always"), "no")
+    restart: RestartPolicy = key(choice("no", "on-failure", "always"), "no")
     max_restarts: int | None = key(integer(0, 1_000_000), None, "how often in a row, before it is given up")
     stop: StopSpec | None = key(record(StopSpec), None, "how it is ended")
     ready: ReadySpec | None = key(Type(_ready, {"anyOf": [{"const": "edges"}, ReadySpec]}), None, "when it is ready")
-    after: dict[str, str] = key(
+    after: dict[str, StartCondition] = key(
         mapping(choice("started", "ready", "done")), {}, "what must have happened before the start"
     )
 

@@ -27,6 +27,7 @@ from tfcompose.validate.schema import Model, key, listing, mapping, record
 
 if TYPE_CHECKING:
     from tfcompose.geometry import Vector
+    from tfcompose.plan import Clock, Discovery
 
 
 class FrameSpec(MountKeys):
@@ -102,8 +103,8 @@ class RosSpec(Model):
         "topics: /tf moves below the namespace; frames: the namespace is the prefix, unless one is given",
     )
     domain_id: int | None = key(integer(0, 232), None, "left out: the environment's")
-    discovery: str | None = key(choice("localhost", "subnet", "off"), None, "left out: the environment's")
-    clock: str = key(choice("wall", "sim"), "wall", "one clock for the whole plan")
+    discovery: Discovery | None = key(choice("localhost", "subnet", "off"), None, "left out: the environment's")
+    clock: Clock = key(choice("wall", "sim"), "wall", "one clock for the whole plan")
     state_publisher: str = key(
         choice("tfcompose", "stock"),
         "tfcompose",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from tfcompose.findings import Note, finding
 from tfcompose.run.launcher.action import Order, TellLate
@@ -13,7 +13,7 @@ from tfcompose.run.orders import Gate
 
 if TYPE_CHECKING:
     from tfcompose.findings import Finding
-    from tfcompose.plan import PlanProcess
+    from tfcompose.plan import LifecycleState, PlanProcess
     from tfcompose.run.launcher.state import State, Tracked
     from tfcompose.run.launcher.turn import Turn
 
@@ -44,7 +44,7 @@ def order_gate(turn: Turn, one: Tracked) -> None:
         return
     nodes, text = process.lifecycle, ready.text if ready else ""
     if kind == "lifecycle" and not nodes:
-        nodes = dict.fromkeys(process.nodes, text)
+        nodes = dict.fromkeys(process.nodes, cast("LifecycleState", text))
     topic, service = (text if kind == name else "" for name in ("topic", "service"))
     writers = process.topics if by_edges else ()
     gate = Gate(process.name, topic, service, dict(nodes), drive=bool(process.lifecycle), writers=writers)

@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 from tfcompose.findings import Finding, finding
-from tfcompose.ros.environment import RosError
 from tfcompose.run.fenced import REMAPPED
 from tfcompose.run.launcher.command import Command
 from tfcompose.run.launcher.executable import NotFound, executable_of, filled_in, folder_of, not_found, own_env
@@ -82,10 +81,7 @@ def _command_of(
     environment: Environment,
 ) -> Command | NotFound | Finding:
     own = process.kind != "run"
-    try:
-        env = environment(base, ros, own=own) | own_env(process, *files)
-    except RosError as error:
-        return finding("TF902", str(error), None)
+    env = environment(base, ros, own=own) | own_env(process, *files)
     argv = filled_in(process, *files)
     if not argv:
         return finding("TF902", f"the plan does not say how {process.name} is started", None)

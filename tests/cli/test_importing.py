@@ -18,7 +18,8 @@ from tfcompose.cli.disk import disk
 from tfcompose.cli.shelves import library
 from tfcompose.cli.terminal import read_text
 from tfcompose.compile import compile_robot
-from tfcompose.emit import Target, emit
+from tfcompose.emit import emit
+from tfcompose.files import Target
 from tfcompose.load import load
 from tfcompose.resolve.presets import holds
 

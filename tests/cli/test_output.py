@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tfcompose.cli.output import write_all
-from tfcompose.emit import File
+from tfcompose.files import File
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 FILES = [File("a.txt", "new a\n"), File("params/b.yaml", "new b\n"), File("c.txt", "new c\n")]

@@ -12,7 +12,8 @@ import yaml
 from tfcompose.cli.compiling import library
 from tfcompose.cli.disk import disk
 from tfcompose.compile import compile_robot
-from tfcompose.emit import Target, emit
+from tfcompose.emit import emit
+from tfcompose.files import Target
 from tfcompose.findings import RejectedError
 from tfcompose.plan import PlanProcess, Ready, StopRule
 from tfcompose.plan.file import read_plan, write_plan

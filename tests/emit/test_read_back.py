@@ -15,8 +15,9 @@ from tests.readers.family import spec
 from tfcompose.cli import main
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
-from tfcompose.emit import Target, emit
+from tfcompose.emit import emit
 from tfcompose.emit import read_back as work
+from tfcompose.files import Target
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

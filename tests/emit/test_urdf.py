@@ -21,10 +21,10 @@ from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
 from tfcompose.emit.markup import quoted
-from tfcompose.emit.numbers import clean_quat, clean_rpy, number
 from tfcompose.emit.urdf import urdf
 from tfcompose.geometry import Pose, angle_between, quat_from_axis_angle, quat_from_rpy
 from tfcompose.model import JOINTS, STATIC
+from tfcompose.numbers import clean_quat, clean_rpy, number
 
 if TYPE_CHECKING:
     from tfcompose.geometry import Quaternion

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.compiling import robot_or_code
 from tfcompose.cli.output import write_all
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings
-from tfcompose.emit import Target, emit, unaddressed
+from tfcompose.emit import emit
+from tfcompose.files import Target, unaddressed
 from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from argparse import Namespace
 
-    from tfcompose.emit import Form
+    from tfcompose.files import Form
     from tfcompose.model import Asset, Robot
 
 

@@ -39,7 +39,7 @@ def expected(file: str, arguments: Namespace) -> tuple[Plan, dict[str, Span]] | 
     robot = import_module("tfcompose.cli.compiling").robot_or_code(file, arguments)
     if isinstance(robot, int):
         return robot
-    final = import_module("tfcompose.emit.final").with_final_names(robot)
+    final = robot.with_final_names()
     return import_module("tfcompose.emit.plan").plan_of(final), {edge.child: edge.at for edge in final.edges}
 
 

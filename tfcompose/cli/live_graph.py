@@ -8,9 +8,9 @@ from tfcompose.cli.edge_table import printable
 from tfcompose.cli.expected import where_to_look
 from tfcompose.cli.looking import from_bag, from_live
 from tfcompose.draw import Arrow, Graph
-from tfcompose.emit.tree import pose_words
 from tfcompose.geometry import Pose, norm, normalised
 from tfcompose.observe.census import SETTLE_S, Census
+from tfcompose.render.tree import short_pose
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -67,4 +67,4 @@ def _arrow(one: EdgeSeen, *, poses: bool) -> Arrow:
 def _pose(pose: Pose) -> str:
     length = norm(pose.quat_xyzw)
     sound = length > 0 and length < float("inf")
-    return pose_words(Pose(pose.xyz, normalised(pose.quat_xyzw))) if sound else "no rotation"
+    return short_pose(Pose(pose.xyz, normalised(pose.quat_xyzw))) if sound else "no rotation"

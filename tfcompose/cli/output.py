@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tfcompose.emit import File
+    from tfcompose.files import File
 
 
 def write_all(folder: Path, files: Sequence[File]) -> None:

@@ -6,8 +6,8 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.emit.numbers import clean_quat, clean_rpy, number
 from tfcompose.geometry import IDENTITY_XYZW
+from tfcompose.numbers import clean_quat, clean_rpy, number
 from tfcompose.resolve.poses import rotation_of
 from tfcompose.resolve.presets import filled
 from tfcompose.validate.preset import Chosen

@@ -1,6 +1,5 @@
 """Stage ``emit``: a Robot becomes files, as text."""
 
-from tfcompose.emit.emit import File, emit
-from tfcompose.emit.target import Form, Target, unaddressed
+from tfcompose.emit.emit import emit
 
-__all__ = ["File", "Form", "Target", "emit", "unaddressed"]
+__all__ = ["emit"]

@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 from tfcompose.emit.flow import Bare
-from tfcompose.emit.numbers import clean_rpy, number
 from tfcompose.geometry import Pose, angle_between, quat_from_rpy
+from tfcompose.numbers import clean_rpy, number
 
 if TYPE_CHECKING:
     from tfcompose.geometry import Quaternion, Vector

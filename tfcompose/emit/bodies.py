@@ -9,11 +9,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.emit.markup import quoted
-from tfcompose.emit.numbers import clean_rpy, clean_tensor, clean_xyz, number, numbers
 from tfcompose.geometry import Pose
+from tfcompose.numbers import clean_rpy, clean_tensor, clean_xyz, number, numbers
 
 if TYPE_CHECKING:
-    from tfcompose.emit.target import Target
+    from tfcompose.files import Target
     from tfcompose.model import Inertial, Link, Material, Shape
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.emit.emit import File
 from tfcompose.emit.params import mapping
 from tfcompose.emit.supervised import (
     MAX_RESTARTS,
@@ -17,6 +16,7 @@ from tfcompose.emit.supervised import (
     started,
     unkept,
 )
+from tfcompose.files import File
 
 if TYPE_CHECKING:
     from tfcompose.emit.supervised import Machine

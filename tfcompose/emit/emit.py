@@ -3,32 +3,22 @@
 from __future__ import annotations
 
 import posixpath
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.draw.picture import draw
 from tfcompose.draw.svg import svg
-from tfcompose.emit.final import with_final_names
-from tfcompose.emit.graph import graph_of
 from tfcompose.emit.params import params_file, written_params
 from tfcompose.emit.plan import plan_of
-from tfcompose.emit.target import AS_WRITTEN, Target
-from tfcompose.emit.tree import tree
 from tfcompose.emit.urdf import body_of, whole
 from tfcompose.emit.xacro import MACRO, caller, macro
+from tfcompose.files import AS_WRITTEN, File, Target
 from tfcompose.plan import DESCRIPTION
 from tfcompose.plan.file import write_plan
+from tfcompose.render.tree import graph_of, tree
 
 if TYPE_CHECKING:
     from tfcompose.model import Process, Robot
-
-
-@dataclass(frozen=True, slots=True)
-class File:
-    """A file to be written: its path below the output folder, and its text."""
-
-    path: str
-    text: str
 
 
 def emit(robot: Robot, target: Target = AS_WRITTEN) -> tuple[File, ...]:
@@ -36,7 +26,7 @@ def emit(robot: Robot, target: Target = AS_WRITTEN) -> tuple[File, ...]:
 
     ``target`` says where they are written and how they address meshes.
     """
-    live = with_final_names(robot)
+    live = robot.with_final_names()
     descriptions = {
         part: _descriptions(robot_of, target, f"{part}/" if part else "") for part, robot_of in described(robot)
     }

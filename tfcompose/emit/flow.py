@@ -6,7 +6,7 @@ import re
 from textwrap import dedent, indent
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.emit.numbers import number
+from tfcompose.numbers import number
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -6,9 +6,9 @@ import re
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
-from tfcompose.emit.emit import File
-from tfcompose.emit.numbers import number
 from tfcompose.emit.supervised import plain_name, started
+from tfcompose.files import File
+from tfcompose.numbers import number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

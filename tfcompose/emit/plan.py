@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 from tfcompose.emit.argv import argv_of
 from tfcompose.emit.driven import driven_of, switches_of
-from tfcompose.emit.numbers import clean
 from tfcompose.emit.params import written_params
-from tfcompose.emit.target import AS_WRITTEN, Target
+from tfcompose.files import AS_WRITTEN, Target
 from tfcompose.model import JOINTS, STATIC
+from tfcompose.numbers import clean
 from tfcompose.plan import DESCRIPTION, Claim, Joint, Plan, PlanEdge, PlanProcess, switch_text
 
 if TYPE_CHECKING:

@@ -18,8 +18,7 @@ from tfcompose.plan import DESCRIPTION
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from tfcompose.emit.emit import File
-    from tfcompose.emit.target import Target
+    from tfcompose.files import File, Target
     from tfcompose.model import Edge, Inertial, Joint, Link, Material, Robot, Shape
 
 #: Poses are written to a picometre, and angles to the noise of computing them.

@@ -10,7 +10,7 @@ from tfcompose.model import Dynamics, SafetyController
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tfcompose.emit.target import Target
+    from tfcompose.files import Target
     from tfcompose.geometry import Pose, Quaternion, Vector
     from tfcompose.model import Edge, Inertial, Joint, Link, Material, Robot, Shape
 

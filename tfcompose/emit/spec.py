@@ -15,7 +15,7 @@ from tfcompose.emit.said import Said
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from tfcompose.emit.target import Target
+    from tfcompose.files import Target
     from tfcompose.imported import Entry, Imported, Recognised
     from tfcompose.model import Edge, Hardware, Interface
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.emit.emit import File
 from tfcompose.emit.supervised import (
     MAX_RESTARTS,
     STOP_S,
@@ -16,6 +15,7 @@ from tfcompose.emit.supervised import (
     started,
     unkept,
 )
+from tfcompose.files import File
 
 if TYPE_CHECKING:
     from tfcompose.emit.supervised import Machine

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 
 from tfcompose.emit.bodies import link_lines, origin
 from tfcompose.emit.markup import quoted
-from tfcompose.emit.numbers import number, numbers
-from tfcompose.emit.target import AS_WRITTEN
+from tfcompose.files import AS_WRITTEN
 from tfcompose.model import JOINTS, STATIC
+from tfcompose.numbers import number, numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.emit.target import Target
+    from tfcompose.files import Target
     from tfcompose.model import Edge, Joint, Robot
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import slip_of
@@ -92,6 +92,32 @@ class Robot:
     def final(self, frame: str) -> str:
         """Return the frame's name on the live tree: with the prefix, unless it is shared."""
         return frame if frame in self.ros.shared_frames else f"{self.ros.frame_prefix}{frame}"
+
+    def with_final_names(self) -> Robot:
+        """Return the robot with every frame named as on the live tree. URDF keeps plain names; RViz adds the prefix."""
+        if not self.ros.frame_prefix:
+            return self
+        final = self.final
+        allow = tuple(
+            (final(parent) if parent in self.frames else parent, final(child) if child in self.frames else child)
+            for parent, child in self.guard.allow
+        )
+        return replace(
+            self,
+            frames={final(frame): at for frame, at in self.frames.items()},
+            edges=tuple(
+                replace(
+                    edge,
+                    parent=final(edge.parent),
+                    child=final(edge.child),
+                    switched=tuple(final(parent) for parent in edge.switched),
+                )
+                for edge in self.edges
+            ),
+            base=self.base and final(self.base),
+            claims=tuple(replace(one, parent=final(one.parent), child=final(one.child)) for one in self.claims),
+            guard=replace(self.guard, allow=allow),
+        )
 
     def excuses(self, name: str) -> bool:
         """Return whether a frame, process or joint may be missing only because an entry was refused already.

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.looking import INTERRUPTED, add_bag, add_namespace, reading, ready_for_ros
 from tfcompose.cli.options import positive
 from tfcompose.cli.terminal import complain, print_findings
-from tfcompose.emit.numbers import clean
 from tfcompose.findings import finding
+from tfcompose.numbers import clean
 from tfcompose.observe.asked import Asked
 from tfcompose.render.pose import pose_json, pose_text
 from tfcompose.ros.environment import RosError

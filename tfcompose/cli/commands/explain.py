@@ -18,8 +18,8 @@ from tfcompose.cli.options import add_variant
 from tfcompose.cli.provenance import written_values
 from tfcompose.cli.terminal import UNREADABLE, complain
 from tfcompose.codes import CODES
-from tfcompose.emit.tree import edge_facts
 from tfcompose.findings import did_you_mean
+from tfcompose.render.tree import edge_facts
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace

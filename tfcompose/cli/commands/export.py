@@ -26,7 +26,7 @@ from tfcompose.run.launcher.fencing import not_remapped
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.emit import File
+    from tfcompose.files import File
 
 KINDS = ("systemd", "compose", "launch")
 #: What ROS's setup files set, and what people set for ROS: units start without a shell that has it.

@@ -19,8 +19,7 @@ from tfcompose.cli.compiling import robot_or_code
 from tfcompose.cli.looking import add_for
 from tfcompose.cli.options import DEFAULT_FILE, add_variant, namespace
 from tfcompose.cli.terminal import UNREADABLE, complain
-from tfcompose.emit.final import with_final_names
-from tfcompose.emit.graph import graph_of
+from tfcompose.render.tree import graph_of
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -76,7 +75,7 @@ def _graph(arguments: Namespace) -> Graph | int:
         published: Graph | int = import_module("tfcompose.cli.live_graph").seen(arguments)
         return published
     robot = robot_or_code(arguments.file or DEFAULT_FILE, arguments)
-    return robot if isinstance(robot, int) else graph_of(with_final_names(robot), poses=arguments.poses)
+    return robot if isinstance(robot, int) else graph_of(robot.with_final_names(), poses=arguments.poses)
 
 
 def _refused(path: Path) -> str:

@@ -19,8 +19,8 @@ from tfcompose.cli.disk import disk
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings, read_text, unreadable
 from tfcompose.cli.urdf import read_urdf
 from tfcompose.compile import Compiled, compile_robot
-from tfcompose.emit import Target
 from tfcompose.emit.spec import robot_name, spec
+from tfcompose.files import Target
 from tfcompose.findings import RejectedError, Span
 from tfcompose.imported import Imported
 from tfcompose.resolve.packages import Packages

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.between import edges_between
 from tfcompose.cli.compiling import robot_or_code
 from tfcompose.cli.options import add_variant
-from tfcompose.emit.numbers import clean
 from tfcompose.geometry import Pose
+from tfcompose.numbers import clean
 from tfcompose.render.pose import pose_json, pose_text
 
 if TYPE_CHECKING:

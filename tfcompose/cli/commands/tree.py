@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import robot_or_code
 from tfcompose.cli.options import DEFAULT_FILE, add_variant, namespace, positive
-from tfcompose.emit.final import with_final_names
-from tfcompose.emit.tree import tree
+from tfcompose.render.tree import tree
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -43,7 +42,7 @@ def run(arguments: Namespace) -> int:
     robot = robot_or_code(arguments.file or DEFAULT_FILE, arguments)
     if isinstance(robot, int):
         return robot
-    final = with_final_names(robot)
+    final = robot.with_final_names()
     if arguments.format == "json":
         sys.stdout.write(import_module("tfcompose.cli.tree_json").planned_json(final))
         return 0

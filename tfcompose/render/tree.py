@@ -1,13 +1,17 @@
-"""The tree as text: frames, and at each edge its kind, owner and pose."""
+"""A robot's tree as text, and as a graph to be drawn: frames, and at each edge its kind, owner, rate and pose."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING
 
-from tfcompose.emit.numbers import clean_rpy, clean_xyz, number
+from tfcompose.draw import Arrow, Graph, Group
+from tfcompose.model import JOINTS, STATIC
+from tfcompose.numbers import clean_rpy, clean_xyz, number
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from tfcompose.geometry import Pose
     from tfcompose.model import Edge, Robot
 
@@ -34,27 +38,22 @@ def _row(name: str, edge: Edge | None, width: int, owners: int) -> str:
     if edge is None:
         return name
     rate = f"{number(edge.rate)} Hz" if edge.rate else ""
-    rest = "  ".join(part for part in (pose_text(edge), _switched(edge)) if part)
-    said = f"{name:<{width}}  {edge.kind:<7}  {edge.owner:<{owners}}  {rate:<6}  {rest}"
-    return said.rstrip()
+    rest = "  ".join(fact for fact in (short_pose(edge.pose), _switched(edge)) if fact)
+    return f"{name:<{width}}  {edge.kind:<7}  {edge.owner:<{owners}}  {rate:<6}  {rest}".rstrip()
 
 
 def edge_facts(edge: Edge) -> str:
     """Return kind, owner, rate and pose of an edge, in one line."""
     rate = f"{number(edge.rate)} Hz" if edge.rate else ""
-    return "  ".join(part for part in (edge.kind, f"by {edge.owner}", rate, pose_text(edge), _switched(edge)) if part)
+    facts = (edge.kind, f"by {edge.owner}", rate, short_pose(edge.pose), _switched(edge))
+    return "  ".join(fact for fact in facts if fact)
 
 
 def _switched(edge: Edge) -> str:
     return f"or on {', '.join(edge.switched)}" if edge.switched else ""
 
 
-def pose_text(edge: Edge) -> str:
-    """Return position and rotation of an edge, as far as they are not zero."""
-    return pose_words(edge.pose)
-
-
-def pose_words(pose: Pose) -> str:
+def short_pose(pose: Pose) -> str:
     """Return position in metres and rotation (rpy) in degrees, as far as they are not zero."""
     parts = []
     xyz = clean_xyz(pose.xyz)
@@ -64,3 +63,32 @@ def pose_words(pose: Pose) -> str:
     if any(rpy):
         parts.append(f"rpy {' '.join(number(round(math.degrees(value), 4)) for value in rpy)} deg")
     return "  ".join(parts)
+
+
+def graph_of(robot: Robot, *, poses: bool = False) -> Graph:
+    """Return the tree of a robot with final names: sensors are groups, owners stand in the order of the tree."""
+    presets = {sensor.name: sensor.preset for sensor in robot.sensors}
+    groups: dict[str, list[str]] = {}
+    for edge in robot.edges:
+        if edge.sensor:
+            groups.setdefault(edge.sensor, []).append(edge.child)
+    owners = dict.fromkeys(edge.owner for edge in robot.edges)
+    built_in = [name for name in (STATIC, JOINTS) if name in owners]
+    return Graph(
+        robot.name,
+        tuple(robot.frames),
+        tuple(arrow for edge in robot.edges for arrow in _arrows(edge, poses=poses)),
+        tuple(Group(_label(name, presets), tuple(frames)) for name, frames in groups.items()),
+        tuple(dict.fromkeys((*built_in, *owners))),
+    )
+
+
+def _label(sensor: str, presets: dict[str, str]) -> str:
+    return f"{sensor} · {presets[sensor]}" if sensor in presets else sensor
+
+
+def _arrows(edge: Edge, *, poses: bool) -> Iterator[Arrow]:
+    rate = f"{number(edge.rate)} Hz" if edge.rate else ""
+    yield Arrow(edge.parent, edge.child, edge.kind, edge.owner, rate, short_pose(edge.pose) if poses else "")
+    for parent in edge.switched:
+        yield Arrow(parent, edge.child, edge.kind, edge.owner, alternative=True)

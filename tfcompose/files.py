@@ -1,4 +1,4 @@
-"""How the written files name meshes and textures: as the robot does, or for a target that reads other addresses."""
+"""Files that tfcompose writes: their text, and how they address meshes and textures."""
 
 from __future__ import annotations
 
@@ -13,6 +13,14 @@ if TYPE_CHECKING:
     from tfcompose.model import Asset, Robot
 
 Form = Literal["as-written", "package", "file", "relative"]
+
+
+@dataclass(frozen=True, slots=True)
+class File:
+    """A file to be written: its path below the output folder, and its text."""
+
+    path: str
+    text: str
 
 
 @dataclass(frozen=True, slots=True)

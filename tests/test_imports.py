@@ -12,15 +12,15 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "tfcompose"
 
-FOUNDATIONS = {"__init__", "codes", "findings", "geometry", "model", "plan"}
+FOUNDATIONS = {"__init__", "catalogue", "findings", "geometry", "model", "plan"}
 STAGES = {"load", "validate", "resolve", "check"}
 
 #: Which parts of the package each part may import, besides itself.
 MAY_IMPORT: dict[str, set[str]] = {
     "__init__": set(),
-    "codes": set(),
+    "catalogue": set(),
     "interrupt": set(),
-    "findings": {"codes"},
+    "findings": {"catalogue"},
     "geometry": set(),
     "numbers": {"geometry"},
     "plan": {"findings", "geometry"},
@@ -28,17 +28,18 @@ MAY_IMPORT: dict[str, set[str]] = {
     "files": {"model"},
     "imported": {"model", "geometry"},
     "load": {"findings"},
-    "render": {"codes", "draw", "findings", "geometry", "model", "numbers"},
+    "render": {"catalogue", "draw", "findings", "geometry", "model", "numbers"},
     "validate": {"findings", "load", "geometry", "plan"},
-    "resolve": {"findings", "imported", "load", "model", "plan", "geometry", "validate"},
-    "check": {"codes", "findings", "load", "model", "geometry"},
+    "resolve": {"catalogue", "findings", "imported", "load", "model", "plan", "geometry", "validate"},
+    "check": {"catalogue", "findings", "load", "model", "geometry"},
     "draw": set(),
     "emit": {"draw", "files", "geometry", "imported", "model", "numbers", "plan", "render"},
     "ros": {"findings", "interrupt", "plan", "geometry"},
-    "verdict": {"findings", "plan", "geometry"},
+    "verdict": {"catalogue", "findings", "plan", "geometry"},
     "run": {"findings", "interrupt", "plan", "geometry", "ros", "verdict"},
-    "observe": {"findings", "model", "plan", "geometry", "ros", "verdict"},
+    "observe": {"catalogue", "findings", "model", "plan", "geometry", "ros", "verdict"},
     "compile": FOUNDATIONS | STAGES,
+    "pages": {"catalogue", "check"},
     "cli": {"*"},
     "__main__": {"cli"},
 }

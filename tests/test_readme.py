@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from tests.benchmarks import bench_buffer, bench_joints
+from tfcompose.catalogue import CATALOGUE
 from tfcompose.cli.parser import COMMANDS, parser_of
 from tfcompose.cli.shelves import library
-from tfcompose.codes import CODES
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -85,7 +85,7 @@ def test_each_command_says_what_it_does_and_what_its_arguments_are(command: str)
 
 
 def test_its_codes_are_known() -> None:
-    assert set(re.findall(r"TF\d{3}", README)) <= set(CODES)
+    assert set(re.findall(r"TF\d{3}", README)) <= set(CATALOGUE)
 
 
 def test_its_presets_are_those_that_come_with_it() -> None:

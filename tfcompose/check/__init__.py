@@ -1,16 +1,16 @@
-"""Stage ``check``: a Robot becomes findings, one rule a file."""
+"""Stage ``check``: a Robot becomes findings, one rule a function, the rules of a family in one module."""
 
-from tfcompose.check.allow import apply, code_of, idle, levelled, unknown_rules
-from tfcompose.check.check import RULES, Rule, check
+from tfcompose.check.allow import apply, idle, levelled, unknown_rules
+from tfcompose.check.check import RULES, check
 from tfcompose.check.edits import with_edits
 from tfcompose.check.replaced import with_replaced
+from tfcompose.check.rule import Rule
 
 __all__ = [
     "RULES",
     "Rule",
     "apply",
     "check",
-    "code_of",
     "idle",
     "levelled",
     "unknown_rules",

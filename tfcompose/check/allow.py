@@ -10,22 +10,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.codes import CODES
+from tfcompose.catalogue import CATALOGUE, can_be_allowed, code_of, codes_and_names
 from tfcompose.findings import Allow, Finding, did_you_mean, finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from tfcompose.findings import Span
-
-
-#: No tree, edges that nobody publishes, processes that never start.
-NOTHING_TO_BUILD = frozenset({"TF201", "TF202", "TF203", "TF206", "TF302", "TF812", "TF813"})
-
-
-def can_be_allowed(code: str) -> bool:
-    """Return whether findings of the code can be let stand."""
-    return code in CODES and code[:3] not in {"TF0", "TF1"} and code not in NOTHING_TO_BUILD
 
 
 def apply(found: Iterable[Finding], allows: Sequence[Allow]) -> tuple[list[Finding], set[tuple[Allow, str]]]:
@@ -60,17 +51,11 @@ def unknown_rules(rules: Mapping[str, Span]) -> list[Finding]:
     for word, at in rules.items():
         code = code_of(word)
         if code is None:
-            advice = did_you_mean(word, [*CODES, *CODES.values()], "lint prints codes: TF401")
+            advice = did_you_mean(word, codes_and_names(), "lint prints codes: TF401")
             found.append(finding("TF017", f"rules: there is no code {word}", at, help=advice))
         elif not can_be_allowed(code):
-            found.append(finding("TF017", f"rules: {code} {CODES[code]} cannot be set", at, help="remove it"))
+            found.append(finding("TF017", f"rules: {code} {CATALOGUE[code].name} cannot be set", at, help="remove it"))
     return found
-
-
-def code_of(word: str) -> str | None:
-    """Return the code that a code or a name means, or None."""
-    upper = word.upper()
-    return upper if upper in CODES else next((code for code, name in CODES.items() if name == word), None)
 
 
 def _covers(allow: Allow, found: Finding) -> bool:
@@ -85,21 +70,19 @@ def idle(allows: Sequence[Allow], used: set[tuple[Allow, str]]) -> list[Finding]
     found = []
     for allow in allows:
         if not allow.codes:
-            found.append(
-                finding("TF012", "allow names no code", allow.at, help="allow TF401 because …", severity="warning")
-            )
+            found.append(finding("TF012", "allow names no code", allow.at, help="allow TF401 because …"))
         for code in allow.codes:
             message = ""
-            if code not in CODES:
+            if code not in CATALOGUE:
                 message = f"allow {code}: there is no such code"
             elif not can_be_allowed(code):
-                message = f"allow {code}: {CODES[code]} cannot be allowed"
+                message = f"allow {code}: {CATALOGUE[code].name} cannot be allowed"
             elif (allow, code) not in used:
-                message = f"allow {code}: there is no {CODES[code]} here"
+                message = f"allow {code}: there is no {CATALOGUE[code].name} here"
             if message:
-                advice = did_you_mean(code, CODES, "remove it") if code not in CODES else "remove it"
-                found.append(finding("TF012", message, allow.at, help=advice, severity="warning"))
+                advice = did_you_mean(code, CATALOGUE, "remove it") if code not in CATALOGUE else "remove it"
+                found.append(finding("TF012", message, allow.at, help=advice))
         if allow.codes and not allow.reason:
             message = f"allow {', '.join(allow.codes)} does not say why"
-            found.append(finding("TF013", message, allow.at, help="add: because …", severity="warning"))
+            found.append(finding("TF013", message, allow.at, help="add: because …"))
     return found

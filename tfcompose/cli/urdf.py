@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from tfcompose.check import apply, check, idle
+from tfcompose.check import RULES, apply, check, idle
 from tfcompose.cli.disk import disk
 from tfcompose.cli.terminal import read_text
 from tfcompose.cli.xacro import expanded
@@ -23,12 +23,7 @@ if TYPE_CHECKING:
     from tfcompose.load.urdf import Element
     from tfcompose.model import Robot
 
-#: The rules that make sense without owners, sensors and processes.
-CODES = frozenset(
-    {"TF201", "TF202", "TF203", "TF204", "TF205", "TF206", "TF209", "TF401", "TF501", "TF503"}
-    | {"TF701", "TF702", "TF704", "TF705", "TF706", "TF707", "TF708", "TF709", "TF710", "TF711", "TF713"}
-    | {"TF716", "TF717", "TF718", "TF728", "TF731"}
-)
+_RULES = tuple(rule for rule in RULES.values() if rule.of_urdf)
 
 #: How a rule says that a frame is missing.
 _DECLARE = re.compile(r"declare it: (?:frames|links): \{(.+): \{\}\}", re.DOTALL)
@@ -72,7 +67,7 @@ class Read:
         robot = self.robot
         if any("<ros2_control" in block.text for block in robot.blocks):
             robot = import_module("tfcompose.resolve.urdf_control").with_hardware(robot)
-        said = (_said(one) for one in check(robot, CODES))
+        said = (_said(one) for one in check(robot, _RULES))
         kept, used = apply(dict.fromkeys([*self.found, *said]), allows)
         return sorted([*kept, *idle(allows, used)], key=lambda one: one.sort_key)
 

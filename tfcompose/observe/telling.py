@@ -15,7 +15,8 @@ from tfcompose.verdict.violation import violation
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from tfcompose.findings import Severity, Span
+    from tfcompose.catalogue import Severity
+    from tfcompose.findings import Span
     from tfcompose.observe.differences import Difference
     from tfcompose.observe.seen import Seen
     from tfcompose.plan import Plan

@@ -6,7 +6,7 @@ import json
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from tfcompose.codes import CODES
+from tfcompose.catalogue import CATALOGUE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -28,7 +28,7 @@ def render_sarif(found: Sequence[Finding], version: str, pages: Mapping[str, str
 
 
 def _rule(code: str, pages: Mapping[str, str]) -> dict[str, Any]:
-    rule: dict[str, Any] = {"id": code, "name": CODES[code]}
+    rule: dict[str, Any] = {"id": code, "name": CATALOGUE[code].name}
     page = pages.get(code, "")
     if page:
         rule["shortDescription"] = {"text": page.partition("\n")[0]}

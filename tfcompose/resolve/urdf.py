@@ -17,7 +17,7 @@ from tfcompose.resolve.urdf_words import unknown_words
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.findings import Severity
+    from tfcompose.catalogue import Severity
     from tfcompose.load.urdf import Element
     from tfcompose.resolve.urdf_bodies import Finder
 

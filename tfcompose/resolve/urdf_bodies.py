@@ -11,7 +11,8 @@ from tfcompose.resolve.bodies import name_of_colour, traces
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tfcompose.findings import Finding, Severity, Span
+    from tfcompose.catalogue import Severity
+    from tfcompose.findings import Finding, Span
     from tfcompose.load.urdf import Element
     from tfcompose.resolve.urdf_values import Values
 

@@ -7,10 +7,11 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.findings import Finding, Severity, Span, finding
+from tfcompose.findings import Finding, Span, finding
 from tfcompose.geometry import Pose, normalised, quat_from_rpy, rpy_from_quat
 
 if TYPE_CHECKING:
+    from tfcompose.catalogue import Severity
     from tfcompose.geometry import Quaternion
     from tfcompose.load.urdf import Element
 

@@ -9,7 +9,8 @@ from tfcompose.findings import Finding, Note, finding
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tfcompose.findings import Severity, Span
+    from tfcompose.catalogue import Severity
+    from tfcompose.findings import Span
     from tfcompose.plan import PlanEdge
 
 NAMED_AT_MOST = 6

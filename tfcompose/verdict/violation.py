@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.findings import Finding, Note, Severity, finding
+from tfcompose.findings import Finding, Note, finding
 from tfcompose.verdict.driven import advice_of, message_of
 from tfcompose.verdict.offence import BACK, REPEATED, SELF, TWO_WRITERS, WRONG_CLOCK
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from tfcompose.catalogue import Severity
     from tfcompose.findings import Span
     from tfcompose.plan import Driven, Plan, PlanEdge
     from tfcompose.verdict.offence import Offence
 
 LISTED_AT_MOST = 12
-_WARNINGS = frozenset({SELF, TWO_WRITERS, REPEATED, BACK})
 _ADVICE = {
     SELF: "no listener gets it; give the node's child frame another name, or switch its TF off",
     TWO_WRITERS: "tf2 takes whatever came last: end one of them, or let each send a frame of its own",
@@ -34,8 +34,7 @@ def violation(
     ``place`` is where the edge stands in the robot's file, if that is at hand.
     """
     first = offences[0]
-    mild = first.code in _WARNINGS or (first.code == "TF803" and plan.guard.unknown_edges == "warn")
-    severity: Severity = "warning" if mild else "error"
+    severity: Severity | None = "warning" if first.code == "TF803" and plan.guard.unknown_edges == "warn" else None
     notes = [*_others(offences), *([] if place else _declared(first)), *_runs(first, where)]
     message = message_of(first, _more(offences), driven) or _message(offences, plan)
     advice = advice_of(first, driven) or _switch(first, plan) or _help(first, plan, _pattern(offences))

@@ -10,15 +10,14 @@ import math
 import sys
 from typing import TYPE_CHECKING
 
-from tfcompose.check import code_of
-from tfcompose.check.pages import page, rule_table
+from tfcompose.catalogue import CATALOGUE, FAMILIES, code_of, codes_and_names
 from tfcompose.cli.between import edges_between
 from tfcompose.cli.compiling import sources_and_robot
 from tfcompose.cli.options import add_variant
 from tfcompose.cli.provenance import written_values
 from tfcompose.cli.terminal import UNREADABLE, complain
-from tfcompose.codes import CODES
 from tfcompose.findings import did_you_mean
+from tfcompose.pages import page, table
 from tfcompose.render.tree import edge_facts
 
 if TYPE_CHECKING:
@@ -34,7 +33,13 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "what", nargs="*", metavar="CODE|FILE A B", help="a code, a rule's name, or a file and two frames"
     )
-    parser.add_argument("--table", action="store_true", help="print all rules as a table in Markdown")
+    parser.add_argument(
+        "--table",
+        nargs="?",
+        const="all",
+        choices=("all", *FAMILIES),
+        help="print a table in Markdown of all codes, or of those of a family",
+    )
     add_variant(parser)
 
 
@@ -42,7 +47,7 @@ def run(arguments: Namespace) -> int:
     """Print the page or the chain; exit code 1 if a frame is not there, 2 for wrong use."""
     words = arguments.what
     if arguments.table and not words:
-        sys.stdout.write(rule_table())
+        sys.stdout.write(table(None if arguments.table == "all" else arguments.table))
         return 0
     if len(words) == 1:
         return _explain_code(words[0])
@@ -56,9 +61,9 @@ def run(arguments: Namespace) -> int:
 def _explain_code(word: str) -> int:
     code = code_of(word)
     if code is None:
-        complain(f"no code {word}; {did_you_mean(word, [*CODES, *CODES.values()], 'lint prints codes: TF301')}")
+        complain(f"no code {word}; {did_you_mean(word, codes_and_names(), 'lint prints codes: TF301')}")
         return UNREADABLE
-    sys.stdout.write(f"{code} {CODES[code]}\n\n{page(code)}\n")
+    sys.stdout.write(f"{code} {CATALOGUE[code].name}\n\n{page(code)}\n")
     return 0
 
 

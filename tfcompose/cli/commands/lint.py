@@ -123,7 +123,7 @@ def _print(found: list[Finding], form: str, files: int) -> None:
     elif form == "github":
         sys.stdout.write(import_module("tfcompose.render.github").render_github(found))
     else:
-        page = import_module("tfcompose.check.pages").page
+        page = import_module("tfcompose.pages").page
         pages = {one.code: page(one.code) for one in found}
         sys.stdout.write(import_module("tfcompose.render.sarif").render_sarif(found, __version__, pages))
 

@@ -120,7 +120,7 @@ def many_static(seen: Seen) -> Iterator[Finding]:
         nodes = sorted({one.node for one in fixed if one.node})
         message = f"{len(fixed)} publishers on {seen.topics[1]}, and a listener keeps the last {MOST_STATIC} messages"
         advice = "let one node publish them: tfcompose sends all fixed edges in one message"
-        yield finding("TF309", message, None, notes=[Note(listed(nodes))], help=advice)
+        yield finding("TF309", message, None, severity="error", notes=[Note(listed(nodes))], help=advice)
 
 
 def isolation_leak(seen: Seen) -> Iterator[Finding]:

@@ -1,0 +1,112 @@
+"""Rules about names of frames, joints, processes, nodes and variables."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from tfcompose.check.rule import rule
+from tfcompose.findings import Finding, Note, Span, finding
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tfcompose.catalogue import Severity
+    from tfcompose.model import Robot
+
+
+_GOOD = re.compile(r"[A-Za-z0-9_]+(/[A-Za-z0-9_]+)*")
+#: What URDF and TF take, and a person can type.
+_TAKEN = r"[\w.:+@-]+(/[\w.:+@-]+)*"
+#: What no listener can look up, or no XML file can hold.
+_LOST = r"(?s)|/.*|\s.*|.*\s|.*[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff].*"
+_PROCESS = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(/[A-Za-z0-9_][A-Za-z0-9_.-]*)*")
+_LAUNCHER = "tfcompose"
+_NODE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
+
+
+@rule("TF501", of_urdf=True)
+def bad_frame_name(robot: Robot) -> Iterator[Finding]:
+    """A frame, joint, process or node has a name that tf2, URDF, ROS or a file system takes differently.
+
+    tf2 strips a leading slash, a process's name is also that of its parameter file, and spaces, quotes and ``&`` break
+    somewhere on the way. Use letters, digits and ``_``; a slash stands between a prefix and a name only. The parts of
+    a node's name do not begin with a digit. Hyphens, dots, colons and letters beyond ASCII, as in
+    ``base_link-base_fixed_joint``, are warnings: URDF and TF take them, but a parameter or a topic that is named after
+    the frame or joint cannot have them. In a URDF that somebody else wrote everything is a warning that can be looked
+    up at all.
+    """
+    names: dict[str, Span] = dict(robot.frames)
+    for edge in robot.edges:
+        names.setdefault(edge.child, edge.child_at or edge.at)
+        if edge.joint_name:
+            names.setdefault(edge.joint_name, edge.joint_at or edge.at)
+    for name, at in names.items():
+        if not _GOOD.fullmatch(name):
+            taken = re.fullmatch(_TAKEN, name) or (at.file in robot.foreign and not re.fullmatch(_LOST, name))
+            yield _invalid(name, at, "name", "warning" if taken else "error")
+    for process in robot.processes:
+        if not _PROCESS.fullmatch(process.name):
+            yield _invalid(process.name, process.at, "name for a process")
+        elif process.name == _LAUNCHER:
+            message = f"{_LAUNCHER} is the launcher's own name, in logs and findings"
+            yield finding("TF501", message, process.at, help="give the process another name")
+        elif (process.package or process.kind != "run" or process.params) and not _NODE.fullmatch(process.node):
+            yield _invalid(process.node, process.at, "name for a node")
+
+
+def _invalid(name: str, at: Span, what: str, severity: Severity = "error") -> Finding:
+    bare = name.lstrip("/")
+    if what == "name" and bare != name and _GOOD.fullmatch(bare):
+        return finding("TF501", f"{name!r} is no good {what}", at, help=f"tf2 drops a leading slash: write {bare}")
+    better = re.sub(r"[^A-Za-z0-9_/]+|//+", "_", name).strip("/")
+    advice = f"for example {better}" if _GOOD.fullmatch(better) and better != name.strip("/") else _LETTERS
+    return finding("TF501", f"{name!r} is no good {what}", at, help=advice, severity=severity)
+
+
+_LETTERS = "letters, digits and _; a node's name does not begin with a digit"
+
+
+@rule("TF503", of_urdf=True)
+def upper_case_name(robot: Robot) -> Iterator[Finding]:
+    """A frame's name has upper case letters.
+
+    tf2 tells ``Base_link`` from ``base_link``, people do not: a lookup fails, and the two names look the same. ROS
+    names are lower case with underscores, ``left_wheel_link``. Only frames that the file names are judged, not those
+    of presets, and all together are one finding; a robot whose vendor's names are upper case says
+    ``rules: {TF503: off}``.
+    """
+    presets = [sensor for sensor in robot.sensors if sensor.name == sensor.name.lower()]
+    inside = {frame for sensor in presets for frame in (sensor.mount, *sensor.frames)}
+    bad = {name: at for name, at in robot.frames.items() if name != name.lower() and name not in inside}
+    if bad:
+        first, *others = bad
+        known = {name.lower(): name for name in robot.frames if name == name.lower()}
+        more = f" and {len(others)} more" if others else ""
+        message = f"upper case in the frame name {first}{more}"
+        notes = [
+            Note(f"{known[name.lower()]} is another frame", at) for name, at in bad.items() if name.lower() in known
+        ]
+        notes += [Note(f"{name} is one too", bad[name]) for name in others[:_MOST_LISTED]]
+        yield finding("TF503", message, bad[first], help=_lower_case(first), notes=notes)
+
+
+_MOST_LISTED = 5
+
+
+def _lower_case(name: str) -> str:
+    apart = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+    return f"for example {apart}"
+
+
+@rule("TF504")
+def unused_variable(robot: Robot) -> Iterator[Finding]:
+    """Nothing uses a variable.
+
+    Probably the number still stands where the variable was meant to go, and changing the variable changes nothing. Use
+    it, ``"${mast}"``, or remove it. Variables that only a profile uses, or that an included file brings, are left
+    alone.
+    """
+    for name, at in robot.unused.items():
+        if at.file == robot.file and ("vars", name) not in robot.broken:
+            yield finding("TF504", f"nothing uses the variable {name}", at, help="remove it")

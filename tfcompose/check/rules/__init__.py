@@ -1,1 +1,0 @@
-"""The rules, one a file; ``tfcompose.check.check`` lists them."""

@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -118,12 +117,10 @@ class Started:
             self._join()  # its last lines may not have been read yet
         assert text in self.output, self.lines + self.errors
 
-    def end(self, number: int = signal.SIGINT) -> tuple[int, float]:
-        """Send the signal; return the exit code and the seconds that it took."""
-        start = time.monotonic()
+    def end(self, number: int = signal.SIGINT) -> int:
+        """Send the signal; return the exit code."""
         self.process.send_signal(number)
-        code = self.process.wait(TIMEOUT_S)
-        return code, time.monotonic() - start
+        return self.process.wait(TIMEOUT_S)
 
     def close(self) -> None:
         """End the process, whatever it does, and its readers."""

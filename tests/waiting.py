@@ -27,32 +27,17 @@ def until(condition: Callable[[], object], timeout_s: float = TIMEOUT_S) -> bool
     return True
 
 
-def in_one_of_a_few(attempt: Callable[[int], float], limit_s: float, tries: int = 4) -> bool:
-    """Return whether an attempt took less than the limit; each is given its number, and returns its seconds.
+def in_one_of_a_few(attempt: Callable[[int], bool], tries: int = 4) -> bool:
+    """Return whether one of a few attempts holds; each is given its number.
 
-    A machine that is busy with other things makes one late now and then. What is slow by itself is slow each time.
+    A machine that is busy with other things may spoil one now and then; what is wrong is wrong each time.
     """
-    return any(attempt(number) < limit_s for number in range(tries))
+    return any(attempt(number) for number in range(tries))
 
 
 def whole_lines(file: Path) -> list[str]:
     """Return the lines of a file that somebody still writes: what stands behind the last line's end is not one yet."""
     return file.read_bytes().rpartition(b"\n")[0].decode().splitlines()
-
-
-def within(condition: Callable[[], object], seconds: float) -> bool:
-    """Return whether the condition holds after so many seconds in which this process ran.
-
-    Of the time between two looks a twentieth of a second counts: a machine that stands still for all makes nobody late.
-    """
-    left, looked = seconds, time.monotonic()
-    while not condition():
-        now = time.monotonic()
-        left, looked = left - min(0.05, now - looked), now
-        if left < 0:
-            return False
-        time.sleep(0.005)
-    return True
 
 
 def offences(said: str) -> list[str]:

@@ -19,4 +19,3 @@ def seconds(links: int) -> float:
 
 def test_thousands_of_unknown_names_are_found_in_time_proportional_to_their_number() -> None:
     assert seconds(4000) < 12 * seconds(1000)
-    assert seconds(4000) < 5

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import shlex
 import subprocess
 import sys
@@ -50,9 +49,7 @@ def test_a_bad_file_gives_one_finding_with_its_place_and_nothing_is_written(
     data, code, (line, column), exit_code = BAD[case]
     (folder / "robot.yaml").write_bytes(data)
     before = everything_below(tmp_path)
-    began = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = tfcompose(command, cwd=folder)
-    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - began.ru_utime < 20
     said = done.stdout + done.stderr
     assert done.returncode == exit_code, said
     assert f"robot.yaml:{line}:{column}: error[{code}]" in said

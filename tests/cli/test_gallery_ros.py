@@ -27,7 +27,7 @@ def test_a_demo_runs_without_hardware(robot: str, start: Callable[..., Started],
         up.until_says("tree complete")
         up.until_says("all ready")
         time.sleep(5)  # it goes on so
-        code, _ = up.end()
+        code = up.end()
         up.close()
         assert (code, up.errors) == (0, [])
         found = set(re.findall(r"\[(TF\d+)\]", up.output))

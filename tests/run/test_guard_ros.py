@@ -27,7 +27,7 @@ pytestmark = pytest.mark.ros
 
 ROBOT = Path(__file__).parents[2] / "robots" / "autonomous_robot.yaml"
 #: A stranger with stock settings: node name, topic's kind, rate, seconds, edges. It sends when there is somebody who
-#: hears it, and prints when that was; and it stays until it was heard, and then so many seconds.
+#: hears it, and says so; and it stays until it was heard, and then so many seconds.
 STRANGER = """
 import signal, sys, time
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
@@ -48,7 +48,7 @@ with open_node(name, "/strange") as node:
     while kind == "moving" and not raw.get_subscription_count():
         time.sleep(0.002)
     publisher.publish(encode(transforms))
-    print(time.monotonic(), flush=True)
+    print("sent", flush=True)
     while kind == "static" and not (raw.get_subscription_count() and raw.wait_for_all_acked()):
         time.sleep(0.002)
     end = time.monotonic() + float(seconds)
@@ -70,11 +70,10 @@ class Robot:
         """Return the lines that hold all the words."""
         return [line for line in whole_lines(self.output) if all(word in line for word in words)]
 
-    def says(self, *words: str, times: int = 1) -> float:
-        """Wait for such a line, or so many, and return when it was there, in monotonic seconds."""
+    def says(self, *words: str, times: int = 1) -> None:
+        """Wait for such a line, or so many."""
         there = until(lambda: len(self.lines(*words)) >= times)
         assert there, (words, self.output.read_text(encoding="utf-8"))
-        return time.monotonic()
 
     def child(self, name: str) -> psutil.Process:
         """Return one of the robot's processes."""
@@ -123,13 +122,13 @@ class Stranger:
 
     popen: subprocess.Popen[str] | None = None
 
-    def __call__(self, name: str, kind: str, *edges: str, hertz: float = 20.0, seconds: float = 600.0) -> float:
-        """Let it join and send, and return when it sent its first message, in monotonic seconds."""
+    def __call__(self, name: str, kind: str, *edges: str, hertz: float = 20.0, seconds: float = 600.0) -> None:
+        """Let it join and send its first message."""
         self.leaves()
         command = [sys.executable, "-c", STRANGER, name, kind, str(hertz), str(seconds), *edges]
         self.popen = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         assert self.popen.stdout
-        return float(self.popen.stdout.readline())
+        assert self.popen.stdout.readline()
 
     def leaves(self) -> None:
         if self.popen and self.popen.stdout:
@@ -153,7 +152,7 @@ def test_every_owner_is_announced_and_the_tree_with_the_time_it_took(robot: Robo
         assert len([line for line in live if owner in line]) == 1
     assert len(live) == 4
     (complete,) = robot.lines("tree complete: 18 edges live after ")
-    assert 0 < float(complete.split()[-2]) < 30
+    assert float(complete.split()[-2]) > 0
     assert offences("".join(robot.lines("TF8"))) == []
 
 
@@ -170,16 +169,12 @@ def test_a_listener_that_joins_late_gets_all_fixed_edges_in_one_message(robot: R
         assert (len(received), len(transforms), len({t.child for t in transforms})) == (1, 14, 14)
 
 
-def test_a_stranger_on_an_owned_edge_is_named_within_a_second_and_once(robot: Robot, stranger: Stranger) -> None:
-    named = "odom → base_link is published by /strange/rogue_odom_{}; the owner is base_drive"
-
-    def attempt(number: int) -> float:
-        sent = stranger(f"rogue_odom_{number}", "moving", "odom base_link")
-        return robot.says("error[TF801]", named.format(number)) - sent
-
-    assert in_one_of_a_few(attempt, 1)
+def test_a_stranger_on_an_owned_edge_is_named_once(robot: Robot, stranger: Stranger) -> None:
+    named = "odom → base_link is published by /strange/rogue_odom; the owner is base_drive"
+    stranger("rogue_odom", "moving", "odom base_link")
+    robot.says("error[TF801]", named)
     time.sleep(1)
-    assert len(robot.lines(named.format(0))) == 1
+    assert len(robot.lines(named)) == 1
 
 
 def test_a_stranger_that_leaves_is_said_to_have(robot: Robot, stranger: Stranger) -> None:
@@ -191,74 +186,55 @@ def test_a_stranger_that_leaves_is_said_to_have(robot: Robot, stranger: Stranger
 
 def test_a_stranger_that_sends_once_and_leaves_at_once_is_named(robot: Robot, stranger: Stranger) -> None:
     # A message that is sent before anybody is discovered reaches nobody; a latched one waits for its readers.
-    def attempt(number: int) -> float:
+    def attempt(number: int) -> bool:
         stranger(f"rogue_{number}", "static", "base_link laser_link", "base_link imu_link", hertz=2, seconds=0.5)
         said = ("TF801", f"base_link → laser_link and 1 more edge are published by /strange/rogue_{number}")
-        return 0 if until(lambda: robot.lines(*said), 10) else 1
+        return until(lambda: robot.lines(*said), 10)
 
-    assert in_one_of_a_few(attempt, 1), "a guard that is kept from looking sees a node come and go no more"
+    assert in_one_of_a_few(attempt), "a guard that is kept from looking sees a node come and go no more"
 
 
 def test_a_second_parent_is_named_with_both_parents(robot: Robot, stranger: Stranger) -> None:
-    def attempt(number: int) -> float:
-        sent = stranger(f"rogue_parent_{number}", "moving", "base_footprint base_link")
-        named = f"second parent: /strange/rogue_parent_{number} publishes base_footprint → base_link, base_drive"
-        return robot.says("TF802", named) - sent
-
-    assert in_one_of_a_few(attempt, 1)
+    stranger("rogue_parent", "moving", "base_footprint base_link")
+    robot.says("TF802", "second parent: /strange/rogue_parent publishes base_footprint → base_link, base_drive")
 
 
 def test_an_edge_that_nobody_declared_is_a_warning(robot: Robot, stranger: Stranger) -> None:
-    def attempt(number: int) -> float:
-        sent = stranger(f"rogue_edge_{number}", "moving", f"base_link cup_{number}\x1b[31m")
-        named = f"base_link → cup_{number}\\x1b[31m is published by /strange/rogue_edge_{number}, and nobody"
-        return robot.says("warning[TF803]", named) - sent
-
-    assert in_one_of_a_few(attempt, 1)
+    stranger("rogue_edge", "moving", "base_link cup\x1b[31m")
+    robot.says("warning[TF803]", "base_link → cup\\x1b[31m is published by /strange/rogue_edge, and nobody")
 
 
 def test_a_volatile_writer_of_static_edges_is_named(robot: Robot, stranger: Stranger) -> None:
-    def attempt(number: int) -> float:
-        sent = stranger(f"rogue_volatile_{number}", "volatile", "base_link cup")
-        return (
-            robot.says("TF806", f"/strange/rogue_volatile_{number} writes /tf_static with durability volatile") - sent
-        )
-
-    assert in_one_of_a_few(attempt, 1)
+    stranger("rogue_volatile", "volatile", "base_link cup")
+    robot.says("TF806", "/strange/rogue_volatile writes /tf_static with durability volatile")
 
 
-def test_an_owner_that_falls_silent_is_named_within_a_second_and_when_it_is_back(robot: Robot) -> None:
+def test_an_owner_that_falls_silent_is_named_and_when_it_is_back(robot: Robot) -> None:
     drive = robot.child("base_drive")
     silent = ("TF804", "base_drive (/diff_drive_controller) fell silent: nothing on odom → base_link for")
     back = ("over", "odom → base_link is back after")
-
-    def attempt(_: int) -> float:
-        known, over = len(robot.lines(*silent)), len(robot.lines(*back))
-        drive.send_signal(signal.SIGSTOP)
-        stopped = time.monotonic()
-        try:
-            said = robot.says(*silent, times=known + 1)
-        finally:
-            drive.send_signal(signal.SIGCONT)
-        robot.says(*back, times=over + 1)
-        return said - stopped
-
-    assert in_one_of_a_few(attempt, 1)
+    known, over = len(robot.lines(*silent)), len(robot.lines(*back))
+    drive.send_signal(signal.SIGSTOP)
+    try:
+        robot.says(*silent, times=known + 1)
+    finally:
+        drive.send_signal(signal.SIGCONT)
+    robot.says(*back, times=over + 1)
 
 
 def test_a_guard_that_was_stopped_for_a_while_blames_nobody(robot: Robot) -> None:
     guard = robot.child("guard")
 
-    def attempt(_: int) -> int:
-        """Return how many were blamed: an owner that is kept from running itself is, and not each time."""
+    def attempt(_: int) -> bool:
+        """Return whether nobody was blamed: an owner that is kept from running itself is, and not each time."""
         before = len(robot.lines("error["))
         guard.send_signal(signal.SIGSTOP)
         time.sleep(3)
         guard.send_signal(signal.SIGCONT)
         time.sleep(5)
-        return len(robot.lines("error[")) - before
+        return len(robot.lines("error[")) == before
 
-    assert in_one_of_a_few(attempt, 1)
+    assert in_one_of_a_few(attempt)
 
 
 def test_a_guard_that_hangs_is_replaced(robot: Robot) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import pty
-import time
 from pathlib import Path
 
 import pytest
@@ -12,14 +11,12 @@ import pytest
 from tfcompose.run.launcher.outlet import KEPT, Outlet
 
 
-def test_a_reader_that_does_not_read_costs_no_time_and_bounded_memory_and_learns_how_much_is_left_out() -> None:
+def test_a_reader_that_does_not_read_is_not_waited_for_costs_bounded_memory_and_learns_how_much_is_left_out() -> None:
     reader, writer = os.pipe()
     outlet = Outlet(writer)
-    began = time.monotonic()
     for number in range(20_000):
         outlet.write(f"line {number:06d} of a process that floods a pager\n", log=True)
     outlet.write("said by the launcher\n")
-    assert time.monotonic() - began < 20
     assert len(outlet._owed) <= KEPT + 1000
     os.set_blocking(reader, False)
     text = b""
@@ -42,10 +39,8 @@ def test_a_reader_that_does_not_read_costs_no_time_and_bounded_memory_and_learns
 def test_a_terminal_that_is_stopped_is_not_waited_for_and_the_shell_keeps_its_blocking_one() -> None:
     master, slave = pty.openpty()
     outlet = Outlet(slave)
-    began = time.monotonic()
-    for _ in range(5000):
+    for _ in range(5000):  # a write that waits, waits for ever
         outlet.write("x" * 100 + "\n", log=True)
-    assert time.monotonic() - began < 20
     assert os.get_blocking(slave)
     outlet.close(0.01)
     os.close(slave)

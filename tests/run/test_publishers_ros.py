@@ -18,7 +18,6 @@ from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from tests.waiting import in_one_of_a_few
 from tfcompose.geometry import Pose, angle_between, normalised, quat_from_rpy
 from tfcompose.plan import Joint, PlanProcess, Simulation, Sweep
 from tfcompose.ros.graph import writers
@@ -273,15 +272,15 @@ def test_the_rate_does_not_drift(
     start: Callable[..., Any], ears: Ears, edge: Callable[..., Any], write: Callable[..., Any]
 ) -> None:
     pose = Pose((1.0, 2.0, 3.0), normalised((0.0, 0.0, 1.0, 1.0)))
-    process = PlanProcess("map", "simulate", simulate=Simulation("fixed", 100.0, pose=pose))
+    process = PlanProcess("map", "simulate", simulate=Simulation("fixed", 25.0, pose=pose))
     start("tfcompose.run.simulate", write([edge("map odom", "map")], process), "map").until_says("simulated")
-    transforms = [transform for _, (transform,) in ears.tf(101)]
+    transforms = [transform for _, (transform,) in ears.tf(51)]
     assert {(t.parent, t.child, t.xyz, t.quat_xyzw) for t in transforms} == {("map", "odom", pose.xyz, pose.quat_xyzw)}
     # A late tick moves no later one: most stamps lie near whole periods from each other, however busy the machine is.
-    periods = [transform.stamp_ns / 10_000_000 for transform in transforms]
+    periods = [transform.stamp_ns / 40_000_000 for transform in transforms]
     off = min(median(abs(math.remainder(a - b, 1.0)) for a in periods) for b in periods)
     assert off < 0.15, "0.25 is what drifting stamps give"
-    assert periods[100] - periods[0] >= 99
+    assert periods[50] - periods[0] >= 49
     assert median(b - a for a, b in pairwise(periods)) < 1.5, "most ticks come"
 
 
@@ -305,9 +304,15 @@ def test_swept_joints_move_within_their_limits_and_the_others_stay(
     messages = [deserialize_message(each.data, JointState) for each in take(ears.node, subscription, 75)]
     assert {tuple(message.name) for message in messages} == {("lift", "grip")}
     assert {message.position[1] for message in messages} == {0.5}
+    # Later messages are where a sine of this period is that goes through the first one's place, upwards or downwards.
+    stamps_s = [message.header.stamp.sec + message.header.stamp.nanosec / 1e9 for message in messages]
     lifts = [message.position[0] for message in messages]
-    assert 0.1 <= min(lifts) < 0.15
-    assert 0.45 < max(lifts) <= 0.5
+    turn = math.asin((lifts[0] - 0.3) / 0.2)
+    by_direction = [
+        [0.3 + 0.2 * math.sin(first + math.tau * (stamp_s - stamps_s[0])) for stamp_s in stamps_s]
+        for first in (turn, math.pi - turn)
+    ]
+    assert any(lifts == pytest.approx(expected, abs=0.01) for expected in by_direction)
 
 
 def test_simulated_time_comes_from_the_clock_topic(
@@ -363,26 +368,20 @@ def test_joint_states_without_a_time_get_simulated_time(
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize("clock", ["wall", "sim"])
-def test_every_process_ends_at_once_and_quietly(
+def test_every_process_ends_before_its_next_message_and_quietly(
     start: Callable[..., Any], edge: Callable[..., Any], write: Callable[..., Any], number: int, clock: str
 ) -> None:
-    simulated = Simulation("fixed", 0.01)
+    simulated = Simulation("fixed", 0.01)  # a message in 100 s
     processes = [PlanProcess(k, k, simulate=simulated) for k in ("static", "joints", "simulate")]
     file = write([edge("map odom", "simulate"), edge("a b")], *processes, clock=clock)
 
-    def attempt(_: int) -> float:
-        running = [start(f"tfcompose.run.{process.kind}", file, process.name) for process in processes]
-        for each in running:
-            each.until_says("edge")
-        took: list[float] = []
-        for each in running:
-            code, seconds = each.end(number)
-            each.close()
-            assert (code, each.errors) == (0, [])
-            took.append(seconds)
-        return max(took)
-
-    assert in_one_of_a_few(attempt, 2.0)
+    running = [start(f"tfcompose.run.{process.kind}", file, process.name) for process in processes]
+    for each in running:
+        each.until_says("edge")
+    for each in running:
+        code = each.end(number)
+        each.close()
+        assert (code, each.errors) == (0, [])
 
 
 def test_an_interrupt_during_the_start_ends_quietly_too(start: Callable[..., Any], write: Callable[..., Any]) -> None:
@@ -393,7 +392,7 @@ def test_an_interrupt_during_the_start_ends_quietly_too(start: Callable[..., Any
         "import 'tfcompose.run.publishing.static_role'" in e or "import 'rclpy'" in e for e in process.errors
     ):
         time.sleep(0.001)
-    code, _ = process.end(signal.SIGINT)
+    code = process.end(signal.SIGINT)
     process.close()
     assert code == 0
     assert "Traceback" not in "".join(process.errors)

@@ -6,7 +6,7 @@ was seen read alike. A code is never used again for something else.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -112,6 +112,18 @@ def finding(  # noqa: PLR0913 (a finding has that many parts; all but three are 
     """Return the finding with the name that the catalogue has for its code, and unless one is given the severity."""
     known = CATALOGUE[code]
     return Finding(code, known.name, severity or known.severity, message, span, tuple(notes), help, tuple(edits))
+
+
+def without_duplicates(found: Iterable[Finding]) -> list[Finding]:
+    """Return each finding once, in order; of those that differ in notes only, the first, with the notes of all."""
+    first: dict[Finding, Finding] = {}
+    for one in found:
+        alone = replace(one, notes=()) if one.notes else one
+        before = first.setdefault(alone, one)
+        notes = dict.fromkeys((*before.notes, *one.notes))
+        if len(notes) > len(before.notes):
+            first[alone] = replace(before, notes=tuple(notes))
+    return list(first.values())
 
 
 def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:

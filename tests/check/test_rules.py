@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tfcompose.catalogue import CATALOGUE
-from tfcompose.check import RULES, check, idle
+from tfcompose.check import RULES, check, unused_allows
 from tfcompose.check.rule import rule
 from tfcompose.cli.compiling import library
 from tfcompose.cli.disk import moments as measured
@@ -72,7 +72,7 @@ def places(found: tuple[Finding, ...]) -> set[tuple[int, str]]:
 def test_each_marked_line_gives_its_finding_and_no_other_line_gives_one(spec: Path) -> None:
     expected = marks(spec.read_text("utf-8"))
     bare = compiled(spec)
-    assert places((*bare.found, *idle(bare.allows, set(bare.used)))) == expected.pop(None)
+    assert places((*bare.found, *unused_allows(bare.allows, set(bare.used)))) == expected.pop(None)
     for profile, more in expected.items():
         assert profile
         alone = {(one.code, one.message) for one in compiled(spec).found}

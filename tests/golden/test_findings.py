@@ -22,7 +22,7 @@ import pytest
 
 from tests.golden.mutations import mutated
 from tests.support.bad_input import BAD
-from tfcompose.check import idle
+from tfcompose.check import unused_allows
 from tfcompose.cli.disk import disk
 from tfcompose.cli.shelves import PRESETS, library
 from tfcompose.cli.terminal import read_text
@@ -72,7 +72,7 @@ def within(text: str, file: str, texts: dict[str, str] | None = None, **more: An
 
     files = replace(disk(), read=read, is_file=is_file)
     compiled = compile_robot(text, file, presets(), read=read, disk=files, **more)
-    return [*compiled.found, *(idle(compiled.allows, set(compiled.used)) if not more else [])]
+    return [*compiled.found, *(unused_allows(compiled.allows, set(compiled.used)) if not more else [])]
 
 
 @cache

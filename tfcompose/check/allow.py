@@ -1,8 +1,7 @@
-"""``# tfcompose: allow TF301 because …``: findings that a person has looked at and lets stand.
+"""What silences findings: ``# tfcompose: allow TF301 because …`` on a line, and ``rules`` for a whole robot.
 
-The comment stands on the line that the finding is about, or alone on the line above. Findings about text and keys (TF0
-and TF1) cannot be allowed, since they say that the file was not understood; nor can those without whose end there is no
-robot to build.
+The comment is on the line that the finding is about, or alone on the line above. Findings about text and keys cannot be
+silenced, since they say that the file was not understood; nor can those that leave nothing to build.
 """
 
 from __future__ import annotations
@@ -18,11 +17,25 @@ if TYPE_CHECKING:
 
     from tfcompose.findings import Span
 
+    Used = set[tuple[Allow, str]]
 
-def apply(found: Iterable[Finding], allows: Sequence[Allow]) -> tuple[list[Finding], set[tuple[Allow, str]]]:
-    """Return the findings that are not allowed, and which comments let something stand, by code."""
+
+def silenced(
+    found: Iterable[Finding], rules: Mapping[str, tuple[str, Span]], allows: Sequence[Allow]
+) -> tuple[list[Finding], Used]:
+    """Return what neither a comment nor an entry of ``rules`` silences, and which comments silenced something.
+
+    ``rules`` holds a severity or ``off`` for codes and names, each with its place; an entry that is neither, or cannot
+    be set, is a finding too.
+    """
+    unknown = _unknown_rules({word: at for word, (_, at) in rules.items()})
+    return apply([*_with_severities(found, {word: level for word, (level, _) in rules.items()}), *unknown], allows)
+
+
+def apply(found: Iterable[Finding], allows: Sequence[Allow]) -> tuple[list[Finding], Used]:
+    """Return the findings that are not allowed, and which comments silenced something, with the code."""
     kept: list[Finding] = []
-    used: set[tuple[Allow, str]] = set()
+    used: Used = set()
     for one in found:
         allowing = [allow for allow in allows if _covers(allow, one)]
         if allowing and can_be_allowed(one.code):
@@ -32,20 +45,20 @@ def apply(found: Iterable[Finding], allows: Sequence[Allow]) -> tuple[list[Findi
     return kept, used
 
 
-def levelled(found: Iterable[Finding], rules: Mapping[str, str]) -> list[Finding]:
+def _with_severities(found: Iterable[Finding], rules: Mapping[str, str]) -> list[Finding]:
     """Return the findings with the severities that the robot's ``rules`` set; those that are ``off`` are left out."""
-    levels = {code_of(word): level for word, level in rules.items()}
+    levels = {code: level for word, level in rules.items() if (code := code_of(word)) and can_be_allowed(code)}
     result = []
     for one in found:
-        level = levels.get(one.code) if can_be_allowed(one.code) else None
-        if level in {"error", "warning"}:
-            result.append(replace(one, severity="error" if level == "error" else "warning"))
-        elif level != "off":
-            result.append(one)
+        match levels.get(one.code):
+            case "error" | "warning" as severity:
+                result.append(replace(one, severity=severity))
+            case None:
+                result.append(one)
     return result
 
 
-def unknown_rules(rules: Mapping[str, Span]) -> list[Finding]:
+def _unknown_rules(rules: Mapping[str, Span]) -> list[Finding]:
     """Return a finding for each entry of ``rules``, with its place, that is no code or cannot be set."""
     found = []
     for word, at in rules.items():
@@ -65,7 +78,7 @@ def _covers(allow: Allow, found: Finding) -> bool:
     return allow.line <= at.line <= max(allow.line, allow.last)
 
 
-def idle(allows: Sequence[Allow], used: set[tuple[Allow, str]]) -> list[Finding]:
+def unused_allows(allows: Sequence[Allow], used: Used) -> list[Finding]:
     """Return a finding for each comment that allows nothing, cannot allow what it names, or does not say why."""
     found = []
     for allow in allows:

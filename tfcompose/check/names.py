@@ -99,7 +99,7 @@ def _lower_case(name: str) -> str:
     return f"for example {apart}"
 
 
-@rule("TF504")
+@rule("TF504", idle=True)
 def unused_variable(robot: Robot) -> Iterator[Finding]:
     """Nothing uses a variable.
 

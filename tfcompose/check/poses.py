@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _OPTICAL_TOLERANCE_RAD = 2e-3
 
 
-@rule("TF401", of_urdf=True)
+@rule("TF401", of_urdf=True, follows="pose")
 def optical_frame_not_rotated(robot: Robot) -> Iterator[Finding]:
     """An optical frame is not turned into the viewing direction.
 
@@ -38,7 +38,7 @@ def optical_frame_not_rotated(robot: Robot) -> Iterator[Finding]:
         if off > _OPTICAL_TOLERANCE_RAD and (is_body or unturned):
             message = f"{edge.child} is no optical frame: it is {math.degrees(off):.2f} deg off the optical rotation"
             advice = f"in {edge.parent} an optical frame has rpy: [-90 deg, 0, -90 deg]"
-            yield finding("TF401", message, edge.at, help=advice)
+            yield finding("TF401", message, edge.at, help=advice, edits=edge.optical_edits())
 
 
 def _stem(frame: str) -> str:
@@ -175,7 +175,7 @@ _VIEWS = {
 _OVERHEAD_M = 1.5
 
 
-@rule("TF413")
+@rule("TF413", follows="pose")
 def camera_looks_away(robot: Robot) -> Iterator[Finding]:
     """A camera looks up and its name says floor, or looks down and its name says ceiling.
 
@@ -207,7 +207,7 @@ _LARGEST_M = 100.0
 _TIMES = 3
 
 
-@rule("TF414")
+@rule("TF414", follows="pose")
 def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
     """A mount or a body is far larger than the robot; it is probably written in millimetres.
 

@@ -30,7 +30,7 @@ def start_order_loop(robot: Robot) -> Iterator[Finding]:
         yield finding("TF812", message, waiting[names[0]].at, notes=notes, help="remove one after")
 
 
-@rule("TF815")
+@rule("TF815", idle=True)
 def process_without_role(robot: Robot) -> Iterator[Finding]:
     """A process that somebody else starts, or a stand-in, has nothing to do with the robot.
 

@@ -16,20 +16,25 @@ if TYPE_CHECKING:
 _OF_AN_ENTRY = 2  # its section and its name
 
 
-def with_replaced(found: Iterable[Finding], source: Source) -> list[Finding]:
+def with_replaced(found: Iterable[Finding], sources: Iterable[Source]) -> list[Finding]:
     """Return the findings; one that is about a value which replaced another has a note with the other's place."""
-    if not source.replaced:
-        return list(found)
-    return [replace(one, notes=(*one.notes, *_notes(one, source))) for one in found]
+    overlaid = [source for source in sources if source.replaced]
+    return [replace(one, notes=_with_notes(one, overlaid)) if overlaid else one for one in found]
 
 
-def _notes(found: Finding, source: Source) -> list[Note]:
+def _with_notes(found: Finding, sources: Iterable[Source]) -> tuple[Note, ...]:
+    notes = found.notes
+    for source in sources:
+        notes = (*notes, *_notes(found, {note.span for note in notes}, source))
+    return notes
+
+
+def _notes(found: Finding, known: set[Span | None], source: Source) -> list[Note]:
     """Return notes about the value at the finding's place; if none is there, about those of the entry as a whole."""
-    said = {note.span for note in found.notes}
     exact, around = [], []
     for path, (old, *_) in source.replaced.items():
         now = source.exactly_at(path)
-        if now is None or found.span is None or old in said:
+        if now is None or found.span is None or old in known:
             continue
         if now.holds(found.span) or found.span == source.at_key(path):
             exact.append(Note("it replaces the value here", old))

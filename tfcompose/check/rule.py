@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import inspect
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from tfcompose.catalogue import CATALOGUE, Code
+
+Follows = Literal["pose"]
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -21,12 +23,16 @@ if TYPE_CHECKING:
 class Rule:
     """A code of the catalogue, and the function that finds it.
 
-    A rule ``of_urdf`` makes sense for a robot without owners, sensors and processes, too.
+    A rule ``of_urdf`` makes sense for a robot without owners, sensors and processes, too. What ``follows`` from a pose
+    is not reported of an entry whose pose was refused. An ``idle`` rule finds what has no use: where profiles or
+    overlays are merged over a robot, the file alone may use it.
     """
 
     code: Code
     find: Find
     of_urdf: bool = False
+    follows: Follows | None = None
+    idle: bool = False
 
     @property
     def page(self) -> str:
@@ -34,7 +40,9 @@ class Rule:
         return inspect.getdoc(self.find) or ""
 
 
-def rule(code: str, *, of_urdf: bool = False) -> Callable[[Find], Rule]:
+def rule(
+    code: str, *, of_urdf: bool = False, follows: Follows | None = None, idle: bool = False
+) -> Callable[[Find], Rule]:
     """Return a decorator that makes a function the rule of a code; the function has the name of the code.
 
     Raises:
@@ -45,6 +53,6 @@ def rule(code: str, *, of_urdf: bool = False) -> Callable[[Find], Rule]:
     def made(find: Find) -> Rule:
         if find.__name__ != CATALOGUE[code].name:
             raise ValueError(f"the catalogue calls {code} {CATALOGUE[code].name}, not {find.__name__}")
-        return Rule(CATALOGUE[code], find, of_urdf=of_urdf)
+        return Rule(CATALOGUE[code], find, of_urdf, follows, idle)
 
     return made

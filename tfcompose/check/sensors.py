@@ -167,7 +167,7 @@ _BUILT_IN_KINDS = frozenset({"imu", "gnss"})
 _SAME_M, _SAME_RAD = 1e-6, 1e-6
 
 
-@rule("TF621")
+@rule("TF621", follows="pose")
 def sensors_at_one_pose(robot: Robot) -> Iterator[Finding]:
     """Two sensors are mounted at exactly one pose.
 
@@ -190,7 +190,7 @@ def sensors_at_one_pose(robot: Robot) -> Iterator[Finding]:
             yield finding("TF621", message, edge.at, help="measure one of them again", notes=notes)
 
 
-@rule("TF622")
+@rule("TF622", follows="pose")
 def mount_copied(robot: Robot) -> Iterator[Finding]:
     """The left one is where the right one is, or the front one where the rear one is.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from tfcompose.check import RULES, apply, check, idle
+from tfcompose.check import RULES, apply, check, unused_allows
 from tfcompose.cli.disk import disk
 from tfcompose.cli.terminal import read_text
 from tfcompose.cli.xacro import expanded
@@ -69,7 +69,7 @@ class Read:
             robot = import_module("tfcompose.resolve.urdf_control").with_hardware(robot)
         said = (_said(one) for one in check(robot, _RULES))
         kept, used = apply(dict.fromkeys([*self.found, *said]), allows)
-        return sorted([*kept, *idle(allows, used)], key=lambda one: one.sort_key)
+        return sorted([*kept, *unused_allows(allows, used)], key=lambda one: one.sort_key)
 
 
 def read_urdf(file: str, packages: Packages, arguments: Mapping[str, str] | None = None) -> Read:

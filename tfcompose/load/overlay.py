@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, finding
 from tfcompose.load.choices import choices_at
 from tfcompose.load.places import Path, Place
-from tfcompose.load.source import Source
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tfcompose.findings import Span
+    from tfcompose.load.source import Source
 
 
 def composed(source: Source, profiles: Sequence[str] = (), overlays: Sequence[Source] = ()) -> Source:
@@ -47,7 +47,7 @@ def composed(source: Source, profiles: Sequence[str] = (), overlays: Sequence[So
         rest = without(overlay, "profiles")
         if rest.data or rest is overlay:
             result = lay_over(result, rest)
-    return _without_nulls(result)
+    return replace(_without_nulls(result), is_variant=bool(profiles or overlays))
 
 
 def lay_over(base: Source, overlay: Source, *, is_overlay: bool = True) -> Source:
@@ -61,8 +61,15 @@ def lay_over(base: Source, overlay: Source, *, is_overlay: bool = True) -> Sourc
     data, places = merger.merge((base.data, base.places), (overlay.data, overlay.places), ())
     found = (*base.found, *overlay.found, *merger.found)
     allows = tuple(dict.fromkeys((*base.allows, *overlay.allows)))
-    has_nulls = base.has_nulls or overlay.has_nulls
-    return Source(base.file, data, places, found, allows, merger.replaced, has_nulls)
+    return replace(
+        base,
+        data=data,
+        places=places,
+        found=found,
+        allows=allows,
+        replaced=merger.replaced,
+        has_nulls=base.has_nulls or overlay.has_nulls,
+    )
 
 
 Replaced = dict[Path, tuple["Span", ...]]

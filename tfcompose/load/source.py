@@ -21,7 +21,8 @@ class Source:
     """A file's plain data, where each key and value stands, and what was found on the way.
 
     Aliases of one anchor are one object in ``data``, which nothing changes. ``replaced`` has the places of the
-    values that others were laid over, by path, the last one first. ``has_nulls`` says that values may be null.
+    values that others were laid over, by path, the last one first. ``has_nulls`` says that values may be null,
+    ``is_variant`` that profiles or overlays are merged over the file.
     """
 
     file: str
@@ -31,6 +32,7 @@ class Source:
     allows: tuple[Allow, ...] = field(default=(), compare=False)
     replaced: dict[Path, tuple[Span, ...]] = field(default_factory=dict, compare=False)
     has_nulls: bool = field(default=True, compare=False)
+    is_variant: bool = field(default=False, compare=False)
 
     def at(self, path: Path) -> Span:
         """Return the place of the value, or of the nearest mapping or list around it that has one."""

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from tfcompose.geometry import angle_between
 
 if TYPE_CHECKING:
-    from tfcompose.findings import Span
+    from collections.abc import Callable
+
+    from tfcompose.findings import Edit, Span
     from tfcompose.geometry import Pose
     from tfcompose.model.joint import Joint
     from tfcompose.plan import EdgeKind
@@ -59,7 +61,8 @@ class Edge:
     the nominal one.
     ``joint`` moves by joint states. ``free`` is a planar or floating joint, of which joint states say nothing.
     ``other_axes``: the vendor's name for the frame does not say whether it is optical, or says it wrongly. ``node`` is
-    the full name of the node that publishes the edge, where the owner has several.
+    the full name of the node that publishes the edge, where the owner has several. ``optical_edits`` returns the edits
+    of the file that give the edge the optical rotation of REP-103; none where that is not safe.
     """
 
     parent: str
@@ -83,6 +86,7 @@ class Edge:
     free: Joint | None = None
     other_axes: bool = False
     node: str = ""
+    optical_edits: Callable[[], tuple[Edit, ...]] = field(default=tuple, compare=False, repr=False)
 
     @property
     def name(self) -> str:

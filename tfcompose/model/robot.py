@@ -11,7 +11,7 @@ from tfcompose.plan import GuardPolicy, RosSettings
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tfcompose.findings import Span
+    from tfcompose.findings import Note, Span
     from tfcompose.model.body import Link
     from tfcompose.model.edge import Edge
     from tfcompose.model.hardware import Block, Hardware
@@ -63,9 +63,10 @@ class Robot:
     tree has no single root; ``sensors`` are those with a known preset, ``as_written`` the numbers of poses and limits
     before they became poses, ``unused`` the variables that nothing uses; ``written`` is the plain data that the robot
     was made from, profiles laid over it; ``broken`` holds the entries (section, name) that were refused already, of a
-    part how its names begin. ``parts`` are those that are robots of their own, ``mounted`` the root frame of each part
-    by its name. ``foreign`` are the files that somebody else wrote: what those say otherwise than is usual here cannot
-    be mended here.
+    part how its names begin; ``refused`` is where the refused entries of the file are. ``parts`` are those that are
+    robots of their own, ``mounted`` the root frame of each part by its name, ``part_notes`` what to add to findings in
+    a part's file. ``foreign`` are the files that somebody else wrote: what those say otherwise than is usual here
+    cannot be fixed here. A robot that ``is_variant`` is a file's with profiles or overlays merged over it.
     """
 
     name: str
@@ -88,6 +89,9 @@ class Robot:
     hardware: tuple[Hardware, ...] = ()
     blocks: tuple[Block, ...] = ()
     foreign: frozenset[str] = field(default=frozenset(), compare=False)
+    refused: tuple[Span, ...] = field(default=(), compare=False)
+    part_notes: dict[str, list[Note]] = field(default_factory=dict, compare=False)
+    is_variant: bool = field(default=False, compare=False)
 
     def final(self, frame: str) -> str:
         """Return the frame's name on the live tree: with the prefix, unless it is shared."""

@@ -211,14 +211,14 @@ class _Work:
 
     def _unused(self, file: CalibrationFile, at: Span) -> None:
         for entry in file.entries:
-            if id(entry) in self.used:
+            if id(entry) in self.used or self.source.is_variant:  # the file alone may use it
                 continue
             advice = "calibration: beside the mount takes it" if entry.child is None else "no such mount: remove it"
             if entry.child is not None and entry.child not in self.frames:
                 advice = did_you_mean(entry.child, self.frames, advice)
             message = f"{file.file}: nothing takes {entry.name}"
             note = Note("it stands here", entry.at)
-            self.found.append(finding("TF619", message, at, help=advice, notes=[note], severity="warning"))
+            self.found.append(finding("TF619", message, at, help=advice, notes=[note]))
 
 
 def _said(draft: Draft, spec: RobotSpec) -> CalibrationSpec | None:

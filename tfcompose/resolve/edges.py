@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, Note, Span, finding
-from tfcompose.model import JOINTS, STATIC, Edge, Joint, Link, MountedSensor, Process
+from tfcompose.model import JOINTS, STATIC, Edge, Joint, Link, MountedSensor, Process, is_optical
 from tfcompose.resolve.joints import FREE, idle_keys, joint_of
+from tfcompose.resolve.optical_edits import optical_edits
 from tfcompose.resolve.poses import Draft, pose_of
 
 if TYPE_CHECKING:
@@ -154,6 +156,7 @@ class Drafts:
             sensor=sensor.name if sensor else None,
             rate_at=self.source.at((*at, "rate")) if keys.rate else None,
             switched=parents[1:],
+            optical_edits=partial(optical_edits, at, self.source) if is_optical(child) else tuple,
         )
         relative_at = self.source.at((*at, "relative_to")) if keys.relative_to else None
         place_at = self.source.at((*at, "place")) if place else None

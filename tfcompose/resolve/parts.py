@@ -77,7 +77,7 @@ class Parts:
             made = import_module("tfcompose.resolve.foreign").foreign(part, packages, self.read)
         except RejectedError as error:
             raise RejectedError([_noted(one, part) for one in error.findings]) from None
-        self.whole.foreign.setdefault(made.file, []).append(_note(part))
+        self.whole.notes.setdefault(made.file, []).append(_note(part))
         self.found += [_noted(one, part) for one in made.found if one.severity == "error" or one.code in _TELLING]
         return made.robot, made.implied
 
@@ -89,7 +89,7 @@ class Parts:
             raise RejectedError([finding("TF015", f"robots are parts of each other: {circle}", at)])
         inside = replace(self, files=(*self.files, file), found=[], missing=[])
         loaded = with_includes(load(read(file), file), read)
-        self.whole.own.setdefault(file, []).append(_note(part))
+        self.whole.notes.setdefault(file, []).append(_note(part))
         validated = validate(part.laid_over(composed(loaded, part.said.profiles)))
         resolved = self.resolve(validated, self.library, self.read, self.disk, inside)
         self.found += [_noted(one, part) for one in (*validated.found, *resolved.found)]

@@ -80,10 +80,11 @@ class _UnsolvableError(Exception):
 
 @dataclass(slots=True)
 class Solver:
-    """Solves the drafts of one robot; ``found`` holds what could not be solved."""
+    """Solves the drafts of one robot; ``found`` holds what could not be solved, ``broken`` the refused entries."""
 
     drafts: list[Draft]
     frames: dict[str, Span]
+    broken: frozenset[Path] = frozenset()
     found: list[Finding] = field(default_factory=list)
     _solved: dict[int, Edge] = field(default_factory=dict)
     _open: list[int] = field(default_factory=list)
@@ -207,11 +208,11 @@ class Solver:
         pose = self._down(chain, mount, at)
         inner = [self.drafts[index].edge for _, index in chain[: names.index(mount)]]
         nominal = [edge for edge in inner if edge.nominal and edge.owner != STATIC]
-        if nominal:
+        if nominal and draft.at not in self.broken:
             edge = nominal[-1]
             message = f"{place} is placed through {edge.name}, which {edge.owner} publishes with its unit's own values"
             advice = f"give this unit's values: sensors.{draft.edge.sensor}.frames.{edge.child}"
-            self.found.append(finding("TF405", message, at, help=advice, severity="warning"))
+            self.found.append(finding("TF405", message, at, help=advice))
         return pose
 
 

@@ -103,7 +103,7 @@ class _Work:
         simulated = frozenset(one.name for one in self._everybody(own) if one.kind == "simulate")
         drafts = Drafts(self.spec, self.source, simulated, bodies)
         self._draft(drafts)
-        solver = Solver(self._measured(drafts), drafts.frames)
+        solver = Solver(self._measured(drafts), drafts.frames, self.validated.broken)
         edges = solver.solve()
         own = [with_positions(one, self.spec, edges, self.source, self.found) for one in (*own, *drafts.drivers)]
         self.found += [*drafts.found, *bodies.found, *solver.found, *self._wrong_names(own)]
@@ -218,6 +218,9 @@ class _Work:
             hardware=tuple(one for part in in_tree for one in part.hardware),
             blocks=_blocks(in_tree),
             foreign=frozenset(file for part in parts for file in part.foreign),
+            refused=tuple(at for entry in sorted(self.validated.broken) if (at := self.source.exactly_at(entry))),
+            part_notes=self.whole.notes,
+            is_variant=self.source.is_variant,
         )
 
 

@@ -14,13 +14,11 @@ if TYPE_CHECKING:
 class Whole:
     """What is known of all parts of a robot, and of theirs, together.
 
-    ``allows`` are the comments that let findings in their files stand. ``foreign`` are the files that somebody else
-    wrote, and ``own`` the robot files that are parts, with a note for each use that says as which part; ``sources`` are
-    what the latter were resolved from.
+    ``allows`` are the comments in their files that silence findings. ``notes`` holds, for each file that is a part, a
+    note for each use that says as which part; ``sources`` are what the robot files among them were resolved from.
     """
 
     count: int = 0
     allows: list[Allow] = field(default_factory=list)
-    foreign: dict[str, list[Note]] = field(default_factory=dict)
-    own: dict[str, list[Note]] = field(default_factory=dict)
+    notes: dict[str, list[Note]] = field(default_factory=dict)
     sources: list[Source] = field(default_factory=list)

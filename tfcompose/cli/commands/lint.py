@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose import __version__
-from tfcompose.check import idle
+from tfcompose.check import unused_allows
 from tfcompose.cli.compiling import library, overlays_of
 from tfcompose.cli.disk import disk
 from tfcompose.cli.options import DEFAULT_FILE, add_variant
@@ -153,5 +153,5 @@ def lint_file(
             if (one.code, one.message, one.span) not in known
         ]
     if looked:  # else a comment may be about what was not looked at
-        found += idle(source.allows, used)
+        found += unused_allows(source.allows, used)
     return sorted(found, key=lambda one: one.sort_key)

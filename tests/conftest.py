@@ -18,6 +18,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from tests.domains import reserved_domain
+from tests.support import processes
 from tests.waiting import TIMEOUT_S, until
 from tfcompose.geometry import Pose
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
@@ -61,11 +62,16 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture(autouse=True)
-def _hang_up() -> Iterator[None]:
-    """Let a hang-up end processes also where the tests run under nohup."""
-    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
-    yield
-    signal.signal(signal.SIGHUP, before)
+def _processes() -> Iterator[None]:
+    """End the processes that a test started; those of a module or the session go on."""
+    with processes.ended_at_exit():
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _all_processes() -> Iterator[None]:
+    with processes.ended_at_exit():
+        yield
 
 
 @dataclass(frozen=True)
@@ -144,8 +150,8 @@ def start(domain: Domain) -> Iterator[Callable[..., Started]]:
 
     def run(module: str, *arguments: object, **environment: str) -> Started:
         command = [sys.executable, "-m", module, *map(str, arguments)]
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-        process = subprocess.Popen(command, text=True, env={**domain.environment, **environment}, **pipes)  # type: ignore[call-overload]
+        env = {**domain.environment, **environment}
+        process = processes.start(command, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         running.append(Started(process))
         return running[-1]
 
@@ -160,7 +166,7 @@ def python() -> Callable[[str], str]:
 
     def run(code: str) -> str:
         command = [sys.executable, "-c", code]
-        return subprocess.run(command, check=True, capture_output=True, text=True, timeout=TIMEOUT_S).stdout
+        return processes.run(command, check=True, timeout_s=TIMEOUT_S).stdout
 
     return run
 

@@ -6,15 +6,17 @@ take more than twenty times the processor time of the undamaged robot's.
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from tests.support import processes
+
 ROOT = Path(__file__).parents[1]
 WORK = r"""
 import random, resource, sys, time
+from tests.support import processes
 from tfcompose.cli.shelves import library
 from tfcompose.compile import compile_robot
 from tfcompose.findings import RejectedError, Span, finding
@@ -114,5 +116,5 @@ def test_a_robot_of_many_files_survives_damage_to_any_of_them(seed: int, tmp_pat
     script = tmp_path / "work.py"
     script.write_text(WORK, encoding="utf-8")
     command = [sys.executable, str(script), str(seed), "150"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
+    done = processes.run(command, cwd=ROOT, timeout_s=300)
     assert done.stdout.endswith("done\n"), done.stdout[-3000:] + done.stderr[-3000:]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import ast
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from tests.support import processes
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "tfcompose"
@@ -162,7 +163,7 @@ def loaded_by(code: str) -> set[str]:
     """Return the modules that are loaded when a fresh interpreter has run the code."""
     program = f"import sys\nimport contextlib\nwith contextlib.suppress(SystemExit):\n    {code}\n"
     program += "sys.stderr.write('\\n'.join(sorted(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT)
+    done = processes.run([sys.executable, "-c", program], check=True, cwd=ROOT)
     return set(done.stderr.split())
 
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
 from collections import Counter
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.benchmarks import bench_buffer, bench_joints
+from tests.support import processes
 from tfcompose.catalogue import CATALOGUE
 from tfcompose.cli.parser import COMMANDS, parser_of
 from tfcompose.cli.shelves import library
+
+if TYPE_CHECKING:
+    import subprocess
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -25,7 +29,7 @@ def blocks(language: str) -> list[str]:
 
 def run(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "tfcompose", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=60, check=False)
+    return processes.run(command, cwd=cwd)
 
 
 @pytest.fixture
@@ -115,7 +119,5 @@ def test_its_python_programs_run_and_give_what_they_say() -> None:
     section = README.partition("## The buffer in Python\n")[2].partition("\n## ")[0]
     imports, program = re.findall(r"^```python\n(.*?)^```", section, re.MULTILINE | re.DOTALL)
     after = "print(round(pose.xyz[0], 9), stamp_ns, xyz.shape, quat_xyzw.shape, round(points[0, 0], 9))"
-    done = subprocess.run(
-        [sys.executable, "-c", imports + program + after], capture_output=True, text=True, timeout=60, check=True
-    )
+    done = processes.run([sys.executable, "-c", imports + program + after], check=True)
     assert done.stdout == "4.7 9000000000 (80, 3) (80, 4) 3.7\n"

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import inspect
 import re
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from tests.support import processes
 from tfcompose.catalogue import CATALOGUE, FAMILIES, Code, code_of
 from tfcompose.check import RULES, Rule
 from tfcompose.check import check as checked
@@ -103,9 +103,7 @@ def test_the_tables_in_the_readme_are_those_that_explain_prints(family: str | No
     shown, mark, _ = rest.partition(f"<!-- /{word} -->")
     assert mark
     command = f"explain --table {family or ''}".split()
-    printed = subprocess.run(
-        [sys.executable, "-m", "tfcompose", *command], capture_output=True, text=True, check=True, cwd=ROOT
-    )
+    printed = processes.run([sys.executable, "-m", "tfcompose", *command], check=True, cwd=ROOT)
     assert shown.strip("\n") == printed.stdout.strip("\n"), f"python -m tfcompose {' '.join(command)}"
 
 
@@ -124,5 +122,5 @@ def test_a_robot_that_cannot_be_built_or_is_not_understood_cannot_be_allowed() -
 
 def test_the_catalogue_loads_no_rules_and_no_pages() -> None:
     program = "import sys, tfcompose.findings; print(*[name for name in sys.modules if name.startswith('tfcompose')])"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT)
+    done = processes.run([sys.executable, "-c", program], check=True, cwd=ROOT)
     assert set(done.stdout.split()) == {"tfcompose", "tfcompose.catalogue", "tfcompose.findings"}

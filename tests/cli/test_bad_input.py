@@ -11,21 +11,18 @@ from pathlib import Path
 
 import pytest
 
+from tests.support import processes
 from tests.support.bad_input import BAD, GOOD
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 
 
 def tfcompose(*words: str, cwd: Path, text: str = "", **environment: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
+    return processes.run(
         [sys.executable, "-m", "tfcompose", *words],
         cwd=cwd,
         env=os.environ | environment,
-        input=text,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
+        stdin=text,
     )
 
 
@@ -143,9 +140,9 @@ def test_output_that_the_terminal_cannot_show_is_escaped(folder: Path) -> None:
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
 def test_output_that_cannot_be_written_is_one_sentence(folder: Path) -> None:
     with Path("/dev/full").open("w") as full:
-        done = subprocess.run(
+        done = processes.run(
             [sys.executable, "-m", "tfcompose", "tree", str(ROBOTS / "my_robot.yaml")],
-            cwd=folder, stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+            cwd=folder, stdout=full, stderr=subprocess.PIPE,
         )  # fmt: skip
     assert done.returncode == 2
     assert done.stderr == "tfcompose: the output cannot be written: No space left on device\n"
@@ -156,9 +153,9 @@ def test_a_reader_that_goes_away_causes_no_traceback(words: tuple[str, ...]) -> 
     reader, writer = os.pipe()
     os.close(reader)
     with os.fdopen(writer, "w") as gone:
-        done = subprocess.run(
+        done = processes.run(
             [sys.executable, "-m", "tfcompose", *words],
-            cwd=ROBOTS.parent, stdout=gone, stderr=subprocess.PIPE, text=True, check=False,
+            cwd=ROBOTS.parent, stdout=gone, stderr=subprocess.PIPE,
         )  # fmt: skip
     assert (done.returncode, done.stderr) == (141, "")
 
@@ -256,7 +253,7 @@ def test_a_stream_that_is_closed_is_no_traceback(tmp_path: Path, closed: str) ->
     said = tmp_path / "said"
     kept = f"2>{said}" if "2>" not in closed else f">{said}" if ">&- 2" not in closed else ""
     command = f"{shlex.quote(sys.executable)} -m tfcompose explain TF301 {kept} {closed}; echo $?"
-    done = subprocess.run(["/bin/sh", "-c", command], capture_output=True, text=True, timeout=30, check=False)
+    done = processes.run(["/bin/sh", "-c", command])
     assert done.stdout.splitlines()[-1] == "0"
     assert "Traceback" not in done.stdout + done.stderr + (said.read_text() if said.exists() else "")
 
@@ -266,8 +263,6 @@ def test_a_folder_that_was_removed_is_named_as_the_reason(tmp_path: Path, comman
     (tmp_path / "robot.yaml").write_text(GOOD)
     (tmp_path / "gone").mkdir()
     words = f"cd gone && rmdir ../gone && {sys.executable} -m tfcompose {command} {tmp_path}/robot.yaml"
-    done = subprocess.run(
-        ["/bin/sh", "-c", words], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
-    )
+    done = processes.run(["/bin/sh", "-c", words], cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "tfcompose: the folder that this is typed in was removed; cd to one that is there\n"

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+from tests.support import processes
+
+if TYPE_CHECKING:
+    import subprocess
 
 ROOT = Path(__file__).parents[2]
 ROBOTS = sorted((ROOT / "robots").glob("*.yaml"))
@@ -31,7 +36,7 @@ BROKEN = {
 def check(*files: Path) -> subprocess.CompletedProcess[str]:
     schema = ROOT / "schemas" / "robot.schema.json"
     command = [sys.executable, "-m", "check_jsonschema", "--schemafile", str(schema), *map(str, files)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    return processes.run(command)
 
 
 def test_the_example_robots_pass() -> None:

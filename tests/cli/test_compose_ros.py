@@ -17,6 +17,7 @@ import psutil
 import pytest
 
 from tests.rover import EXTERNAL, ROVER
+from tests.support import processes
 from tests.waiting import gone, until
 from tests.witness import Witness
 from tfcompose.run.launcher.control import ANSWER_S
@@ -42,7 +43,7 @@ def tfc(domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iter
 
     def run(*words: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "tfcompose", *words]
-        return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+        return processes.run(command)
 
     yield run
     left: list[psutil.Process] = []
@@ -210,7 +211,7 @@ def broken(*_, **__): raise ZeroDivisionError("of a launcher")
 detach.supervise = broken
 sys.exit(main(["up", "-d"]))
 """
-    up = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    up = processes.run([sys.executable, "-c", code])
     assert up.returncode == 1
     (said,) = (tmp_path / "log").rglob("launcher.err")
     assert f"{said} may say why" in up.stderr
@@ -220,7 +221,7 @@ sys.exit(main(["up", "-d"]))
 @pytest.mark.usefixtures("tfc")
 def test_of_two_that_start_at_the_same_moment_one_wins_and_the_other_says_who() -> None:
     command = [sys.executable, "-m", "tfcompose", "up"]
-    start = partial(subprocess.Popen, command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    start = partial(processes.start, command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     both = [start(), start()]
     assert until(lambda: any(one.poll() is not None for one in both))
     loser, winner = sorted(both, key=lambda one: one.poll() is None)
@@ -265,7 +266,7 @@ def test_events_are_told_from_the_start_and_wait_returns_the_exit_code(tfc: Call
     assert tfc("up", "--wait").returncode == 0
     launcher = psutil.Process(launcher_of(tmp_path))
     alone = len(launcher.net_connections("unix"))
-    start = partial(subprocess.Popen, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    start = partial(processes.start, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     command = [sys.executable, "-m", "tfcompose"]
     waiting, listening = start([*command, "wait"]), start([*command, "events", "--format", "json"])
     assert until(lambda: len(launcher.net_connections("unix")) >= alone + 2), "both are heard"
@@ -285,9 +286,9 @@ def test_events_are_told_from_the_start_and_wait_returns_the_exit_code(tfc: Call
 def test_who_follows_ends_when_nobody_reads_it_any_more(tfc: Callable[..., Any], words: tuple[str, ...]) -> None:
     """``tfcompose logs -f | grep -m1 complete``: nothing more may ever be written."""
     assert tfc("up", "--wait").returncode == 0
-    with subprocess.Popen([sys.executable, "-m", "tfcompose", *words], stdout=subprocess.PIPE) as follower:
+    with processes.start([sys.executable, "-m", "tfcompose", *words], stdout=subprocess.PIPE) as follower:
         assert follower.stdout
-        while b"all ready after" not in follower.stdout.readline():
+        while "all ready after" not in follower.stdout.readline():
             pass
         follower.stdout.close()
         assert follower.wait(20) == 141
@@ -298,7 +299,7 @@ def test_events_of_a_launcher_that_is_killed_do_not_end_like_those_of_one_that_e
 ) -> None:
     assert tfc("up", "-d").returncode == 0
     command = [sys.executable, "-m", "tfcompose", "events"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as follower:
+    with processes.start(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as follower:
         assert follower.stdout
         assert "started guard" in follower.stdout.readline()
         os.kill(launcher_of(tmp_path), signal.SIGKILL)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.support import processes
 from tfcompose.cli.compiling import library
 from tfcompose.cli.fixing import Fixer, edited, rewrite
 from tfcompose.compile import compile_robot
@@ -21,6 +21,7 @@ from tfcompose.findings import Edit, RejectedError, Span, finding, slip_of
 from tfcompose.load import load, with_includes
 
 if TYPE_CHECKING:
+    import subprocess
     from collections.abc import Callable
 
     from tfcompose.findings import Finding
@@ -48,7 +49,7 @@ def fixed(folder: Path, text: str) -> str:
 
 def run(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "tfcompose", "lint", "--fix", *words]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=60)
+    return processes.run(command, cwd=folder)
 
 
 PAIR = "links: {a: {}, b: {parent: a, "
@@ -226,9 +227,7 @@ def test_a_file_that_cannot_be_written_is_one_sentence_and_exit_2(tmp_path: Path
     )
     text = HEAD + EXAMPLES["a key"][0]
     (tmp_path / "r.yaml").write_text(text)
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60
-    )
+    done = processes.run([sys.executable, "-c", program], cwd=tmp_path)
     assert done.returncode == 2
     assert "cannot be fixed: No space left on device" in done.stdout
     assert "fixed[" not in done.stdout

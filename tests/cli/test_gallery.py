@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+from tests.support import processes
+
+if TYPE_CHECKING:
+    import subprocess
 
 ROOT = Path(__file__).parents[2]
 ROBOTS = sorted(path.name for path in (ROOT / "robots").glob("*.yaml"))
@@ -18,13 +23,9 @@ OWN = {"static", "joints", "guard", "simulate"}
 
 def tfcompose(*words: str) -> subprocess.CompletedProcess[str]:
     """Run it as a person does who stands in the project's folder."""
-    return subprocess.run(
+    return processes.run(
         [sys.executable, "-m", "tfcompose", *words],
         cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
     )
 
 

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+from tests.support import processes
+
+if TYPE_CHECKING:
+    import subprocess
 
 ROOT = Path(__file__).parents[2]
 ROBOT = ROOT / "robots" / "two_rovers.yaml"
@@ -17,9 +22,7 @@ def graph(*words: object, cwd: Path, without: str = "") -> subprocess.CompletedP
     """Run the command, ``without`` a package."""
     hide = f"import sys; sys.modules[{without!r}] = None; " if without else ""
     program = f"{hide}from tfcompose.cli import main; raise SystemExit(main({['graph', *map(str, words)]!r}))"
-    return subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, cwd=cwd, timeout=60, check=False
-    )
+    return processes.run([sys.executable, "-c", program], cwd=cwd)
 
 
 @pytest.mark.parametrize("ending", BEGIN)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
@@ -13,6 +12,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from tests.support import processes
 from tests.waiting import until
 from tfcompose.observe import Buffer, Listener
 from tfcompose.ros.node import JOINT_STATES, LATCHED, open_node
@@ -52,7 +52,7 @@ def tfc(domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iter
 
     def run(*words: str) -> str:
         command = [sys.executable, "-m", "tfcompose", *words]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        done = processes.run(command)
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.support import processes
 from tfcompose.check import RULES
 from tfcompose.cli.compiling import library
 from tfcompose.cli.disk import disk
@@ -23,6 +24,9 @@ from tfcompose.findings import Finding, RejectedError, Span
 from tfcompose.load.urdf import load_xml
 from tfcompose.resolve.packages import Packages
 from tfcompose.resolve.urdf import robot_of_urdf
+
+if TYPE_CHECKING:
+    import subprocess
 
 ROOT = Path(__file__).parents[2]
 FILES = sorted((Path(__file__).parent / "urdfs").glob("*.urdf"))
@@ -44,7 +48,7 @@ def lint_text(text: str) -> tuple[Finding, ...]:
 
 def run(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "tfcompose", "lint", *words]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=60)
+    return processes.run(command, cwd=folder)
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
 import pytest
 import trimesh
 
+from tests.support import processes
 from tfcompose.cli import main
+
+if TYPE_CHECKING:
+    import subprocess
 
 ROBOT = """tfcompose: 1
 robot: r
@@ -42,7 +45,7 @@ def workspace(tmp_path: Path) -> Path:
 def build(workspace: Path, *words: str, file: str = "src/robots/r.yaml") -> subprocess.CompletedProcess[str]:
     env = os.environ | {"AMENT_PREFIX_PATH": f"/nowhere:{workspace}/install"}
     command = [sys.executable, "-m", "tfcompose", "build", file, *words]
-    return subprocess.run(command, capture_output=True, text=True, cwd=workspace, env=env, check=False)
+    return processes.run(command, cwd=workspace, env=env)
 
 
 def addresses(folder: Path) -> list[str]:
@@ -169,9 +172,7 @@ def test_a_mass_over_a_mesh_is_spread_by_its_triangles_and_trimesh_is_loaded_onl
     env = os.environ | {"AMENT_PREFIX_PATH": f"{workspace}/install"}
 
     def loaded() -> str:
-        done = subprocess.run(
-            [sys.executable, "-c", names], capture_output=True, text=True, cwd=workspace, env=env, check=False
-        )
+        done = processes.run([sys.executable, "-c", names], cwd=workspace, env=env)
         return done.stdout.splitlines()[-1]
 
     assert loaded() == "False"
@@ -221,9 +222,7 @@ def test_a_mass_that_cannot_be_spread_is_a_finding(
     hide = f"import sys; sys.modules[{hidden!r}] = None; " if hidden else "import sys; "
     code_run = f"{hide}import tfcompose.cli as c; sys.exit(c.main(['build', 'src/robots/r.yaml']))"
     env = os.environ | {"AMENT_PREFIX_PATH": f"{workspace}/install"}
-    done = subprocess.run(
-        [sys.executable, "-c", code_run], capture_output=True, text=True, cwd=workspace, env=env, check=False
-    )
+    done = processes.run([sys.executable, "-c", code_run], cwd=workspace, env=env)
     assert done.returncode == 1
     assert f"r.yaml:10:5: error[{code}] meshes/a b.stl: " in done.stderr
     assert words in done.stderr

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support import processes
 from tfcompose.cli.output import write_all
 from tfcompose.files import File
 
@@ -101,7 +102,7 @@ def test_a_file_in_the_way_of_a_folder_leaves_everything_as_it_was(tmp_path: Pat
 
 def build(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "tfcompose", "build", *words]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=60)
+    return processes.run(command, cwd=folder)
 
 
 @pytest.mark.parametrize("output", ["file", "file/below", "/proc/tfcompose", "/dev/null/out"])
@@ -142,7 +143,7 @@ def test_a_plan_that_names_files_elsewhere_has_nothing_removed_there(tmp_path: P
 
 def test_two_builds_at_once_leave_one_whole_build(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "tfcompose", "build", str(ROBOTS / "autonomous_robot.yaml"), "-o", "out"]
-    both = [subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL) for _ in range(4)]
+    both = [processes.start(command, cwd=tmp_path, stdout=subprocess.DEVNULL) for _ in range(4)]
     assert [process.wait(60) for process in both] == [0] * 4
     assert build(tmp_path, str(ROBOTS / "autonomous_robot.yaml"), "-o", "alone").returncode == 0
     assert contents(tmp_path / "out") == contents(tmp_path / "alone")

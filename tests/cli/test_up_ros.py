@@ -16,6 +16,7 @@ import psutil
 import pytest
 
 from tests.rover import EXTERNAL, ROVER
+from tests.support import processes
 from tests.waiting import TIMEOUT_S, gone, until
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ def first_on_the_path(folder: Path) -> dict[str, str]:
 class Up:
     """A launcher that runs, and what it has printed so far."""
 
-    popen: subprocess.Popen[bytes]
+    popen: subprocess.Popen[str]
     output: Path
 
     @property
@@ -114,7 +115,7 @@ def up(domain: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Itera
         output = tmp_path / f"output{len(running)}.txt"
         command = [sys.executable, "-m", "tfcompose", "up", *words]
         with output.open("wb") as out:
-            popen = subprocess.Popen(command, stdout=out, stderr=out, env=os.environ | environment)
+            popen = processes.start(command, stdout=out, stderr=out, env=os.environ | environment)
         running.append(Up(popen, output))
         return running[-1]
 
@@ -135,7 +136,7 @@ def rogue(domain: object) -> Iterator[Callable[[], subprocess.Popen[str]]]:
     running: list[subprocess.Popen[str]] = []
 
     def run() -> subprocess.Popen[str]:
-        popen = subprocess.Popen([sys.executable, "-c", ROGUE], stdout=subprocess.PIPE, text=True)
+        popen = processes.start([sys.executable, "-c", ROGUE], stdout=subprocess.PIPE)
         running.append(popen)
         assert popen.stdout
         assert popen.stdout.readline() == "sends\n"
@@ -306,7 +307,7 @@ def test_a_built_plan_starts_where_neither_yaml_nor_pydantic_can_be_imported(
     up: Callable[..., Up], tmp_path: Path
 ) -> None:
     (tmp_path / "rover.yaml").write_text(ROVER, encoding="utf-8")
-    subprocess.run([sys.executable, "-m", "tfcompose", "build", "rover.yaml"], check=True, capture_output=True)
+    processes.run([sys.executable, "-m", "tfcompose", "build", "rover.yaml"], check=True)
     stubs = tmp_path / "stubs"
     stubs.mkdir()
     (stubs / "sitecustomize.py").write_text(WITHOUT_COMPILER)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import configparser
 import os
 import shutil
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +16,7 @@ import pytest
 import yaml
 
 from tests.planned import built, compiled_plan
+from tests.support import processes
 from tfcompose.emit.compose import compose
 from tfcompose.emit.launch import launch
 from tfcompose.emit.supervised import Machine
@@ -142,7 +142,7 @@ def test_systemd_finds_nothing_wrong_with_the_units(
     for file in files:
         (tmp_path / file.path).write_text(file.text, "utf-8")
     command = ["systemd-analyze", "verify", "--man=no", *(str(tmp_path / file.path) for file in files)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = processes.run(command)
     said = [line for line in done.stderr.splitlines() if str(tmp_path) in line or "rover" in line or "robot" in line]
     assert (done.returncode, said) == (0, [])
 
@@ -178,7 +178,7 @@ def test_the_schema_of_compose_files_takes_ours(text: str, profiles: tuple[str, 
     (file,), _ = compose(compiled_plan(text, *profiles), Machine(".."))
     (tmp_path / file.path).write_text(file.text, "utf-8")
     words = ["-m", "check_jsonschema", "--builtin-schema", "vendor.compose-spec", str(tmp_path / file.path)]
-    done = subprocess.run([sys.executable, *words], capture_output=True, text=True, timeout=60, check=False)
+    done = processes.run([sys.executable, *words])
     assert done.returncode == 0, done.stdout
 
 
@@ -238,7 +238,7 @@ def test_a_health_check_has_ross_environment_also_where_only_the_entry_point_sou
     words = [word.replace("/opt/ros", str(tmp_path)) for word in words]
     for distro, said in (("rolling", "yes two words"), ("jazzy", " two words")):
         env = {"PATH": os.environ["PATH"], "ROS_DISTRO": distro}
-        done = subprocess.run(words, env=env, capture_output=True, text=True, check=False)
+        done = processes.run(words, env=env)
         assert (done.stdout.strip("\n"), done.stderr) == (said, "")
 
 

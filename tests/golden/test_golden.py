@@ -8,11 +8,12 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from tests.support import processes
 
 HERE = Path(__file__).parent
 ROBOTS = HERE.parents[1] / "robots"
@@ -30,12 +31,11 @@ CASES = {
 
 def build(words: tuple[str, ...], output: Path, cwd: Path, **environment: str) -> dict[str, bytes]:
     """Build with a process of its own and return the files, by their path below the output folder."""
-    subprocess.run(
+    processes.run(
         [sys.executable, "-m", "tfcompose", "build", *words, "-o", str(output)],
         cwd=cwd,
         env=os.environ | environment,
         check=True,
-        capture_output=True,
     )
     return contents(output)
 

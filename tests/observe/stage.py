@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import json
-import subprocess
 import sys
 import threading
 import time
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
+from tests.support import processes
 from tfcompose.ros.message import Transform, encode
 from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFPublisher
@@ -92,7 +92,7 @@ def message(stamp_ns: int, edges: tuple[str, ...], x: float = 0.0, quat: Any = I
 def doctor(*words: str, seconds: float = 3.0) -> tuple[int, list[dict[str, Any]]]:
     """Run it, and return the exit code and the findings."""
     command = [sys.executable, "-m", "tfcompose", "doctor", "--for", str(seconds), "--format", "json", *words]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=90, check=False)
+    done = processes.run(command)
     assert "Traceback" not in done.stderr, done.stderr
     return done.returncode, json.loads(done.stdout)
 

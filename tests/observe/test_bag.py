@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -12,9 +11,11 @@ from rosbags.rosbag2 import CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from tests.observe.bags import START_S, STORE, write_bag
+from tests.support import processes
 from tfcompose.cli import main
 
 if TYPE_CHECKING:
+    import subprocess
     from pathlib import Path
 
     from tests.observe.bags import Sent
@@ -26,7 +27,7 @@ def tfcompose(*words: str, code: int = 0) -> subprocess.CompletedProcess[str]:
     """Run the command line where rclpy cannot be imported."""
     program = "import sys; sys.modules['rclpy'] = None; from tfcompose.cli import main; sys.exit(main())"
     command = [sys.executable, "-c", program, *words]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = processes.run(command)
     assert "Traceback" not in done.stderr, done.stderr
     assert done.returncode == code, done.stdout + done.stderr
     return done
@@ -280,7 +281,7 @@ def test_a_large_bag_takes_no_more_memory_than_a_small_one(tmp_path: Path) -> No
             "sys.stderr.write(open('/proc/self/status').read().split('VmHWM:')[1].split()[0])"
         )
         command = [sys.executable, "-c", program, "monitor", "--bag", str(bag)]
-        return int(subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stderr)
+        return int(processes.run(command, check=True).stderr)
 
     small, large = most_kib(2.0), most_kib(100.0)
     assert large < small + 5_000, (small, large)

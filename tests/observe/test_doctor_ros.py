@@ -22,6 +22,7 @@ from sensor_msgs.msg import JointState, LaserScan
 from std_msgs.msg import String
 
 from tests.observe.stage import at_last, doctor, doctor_finds, finds_nothing, message, said
+from tests.support import processes
 from tests.waiting import until
 from tfcompose.ros.node import LATCHED, open_node, qos
 from tfcompose.ros.tf import TFPublisher
@@ -348,7 +349,7 @@ def missed(name: str, *, static: bool, seconds: float) -> str:
     command = [sys.executable, "-m", "tfcompose", "doctor", "--for", str(2 * seconds), "--format", "json"]
     with ExitStack() as leave:
         publisher = TFPublisher(leave.enter_context(open_node(name, "")), static=static)
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        with processes.start(command, stdout=subprocess.PIPE) as process:
             assert until(publisher.publisher.get_subscription_count)
             for each in data:
                 publisher.publish(each)
@@ -416,7 +417,7 @@ def test_a_robot_in_another_domain_is_seen_by_its_process(domain: Any) -> None:
     command = [sys.executable, "-c", FAR]
 
     def is_seen(seconds: float) -> None:
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        with processes.start(command, stdout=subprocess.PIPE, env=environment) as process:
             try:
                 assert process.stdout
                 assert process.stdout.readline() == "up\n"
@@ -468,10 +469,10 @@ with open_node("far", "") as node:
 def test_the_clock_of_another_machine_is_named_with_how_far_it_is_off(tmp_path: Path) -> None:
     (tmp_path / "shim.c").write_text(SHIM, encoding="utf-8")
     library = str(tmp_path / "shim.so")
-    subprocess.run([GCC, "-shared", "-fPIC", "-o", library, str(tmp_path / "shim.c"), "-ldl"], check=True)
+    processes.run([GCC, "-shared", "-fPIC", "-o", library, str(tmp_path / "shim.c"), "-ldl"], check=True)
     environment = {**os.environ, "LD_PRELOAD": library}
     command = [sys.executable, "-c", TALKER]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as talker:
+    with processes.start(command, stdout=subprocess.PIPE, env=environment) as talker:
         try:
             assert talker.stdout
             assert talker.stdout.readline() == "up\n"
@@ -544,7 +545,7 @@ def test_ctrl_c_before_anything_came_is_no_finding(
 def test_a_node_that_asks_a_discovery_server_is_named(domain: Any) -> None:
     """It announces itself to its server only, and hears of nobody else."""
     environment = {**domain.environment, "ROS_DISCOVERY_SERVER": "127.0.0.1:11811"}
-    with subprocess.Popen([sys.executable, "-c", FAR], stdout=subprocess.PIPE, text=True, env=environment) as process:
+    with processes.start([sys.executable, "-c", FAR], stdout=subprocess.PIPE, env=environment) as process:
         try:
             assert process.stdout
             assert process.stdout.readline() == "up\n"
@@ -561,7 +562,7 @@ def test_where_other_robots_are_beside_is_said(stage: Stage) -> None:
     command = [sys.executable, "-m", "tfcompose", "doctor", "--for"]
 
     def is_said(seconds: float) -> None:
-        done = subprocess.run([*command, str(seconds)], capture_output=True, text=True, timeout=90, check=False)
+        done = processes.run([*command, str(seconds)])
         assert done.stdout.endswith("there is TF on /robot2/tf too: --namespace /robot2\n")
 
     at_last(is_said)
@@ -583,7 +584,7 @@ def test_a_process_with_another_middleware_is_named(domain: Any) -> None:
     )
     environment = {**domain.environment, "RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}
     command = [sys.executable, "-c", OTHER_RMW, str(rcl)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+    with processes.start(command, stdout=subprocess.PIPE, env=environment) as process:
         try:
             assert process.stdout
             assert process.stdout.readline() == "up\n"
@@ -611,7 +612,7 @@ def test_settings_with_which_ros_does_not_start_are_said_by_every_command_that_l
     monkeypatch.setenv(name, value)
     for words in (["doctor"], ["monitor", "--for", "1"], ["echo", "a", "b", "--once"], ["tree", "--live"]):
         command = [sys.executable, "-m", "tfcompose", *words]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=90, check=False)
+        done = processes.run(command)
         output = done.stdout + done.stderr
         assert (done.returncode, output.splitlines()[0]) == (1, f"error[TF909] {said}")
         assert len(output.splitlines()) == 2

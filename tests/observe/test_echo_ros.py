@@ -15,6 +15,7 @@ import pytest
 from builtin_interfaces.msg import Time
 from rosgraph_msgs.msg import Clock
 
+from tests.support import processes
 from tests.waiting import until
 from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.observe.asked import Asked
@@ -59,7 +60,7 @@ def rover(write: Callable[..., Path], start: Callable[..., Started], edge: Calla
 
 def echo(*arguments: str, timeout: float = 60.0) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "tfcompose", "echo", *arguments, "--timeout", str(timeout)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=90, check=False)
+    return processes.run(command)
 
 
 def misses(*arguments: str, why: str) -> subprocess.CompletedProcess[str]:
@@ -99,7 +100,7 @@ def test_once_prints_the_pose_in_metres_quaternion_radians_and_degrees() -> None
 def test_json_is_one_object_a_line_until_a_signal_ends_it_with_exit_code_0() -> None:
     command = [sys.executable, "-m", "tfcompose", "echo", "odom", "camera", "--rate", "20", "--timeout", "60"]
     command += ["--format", "json"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    with processes.start(command, stdout=subprocess.PIPE) as process:
         assert process.stdout
         rows = [json.loads(process.stdout.readline()) for _ in range(3)]
         process.send_signal(signal.SIGINT)
@@ -137,7 +138,7 @@ def test_when_the_owner_falls_silent_it_says_so_and_ends(
         owner = start("tfcompose.run.simulate", plan, "drive")
         owner.until_says("edge")
         words = [*command, str(timeout)]
-        with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        with processes.start(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
             assert process.stdout
             first = process.stdout.readline()
             owner.end()
@@ -185,8 +186,8 @@ def running(domain: Any) -> Iterator[Callable[..., subprocess.Popen[str]]]:
 
     def run(*arguments: str) -> subprocess.Popen[str]:
         command = [sys.executable, "-m", "tfcompose", "echo", *arguments]
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-        started.append(subprocess.Popen(command, text=True, env=domain.environment, **pipes))  # type: ignore[call-overload]
+        process = processes.start(command, env=domain.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        started.append(process)
         return started[-1]
 
     yield run

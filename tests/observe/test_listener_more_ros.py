@@ -13,6 +13,7 @@ from rclpy.qos import QoSProfile
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
+from tests.support import processes
 from tests.waiting import none_but
 from tfcompose.geometry import Pose
 from tfcompose.observe import Buffer, Listener, TransformListener
@@ -151,11 +152,10 @@ rclpy.shutdown()
 """
     with (
         open_node("talks", "") as other,
-        subprocess.Popen(
+        processes.start(
             [sys.executable, "-c", code],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            text=True,
             env=domain.environment,
         ) as process,
     ):

@@ -17,6 +17,7 @@ from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.time import Time
 
+from tests.support import processes
 from tests.waiting import none_but
 from tfcompose.geometry import Pose
 from tfcompose.observe import Buffer, LookupException, TransformException, TransformListener
@@ -66,9 +67,7 @@ def program(tmp_path: Path) -> Callable[..., str]:
         assert not re.search(r"^(import|from) tf2", text, re.MULTILINE)
         file = tmp_path / f"{name}.py"
         file.write_text(text, "utf-8")
-        done = subprocess.run(
-            [sys.executable, file, *arguments], capture_output=True, text=True, timeout=90, check=False
-        )
+        done = processes.run([sys.executable, file, *arguments])
         assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
         return done.stdout
 
@@ -215,23 +214,17 @@ def test_when_the_clock_goes_back_moving_edges_are_forgotten(node: Any) -> None:
 
 def test_a_program_that_never_closes_its_listener_ends(domain: Any) -> None:
     code = "from tfcompose.observe import Buffer, Listener; Listener(Buffer()); print('up', flush=True)"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=90, check=False, env=domain.environment
-    )
+    done = processes.run([sys.executable, "-c", code], env=domain.environment)
     assert (done.returncode, done.stdout, done.stderr) == (0, "up\n", "")
 
 
 def test_a_wait_is_ended_by_ctrl_c(domain: Any) -> None:
     code = (
-        # The shell lets what runs in the background ignore the signal.
-        "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "from tfcompose.observe import Buffer, Listener\nbuffer = Buffer()\nListener(buffer)\n"
         "try:\n    print('up', flush=True)\n    buffer.lookup_transform('a', 'b', 0, 60 * 10**9)\n"
         "except KeyboardInterrupt:\n    print('out')"
     )
-    with subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=domain.environment
-    ) as it:
+    with processes.start([sys.executable, "-c", code], stdout=subprocess.PIPE, env=domain.environment) as it:
         assert it.stdout
         assert it.stdout.readline() == "up\n"
         it.send_signal(signal.SIGINT)
@@ -241,6 +234,6 @@ def test_a_wait_is_ended_by_ctrl_c(domain: Any) -> None:
 
 def test_rclpy_is_not_started_by_importing_the_classes() -> None:
     code = "import tfcompose.observe, sys; print([m for m in ('rclpy', 'numpy') if m in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+    assert processes.run([sys.executable, "-c", code], check=True).stdout == "[]\n"
     assert issubclass(LookupException, TransformException)
     assert rclpy is not None

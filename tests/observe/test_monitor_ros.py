@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.observe.stage import LOOKS_S, at_last
+from tests.support import processes
 from tfcompose.ros.message import Transform, encode
 from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFPublisher
@@ -28,7 +29,7 @@ UP = (0.0, 0.0, 0.0, 1.0)
 
 def monitor(*words: str, code: int = 0) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "tfcompose", "monitor", *words]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=90, check=False)
+    done = processes.run(command)
     assert done.returncode == code, done.stdout + done.stderr
     return done
 
@@ -136,7 +137,7 @@ def test_what_a_slow_start_takes_is_not_taken_from_the_time_to_look(command: str
     words = [sys.executable, "-c", SLOW, command, "--for", "3"]
 
     def is_heard() -> bool:
-        done = subprocess.run(words, capture_output=True, text=True, timeout=90, check=False)
+        done = processes.run(words)
         return "/drive" in done.stdout or "at 1 edge from 1 node" in done.stdout
 
     with sending("drive", "odom", "base_link", rate=50):
@@ -148,7 +149,7 @@ def test_piped_it_prints_a_table_each_second_and_ends_with_exit_code_0_on_a_sign
     command = [sys.executable, "-m", "tfcompose", "monitor", "--every", "0.2"]
     with (
         sending("drive", "odom", "base_link", rate=50),
-        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process,
+        processes.start(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process,
     ):
         assert process.stdout
         for line in process.stdout:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 import time
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.observe.stage import LOOKS_S, doctor, finds_nothing, message, said, says
+from tests.support import processes
 from tfcompose.geometry import OPTICAL_XYZW
 from tfcompose.ros.tf import TFPublisher
 
@@ -173,7 +173,7 @@ def robot(tmp_path: Path) -> str:
 
 def verify(robot: str, seconds: float) -> list[dict[str, Any]]:
     command = [sys.executable, "-m", "tfcompose", "verify", "--for", str(seconds), "--format", "json", robot]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=90, check=False)
+    done = processes.run(command)
     assert "Traceback" not in done.stderr, done.stderr
     found: list[dict[str, Any]] = json.loads(done.stdout)
     return found

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -12,6 +11,7 @@ import pytest
 
 from tests.observe.stage import at_last
 from tests.observe.test_monitor_ros import sending
+from tests.support import processes
 from tfcompose.geometry import Pose
 from tfcompose.plan import PlanProcess, Simulation
 from tfcompose.plan.file import read_plan, write_plan
@@ -45,7 +45,7 @@ def running(write: Callable[..., Path], start: Callable[..., Started], edge: Cal
 
 def tfcompose(*words: str, code: int = 0) -> str:
     command = [sys.executable, "-m", "tfcompose", *words]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=90, check=False)
+    done = processes.run(command)
     assert done.returncode == code, done.stdout + done.stderr
     return done.stdout
 

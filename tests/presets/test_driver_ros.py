@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import psutil
 import pytest
 
+from tests.support import processes
 from tests.waiting import TIMEOUT_S, until
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ CLEAR_S = 3.0
 class Up:
     """A launcher that runs, and what it has printed so far."""
 
-    popen: subprocess.Popen[bytes]
+    popen: subprocess.Popen[str]
     output: Path
 
     @property
@@ -129,7 +130,7 @@ def up(domain: object, tmp_path: Path) -> Iterator[Callable[..., Up]]:
         output = tmp_path / "output.txt"
         prefixes = os.pathsep.join(filter(None, [str(tmp_path / "ros"), os.environ.get("AMENT_PREFIX_PATH")]))
         with output.open("wb") as out:
-            popen = subprocess.Popen(
+            popen = processes.start(
                 [sys.executable, "-m", "tfcompose", "up", "rover.yaml"],
                 stdout=out,
                 stderr=out,

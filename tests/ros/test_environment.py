@@ -1,12 +1,12 @@
 from __future__ import annotations
 
-import subprocess
 import sys
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
 import pytest
 
+from tests.support import processes
 from tfcompose.plan import RosSettings
 from tfcompose.ros.environment import (
     FASTDDS_PROFILE,
@@ -77,4 +77,4 @@ def test_the_parts_that_need_no_ros_import_none() -> None:
     names = ["environment", "message", "stop"]
     code = "import sys; " + "; ".join(f"import tfcompose.ros.{name}" for name in names)
     code += "; import tfcompose.run.begin, tfcompose.run.publishing.motion; sys.exit('rclpy' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0
+    assert processes.run([sys.executable, "-c", code]).returncode == 0

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from typing import TYPE_CHECKING
 
 import pytest
+
+from tests.support import processes
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -36,6 +37,8 @@ FILE = """
 """
 READER = """
 import json, rclpy, sys
+
+from tests.support import processes
 rclpy.init(args=["--ros-args", "--params-file", sys.argv[1]])
 given = {"allow_undeclared_parameters": True, "automatically_declare_parameters_from_overrides": True}
 node = rclpy.create_node("planner", **given)
@@ -56,13 +59,11 @@ def test_rcl_reads_the_same_values_from_the_built_file(tmp_path: Path, domain: D
     (tmp_path / "mine.yaml").write_text(FILE, encoding="utf-8")
     (tmp_path / "r.yaml").write_text(ROBOT, encoding="utf-8")
     build = [sys.executable, "-m", "tfcompose", "build", "r.yaml", "-o", "out"]
-    subprocess.run(build, cwd=tmp_path, check=True, timeout=60, capture_output=True)
+    processes.run(build, cwd=tmp_path, check=True)
 
     def read(file: Path) -> dict[str, str]:
         command = [sys.executable, "-W", "ignore", "-c", READER, str(file)]
-        done = subprocess.run(
-            command, env=dict(domain.environment), timeout=60, capture_output=True, text=True, check=True
-        )
+        done = processes.run(command, env=dict(domain.environment), check=True)
         values: dict[str, str] = json.loads(done.stdout.splitlines()[-1])
         return values
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 
 import pytest
 
+from tests.support import processes
 from tfcompose.plan import Discovery, RosSettings
 from tfcompose.ros.environment import child_environment
 
@@ -31,5 +31,5 @@ def test_tfcomposes_own_processes_read_no_shared_memory_and_others_do(
 ) -> None:
     assert domain
     env = child_environment(os.environ, RosSettings(discovery=discovery), own=own)
-    said = subprocess.run([sys.executable, "-c", NODE], env=env, capture_output=True, text=True, check=True, timeout=60)
+    said = processes.run([sys.executable, "-c", NODE], env=env, check=True)
     assert (said.stdout == "\n") == own, said.stdout

@@ -12,7 +12,6 @@ import shlex
 import shutil
 import signal
 import socket
-import subprocess
 import sys
 import tempfile
 import time
@@ -24,9 +23,11 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import yaml
 
+from tests.support import processes
 from tests.waiting import TIMEOUT_S, offences, until
 
 if TYPE_CHECKING:
+    import subprocess
     from collections.abc import Callable, Iterator
 
 pytestmark = pytest.mark.ros
@@ -86,7 +87,7 @@ class Supervisor:
 
     def __init__(self, services: dict[str, Service], output: Path) -> None:
         self.services = services
-        self.running: dict[str, subprocess.Popen[bytes]] = {}
+        self.running: dict[str, subprocess.Popen[str]] = {}
         self._output = output
         self._stack = ExitStack()
 
@@ -103,14 +104,14 @@ class Supervisor:
             manager.bind(path)
             manager.settimeout(60)
             env = one.env | ({"NOTIFY_SOCKET": path} if one.notifies else {})
-            self.running[name] = subprocess.Popen(one.argv, env=env, cwd=one.folder, stdout=out, stderr=out)
+            self.running[name] = processes.start(one.argv, env=env, cwd=one.folder, stdout=out, stderr=out)
             try:
                 if one.notifies:
                     assert manager.recv(100) == b"READY=1", name
             finally:
                 Path(path).unlink()
         if one.healthy:
-            assert until(lambda: subprocess.run(one.healthy, env=one.env, check=False).returncode == 0), name
+            assert until(lambda: processes.run(one.healthy, env=one.env).returncode == 0), name
 
     def log(self, name: str) -> str:
         return (self._output / f"{name}.log").read_text("utf-8")
@@ -186,7 +187,7 @@ def exported(domain: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> It
         text = ROBOT.format(domain=domain.id, python=sys.executable, file=tmp_path / "arm.py", mode=mode)
         (tmp_path / "robot.yaml").write_text(text.replace("localhost", f"localhost{more}", 1), "utf-8")
         command = [sys.executable, "-m", "tfcompose", "export", kind, "robot.yaml", "-o", "build"]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+        done = processes.run(command, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         folder = tmp_path / "build" / kind
         running.append(Supervisor(units(folder) if kind == "systemd" else services(folder), tmp_path))
@@ -200,7 +201,7 @@ def exported(domain: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> It
 def verified(folder: Path, wrong: str = "") -> str:
     """Compare the live tree with the plan, and return what is wrong, if a line of it fits; else nothing."""
     command = [sys.executable, "-m", "tfcompose", "verify", "build/plan.json", "--live", "--for", "3"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60, check=False)
+    done = processes.run(command, cwd=folder)
     said = done.stdout + done.stderr
     return said if done.returncode and re.search(wrong, said, re.MULTILINE) else ""
 
@@ -307,7 +308,7 @@ def test_ros2_launch_starts_the_tree_of_the_plan_with_stock_nodes(
     )
     command = ["ros2", "launch", "--noninteractive", str(tmp_path / "build" / "launch" / "rover.launch.py")]
     with (tmp_path / "launch.log").open("wb") as out:
-        launch = subprocess.Popen(command, stdout=out, stderr=out, start_new_session=True)
+        launch = processes.start(command, stdout=out, stderr=out)
     try:
         # Stock nodes are not the plan's owners, and are found late: nothing else is wrong in the end.
         assert until(lambda: verified(tmp_path, r"^error(?!\[TF801\])") == "", 60), verified(tmp_path)

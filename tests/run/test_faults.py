@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import psutil
 import pytest
 
+from tests.support import processes
 from tests.waiting import TIMEOUT_S, gone, until
 from tfcompose.plan import Plan, PlanProcess, RosSettings
 from tfcompose.plan.file import write_plan
@@ -101,13 +102,13 @@ class Run:
     """A launcher that runs in a folder, and who can be asked there."""
 
     def __init__(
-        self, folder: Path, processes: tuple[PlanProcess, ...], stdout: int, *words: str, clock: str = ""
+        self, folder: Path, planned: tuple[PlanProcess, ...], stdout: int, *words: str, clock: str = ""
     ) -> None:
         file = folder / "plan.json"
-        file.write_text(write_plan(Plan("rover", "", None, RosSettings(), (), processes)))
+        file.write_text(write_plan(Plan("rover", "", None, RosSettings(), (), planned)))
         self.place = Place(NAME, folder / "place", folder / "log")
         command = [sys.executable, "-c", clock + LAUNCHER, str(file), NAME, *words]
-        self.popen = subprocess.Popen(command, stdout=stdout, cwd=folder)
+        self.popen = processes.start(command, stdout=stdout, cwd=folder)
 
     def ps(self) -> dict[str, dict[str, Any]]:
         return {process["name"]: process for process in ask(self.place, do="ps")["processes"]}

@@ -16,6 +16,7 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from tests.run.nameless import nameless_guard
+from tests.support import processes
 from tests.waiting import TIMEOUT_S, in_one_of_a_few, until, whole_lines
 from tfcompose.plan import SILENT_PERIODS
 from tfcompose.run.guard.judge import FINDING_S
@@ -80,7 +81,7 @@ class Running:
         self.output = folder / "output.txt"
         with self.output.open("wb") as out:
             command = [sys.executable, "-m", "tfcompose", "up"]
-            self.popen = subprocess.Popen(command, cwd=folder, stdout=out, stderr=out)
+            self.popen = processes.start(command, cwd=folder, stdout=out, stderr=out)
         self.nodes: list[subprocess.Popen[str]] = []
 
     def joins(self, name: str, *edges: str, reliability: str = "reliable", stamps: str = "right") -> int:
@@ -89,7 +90,7 @@ class Running:
 
     def starts(self, code: str, *arguments: str) -> int:
         """Start a node of this code, wait for its first line, and return its process id."""
-        node = subprocess.Popen([sys.executable, "-c", code, *arguments], stdout=subprocess.PIPE, text=True)
+        node = processes.start([sys.executable, "-c", code, *arguments], stdout=subprocess.PIPE)
         self.nodes.append(node)
         assert node.stdout
         assert node.stdout.readline()
@@ -412,7 +413,7 @@ def test_a_rogue_at_1_khz_is_named_once_and_costs_the_guard_little_beside_a_plai
 def test_of_more_static_publishers_than_a_listener_keeps_every_one_is_seen(
     up: Callable[[str], Running], guard: str
 ) -> None:
-    foreign = subprocess.Popen([sys.executable, "-c", MANY], stdout=subprocess.PIPE, text=True)
+    foreign = processes.start([sys.executable, "-c", MANY], stdout=subprocess.PIPE)
     try:
         assert foreign.stdout
         assert foreign.stdout.readline()

@@ -14,6 +14,7 @@ import psutil
 import pytest
 
 from tests.domains import reserved_domain
+from tests.support import processes
 from tests.waiting import TIMEOUT_S, in_one_of_a_few, offences, until, whole_lines
 from tfcompose.ros.message import decode
 from tfcompose.ros.node import open_node
@@ -63,7 +64,7 @@ with open_node(name, "/strange") as node:
 class Robot:
     """A robot that runs, and what it has printed so far."""
 
-    popen: subprocess.Popen[bytes]
+    popen: subprocess.Popen[str]
     output: Path
 
     def lines(self, *words: str) -> list[str]:
@@ -93,7 +94,7 @@ def start(folder: Path, *words: str) -> Robot:
     output = folder / "output.txt"
     command = [sys.executable, "-m", "tfcompose", "up", *words]
     with output.open("wb") as out:
-        return Robot(subprocess.Popen(command, cwd=folder, stdout=out, stderr=out), output)
+        return Robot(processes.start(command, cwd=folder, stdout=out, stderr=out), output)
 
 
 def end(robot: Robot) -> int:
@@ -126,7 +127,7 @@ class Stranger:
         """Let it join and send its first message."""
         self.leaves()
         command = [sys.executable, "-c", STRANGER, name, kind, str(hertz), str(seconds), *edges]
-        self.popen = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        self.popen = processes.start(command, stdout=subprocess.PIPE)
         assert self.popen.stdout
         assert self.popen.stdout.readline()
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.run.test_hosts import TWO
+from tests.support import processes
 from tests.waiting import offences, until
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.ros
 
 def ps() -> dict[str, dict[str, str]]:
     words = [sys.executable, "-m", "tfcompose", "ps", "--format", "json"]
-    said = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False).stdout
+    said = processes.run(words).stdout
     robots = json.loads(said or "[]")
     return {
         robot["name"].partition("@")[0]: {one["name"]: one["state"] for one in robot["processes"]} for robot in robots
@@ -90,7 +90,7 @@ def test_each_of_two_strict_guards_holds_back_on_its_machine_and_passes_on_to_al
     words = [sys.executable, "-m", "tfcompose", "verify", str(file), "--live", "--for", "3"]
 
     def wrong() -> str:
-        done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+        done = processes.run(words)
         return done.stdout + done.stderr if done.returncode else ""
 
     assert until(lambda: not wrong()), wrong()

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import shutil
 import signal
-import subprocess
 import sys
 from typing import TYPE_CHECKING
 
 import psutil
 import pytest
 
+from tests.support import processes
 from tests.waiting import gone, until
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def _can_launch() -> bool:
     ros2 = shutil.which("ros2")
     if ros2 is None:
         return False
-    return subprocess.run([ros2, "launch", "--help"], capture_output=True, check=False).returncode == 0
+    return processes.run([ros2, "launch", "--help"]).returncode == 0
 
 
 pytestmark = [pytest.mark.ros, pytest.mark.skipif(not _can_launch(), reason="there is no ros2 launch")]

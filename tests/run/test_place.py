@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.support import processes
 from tfcompose.plan import Plan, RosSettings
 from tfcompose.run import place as place_module
 from tfcompose.run.place import Lock, PlaceError, place_of, places
@@ -94,7 +95,7 @@ def test_of_two_only_one_gets_the_lock_the_other_learns_who_has_it_and_a_killed_
 ) -> None:
     place = place_of(ROVER, env)
     command = [sys.executable, "-c", HOLD, str(place.folder)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+    with processes.start(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
         assert other.stdout
         run = other.stdout.readline().strip()
         with pytest.raises(BlockingIOError):
@@ -125,7 +126,7 @@ def test_who_only_looks_is_in_nobodys_way_and_is_taken_for_nobodys_run(env: dict
 def test_a_child_that_is_started_does_not_hold_the_lock_on(env: dict[str, str], until: Callable[..., bool]) -> None:
     place = place_of(ROVER, env)
     lock = Lock(place)
-    with subprocess.Popen(["/bin/sleep", "60"], close_fds=False) as child:
+    with processes.start(["/bin/sleep", "60"], close_fds=False) as child:
         lock.close()
         try:
             # The kernel gives the parent its turn a moment before it closes what the child must not have.

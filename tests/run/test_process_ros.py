@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shlex
-import subprocess
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.rover import ROVER
+from tests.support import processes
 from tests.waiting import until
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def units(domain: object, tmp_path: Path) -> Path:
     assert domain
     (tmp_path / "robot.yaml").write_text(HELLO, "utf-8")
     words = [sys.executable, "-m", "tfcompose", "export", "systemd", str(tmp_path / "robot.yaml"), "-o", str(tmp_path)]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    done = processes.run(words)
     assert done.returncode == 0, done.stderr
     return tmp_path / "systemd"
 

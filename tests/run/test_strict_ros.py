@@ -6,7 +6,6 @@ import json
 import os
 import re
 import signal
-import subprocess
 import sys
 import time
 from typing import TYPE_CHECKING
@@ -15,6 +14,7 @@ import psutil
 import pytest
 
 from tests.run.nameless import nameless_guard
+from tests.support import processes
 from tests.waiting import TIMEOUT_S, gone, until, whole_lines
 from tfcompose.ros.graph import writers
 from tfcompose.ros.message import Transform, decode, encode
@@ -110,7 +110,7 @@ class Fenced:
         self.output = folder / "output.txt"
         with self.output.open("wb") as out:
             command = [sys.executable, "-m", "tfcompose", "up"]
-            self.popen = subprocess.Popen(command, cwd=folder, stdout=out, stderr=out, env=os.environ | env)
+            self.popen = processes.start(command, cwd=folder, stdout=out, stderr=out, env=os.environ | env)
 
     def lines(self, word: str) -> list[str]:
         return [line for line in whole_lines(self.output) if word in line]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
-import subprocess
 import sys
 import tracemalloc
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import psutil
 import pytest
 
+from tests.support import processes
 from tests.waiting import TIMEOUT_S, gone, until, whole_lines
 from tfcompose.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.plan.file import write_plan
@@ -26,6 +26,7 @@ from tfcompose.run.launcher.state import Times
 from tfcompose.run.launcher.supervisor import supervise
 
 if TYPE_CHECKING:
+    import subprocess
     from collections.abc import Callable, Iterator
 
 PYTHON = ("${python}", "-I", "-S", "-c")
@@ -55,7 +56,6 @@ import signal, sys
 from pathlib import Path
 from tfcompose.plan.file import read_plan
 from tfcompose.run.launcher.supervisor import supervise
-signal.signal(signal.SIGHUP, signal.SIG_DFL)  # the tests may run below nohup
 file = Path(sys.argv[1])
 plan = read_plan(file.read_text(), str(file))
 sys.exit(supervise(plan, file, report=lambda notice: print(notice, flush=True)))
@@ -81,7 +81,7 @@ def plan_of(*processes: PlanProcess) -> Plan:
 class Launcher:
     """A launcher that runs as a process of its own."""
 
-    popen: subprocess.Popen[bytes]
+    popen: subprocess.Popen[str]
     output: Path
 
     def pids(self) -> list[int]:
@@ -97,11 +97,11 @@ class Launcher:
 def launch(tmp_path: Path) -> Iterator[Callable[..., Launcher]]:
     launchers: list[Launcher] = []
 
-    def start(*processes: PlanProcess) -> Launcher:
+    def start(*planned: PlanProcess) -> Launcher:
         file, output = tmp_path / "plan.json", tmp_path / "output.txt"
-        file.write_text(write_plan(plan_of(*processes)))
+        file.write_text(write_plan(plan_of(*planned)))
         with output.open("wb") as out:
-            popen = subprocess.Popen([sys.executable, "-c", LAUNCHER, str(file)], stdout=out, stderr=out)
+            popen = processes.start([sys.executable, "-c", LAUNCHER, str(file)], stdout=out, stderr=out)
         launchers.append(Launcher(popen, output))
         return launchers[-1]
 

@@ -1,0 +1,100 @@
+"""Processes that tests start: in a session of their own, with no signal ignored, bounded, and ended with the test."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+from typing import TYPE_CHECKING, Any
+
+from tests.waiting import TIMEOUT_S
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from pathlib import Path
+
+#: What a script that puts the tests into the background, or nohup, has them ignore; a child would inherit that.
+_IGNORABLE = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_started: list[subprocess.Popen[str]] = []
+
+
+def start(command: Sequence[str | Path], **options: Any) -> subprocess.Popen[str]:
+    """Start a process as ``subprocess.Popen`` does, in a session of its own and with the default action of each signal.
+
+    Its pipes are text, and it reads nothing unless it is given something. It is killed at the end of the test, with
+    its group, if it still runs then.
+    """
+    options.setdefault("stdin", subprocess.DEVNULL)
+    with default_signal_actions():
+        process = subprocess.Popen(command, start_new_session=True, text=True, **options)
+    _started.append(process)
+    return process
+
+
+def run(
+    command: Sequence[str | Path],
+    *,
+    check: bool = False,
+    stdin: str | None = None,
+    timeout_s: float = 2 * TIMEOUT_S,
+    **options: Any,
+) -> subprocess.CompletedProcess[str]:
+    """Run a process to its end and return its exit code and what it printed.
+
+    It is given the text of ``stdin``, if there is one, and killed with its group if the time is over before.
+
+    Raises:
+        subprocess.TimeoutExpired: if it does not end in time.
+        subprocess.CalledProcessError: if it is to be checked, and does not end with 0.
+    """
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    if stdin is not None:
+        pipes["stdin"] = subprocess.PIPE
+    process = start(command, **pipes | options)
+    try:
+        output, errors = process.communicate(stdin, timeout_s)
+    finally:
+        end(process)
+    done = subprocess.CompletedProcess(process.args, process.returncode, output, errors)
+    if check:
+        done.check_returncode()
+    return done
+
+
+def end(process: subprocess.Popen[str]) -> None:
+    """Kill the process and its group, if they still run, and close its pipes."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait(TIMEOUT_S)
+    for stream in (process.stdin, process.stdout, process.stderr):
+        if stream:
+            with contextlib.suppress(BrokenPipeError):
+                stream.close()
+    if process in _started:
+        _started.remove(process)
+
+
+@contextlib.contextmanager
+def ended_at_exit() -> Iterator[None]:
+    """End what was started inside and still runs at the end."""
+    before = list(_started)
+    try:
+        yield
+    finally:
+        for process in [each for each in _started if each not in before]:
+            end(process)
+
+
+@contextlib.contextmanager
+def default_signal_actions() -> Iterator[None]:
+    """Heed the signals that this process was started to ignore, as Python does: an interrupt is an exception."""
+    before = {number: signal.getsignal(number) for number in _IGNORABLE}
+    ignored = [number for number, handler in before.items() if handler == signal.SIG_IGN]
+    for number in ignored:
+        signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
+    try:
+        yield
+    finally:
+        for number in ignored:
+            signal.signal(number, before[number])

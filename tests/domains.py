@@ -13,19 +13,30 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-#: The domains that a test may have; CI's own run of a robot has 101.
-DOMAINS = 100
+#: The domains that tests may have; CI's own run of a robot has 101.
+DOMAINS = range(1, 101)
 _TURN = count(os.getpid())
+
+
+def own_domains() -> range:
+    """Return the domains of this worker of pytest-xdist: each has as many, and none has another's."""
+    workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    return DOMAINS[worker * len(DOMAINS) // workers : (worker + 1) * len(DOMAINS) // workers]
 
 
 @contextmanager
 def reserved_domain() -> Iterator[int]:
-    """Give a domain from 1 to 100 in which nobody is, locked by a file so that concurrent runs do not take it.
+    """Give a domain of this worker's in which nobody is, locked by a file so that concurrent runs do not take it.
 
     Each test has the next one: what a test before left behind may need a moment to end.
+
+    Raises:
+        RuntimeError: if there is none.
     """
-    for _ in range(DOMAINS):
-        number = 1 + next(_TURN) % DOMAINS
+    domains = own_domains()
+    for _ in domains:
+        number = domains[next(_TURN) % len(domains)]
         try:
             descriptor = _opened(Path(tempfile.gettempdir()) / f"tfcompose-test-domain-{number}.lock")
         except PermissionError:  # of a user who lets nobody read it

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.support import processes
+from tests.support.tables import for_each
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "tfcompose"
@@ -105,7 +106,7 @@ def test_every_part_of_the_package_is_in_the_table() -> None:
     assert {part_of(file) for file in FILES} == set(MAY_IMPORT)
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: file.relative_to(PACKAGE).as_posix())
+@for_each(FILES)
 def test_a_file_imports_only_what_its_part_may(file: Path) -> None:
     part, allowed = part_of(file), MAY_IMPORT[part_of(file)]
     for name in imports_of(file):
@@ -119,7 +120,7 @@ def test_a_file_imports_only_what_its_part_may(file: Path) -> None:
             assert part in ONLY_IN.get(first, set()), f"{part} imports {name}"
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: file.relative_to(PACKAGE).as_posix())
+@for_each(FILES)
 def test_a_stage_is_imported_by_its_own_name_from_outside(file: Path) -> None:
     """What a stage keeps in its files is its own: outside, ``from tfcompose.check import check``."""
     if part_of(file) in STAGES or part_of(file) == "cli":

@@ -12,6 +12,7 @@ import pytest
 
 from tests.benchmarks import bench_buffer, bench_joints
 from tests.support import processes
+from tests.support.tables import for_each
 from tfcompose.catalogue import CATALOGUE
 from tfcompose.cli.parser import COMMANDS, parser_of
 from tfcompose.cli.shelves import library
@@ -79,7 +80,7 @@ def test_its_table_of_commands_is_that_of_the_command_line() -> None:
     assert rows == COMMANDS
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@for_each(COMMANDS)
 def test_each_command_says_what_it_does_and_what_its_arguments_are(command: str) -> None:
     parser = parser_of(command)
     assert parser.description

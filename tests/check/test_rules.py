@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.support.tables import for_each
 from tfcompose.catalogue import CATALOGUE
 from tfcompose.check import RULES, check, unused_allows
 from tfcompose.check.rule import rule
@@ -68,7 +69,7 @@ def places(found: tuple[Finding, ...]) -> set[tuple[int, str]]:
     return {(one.span.line, one.code) for one in found if one.span}
 
 
-@pytest.mark.parametrize("spec", SPECS, ids=lambda path: path.stem)
+@for_each(SPECS)
 def test_each_marked_line_gives_its_finding_and_no_other_line_gives_one(spec: Path) -> None:
     expected = marks(spec.read_text("utf-8"))
     bare = compiled(spec)
@@ -80,7 +81,7 @@ def test_each_marked_line_gives_its_finding_and_no_other_line_gives_one(spec: Pa
         assert places(tuple(added)) == more
 
 
-@pytest.mark.parametrize("code", sorted(set(CATALOGUE) - NOT_OF_A_LINE - LIVE))
+@for_each(sorted(set(CATALOGUE) - NOT_OF_A_LINE - LIVE))
 def test_each_code_that_a_robot_file_can_provoke_has_a_marked_line(code: str) -> None:
     marked = {code for spec in SPECS for found in marks(spec.read_text("utf-8")).values() for _, code in found}
     assert code in marked
@@ -110,7 +111,7 @@ def test_a_conflict_shows_its_other_place_too(code: str, spec: str) -> None:
     assert all("self" in one.message for one in alone), "only a frame on itself has one place"
 
 
-@pytest.mark.parametrize("spec", SPECS, ids=lambda path: path.stem)
+@for_each(SPECS)
 def test_a_message_is_one_line_and_its_place_lies_in_the_file(spec: Path) -> None:
     lines = spec.read_text("utf-8").splitlines()
     for one in compiled(spec).found:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.tables import for_each
 from tfcompose.catalogue import can_be_allowed
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
@@ -16,7 +17,7 @@ SPECS = sorted((Path(__file__).parent / "specs").glob("*.yaml"))
 PRESETS = library()
 
 
-@pytest.mark.parametrize("spec", SPECS, ids=lambda spec: spec.stem)
+@for_each(SPECS)
 def test_with_all_rules_off_that_can_be_off_a_robot_is_built_or_refused(spec: Path) -> None:
     text = spec.read_text("utf-8")
     codes = sorted({one.code for one in compile_robot(text, spec.name, PRESETS).found if can_be_allowed(one.code)})

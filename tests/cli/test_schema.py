@@ -10,6 +10,7 @@ from typing import Any
 import jsonschema
 import pytest
 
+from tests.support.tables import for_each
 from tfcompose.cli.commands.schema import LANGUAGES, schema_text
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
@@ -40,7 +41,7 @@ def test_the_example_robots_are_valid(file: Path) -> None:
     assert (file.parent / schema[1]).resolve() == ROOT / "schemas" / "robot.schema.json"
 
 
-@pytest.mark.parametrize("file", sorted((ROOT / "tfcompose/presets").glob("*/*.yaml")), ids=lambda file: file.stem)
+@for_each(sorted((ROOT / "tfcompose/presets").glob("*/*.yaml")))
 def test_the_presets_are_valid(file: Path) -> None:
     validator("preset").validate(load(file.read_text("utf-8"), file.name).data)
 

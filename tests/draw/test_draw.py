@@ -17,6 +17,7 @@ import pypdfium2
 import pytest
 from PIL import Image
 
+from tests.support.tables import for_each
 from tfcompose.draw import Arrow, Graph, Group
 from tfcompose.draw.dot import dot
 from tfcompose.draw.letters import width_of
@@ -111,7 +112,7 @@ def around(shape: Box | Text) -> tuple[float, float, float, float]:
     return left, shape.y - 0.75 * size, left + shape.width, shape.y + 0.2 * size
 
 
-@pytest.mark.parametrize(("seed", "frames", "poses"), FAMILY)
+@for_each(FAMILY)
 def test_no_boxes_and_no_texts_overlap_and_all_is_on_the_paper(seed: int, frames: int, *, poses: bool) -> None:
     drawing = draw(tree(seed, frames, poses=poses))
     texts = [around(shape) for shape in drawing.shapes if isinstance(shape, Text)]
@@ -128,7 +129,7 @@ def test_no_boxes_and_no_texts_overlap_and_all_is_on_the_paper(seed: int, frames
         assert bottom < drawing.height
 
 
-@pytest.mark.parametrize(("seed", "frames", "poses"), FAMILY)
+@for_each(FAMILY)
 def test_the_area_of_a_group_holds_its_frames_whole_and_cuts_no_box(seed: int, frames: int, *, poses: bool) -> None:
     graph = tree(seed, frames, poses=poses)
     drawing = draw(graph)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import yaml
 
+from tests.support.tables import for_each
 from tfcompose.cli.compiling import library
 from tfcompose.cli.disk import disk
 from tfcompose.compile import compile_robot
@@ -69,7 +70,7 @@ REACH: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("keys", REACH)
+@for_each(REACH)
 def test_a_key_of_a_process_reaches_the_plan(keys: str) -> None:
     head = HEAD.replace("map: {}", "map: {}, odom: {parent: map, owner: a}") if "edges" in keys else HEAD
     process = process_of(f"{EXE}, {keys}".rstrip(", "), head)
@@ -109,7 +110,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("keys", COMMANDS)
+@for_each(COMMANDS)
 def test_how_it_is_run_becomes_words_that_the_launcher_can_follow(keys: str) -> None:
     assert process_of(keys).argv == COMMANDS[keys]
 

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.support.tables import for_each
 from tfcompose.findings import RejectedError, Span
 from tfcompose.load import Source, composed, load
 from tfcompose.load.nodes import MOST_VALUES
@@ -54,7 +55,7 @@ SCALARS: dict[str, Any] = {
 }
 
 
-@pytest.mark.parametrize("written", SCALARS)
+@for_each(SCALARS)
 def test_a_scalar_is_read_as_yaml_1_2_reads_it(written: str) -> None:
     value = load(f"a: {written}\n", "f").data["a"]
     assert value == SCALARS[written]

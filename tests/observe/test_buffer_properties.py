@@ -12,6 +12,7 @@ from pytransform3d.transform_manager import TransformManager
 from pytransform3d.transformations import transform_from_pq
 from scipy.spatial.transform import Rotation, Slerp
 
+from tests.support.tables import for_each
 from tfcompose.geometry import Pose, Quaternion, angle_between, normalised
 from tfcompose.observe import Buffer, TransformException
 from tfcompose.ros.decoder import Decoder
@@ -122,7 +123,7 @@ def test_a_trajectory_is_row_by_row_what_lookup_returns(buffer: Buffer, times: l
         assert found.quat_xyzw[row, 3] >= 0
 
 
-@pytest.mark.parametrize("seed", range(20))
+@for_each(range(20))
 def test_random_trees_agree_with_pytransform3d(seed: int) -> None:
     rng = random.Random(seed)
     buffer, manager, frames = Buffer(), TransformManager(), ["f0"]

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.support.tables import for_each
 from tfcompose import observe
 from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.observe import (
@@ -77,7 +78,7 @@ METHODS = {
 }
 
 
-@pytest.mark.parametrize("name", METHODS)
+@for_each(METHODS)
 def test_a_method_takes_tf2s_arguments_in_tf2s_order(name: str) -> None:
     assert list(inspect.signature(getattr(Buffer(), name)).parameters) == METHODS[name].split()
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.support.tables import for_each
 from tfcompose.geometry import Pose, normalised, quat_from_rpy
 from tfcompose.observe import Buffer, InvalidArgumentException
 from tfcompose.observe.exceptions import TypeException
@@ -240,7 +241,7 @@ class Layout:
         ]
 
 
-@pytest.mark.parametrize("seed", range(40))
+@for_each(range(40))
 def test_a_cloud_of_any_layout_is_moved_and_every_other_byte_stays(seed: int) -> None:
     layout = Layout(random.Random(seed))
     given = layout.cloud()

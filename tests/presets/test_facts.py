@@ -6,9 +6,9 @@ from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import pytest
 import yaml
 
+from tests.support.tables import for_each
 from tfcompose.cli.shelves import library
 from tfcompose.geometry import IDENTITY_XYZW, OPTICAL_XYZW, angle_between, quat_from_rpy
 from tfcompose.resolve.poses import rotation_of
@@ -57,7 +57,7 @@ def is_there(frame: PresetFrame, fact: dict[str, Any], name: str, *, optical: bo
     return angle_between(turn, OPTICAL_XYZW if optical else quat_from_rpy(*fact["rpy"])) < 1e-9
 
 
-@pytest.mark.parametrize(("preset", "name"), [(preset, name) for preset, frames in FACTS.items() for name in frames])
+@for_each([(preset, name) for preset, frames in FACTS.items() for name in frames])
 def test_a_frame_is_where_the_package_of_its_vendor_has_it(preset: str, name: str) -> None:
     fact = FACTS[preset][name]
     found = [one for frames in variants(preset) for one in frames.get(name, [])]

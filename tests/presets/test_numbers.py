@@ -9,8 +9,7 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
-import pytest
-
+from tests.support.tables import for_each
 from tfcompose.cli.shelves import library
 from tfcompose.compile import compile_robot
 from tfcompose.geometry import Pose, rotate
@@ -115,7 +114,7 @@ def in_mount(robot: Robot, frame: str) -> Pose:
     return pose
 
 
-@pytest.mark.parametrize(("preset", "options", "frame", "xyz", "axes"), TABLE)
+@for_each(TABLE)
 def test_a_frame_is_where_the_vendor_has_it(
     preset: str, options: dict[str, Any], frame: str, xyz: Vector, axes: Axes
 ) -> None:

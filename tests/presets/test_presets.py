@@ -9,8 +9,7 @@ from functools import cache
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-import pytest
-
+from tests.support.tables import for_each
 from tfcompose.cli.shelves import library
 from tfcompose.compile import compile_robot
 from tfcompose.geometry import angle_between, rotate
@@ -69,7 +68,7 @@ def robots(name: str) -> list[tuple[str, dict[str, Any], Robot]]:
     return made
 
 
-@pytest.mark.parametrize("name", NAMES)
+@for_each(NAMES)
 def test_its_frames_are_one_tree_below_its_mount(name: str) -> None:
     for _tf, _options, robot in robots(name):
         children = [edge.child for edge in robot.edges]
@@ -79,7 +78,7 @@ def test_its_frames_are_one_tree_below_its_mount(name: str) -> None:
         assert [edge.child for edge in robot.edges if edge.parent == "base_link"] == [mount]
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name != "realsense/t265"])
+@for_each([name for name in NAMES if name != "realsense/t265"])
 def test_its_optical_frames_have_z_forward_x_right_and_y_down(name: str) -> None:
     for _tf, _options, robot in robots(name):
         for edge in robot.edges:
@@ -101,7 +100,7 @@ def test_the_optical_frames_of_a_t265_have_x_right_y_up_and_z_backward() -> None
                     assert math.dist(rotate(edge.pose.quat_xyzw, axis), wanted) < 1e-9
 
 
-@pytest.mark.parametrize("name", NAMES)
+@for_each(NAMES)
 def test_what_stamps_its_messages_is_a_frame_of_the_robot(name: str) -> None:
     for tf, options, robot in robots(name):
         preset = KNOWN.get(name, {key: options[key] for key in (variants(name) or [{}])[0]})
@@ -110,7 +109,7 @@ def test_what_stamps_its_messages_is_a_frame_of_the_robot(name: str) -> None:
             assert said.hard_coded is (stamped not in robot.frames), (tf, topic, stamped)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@for_each(NAMES)
 def test_it_says_where_it_is_from(name: str) -> None:
     preset = KNOWN.get(name)
     assert preset.source or name.startswith("generic/")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import yaml
 
+from tests.support.tables import for_each
 from tfcompose.cli import shelves
 from tfcompose.cli.commands import presets as presets_command
 from tfcompose.cli.parser import main
@@ -78,7 +79,7 @@ WITH_SWITCH = [name for name in DRIVEN if (driver := KNOWN.get(name).driver) and
 WITH_CLAIMS = [name for name in NAMES if (driver := KNOWN.get(name).driver) and driver.claims]
 
 
-@pytest.mark.parametrize("name", WITH_SWITCH)
+@for_each(WITH_SWITCH)
 def test_the_switch_is_among_what_the_driver_is_told(name: str) -> None:
     preset = KNOWN.get(name)
     assert preset.driver
@@ -105,7 +106,7 @@ def test_without_a_switch_tfcompose_cannot_publish_what_the_driver_does(name: st
     assert not compiled(name, tf="driver", frames=unknown(name)).errors
 
 
-@pytest.mark.parametrize("name", WITH_CLAIMS)
+@for_each(WITH_CLAIMS)
 def test_what_a_driver_claims_outside_its_sensor_is_switched_off_unless_it_owns_it(name: str) -> None:
     driver = KNOWN.get(name).driver
     assert driver
@@ -116,7 +117,7 @@ def test_what_a_driver_claims_outside_its_sensor_is_switched_off_unless_it_owns_
     assert not off.keys() & told(robot_of(name, frames=frames, owner="s")).keys()
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if (driver := KNOWN.get(name).driver) and driver.naming])
+@for_each([name for name in NAMES if (driver := KNOWN.get(name).driver) and driver.naming])
 def test_a_driver_is_told_the_final_names_of_its_frames(name: str) -> None:
     preset = KNOWN.get(name)
     assert preset.driver

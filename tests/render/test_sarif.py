@@ -14,6 +14,7 @@ from urllib.parse import unquote, urlparse
 import pytest
 from jsonschema import Draft4Validator, ValidationError
 
+from tests.support.tables import for_each
 from tfcompose import __version__
 from tfcompose.catalogue import CATALOGUE
 from tfcompose.cli.compiling import library
@@ -52,7 +53,7 @@ def test_the_schema_is_the_official_one_of_2_1_0() -> None:
         VALIDATOR.validate({"version": "2.1.0", "runs": [{"tool": {"driver": {"name": "tfcompose"}, "x": 1}}]})
 
 
-@pytest.mark.parametrize("spec", SPECS, ids=lambda spec: spec.stem)
+@for_each(SPECS)
 def test_it_is_valid_and_says_what_was_found(spec: Path) -> None:
     found = findings(spec)
     run = written(found)

@@ -21,7 +21,7 @@ from tfcompose.cli.shelves import library
 from tfcompose.compile import compile_robot
 from tfcompose.findings import RejectedError, Span, finding
 from tfcompose.emit import emit
-from tfcompose.resolve.packages import Disk
+from tfcompose.urdf.packages import Disk
 
 resource.setrlimit(resource.RLIMIT_DATA, (500_000_000, 500_000_000))
 seed, count = map(int, sys.argv[1:])

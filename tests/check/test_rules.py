@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from tfcompose.geometry import Vector
     from tfcompose.model import Robot
-    from tfcompose.resolve.moments import Moments
+    from tfcompose.urdf.inertia import Moments
 
 SPECS = sorted((Path(__file__).parent / "specs").glob("*.yaml"))
 MARK = re.compile(r"# expect(?:-with (?P<profile>\w+))?: (?P<codes>TF\d{3}(?: TF\d{3})*)$")

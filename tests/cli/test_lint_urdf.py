@@ -17,13 +17,13 @@ from tests.support import processes
 from tfcompose.check import RULES
 from tfcompose.cli.compiling import library
 from tfcompose.cli.disk import disk
-from tfcompose.cli.urdf import lint_urdf
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
 from tfcompose.findings import Finding, RejectedError, Span
-from tfcompose.load.urdf import load_xml
-from tfcompose.resolve.packages import Packages
-from tfcompose.resolve.urdf import robot_of_urdf
+from tfcompose.urdf.convert import robot_of
+from tfcompose.urdf.lint import lint_urdf as lint_with
+from tfcompose.urdf.packages import Packages
+from tfcompose.urdf.read import read_xml
 
 if TYPE_CHECKING:
     import subprocess
@@ -39,9 +39,14 @@ def marks(text: str) -> list[tuple[int, str]]:
     return [(number, code) for number, line in lines for hit in MARK.findall(line) for code in hit.split()]
 
 
+def lint_urdf(file: str) -> list[Finding]:
+    files = disk()
+    return lint_with(file, Packages(files), files)
+
+
 def lint_text(text: str) -> tuple[Finding, ...]:
     try:
-        return robot_of_urdf(load_xml(text, "r.urdf"), "r.urdf", Packages().asset)[1]
+        return robot_of(read_xml(text, "r.urdf"), "r.urdf", Packages().asset)[1]
     except RejectedError as error:
         return error.findings
 
@@ -312,7 +317,7 @@ TURN = 'quat_xyzw="0 0 3 3"'
 )
 def test_a_rotation_as_a_quaternion_is_taken_and_said(version: str, origin: str, said: list[str]) -> None:
     text = QUAT.format(version, origin)
-    robot, found = robot_of_urdf(load_xml(text, "r.urdf"), "r.urdf", Packages().asset)
+    robot, found = robot_of(read_xml(text, "r.urdf"), "r.urdf", Packages().asset)
     assert [f"{one.severity}: {one.message}" for one in found] == said
     if TURN in origin:
         assert robot.edges[0].pose.quat_xyzw == pytest.approx((0, 0, 0.5**0.5, 0.5**0.5))
@@ -336,6 +341,7 @@ def test_of_a_file_that_only_defines_macros_these_are_named(tmp_path: Path) -> N
 
 def test_without_xacro_that_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "xacro", None)
+    monkeypatch.delitem(sys.modules, "tfcompose.urdf.expand", raising=False)
     (tmp_path / "r.xacro").write_text(XACRO)
     assert [one.code for one in lint_urdf(str(tmp_path / "r.xacro"))] == ["TF904"]
     assert [one.code for one in lint_urdf(str(tmp_path / "none.xacro"))] == ["TF001"]

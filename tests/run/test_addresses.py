@@ -5,18 +5,18 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from urllib.parse import unquote
+from xml.sax.saxutils import quoteattr
 
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tfcompose.emit.markup import quoted
 from tfcompose.run.publishing.addresses import with_whole_addresses
 
 FOLDER = Path("/builds/a b & <c>/rover")
 
 
 def address(filename: str) -> str:
-    urdf = f'<robot name="r"><link name="mesh filename="/><mesh scale="1 1 1" filename={quoted(filename)}/></robot>'
+    urdf = f'<robot name="r"><link name="mesh filename="/><mesh scale="1 1 1" filename={quoteattr(filename)}/></robot>'
     urdf = urdf.replace('name="mesh filename="/', 'name="../a"/')
     found = ET.fromstring(with_whole_addresses(urdf, FOLDER))  # noqa: S314 (ours)
     assert [link.get("name") for link in found.iter("link")] == ["../a"]

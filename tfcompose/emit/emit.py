@@ -10,12 +10,12 @@ from tfcompose.draw.picture import draw
 from tfcompose.draw.svg import svg
 from tfcompose.emit.params import params_file, written_params
 from tfcompose.emit.plan import plan_of
-from tfcompose.emit.urdf import body_of, whole
-from tfcompose.emit.xacro import MACRO, caller, macro
 from tfcompose.files import AS_WRITTEN, File, Target
 from tfcompose.plan import DESCRIPTION
 from tfcompose.plan.file import write_plan
 from tfcompose.render.tree import graph_of, tree
+from tfcompose.urdf.write import urdf
+from tfcompose.urdf.xacro import MACRO, caller, macro
 
 if TYPE_CHECKING:
     from tfcompose.model import Process, Robot
@@ -54,10 +54,11 @@ def _params(process: Process, nodes: dict[str, dict[str, Any]], stock: dict[str,
 
 def _descriptions(robot: Robot, target: Target, folder: str = "") -> tuple[File, ...]:
     """Return what describes the robot, or a part that is a robot of its own, in a folder of its own."""
-    body = body_of(robot, replace(target, folder=posixpath.join(target.folder, folder)))
+    target = replace(target, folder=posixpath.join(target.folder, folder))
+    full, stock = urdf(robot, target)
     return (
-        File(f"{folder}{DESCRIPTION}", whole(robot, body.full)),
-        File(f"{folder}robot.urdf", whole(robot, body.stock)),
+        File(f"{folder}{DESCRIPTION}", full),
+        File(f"{folder}robot.urdf", stock),
         File(f"{folder}robot.urdf.xacro", caller(robot)),
-        File(f"{folder}{MACRO}", macro(robot, body.full)),
+        File(f"{folder}{MACRO}", macro(robot, target)),
     )

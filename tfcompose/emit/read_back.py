@@ -10,10 +10,10 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.emit.emit import described
-from tfcompose.emit.urdf import joint_type
 from tfcompose.geometry import Pose, angle_between, quat_from_rpy
 from tfcompose.model import JOINTS, STATIC
 from tfcompose.plan import DESCRIPTION
+from tfcompose.urdf.write import joint_type
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

@@ -22,6 +22,12 @@ if TYPE_CHECKING:
 MOST_FILES = 50
 
 
+def path_named(named: str, at: Span) -> str:
+    """Return the path of a file that is named at a place: relative to the file there, or to the working folder."""
+    folder = "" if at.file.startswith("--") else posixpath.dirname(at.file)  # --set and its like
+    return posixpath.normpath(posixpath.join(folder, named))
+
+
 def with_includes(source: Source, read: Reader) -> Source:
     """Return the source laid over the files that it includes, and they over theirs; ``read`` gives a file's text.
 

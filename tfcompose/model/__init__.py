@@ -4,18 +4,21 @@ A ``Robot`` can hold a wrong robot: two parents, a cycle, two owners can all be 
 places. Lengths are metres, angles radians, rates hertz; an edge's pose is the pose of its child in its parent.
 """
 
-from tfcompose.model.body import Asset, Inertial, Link, Material, Shape
+from tfcompose.model.body import Asset, Inertial, Link, Material, Shape, colour_name, materials
 from tfcompose.model.edge import Calibration, Edge
 from tfcompose.model.hardware import Block, Component, Hardware, Interface
-from tfcompose.model.joint import Dynamics, Joint, Limit, ReferencePositions, SafetyController
+from tfcompose.model.joint import BOUNDED, FREE, MOVING, Dynamics, Joint, Limit, ReferencePositions, SafetyController
 from tfcompose.model.process import BUILT_IN, GUARD, JOINTS, SHELL, STATIC, AsInFile, Claim, Node, Process
 from tfcompose.model.robot import AsWritten, Part, Robot
 from tfcompose.model.sensor import OPTICAL_ENDINGS, MountedSensor, is_optical
 
 __all__ = [
+    "BOUNDED",
     "BUILT_IN",
+    "FREE",
     "GUARD",
     "JOINTS",
+    "MOVING",
     "OPTICAL_ENDINGS",
     "SHELL",
     "STATIC",
@@ -43,5 +46,7 @@ __all__ = [
     "Robot",
     "SafetyController",
     "Shape",
+    "colour_name",
     "is_optical",
+    "materials",
 ]

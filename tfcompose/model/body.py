@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from tfcompose.findings import Span
     from tfcompose.geometry import Pose
 
@@ -33,6 +35,11 @@ class Material:
     rgba: tuple[float, float, float, float] | None = None
     texture: Asset | None = None
     at: Span | None = None
+
+
+def colour_name(rgba: Sequence[float]) -> str:
+    """Return a name for a colour that has none, so that URDF keeps colours apart."""
+    return "_".join(["rgba", *(f"{part:g}".replace(".", "p").replace("-", "m") for part in rgba)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,3 +81,8 @@ class Link:
     visuals: tuple[Shape, ...] = ()
     collisions: tuple[Shape, ...] = ()
     inertial: Inertial | None = None
+
+
+def materials(links: Mapping[str, Link]) -> list[Material]:
+    """Return the materials of all visuals, in the order of declaration."""
+    return [shape.material for link in links.values() for shape in link.visuals if shape.material]

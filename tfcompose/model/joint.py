@@ -10,6 +10,12 @@ if TYPE_CHECKING:
     from tfcompose.geometry import Vector
     from tfcompose.plan import JointType
 
+#: Joints that joint states move; those of them that have ends; and those that have more than one position, of which
+#: joint states say nothing.
+MOVING: tuple[JointType, ...] = ("revolute", "continuous", "prismatic")
+BOUNDED: tuple[JointType, ...] = ("revolute", "prismatic")
+FREE: tuple[JointType, ...] = ("floating", "planar")
+
 
 @dataclass(frozen=True, slots=True)
 class Limit:

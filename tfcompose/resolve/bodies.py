@@ -7,20 +7,16 @@ from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, finding
 from tfcompose.geometry import Pose
-from tfcompose.model import Inertial, Link, Material, Shape
-from tfcompose.resolve.moments import Moments, Tensor, joined, of_primitive
-from tfcompose.resolve.packages import Packages, UnmeasurableError
+from tfcompose.model import Inertial, Link, Material, Shape, colour_name, materials
 from tfcompose.resolve.poses import pose_of, rotation_of
+from tfcompose.urdf.inertia import Moments, UnmeasurableError, inertial, joined, of_primitive, trace, traces
+from tfcompose.urdf.packages import Packages
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from tfcompose.findings import Span
     from tfcompose.load import Path, Source
     from tfcompose.validate import bodies as said
 
-#: What computing leaves of a product of inertia that is 0, as a part of the trace.
-_NOISE = 1e-15
 FORMS = ("box", "cylinder", "sphere", "capsule", "mesh")
 
 
@@ -87,7 +83,7 @@ class Bodies:
         name, rgba = given.name, given.rgba
         if name is None:
             rgba = rgba if rgba or texture else (0.5, 0.5, 0.5, 1.0)
-            name = name_of_colour(rgba or ())
+            name = colour_name(rgba or ())
             name = name if texture is None else f"{name}_{_word(texture.uri)}"
         return Material(name, rgba, texture, self.source.at(at))
 
@@ -107,16 +103,16 @@ class Bodies:
         if given.inertia:
             i = given.inertia
             tensor = (i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz)
-            return Inertial(density * whole.volume, pose, tensor, (density * _trace(whole.tensor),), place)
-        inertial = _of_density(whole, density, given.mass)
-        return replace(inertial, pose=Pose(given.xyz)) if given.xyz else inertial
+            return Inertial(density * whole.volume, pose, tensor, (density * trace(whole.tensor),), place)
+        computed = inertial(whole, density, given.mass)
+        return replace(computed, pose=Pose(given.xyz)) if given.xyz else computed
 
     def moments(self, shapes: tuple[Shape, ...], at: Span) -> Moments | None:
         """Return the moments of the shapes at density 1 in the link's axes, or None after saying why there are none."""
         parts: list[Moments] = []
         for shape in shapes:
             if shape.mesh is None:
-                parts.append(of_primitive(shape).at(shape.pose))
+                parts.append(of_primitive(shape))
                 continue
             measure = self.packages.disk.moments if self.packages.disk else None
             if measure is None or (shape.mesh.path and self._is_missing(shape.mesh.path)):  # that has been said
@@ -138,11 +134,6 @@ class Bodies:
         return self.packages.disk is not None and not self.packages.disk.is_file(path)
 
 
-def name_of_colour(rgba: Sequence[float]) -> str:
-    """Return a name for a colour that has none."""
-    return "_".join(["rgba", *(f"{part:g}".replace(".", "p").replace("-", "m") for part in rgba)])
-
-
 def with_colours(links: dict[str, Link]) -> dict[str, Link]:
     """Return the links in which a material that is a name alone is the first one that has a colour by that name."""
     known: dict[str, Material] = {}
@@ -161,33 +152,5 @@ def _coloured(link: Link, known: dict[str, Material], bare: set[str]) -> Link:
     return replace(link, visuals=tuple(map(shape, link.visuals)), collisions=tuple(map(shape, link.collisions)))
 
 
-def materials(links: dict[str, Link]) -> list[Material]:
-    """Return the materials of all visuals, in the order of declaration."""
-    return [shape.material for link in links.values() for shape in link.visuals if shape.material]
-
-
 def _word(uri: str) -> str:
     return "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in uri)
-
-
-def traces(mass: float, *several: tuple[Shape, ...]) -> tuple[float, ...]:
-    """Return the traces of the tensors that these shapes would have at one density; those with a mesh have none."""
-    plain = [shapes for shapes in several if shapes and not any(shape.mesh for shape in shapes)]
-    return tuple(_trace(inertial_of(mass, shapes).tensor) for shapes in plain)
-
-
-def inertial_of(mass: float, shapes: tuple[Shape, ...]) -> Inertial:
-    """Return centre of mass and tensor (xx, xy, xz, yy, yz, zz, in the link's axes) of primitives of one density."""
-    whole = joined([of_primitive(shape).at(shape.pose) for shape in shapes])
-    return _of_density(whole, mass / whole.volume, mass)
-
-
-def _of_density(whole: Moments, density: float, mass: float | None) -> Inertial:
-    noise = density * _NOISE * _trace(whole.tensor)
-    xx, xy, xz, yy, yz, zz = (density * value for value in whole.tensor)
-    xy, xz, yz = (value if abs(value) > noise else 0.0 for value in (xy, xz, yz))
-    return Inertial(mass or density * whole.volume, Pose(whole.centre), (xx, xy, xz, yy, yz, zz))
-
-
-def _trace(tensor: Tensor) -> float:
-    return tensor[0] + tensor[3] + tensor[5]

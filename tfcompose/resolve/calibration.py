@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, RejectedError, Span, did_you_mean, finding, nearest
+from tfcompose.load import path_named
 from tfcompose.load.choices import ROTATIONS
 from tfcompose.model import Calibration
-from tfcompose.resolve.beside import beside
 from tfcompose.validate.calibration import CalibrationLimit, CalibrationSpec
 from tfcompose.validate.calibration_file import CalibrationFile, read_calibration
 
@@ -56,7 +56,7 @@ class _Files:
 
     def get(self, named: str, at: Span, form: str = "auto") -> CalibrationFile:
         """Return what the file says; what is wrong with it is said once."""
-        path = beside(named, at)
+        path = path_named(named, at)
         if (path, form) not in self._known:
             self._known[path, form] = self._load(path, at, form)
         return self._known[path, form]

@@ -7,14 +7,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, did_you_mean, finding
+from tfcompose.resolve.blocks import blocks_of, hardware_of
 from tfcompose.resolve.filling import Filler
 from tfcompose.resolve.isolation import isolate
 from tfcompose.resolve.nodes import has_claims
+from tfcompose.urdf.ros2_control import unknown_joints
 
 if TYPE_CHECKING:
     from tfcompose.load import Source
     from tfcompose.model import Robot
-    from tfcompose.resolve.packages import Disk
+    from tfcompose.urdf.packages import Disk
     from tfcompose.validate.spec import RobotSpec
 
 
@@ -39,15 +41,14 @@ def completed(robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None) 
 
 
 def _with_blocks(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Finding]]:
-    """Return the robot with its hardware and raw blocks; what reads XML is loaded only here."""
-    work = import_module("tfcompose.resolve.blocks")
+    """Return the robot with its hardware and raw blocks."""
     moving = [edge.joint.name for edge in robot.edges if edge.joint]
-    hardware = work.hardware_of(spec.ros2_control, source)
+    hardware = hardware_of(spec.ros2_control, source)
     frames = [frame for frame in robot.frames if frame in robot.links or robot.parent_edge(frame)]
     joints = [edge.joint_name for edge in robot.edges if edge.joint_name]
-    blocks, found = work.blocks_of(spec.xml, source, frames, joints)
+    blocks, found = blocks_of(spec.xml, source, frames, joints)
     known = [*moving, *sorted(name for section, name in robot.broken if section == "joints")]
-    found += work.unknown_joints(hardware, known)
+    found += unknown_joints(hardware, known)
     return replace(robot, hardware=(*hardware, *robot.hardware), blocks=(*blocks, *robot.blocks)), found
 
 

@@ -7,8 +7,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, Note, Span, finding
-from tfcompose.model import JOINTS, STATIC, Edge, Joint, Link, MountedSensor, Process, is_optical
-from tfcompose.resolve.joints import FREE, idle_keys, joint_of
+from tfcompose.model import FREE, JOINTS, STATIC, Edge, Joint, Link, MountedSensor, Process, is_optical
+from tfcompose.resolve.joints import idle_keys, joint_of
 from tfcompose.resolve.optical_edits import optical_edits
 from tfcompose.resolve.poses import Draft, pose_of
 

@@ -12,14 +12,14 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, did_you_mean, finding
+from tfcompose.load import path_named
 from tfcompose.model import SHELL
 from tfcompose.plan import told_at_start
-from tfcompose.resolve.beside import beside
 
 if TYPE_CHECKING:
     from tfcompose.load import Path, Source
     from tfcompose.model import Node, Process, Robot
-    from tfcompose.resolve.packages import Disk
+    from tfcompose.urdf.packages import Disk
 
 _WORDS = {
     "remap": "-r FROM:=TO",
@@ -99,7 +99,7 @@ class Filler:
 
     def _file(self, name: str, path: Path) -> str:
         at = self.source.at(path)
-        place = beside(name, at)
+        place = path_named(name, at)
         if name.startswith("/"):
             advice = "a path from this file's folder; or write the path alone, which no other machine has"
             self.found.append(finding("TF106", f"${{file({name})}} is an absolute path", at, help=advice))
@@ -113,7 +113,7 @@ class Filler:
         if cwd is None or cwd.startswith(("/", "${")):
             return self._fill(cwd, path)  # type: ignore[no-any-return]
         at = self.source.at(path)
-        place = beside(cwd, at)
+        place = path_named(cwd, at)
         if self.disk and not self.disk.is_folder(place):
             advice = "a path is relative to the file that writes it"
             self.found.append(finding("TF019", f"cwd: the folder {place} is not there", at, help=advice))

@@ -1,34 +1,34 @@
-"""Robots that somebody else describes: a URDF or a xacro file as a part, or what one macro of such a file makes."""
+"""Parts that somebody else describes: a URDF, a xacro file, or what one macro of such a file makes."""
 
 from __future__ import annotations
 
 import hashlib
 import re
 from dataclasses import dataclass, replace
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
-from xml.sax.saxutils import quoteattr
 
 from tfcompose.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
 from tfcompose.geometry import rpy_from_quat
-from tfcompose.load.urdf import MACRO, load_xml
+from tfcompose.load import path_named
 from tfcompose.model import BUILT_IN, Node, Process, Robot
-from tfcompose.resolve.beside import beside
 from tfcompose.resolve.isolation import topics_below
 from tfcompose.resolve.nodes import full_name
 from tfcompose.resolve.poses import pose_of
 from tfcompose.resolve.stock import with_stock
-from tfcompose.resolve.urdf import robot_of_urdf
+from tfcompose.urdf.blocks import read_block
+from tfcompose.urdf.convert import robot_of
+from tfcompose.urdf.read import read_xml
+from tfcompose.urdf.ros2_control import with_hardware
+from tfcompose.urdf.xacro import calling, macros_in
 from tfcompose.validate.part import Block
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tfcompose.plan import RosSettings
-    from tfcompose.resolve.packages import Packages
     from tfcompose.resolve.part import PartEntry
+    from tfcompose.urdf.packages import Packages
 
-_PARAMS = re.compile(r"""\bparams\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 _WORD = re.compile(r"""["']?(\w+)["']?""")
 _PACKAGE = re.compile(r"(?:package://|\$\(find(?:-pkg-share)?\s+)([A-Za-z][A-Za-z0-9_.-]*)\)?/(.+)")
 
@@ -52,23 +52,22 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
     Raises:
         RejectedError: if the file is not there, is none, or xacro refuses it.
     """
-    said = part.said
-    key = "urdf" if said.urdf is not None else "xacro"
+    spec = part.said
+    key = "urdf" if spec.urdf is not None else "xacro"
     at = part.source.at((*part.at, key))
-    file = _address(said.urdf or said.xacro or "", at, packages)
-    if said.urdf is not None:
+    file = _address(spec.urdf or spec.xacro or "", at, packages)
+    if spec.urdf is not None:
         name, text = file, read(file)
     else:
         name, text = f"{file} (expanded)", _expanded(part, file, at, packages)
-    robot, found = robot_of_urdf(load_xml(text, name), name, packages.asset)
+    robot, found = robot_of(read_xml(text, name), name, packages.asset)
     if not robot.frames:
-        macros = dict.fromkeys(MACRO.findall(read(file)))
+        macros = macros_in(read(file))
         advice = f"it defines macros; name one, as xacro: and macro: {', '.join(macros)}" if macros else ""
         raise RejectedError([finding("TF206", f"{file} has no links", at, help=advice)])
-    if any("<ros2_control" in block.text for block in robot.blocks):
-        robot = import_module("tfcompose.resolve.urdf_control").with_hardware(robot)
+    robot = with_hardware(robot)
     parents = {edge.parent for edge in robot.edges}
-    implied = frozenset(parents - robot.frames.keys()) if said.macro is not None else frozenset[str]()
+    implied = frozenset(parents - robot.frames.keys()) if spec.macro is not None else frozenset[str]()
     digest = hashlib.sha256(text.encode()).hexdigest()
     own = _with_base(replace(robot, ros=part.settings, processes=_own(part), written={"urdf": digest}))
     if part.alone and part.spec.ros.state_publisher == "stock":
@@ -86,7 +85,7 @@ def _address(named: str, at: Span, packages: Packages) -> str:
     """Return the path of a file beside the robot file, or in a package."""
     found = _PACKAGE.fullmatch(named)
     if found is None:
-        return beside(named, at)
+        return path_named(named, at)
     folder = packages.folder(found[1], at.file)
     if folder is None:
         raise RejectedError([replace(packages.not_found(found[1], at), severity="error")])
@@ -94,14 +93,14 @@ def _address(named: str, at: Span, packages: Packages) -> str:
 
 
 def _expanded(part: PartEntry, file: str, at: Span, packages: Packages) -> str:
-    disk, said = packages.disk, part.said
-    if disk is None or disk.expand is None:
+    disk, spec = packages.disk, part.said
+    if disk is None:
         raise RejectedError([finding("TF904", f"{file}: xacro files cannot be expanded here", at)])
     document = _document(part, file, packages, disk.absolute)
     try:
-        return disk.expand(file, packages, said.args, document)
+        return disk.expand(file, packages, spec.args, document)
     except RejectedError as error:
-        if said.macro is None:
+        if spec.macro is None:
             place = part.source.at((*part.at, "xacro"))
             raise RejectedError([_at(place, one) for one in error.findings]) from None
         raise RejectedError([_in_call(part, file, one, disk.read) for one in error.findings]) from None
@@ -109,18 +108,15 @@ def _expanded(part: PartEntry, file: str, at: Span, packages: Packages) -> str:
 
 def _in_call(part: PartEntry, file: str, found: Finding, read: Callable[[str], str]) -> Finding:
     """Return the finding about a call of a macro, at the parameter that it names, with what the macro takes."""
-    said, macro = part.said, part.said.macro or ""
+    macro = part.said.macro or ""
     place = part.source.at((*part.at, "macro"))
     if found.code != "TF018":
         return _at(place, found)
-    named = [word for word in _WORD.findall(found.message) if word in said.params]
-    text = read(file)
-    macros = {one[1]: text[one.start() : text.find(">", one.end())] for one in MACRO.finditer(text)}
+    named = [word for word in _WORD.findall(found.message) if word in part.said.params]
+    macros = macros_in(read(file))
     if macro in macros:
-        takes = _PARAMS.search(macros[macro])
-        names = " ".join((takes[1] or takes[2] or "").split()) if takes else ""
-        advice = f"{macro} takes {names or 'nothing'}"
-        advice += "; what begins with * is {xyz, rpy}, or XML" if "*" in names else ""
+        advice = f"{macro} takes {macros[macro] or 'nothing'}"
+        advice += "; what begins with * is {xyz, rpy}, or XML" if "*" in macros[macro] else ""
         place = part.source.at_key((*part.at, "params", named[-1])) if named else place
     else:
         advice = did_you_mean(macro, macros, f"{file} has {', '.join(macros)}" if macros else "")
@@ -137,15 +133,21 @@ def _at(place: Span, found: Finding) -> Finding:
 
 def _document(part: PartEntry, file: str, packages: Packages, absolute: Callable[[str], str]) -> str | None:
     """Return the document that calls the part's macro; None where the file itself is the robot."""
-    said = part.said
-    if said.macro is None:
+    spec = part.said
+    if spec.macro is None:
         return None
-    places = (part.source.at((*part.at, "include", index)) for index in range(len(said.include)))
-    files = [*(_address(one, place, packages) for one, place in zip(said.include, places, strict=True)), file]
-    for name, value in said.params.items():
+    places = (part.source.at((*part.at, "include", index)) for index in range(len(spec.include)))
+    files = [*(_address(one, place, packages) for one, place in zip(spec.include, places, strict=True)), file]
+    attributes, blocks = {}, []
+    for name, value in spec.params.items():
         if _is_markup(value):
             _refuse_broken(name, value, part.source.at((*part.at, "params", name)))
-    return _call(said.macro, said.params, files, absolute)
+        block = _block(value)
+        if block is None:
+            attributes[name] = _word(value)
+        else:
+            blocks.append(block)
+    return calling(spec.macro, attributes, blocks, map(absolute, files))
 
 
 def _is_markup(value: Any) -> bool:
@@ -154,20 +156,10 @@ def _is_markup(value: Any) -> bool:
 
 def _refuse_broken(name: str, text: str, at: Span) -> None:
     try:
-        load_xml(f"<block>{text}</block>", at.file)
+        read_block(text, at.file)
     except RejectedError as error:
         found = (replace(one, span=at, message=f"the block {name}: {one.message}") for one in error.findings)
         raise RejectedError(found) from None
-
-
-def _call(macro: str, params: dict[str, Any], files: list[str], absolute: Callable[[str], str]) -> str:
-    """Return a xacro document that calls the macro."""
-    blocks = [block for value in params.values() if (block := _block(value)) is not None]
-    plain = {name: value for name, value in params.items() if _block(value) is None}
-    attributes = "".join(f" {name}={quoteattr(_word(value))}" for name, value in plain.items())
-    includes = "".join(f"<xacro:include filename={quoteattr(absolute(file))}/>" for file in files)
-    call = f"<xacro:{macro}{attributes}>{''.join(blocks)}</xacro:{macro}>"
-    return f'<robot name="part" xmlns:xacro="http://www.ros.org/wiki/xacro">{includes}{call}</robot>'
 
 
 def _block(value: Any) -> str | None:

@@ -17,7 +17,7 @@ from tfcompose.resolve.filling import Filler
 if TYPE_CHECKING:
     from tfcompose.load import Source
     from tfcompose.model import Robot
-    from tfcompose.resolve.packages import Disk
+    from tfcompose.urdf.packages import Disk
     from tfcompose.validate.spec import RosSpec
 
 TF_TOPICS = ("/tf", "/tf_static")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, finding
 from tfcompose.geometry import norm
-from tfcompose.model import Dynamics, Joint, Limit, ReferencePositions, SafetyController
+from tfcompose.model import FREE, Dynamics, Joint, Limit, ReferencePositions, SafetyController
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from tfcompose.validate import Validated
     from tfcompose.validate.joints import JointSpec
 
-#: Types of which joint states say nothing: they have more than one position.
-FREE = frozenset({"planar", "floating"})
 _MOVING = "revolute, continuous or prismatic"
 #: What is said of a joint's motion, by types of joints of which it says nothing.
 _IDLE = {

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, RejectedError, finding, nearest
+from tfcompose.load import path_named
 from tfcompose.load.params import NodeParams, ParamsFile, Word, load_params
 from tfcompose.model import AsInFile
-from tfcompose.resolve.beside import beside
 from tfcompose.resolve.nodes import FILE_KEY, full_name, names_files
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ class _Work:
 
     def _said(self, file: str, at: Span, node: Node, process: Process) -> dict[str, Any]:
         """Return what a file says to the node; a file that says nothing to it is a finding."""
-        path = beside(file, at)
+        path = path_named(file, at)
         loaded = self._load(path, at)
         if loaded is None:
             return {}

@@ -10,8 +10,8 @@ from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, findi
 from tfcompose.load import Place, Source, lay_over
 from tfcompose.model import Part
 from tfcompose.plan import RosSettings
-from tfcompose.resolve.cut import below
 from tfcompose.resolve.renamed import Names, renamed
+from tfcompose.resolve.subtree import subtree
 
 if TYPE_CHECKING:
     from tfcompose.findings import Span
@@ -131,7 +131,7 @@ class PartEntry:
             raise RejectedError([finding("TF501", f"{self.prefix!r} is no good prefix", at, help=advice)])
         shared = frozenset(robot.ros.shared_frames) & robot.frames.keys() | implied
         if self.said.root is not None:
-            robot = self._cut(robot, self.said.root)
+            robot = self._subtree(robot, self.said.root)
         names = Names(self.name, self.prefix, shared, self.alone)
         again = renamed(robot, names)
         if self.said.owner is not None:
@@ -141,14 +141,14 @@ class PartEntry:
             again = replace(again, parts=(Part(self.name, self.prefix, robot), *again.parts))
         return Joined(self.name, self.said, again, self._root(robot, names), shared)
 
-    def _cut(self, robot: Robot, root: str) -> Robot:
+    def _subtree(self, robot: Robot, root: str) -> Robot:
         """Return what is below ``root``."""
         if root not in robot.frames:
             if robot.excuses(root):
                 raise RejectedError([])
             at, advice = self.source.at((*self.at, "root")), did_you_mean(root, robot.frames)
             raise RejectedError([finding("TF203", f"the part {self.name} has no frame {root}", at, help=advice)])
-        return below(robot, root)
+        return subtree(robot, root)
 
     def _root(self, robot: Robot, names: Names) -> str | None:
         """Return the frame that the holder bolts on; to have none, or several, is wrong only if it has to be one."""

@@ -11,8 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, finding
-from tfcompose.load import composed, load, with_includes
-from tfcompose.resolve.beside import beside
+from tfcompose.load import composed, load, path_named, with_includes
 from tfcompose.resolve.part import Joined, PartEntry
 from tfcompose.resolve.whole import Whole
 from tfcompose.validate import validate
@@ -23,8 +22,8 @@ if TYPE_CHECKING:
     from tfcompose.load import Source
     from tfcompose.model import Robot
     from tfcompose.resolve.library import Library
-    from tfcompose.resolve.packages import Disk, Packages
     from tfcompose.resolve.resolve import Resolved
+    from tfcompose.urdf.packages import Disk, Packages
     from tfcompose.validate import Validated
 
     Reader = Callable[[str], str]
@@ -83,7 +82,7 @@ class Parts:
 
     def _resolved(self, part: PartEntry, named: str, read: Reader) -> Robot:
         at = part.source.at((*part.at, "spec"))
-        file = beside(named, at)
+        file = path_named(named, at)
         if file in self.files:
             circle = " → ".join([*self.files[self.files.index(file) :], file])
             raise RejectedError([finding("TF015", f"robots are parts of each other: {circle}", at)])

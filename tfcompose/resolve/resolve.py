@@ -7,9 +7,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, cast
 
 from tfcompose.findings import Finding, finding
+from tfcompose.load import path_named
 from tfcompose.model import Edge, Process, Robot
 from tfcompose.plan import GuardPolicy
-from tfcompose.resolve.beside import beside
 from tfcompose.resolve.bodies import Bodies, with_colours
 from tfcompose.resolve.built_in import built_in
 from tfcompose.resolve.completed import completed
@@ -18,7 +18,6 @@ from tfcompose.resolve.idle import idle_keys
 from tfcompose.resolve.isolation import settings_of
 from tfcompose.resolve.joints import unjoined
 from tfcompose.resolve.nodes import names_files
-from tfcompose.resolve.packages import Packages
 from tfcompose.resolve.poses import Solver
 from tfcompose.resolve.presets import sensor_of
 from tfcompose.resolve.processes import name_clashes, unknown_names, user_process
@@ -26,6 +25,7 @@ from tfcompose.resolve.sensors import add_sensor
 from tfcompose.resolve.simulated import with_positions
 from tfcompose.resolve.whole import Whole
 from tfcompose.resolve.written import as_written
+from tfcompose.urdf.packages import Packages
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,10 +34,10 @@ if TYPE_CHECKING:
     from tfcompose.model import Block
     from tfcompose.plan import FenceWay, GuardMode, OnViolation, UnknownEdges
     from tfcompose.resolve.library import Library
-    from tfcompose.resolve.packages import Disk
     from tfcompose.resolve.part import Joined
     from tfcompose.resolve.parts import Parts
     from tfcompose.resolve.poses import Draft
+    from tfcompose.urdf.packages import Disk
     from tfcompose.validate import Validated
     from tfcompose.validate.spec import GuardSpec, RobotSpec
 
@@ -166,7 +166,7 @@ class _Work:
         if not self.spec.preset_path:
             return self.library
         places = [self.source.at(("preset_path", index)) for index in range(len(self.spec.preset_path))]
-        folders = [beside(folder, at) for folder, at in zip(self.spec.preset_path, places, strict=True)]
+        folders = [path_named(folder, at) for folder, at in zip(self.spec.preset_path, places, strict=True)]
         self.found += [
             finding("TF001", f"preset_path: no folder {folder}", at)
             for folder, at in zip(folders, places, strict=True)

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 from tfcompose.findings import did_you_mean, finding
 from tfcompose.geometry import Pose
 from tfcompose.model import STATIC, Edge, Link, MountedSensor
-from tfcompose.resolve.bodies import inertial_of
 from tfcompose.resolve.drivers import claims_of, driver_process
 from tfcompose.resolve.poses import Draft, rotation_of
 from tfcompose.resolve.presets import DRIVER, TFCOMPOSE
+from tfcompose.urdf.inertia import of_primitives
 
 if TYPE_CHECKING:
     from tfcompose.findings import Span
@@ -177,7 +177,7 @@ class _Mounting:
         if frame in self.drafts.links:
             return
         shape = self.drafts.bodies.shape(body.shape, ("sensors", self.sensor.name))
-        inertial = inertial_of(body.mass, (shape,)) if body.mass and not shape.mesh else None
+        inertial = of_primitives(body.mass, (shape,)) if body.mass and not shape.mesh else None
         self.drafts.links[frame] = Link(frame, self.place(), (shape,), (shape,), inertial)
 
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.load.urdf import load_xml
-from tfcompose.resolve.blocks import references
+from tfcompose.urdf.blocks import read_block, unknown_references
 
 if TYPE_CHECKING:
-    from tfcompose.load.urdf import Element
     from tfcompose.model import Robot
+    from tfcompose.urdf.read import Element
 
 #: ros2_control is not among them: with a joint that is not there it does not start.
 _IDLE = ("<gazebo", "<transmission")
@@ -21,8 +20,8 @@ def without_idle_blocks(robot: Robot) -> tuple[Robot, list[str]]:
     joints = {edge.joint_name: None for edge in robot.edges}
     blocks, notes = [], []
     for block in robot.blocks:
-        (element,) = load_xml(f"<robot>{block.text}</robot>", robot.file).children
-        missing = list(references(element, robot.frames, joints)) if block.text.startswith(_IDLE) else []
+        (element,) = read_block(block.text, robot.file).children
+        missing = list(unknown_references(element, robot.frames, joints)) if block.text.startswith(_IDLE) else []
         if missing:
             notes.append(f"left out: {_called(element)}: {missing[0].message}")
         else:

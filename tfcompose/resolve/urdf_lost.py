@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.geometry import normalised, quat_from_rpy
-from tfcompose.resolve.urdf_words import OPAQUE
+from tfcompose.urdf.schema import OPAQUE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from tfcompose.findings import Finding, Span
     from tfcompose.geometry import Quaternion, Vector
     from tfcompose.imported import Entry
-    from tfcompose.load.urdf import Element
     from tfcompose.model import Robot
+    from tfcompose.urdf.read import Element
 
 #: Known attributes that nothing here holds.
 _NOT_HELD = {

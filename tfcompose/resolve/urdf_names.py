@@ -6,7 +6,7 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.resolve.bodies import materials
+from tfcompose.model import materials
 
 if TYPE_CHECKING:
     from tfcompose.model import Link, Material, Robot, Shape

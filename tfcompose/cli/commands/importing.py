@@ -17,25 +17,25 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.compiling import library
 from tfcompose.cli.disk import disk
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings, read_text, unreadable
-from tfcompose.cli.urdf import read_urdf
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit.spec import robot_name, spec
 from tfcompose.files import Target
 from tfcompose.findings import RejectedError, Span
 from tfcompose.imported import Imported
-from tfcompose.resolve.packages import Packages
 from tfcompose.resolve.recognise import recognised
-from tfcompose.resolve.urdf_control import with_hardware
 from tfcompose.resolve.urdf_idle import without_idle_blocks
 from tfcompose.resolve.urdf_lost import angles, lost
 from tfcompose.resolve.urdf_names import with_material_names
+from tfcompose.urdf.lint import read_urdf
+from tfcompose.urdf.packages import Packages
+from tfcompose.urdf.ros2_control import with_hardware
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from collections.abc import Iterable
 
-    from tfcompose.cli.urdf import Read
     from tfcompose.findings import Finding
+    from tfcompose.urdf.lint import Document
 
 _ROBOT = re.compile(r"[a-z][a-z0-9_]*")
 
@@ -70,12 +70,13 @@ def run(arguments: Namespace) -> int:
         return 2
     try:
         named = {name: (str(Path(folder).absolute()), Span(folder)) for name, folder in packages.items()}
-        known = Packages(disk(), named, otherwise="--package {name}=FOLDER, or source the workspace's setup file")
-        read = read_urdf(arguments.file, known, given)
+        files = disk()
+        known = Packages(files, named, otherwise="--package {name}=FOLDER, or source the workspace's setup file")
+        read = read_urdf(arguments.file, known, files, given)
     except RejectedError as error:
         print_findings(error.findings, sys.stderr)
         return UNREADABLE if unreadable(error.findings) else 1
-    errors = [one for one in read.judged() if one.severity == "error"]
+    errors = [one for one in read.findings() if one.severity == "error"]
     print_findings(errors, sys.stderr)
     if errors and not arguments.keep_going:
         complain("nothing was written; --keep-going writes what can be taken")
@@ -106,7 +107,7 @@ def _refusal(arguments: Namespace) -> str:
     return ""
 
 
-def _written(read: Read, arguments: Namespace, packages: dict[str, str]) -> tuple[str, list[Finding]]:
+def _written(read: Document, arguments: Namespace, packages: dict[str, str]) -> tuple[str, list[Finding]]:
     """Return the robot file, and the errors that it has where the source has none."""
     robot, idle = without_idle_blocks(with_hardware(read.robot))
     robot, renamed = with_material_names(robot)

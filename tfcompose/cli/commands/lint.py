@@ -75,11 +75,20 @@ def run(arguments: Namespace) -> int:
         for file in files:
             found += lint_file(file, presets, arguments)
     for file in urdfs:
-        found += import_module("tfcompose.cli.urdf").lint_urdf(file)
+        found += _urdf_findings(file)
     _print(found, arguments.format, len(files) + len(urdfs))
     if unreadable(found):
         return UNREADABLE
     return int(any(one.severity == "error" or arguments.fail_on == "warning" for one in found))
+
+
+def _urdf_findings(file: str) -> list[Finding]:
+    """Return what is wrong with a URDF or xacro file; what reads them is loaded only here."""
+    from tfcompose.urdf.lint import lint_urdf
+    from tfcompose.urdf.packages import Packages
+
+    files = disk()
+    return lint_urdf(file, Packages(files, otherwise="source the workspace's setup file"), files)
 
 
 def _fixed(fixer: Fixer, form: str) -> list[Finding]:

@@ -1,27 +1,25 @@
-"""Lint a URDF, or a xacro file, that tfcompose did not write; places are those of that file."""
+"""What is wrong with a URDF, or a xacro file, that tfcompose did not write; places are those of that file."""
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.check import RULES, apply, check, unused_allows
-from tfcompose.cli.disk import disk
-from tfcompose.cli.terminal import read_text
-from tfcompose.cli.xacro import expanded
 from tfcompose.findings import Finding, RejectedError, Span, finding
-from tfcompose.load.comments import allows_in_xml
-from tfcompose.load.urdf import MACRO, load_xml
-from tfcompose.resolve.packages import Packages
-from tfcompose.resolve.urdf import robot_of_urdf
+from tfcompose.load import allows_in_xml
+from tfcompose.urdf.convert import robot_of
+from tfcompose.urdf.read import read_xml
+from tfcompose.urdf.ros2_control import with_hardware
+from tfcompose.urdf.xacro import macros_in
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from tfcompose.load.urdf import Element
     from tfcompose.model import Robot
+    from tfcompose.urdf.packages import Disk, Packages
+    from tfcompose.urdf.read import Element
 
 _RULES = tuple(rule for rule in RULES.values() if rule.of_urdf)
 
@@ -42,17 +40,17 @@ _HELP = {
 }
 
 
-def lint_urdf(file: str) -> list[Finding]:
+def lint_urdf(file: str, packages: Packages, disk: Disk) -> list[Finding]:
     """Return what is wrong with the file, by place. A xacro file is expanded, and places are those of the result."""
     try:
-        read = read_urdf(file, Packages(disk(), otherwise="source the workspace's setup file"))
+        document = read_urdf(file, packages, disk)
     except RejectedError as error:
         return list(error.findings)
-    return read.judged()
+    return document.findings()
 
 
 @dataclass(frozen=True, slots=True)
-class Read:
+class Document:
     """A URDF that was read: its elements, the robot that it describes, and what was found by reading it."""
 
     name: str
@@ -61,40 +59,37 @@ class Read:
     robot: Robot
     found: tuple[Finding, ...]
 
-    def judged(self) -> list[Finding]:
-        """Return what is wrong with it, by place, but for what its comments let stand."""
+    def findings(self) -> list[Finding]:
+        """Return what is wrong with it, by place, but for what its comments allow."""
         allows = allows_in_xml(self.text, self.name)
-        robot = self.robot
-        if any("<ros2_control" in block.text for block in robot.blocks):
-            robot = import_module("tfcompose.resolve.urdf_control").with_hardware(robot)
-        said = (_said(one) for one in check(robot, _RULES))
-        kept, used = apply(dict.fromkeys([*self.found, *said]), allows)
+        ruled = (_in_words_of_urdf(one) for one in check(with_hardware(self.robot), _RULES))
+        kept, used = apply(dict.fromkeys([*self.found, *ruled]), allows)
         return sorted([*kept, *unused_allows(allows, used)], key=lambda one: one.sort_key)
 
 
-def read_urdf(file: str, packages: Packages, arguments: Mapping[str, str] | None = None) -> Read:
-    """Return what the file says; a xacro file, by its name or by what is in it, is expanded, with arguments.
+def read_urdf(file: str, packages: Packages, disk: Disk, arguments: Mapping[str, str] | None = None) -> Document:
+    """Return what the file holds; a xacro file, by its name or by what is in it, is expanded, with arguments.
 
     Raises:
         RejectedError: if it cannot be read, or is no URDF; or takes no arguments, and is given some.
     """
-    written = read_text(file)
-    is_xacro = file.endswith(".xacro") or "<xacro:" in written
+    raw = disk.read(file)
+    is_xacro = file.endswith(".xacro") or "<xacro:" in raw
     if arguments and not is_xacro:
         advice = "xacro files take arguments"
         raise RejectedError([finding("TF106", f"no argument {next(iter(arguments))}", Span(file), help=advice)])
-    name, text = (f"{file} (expanded)", expanded(file, packages, arguments)) if is_xacro else (file, written)
-    root = load_xml(text, name)
-    robot, found = robot_of_urdf(root, name, packages.asset)
-    macros = MACRO.findall(written) if is_xacro and not robot.frames else []
+    name, text = (f"{file} (expanded)", disk.expand(file, packages, arguments or {}, None)) if is_xacro else (file, raw)
+    root = read_xml(text, name)
+    robot, found = robot_of(root, name, packages.asset)
+    macros = list(macros_in(raw)) if is_xacro and not robot.frames else []
     if macros:
         advice = f"a part can call one: parts: {{NAME: {{xacro: {file}, macro: {macros[0]}, …}}}}"
-        message = f"{file} defines macros, and no links: {', '.join(dict.fromkeys(macros))}"
+        message = f"{file} defines macros, and no links: {', '.join(macros)}"
         raise RejectedError([finding("TF206", message, Span(file), help=advice)])
-    return Read(name, text, root, robot, found)
+    return Document(name, text, root, robot, found)
 
 
-def _said(found: Finding) -> Finding:
+def _in_words_of_urdf(found: Finding) -> Finding:
     """Return the finding with its advice in URDF's words."""
     if found.help.startswith("did you mean"):
         return found

@@ -8,18 +8,18 @@ from __future__ import annotations
 import posixpath
 import re
 from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote
 
-from tfcompose.findings import Finding, Span, finding, nearest, slip_of
+from tfcompose.findings import Finding, RejectedError, Span, finding, nearest, slip_of
+from tfcompose.load import path_named
 from tfcompose.model import Asset
-from tfcompose.resolve.beside import beside
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from tfcompose.geometry import Vector
-    from tfcompose.resolve.moments import Moments
+    from tfcompose.urdf.inertia import Moments
 
 _PACKAGE_NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://")
@@ -28,6 +28,10 @@ _MEANT = re.compile(r"(?:(?:file://)?\$\(find(?:-pkg-share)?\s+([\w.-]+)\s*\)|pa
 _NEAR = 0.8  # many packages end in _description
 FETCH = "git lfs pull fetches the file itself"
 _HIGHEST = 12  # so many folders above a file its package.xml is looked for
+
+
+def _not_expanded(file: str, *_: object) -> str:
+    raise RejectedError([finding("TF904", "xacro files cannot be expanded here", Span(file))])
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,22 +48,9 @@ class Disk:
     is_folder: Callable[[str], bool]
     prefixes: tuple[str, ...] = ()
     moments: Callable[[str, Vector], Moments] | None = None
-    expand: Callable[[str, Packages, Mapping[str, Any], str | None], str] | None = None
+    expand: Callable[[str, Packages, Mapping[str, Any], str | None], str] = _not_expanded
     absolute: Callable[[str], str] = str
     is_pointer: Callable[[str], bool] = lambda _: False
-
-
-class UnmeasurableError(Exception):
-    """A mesh has no volume, or it cannot be read: code, message and help of the finding."""
-
-    def __init__(self, code: str, message: str, advice: str) -> None:
-        self.code, self.advice = code, advice
-        super().__init__(message)
-
-
-def _unquoted(text: str) -> str:
-    """Return the text with ``%20`` and its like as what they stand for."""
-    return str(import_module("urllib.parse").unquote(text)) if "%" in text else text
 
 
 @dataclass(slots=True)
@@ -79,7 +70,7 @@ class Packages:
 
     def places(self, name: str) -> list[str]:
         """Return where a package of that name would be, in the order of looking."""
-        own = [beside(*self.named[name])] if name in self.named else []
+        own = [path_named(*self.named[name])] if name in self.named else []
         return own + [posixpath.join(prefix, "share", name) for prefix in (self.disk.prefixes if self.disk else ())]
 
     def folder(self, name: str, file: str) -> str | None:
@@ -113,16 +104,16 @@ class Packages:
             return self._in_package(uri, at)
         if scheme and scheme[1] != "file":
             return Asset(uri, at), None
-        path = _unquoted(uri[scheme.end() :]) if scheme else uri
+        path = unquote(uri[scheme.end() :]) if scheme else uri
         if scheme and not path.startswith("/"):
             wrong = f"{uri} is no address of a file"
             return Asset(uri, at), finding("TF723", wrong, at, help="file:// and an absolute path have three slashes")
-        path = posixpath.normpath(path) if path.startswith("/") else beside(path, at)
+        path = posixpath.normpath(path) if path.startswith("/") else path_named(path, at)
         package, inside = self._package_above(path)
         return Asset(uri, at, path, package, inside), self._missing(path, f"no file {uri}", at)
 
     def _in_package(self, uri: str, at: Span) -> tuple[Asset, Finding | None]:
-        name, _, inside = _unquoted(uri.partition("://")[2]).partition("/")
+        name, _, inside = unquote(uri.partition("://")[2]).partition("/")
         if not name or not inside:
             advice = f"a slash too many: package://{inside}" if "/" in inside else "package://NAME/PATH"
             return Asset(uri, at), finding("TF723", f"{uri} is no address of a file", at, help=advice)

@@ -1,4 +1,4 @@
-"""The elements and attributes of URDF, and a finding for each that is none.
+"""The words of URDF: its elements, attributes, shapes and types of joints; and a finding for each word that is none.
 
 Source: the URDF XML specification of ROS (link, joint, robot). What stands in transmissions, Gazebo and ros2_control
 blocks is not looked at.
@@ -9,14 +9,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, finding, nearest, slip_of
+from tfcompose.model import FREE, MOVING
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.load.urdf import Element
+    from tfcompose.urdf.read import Element
+
+JOINT_TYPES = (*MOVING, "fixed", *FREE)
 
 #: Each element with its attributes and the elements in it.
-WORDS: dict[str, tuple[str, str]] = {
+ELEMENTS: dict[str, tuple[str, str]] = {
     "robot": ("name version", "link joint material transmission gazebo ros2_control sensor"),
     "link": ("name type", "inertial visual collision"),
     "inertial": ("", "origin mass inertia"),
@@ -44,11 +47,25 @@ WORDS: dict[str, tuple[str, str]] = {
     "calibration": ("rising falling reference_position", ""),
     "safety_controller": ("soft_lower_limit soft_upper_limit k_position k_velocity", ""),
 }
-#: A word that is so near to a known one is a misspelt one.
-_MISSPELT = 0.8
-#: Words of xacro that URDF does not have.
-_XACRO = frozenset({"insert_block", "include", "property", "if", "unless", "macro"})
+
+#: The components of a tensor, in the order in which ``Inertial`` holds them.
+MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+#: Of each primitive shape the attributes that give its size, each with how many numbers it has.
+SIZES: dict[str, tuple[tuple[str, int], ...]] = {
+    "box": (("size", 3),),
+    "cylinder": (("radius", 1), ("length", 1)),
+    "sphere": (("radius", 1),),
+    "capsule": (("radius", 1), ("length", 1)),
+}
+
+#: What may stand beside links, joints and materials, and is other programs' business.
 OPAQUE = frozenset({"transmission", "gazebo", "ros2_control", "sensor"})
+
+#: Elements of xacro that URDF does not have.
+_XACRO = frozenset({"insert_block", "include", "property", "if", "unless", "macro"})
+#: A word as near as this to a known one is taken for a misspelling of it.
+_MISSPELT = 0.8
 
 
 def unknown_words(root: Element) -> Iterator[Finding]:
@@ -59,7 +76,7 @@ def unknown_words(root: Element) -> Iterator[Finding]:
     waiting = [root]
     while waiting:
         element = waiting.pop()
-        attributes, inside = (words.split() for words in WORDS[element.tag])
+        attributes, inside = (words.split() for words in ELEMENTS[element.tag])
         for name in element.attributes:
             if name not in attributes and ":" not in name and name != "xmlns":
                 yield _unknown(f"attribute {name} of <{element.tag}>", name, attributes, element, name)
@@ -73,7 +90,7 @@ def unknown_words(root: Element) -> Iterator[Finding]:
 
 
 def _unexpanded(element: Element) -> Finding:
-    """Return the finding about what xacro should have replaced, and what readers pass over."""
+    """Return the finding about an element that xacro should have replaced: readers of URDF ignore it."""
     if element.tag in _XACRO:
         message = f"<{element.tag}> is xacro's, and without its prefix nobody expands it"
         return finding("TF720", message, element.at, help=f"<xacro:{element.tag} …>")
@@ -81,9 +98,9 @@ def _unexpanded(element: Element) -> Finding:
     return finding("TF720", f"<{element.tag}> was not expanded", element.at, help=advice)
 
 
-def _unknown(what: str, word: str, known: list[str], at: Element, attribute: str = "") -> Finding:
+def _unknown(what: str, word: str, known: list[str], element: Element, attribute: str = "") -> Finding:
     near = nearest(word, known)
     advice = f"did you mean {near}?" if near else f"known here: {', '.join(known)}" if known else "nothing stands here"
-    place = at.place(attribute) if attribute else at.at
+    at = element.at_value(attribute) if attribute else element.at
     wrong = near and (slip_of(word, known) or nearest(word, known, _MISSPELT))
-    return finding("TF720", f"unknown {what}", place, help=advice, severity="error" if wrong else "warning")
+    return finding("TF720", f"unknown {what}", at, help=advice, severity="error" if wrong else "warning")

@@ -1,4 +1,4 @@
-"""Volumes, centres and moments of inertia of solids of density 1; their sum for what is made of several.
+"""Volumes, centres and moments of inertia of solids of density 1, their sum, and what follows at another density.
 
 Moments about the centre of mass, V the volume: box V/12 (b² + c²); cylinder along z V/12 (3r² + l²) and V r²/2; sphere
 2/5 V r². A capsule is a cylinder C and two half spheres S whose centres of mass are 3/8 r outside its ends: along z
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tfcompose.geometry import Pose, matrix_from_quat, normalised, rotate
+from tfcompose.model import Inertial
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -19,9 +20,19 @@ if TYPE_CHECKING:
     from tfcompose.geometry import Vector
     from tfcompose.model import Shape
 
-_UNMOVED = Pose()
-
 Tensor = tuple[float, float, float, float, float, float]
+
+_UNMOVED = Pose()
+#: What computing leaves of a product of inertia that is 0, as a part of the trace.
+_NOISE = 1e-15
+
+
+class UnmeasurableError(Exception):
+    """A mesh has no volume, or it cannot be read: code, message and help of the finding."""
+
+    def __init__(self, code: str, message: str, advice: str) -> None:
+        self.code, self.advice = code, advice
+        super().__init__(message)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +84,7 @@ def joined(parts: Sequence[Moments]) -> Moments:
 
 
 def of_primitive(shape: Shape) -> Moments:
-    """Return the moments of a box, cylinder, sphere or capsule in its own axes.
+    """Return the moments of a box, cylinder, sphere or capsule in the axes that its pose is given in.
 
     Raises:
         ValueError: for a mesh, whose file would have to be read.
@@ -81,7 +92,35 @@ def of_primitive(shape: Shape) -> Moments:
     if shape.kind == "mesh":
         raise ValueError("a mesh is no primitive")
     volume, (x, y, z) = _SOLIDS[shape.kind](*shape.size)
-    return Moments(volume, (0.0, 0.0, 0.0), (x, 0.0, 0.0, y, 0.0, z))
+    return Moments(volume, (0.0, 0.0, 0.0), (x, 0.0, 0.0, y, 0.0, z)).at(shape.pose)
+
+
+def inertial(moments: Moments, density: float, mass: float | None = None) -> Inertial:
+    """Return the inertia of a solid of this density (kg/m³), in the axes of its moments.
+
+    ``mass`` (kg) is what the density follows from, if it does: computed back it would be off by a rounding.
+    """
+    noise = density * _NOISE * trace(moments.tensor)
+    xx, xy, xz, yy, yz, zz = (density * value for value in moments.tensor)
+    xy, xz, yz = (value if abs(value) > noise else 0.0 for value in (xy, xz, yz))
+    return Inertial(mass or density * moments.volume, Pose(moments.centre), (xx, xy, xz, yy, yz, zz))
+
+
+def of_primitives(mass: float, shapes: Sequence[Shape]) -> Inertial:
+    """Return the inertia of a body of this mass (kg) and of one density, in the axes of its shapes' poses."""
+    moments = joined([of_primitive(shape) for shape in shapes])
+    return inertial(moments, mass / moments.volume, mass)
+
+
+def trace(tensor: Tensor) -> float:
+    """Return the sum of the principal moments, which is the same in all axes."""
+    return tensor[0] + tensor[3] + tensor[5]
+
+
+def traces(mass: float, *bodies: tuple[Shape, ...]) -> tuple[float, ...]:
+    """Return of each body of primitives the trace that its tensor would have at this mass and one density."""
+    primitives = [shapes for shapes in bodies if shapes and not any(shape.mesh for shape in shapes)]
+    return tuple(trace(of_primitives(mass, shapes).tensor) for shapes in primitives)
 
 
 def _box(x: float, y: float, z: float) -> tuple[float, Vector]:

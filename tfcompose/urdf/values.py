@@ -1,4 +1,4 @@
-"""The values of a URDF's attributes."""
+"""Attributes of a URDF as texts, numbers and poses, with a finding for each value that is none."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from tfcompose.geometry import Pose, normalised, quat_from_rpy, rpy_from_quat
 if TYPE_CHECKING:
     from tfcompose.catalogue import Severity
     from tfcompose.geometry import Quaternion
-    from tfcompose.load.urdf import Element
+    from tfcompose.urdf.read import Element
 
-
-#: Beyond this, products of four such numbers leave the range of floats.
+#: Products of three smaller numbers stay in the range of floats.
 HUGE = 1e30
 
 
@@ -36,11 +35,11 @@ class Values:
         self.found.append(finding("TF721", message, at, help=advice, severity=severity))
         self.refused += severity == "error"
 
-    def text(self, element: Element, name: str, sample: str) -> str:
+    def text(self, element: Element, name: str, example: str) -> str:
         """Return an attribute that must be there, or an empty text."""
         value = element.attributes.get(name, "")
         if not value:
-            self.refuse(f"<{element.tag}> has no {name}", element.at, f"for example {sample}")
+            self.refuse(f"<{element.tag}> has no {name}", element.at, f"for example {example}")
         return value
 
     def numbers(self, element: Element | None, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
@@ -55,14 +54,14 @@ class Values:
         if len(values) != len(default) or not all(map(math.isfinite, values)):
             count = "a number" if len(default) == 1 else f"{len(default)} numbers"
             text = element.attributes[name]
-            self.refuse(f"{name}={text!r} is not {count}", element.place(name), _advice(text, len(default)))
+            self.refuse(f"{name}={text!r} is not {count}", element.at_value(name), _advice(text, len(default)))
             return default
         if max(map(abs, values)) > HUGE:
-            self.refuse(f"{name} is beyond what can be computed with", element.place(name))
+            self.refuse(f"{name} is beyond what can be computed with", element.at_value(name))
             return default
-        if element.has_broken_values and re.search(r"[\t\r\n]", element.written(name).lstrip()):
+        if element.has_broken_values and re.search(r"[\t\r\n]", element.raw_value(name).lstrip()):
             message = f"a tab or a line break in the numbers of {name}"
-            self.refuse(message, element.place(name), "a space: readers of ROS refuse the robot for it", "warning")
+            self.refuse(message, element.at_value(name), "a space: readers of ROS refuse the robot for it", "warning")
         return values
 
     def number(self, element: Element | None, name: str, default: Any = None) -> Any:
@@ -81,7 +80,7 @@ class Values:
             return self.number(element, name)  # type: ignore[no-any-return]  # a number, or None
         taken = math.copysign(HUGE, value)
         message = f"{name} is beyond what can be computed with: {taken:g} is taken"
-        self.refuse(message, element.place(name), "such a limit is none", "warning")
+        self.refuse(message, element.at_value(name), "such a limit is none", "warning")
         return taken
 
     def pose(self, parent: Element) -> Pose:
@@ -92,13 +91,13 @@ class Values:
             return Pose((x, y, z), self._quaternion(origin))
         roll, pitch, yaw = self.numbers(origin, "rpy", (0.0, 0.0, 0.0))
         if max(map(abs, (roll, pitch, yaw))) > 1e9:  # noqa: PLR2004 (no angle has so many turns, and none is left of it)
-            self.refuse("this rpy is no angle", origin.place("rpy") if origin else parent.at)
+            self.refuse("this rpy is no angle", origin.at_value("rpy") if origin else parent.at)
             return Pose((x, y, z))
         return Pose((x, y, z), normalised(quat_from_rpy(roll, pitch, yaw)))
 
     def _quaternion(self, origin: Element) -> Quaternion:
         """Return the rotation that is given as a quaternion, which URDF has from version 1.1 on."""
-        before, at = self.refused, origin.place("quat_xyzw")
+        before, at = self.refused, origin.at_value("quat_xyzw")
         x, y, z, w = self.numbers(origin, "quat_xyzw", (0.0, 0.0, 0.0, 1.0))
         if not any((x, y, z, w)):
             self.refuse("this quaternion is no rotation", at, "no rotation at all is 0 0 0 1")
@@ -114,17 +113,17 @@ class Values:
 
 
 def version_of(root: Element, values: Values) -> tuple[int, ...]:
-    """Return the version of URDF that the document says it is; a finding where readers of ROS 2 Jazzy refuse it."""
-    said = root.attributes.get("version", "1.0")
-    numbers = tuple(map(int, said.split("."))) if re.fullmatch(r"\d{1,4}\.\d{1,4}", said) else ()
-    if numbers != (1, 0):
-        at = root.place("version")
-        if numbers:
-            message = f"readers of ROS 2 Jazzy refuse version {said}: they know 1.0 only"
+    """Return the version of URDF that the document declares; a finding where readers of ROS 2 Jazzy refuse it."""
+    text = root.attributes.get("version", "1.0")
+    version = tuple(map(int, text.split("."))) if re.fullmatch(r"\d{1,4}\.\d{1,4}", text) else ()
+    if version != (1, 0):
+        at = root.at_value("version")
+        if version:
+            message = f"readers of ROS 2 Jazzy refuse version {text}: they know 1.0 only"
             values.refuse(message, at, "leave it out, if nothing here needs it", "warning")
         else:
-            values.refuse(f"{said!r} is no version", at, 'version="1.0"')
-    return numbers
+            values.refuse(f"{text!r} is no version", at, 'version="1.0"')
+    return version
 
 
 def _advice(text: str, count: int) -> str:

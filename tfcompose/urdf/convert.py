@@ -1,0 +1,323 @@
+"""From the elements of a URDF to a robot, with the places of that file; whatever is wrong with it is a finding."""
+
+from __future__ import annotations
+
+import html
+import math
+import re
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, finding
+from tfcompose.geometry import norm
+from tfcompose.model import (
+    FREE,
+    JOINTS,
+    MOVING,
+    STATIC,
+    Asset,
+    Block,
+    Dynamics,
+    Edge,
+    Inertial,
+    Joint,
+    Limit,
+    Link,
+    Material,
+    ReferencePositions,
+    Robot,
+    SafetyController,
+    Shape,
+    colour_name,
+)
+from tfcompose.urdf.blocks import REFERRING, unknown_references
+from tfcompose.urdf.inertia import traces
+from tfcompose.urdf.schema import JOINT_TYPES, MOMENTS, SIZES, unknown_words
+from tfcompose.urdf.values import HUGE, Values, version_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from tfcompose.catalogue import Severity
+    from tfcompose.findings import Span
+    from tfcompose.geometry import Vector
+    from tfcompose.urdf.read import Element
+
+    #: Takes the address of a file and its place; returns the file, and what is wrong with the address, if anything is.
+    Finder = Callable[[str, Span], tuple[Asset, Finding | None]]
+
+#: What links and joints are made of; everything else beside them is kept as it stands.
+_CONVERTED = frozenset({"link", "joint", "material"})
+
+T = TypeVar("T", Dynamics, Limit, ReferencePositions, SafetyController)
+#: Their numbers say how far or how much at the most: one that is endless only says nothing.
+_BOUNDS = (Limit, SafetyController)
+
+
+def robot_of(root: Element, file: str, find: Finder) -> tuple[Robot, tuple[Finding, ...]]:
+    """Return the robot that the URDF describes, right or wrong, and what was found while reading it.
+
+    ``find`` looks for the files of meshes and textures.
+
+    Raises:
+        RejectedError: if it is no URDF.
+    """
+    if root.tag != "robot":
+        message = f"the document is <{root.tag}>, not <robot>"
+        raise RejectedError([finding("TF018", message, root.at, help="a URDF begins with <robot name=…>")])
+    values = Values()
+    values.has_quaternions = version_of(root, values) >= (1, 1)
+    bodies = _Bodies(values, find, root)
+    name = values.text(root, "name", '<robot name="rover">')
+    links = _by_name(root.all("link"), values)
+    joints = root.all("joint")
+    _by_name(joints, values)
+    _by_name([one for one in root.all("material") if one.attributes.get("name")], values, "warning")
+    edges = [edge for element in joints if (edge := _edge(element, values))]
+    frames = {link: element.at_value("name") for link, element in links.items()}
+    names = {edge.joint_name: None for edge in edges}
+    for element in root.children:
+        if element.tag in REFERRING:
+            values.found += [replace(one, severity="warning") for one in unknown_references(element, frames, names)]
+    robot = Robot(
+        name=name,
+        file=file,
+        frames=frames,
+        edges=tuple(edges),
+        links={link: bodies.link(link, element) for link, element in links.items()},
+        processes=(),
+        base=None,
+        blocks=tuple(_blocks(root)),
+        foreign=frozenset({file}),
+    )
+    return robot, (*values.found, *bodies.found, *unknown_words(root))
+
+
+def _by_name(elements: list[Element], values: Values, severity: Severity = "error") -> dict[str, Element]:
+    """Return the elements by their names; a second one of a name is a finding."""
+    known: dict[str, Element] = {}
+    for element in elements:
+        name = values.text(element, "name", f'<{element.tag} name="…">')
+        if name in known:
+            note = Note("it stands here first", known[name].at_value("name"))
+            message = f"two {element.tag}s have the name {name}"
+            advice = "remove it: readers of ROS refuse the robot"
+            advice = "another name for one of them" if severity == "error" else advice
+            at = element.at_value("name")
+            values.found.append(finding("TF722", message, at, notes=[note], help=advice, severity=severity))
+        elif name:
+            known[name] = element
+    return known
+
+
+def _blocks(root: Element) -> Iterator[Block]:
+    """Yield what stands beside links and joints, each element by its tag and number."""
+    counts: dict[str, int] = {}
+    for element in root.children:
+        if element.tag not in _CONVERTED:
+            counts[element.tag] = counts.get(element.tag, 0) + 1
+            name = f"{element.tag.replace(':', '_')}_{counts[element.tag]}"
+            yield Block(name, element.at, _with_namespaces(element, root))
+
+
+def _with_namespaces(element: Element, root: Element) -> str:
+    """Return the element as it stands in the text, with the namespaces that it takes from the root."""
+    raw = element.raw
+    spaces = {name: value for name, value in root.attributes.items() if name.startswith("xmlns:")}
+    used = [name for name in spaces if re.search(rf"[<\s]{re.escape(name[6:])}:", raw)]
+    more = "".join(f' {name}="{html.escape(spaces[name])}"' for name in used if name not in element.attributes)
+    begin = 1 + len(element.tag)
+    return raw[:begin] + more + raw[begin:]
+
+
+def _edge(element: Element, values: Values) -> Edge | None:
+    """Return the edge that a joint is, or None where it has no parent or no child."""
+    name, kind = element.attributes.get("name", ""), values.text(element, "type", 'type="fixed"')
+    if kind and kind not in JOINT_TYPES:
+        advice = did_you_mean(kind, JOINT_TYPES, f"one of: {', '.join(JOINT_TYPES)}")
+        values.refuse(f"there is no joint type {kind}", element.at_value("type"), advice)
+    ends = {}
+    for tag in ("parent", "child"):
+        end = element.first(tag)
+        if end is None:
+            values.refuse(f"the joint {name} has no {tag}", element.at, f'<{tag} link="…"/>')
+        elif values.text(end, "link", f'<{tag} link="…"/>'):
+            ends[tag] = end
+    joint = _joint(name, kind, element, values) if kind in MOVING or kind in FREE else None
+    if len(ends) < 2:  # noqa: PLR2004 (parent and child)
+        return None
+    free = kind in FREE
+    return Edge(
+        parent=ends["parent"].attributes["link"],
+        child=ends["child"].attributes["link"],
+        kind="dynamic" if free else "joint" if joint else "static",
+        pose=values.pose(element),
+        owner=JOINTS if joint and not free else STATIC,
+        at=ends["parent"].at_value("link"),
+        joint=None if free else joint,
+        free=joint if free else None,
+        joint_name=name,
+        joint_at=element.at_value("name"),
+        child_at=ends["child"].at_value("link"),
+    )
+
+
+def _joint(name: str, kind: Any, element: Element, values: Values) -> Joint:
+    x, y, z = values.numbers(element.first("axis"), "xyz", (1.0, 0.0, 0.0))
+    length = norm((x, y, z))
+    if not 0 < length < math.inf:
+        at = (element.first("axis") or element).at_value("xyz")
+        values.refuse(f"the axis of {name} has no direction", at, '<axis xyz="0 0 1"/>')
+        x, y, z, length = 1.0, 0.0, 0.0, 1.0
+    axis: Vector = (x / length, y / length, z / length)
+    mimic = element.first("mimic")
+    joint = Joint(name, kind, element.at_value("name"), axis, axis_length=length)
+    if mimic is not None:
+        master = values.text(mimic, "joint", '<mimic joint="…"/>')
+        multiplier, offset = values.number(mimic, "multiplier", 1.0), values.number(mimic, "offset", 0.0)
+        joint = replace(joint, mimic=master or None, multiplier=multiplier, offset=offset)
+    return replace(
+        joint,
+        limit=_limit(name, element.first("limit"), values),
+        dynamics=_numbers(Dynamics, element.first("dynamics"), values),
+        safety=_safety(name, element.first("safety_controller"), values),
+        reference=_numbers(ReferencePositions, element.first("calibration"), values),
+    )
+
+
+def _limit(name: str, element: Element | None, values: Values) -> Limit | None:
+    for key in ("effort", "velocity"):
+        if element is not None and key not in element.attributes:
+            values.refuse(f"the limit of {name} has no {key}", element.at, f'URDF requires it: {key}="1"')
+    return _numbers(Limit, element, values)
+
+
+def _safety(name: str, element: Element | None, values: Values) -> SafetyController | None:
+    if element is not None and "k_velocity" not in element.attributes:
+        message = f"the safety_controller of {name} has no k_velocity"
+        values.refuse(message, element.at, 'URDF requires it: k_velocity="10"')
+    return _numbers(SafetyController, element, values)
+
+
+def _numbers(cls: type[T], element: Element | None, values: Values) -> T | None:
+    """Return the object whose fields are the element's attributes; those that are missing have their defaults."""
+    if element is None:
+        return None
+    read = values.bound if cls in _BOUNDS else values.number
+    given = {name: read(element, name) for name in cls.__slots__}
+    return cls(**{name: value for name, value in given.items() if value is not None})
+
+
+@dataclass(slots=True)
+class _Bodies:
+    """Reads the links of a document; ``found`` holds what is wrong with their files."""
+
+    values: Values
+    find: Finder
+    root: Element
+    found: list[Finding] = field(default_factory=list)
+    _materials: dict[str, Material | None] = field(default_factory=dict)
+
+    def link(self, name: str, element: Element) -> Link:
+        """Return the body."""
+        visuals = tuple(shape for one in element.all("visual") for shape in self._shapes(one))
+        collisions = tuple(shape for one in element.all("collision") for shape in self._shapes(one))
+        inertial = element.first("inertial")
+        body = self._inertial(name, inertial, visuals, collisions) if inertial is not None else None
+        return Link(name, element.at_value("name"), visuals, collisions, body)
+
+    def _shapes(self, element: Element) -> list[Shape]:
+        geometry = element.first("geometry")
+        if geometry is None or not geometry.children:
+            advice = '<geometry><box size="1 1 1"/></geometry>'
+            self.values.refuse(f"a {element.tag} without a geometry", (geometry or element).at, advice)
+            return []
+        shapes = []
+        for form in geometry.children:
+            if form.tag == "mesh":
+                shapes += self._mesh(element, form)
+            elif form.tag in SIZES:
+                shapes += self._primitive(element, form)
+        return shapes
+
+    def _primitive(self, element: Element, form: Element) -> list[Shape]:
+        size: list[float] = []
+        before = self.values.refused
+        for key, count in SIZES[form.tag]:
+            if key not in form.attributes:
+                self.values.refuse(f"<{form.tag}> has no {key}", form.at)
+                return []
+            size += self.values.numbers(form, key, (0.0,) * count)
+        if self.values.refused > before:
+            return []
+        if not all(0 < value < HUGE for value in size):
+            at = form.at_value(SIZES[form.tag][0][0])
+            severity: Severity = "warning" if min(size) == 0 and max(size) < HUGE else "error"
+            advice = "give it a size, or remove it: some readers see nothing, others refuse the robot"
+            message = f"a {form.tag} of size {' '.join(f'{value:g}' for value in size)}"
+            self.values.refuse(message, at, advice, severity)
+            return []
+        if form.tag == "capsule":
+            message, advice = "readers of ROS 2 Jazzy refuse a robot with a <capsule>", "a cylinder and two spheres"
+            self.values.refuse(message, form.at, advice, "warning")
+        kind: Any = form.tag
+        return [Shape(kind, tuple(size), self.values.pose(element), self._material(element))]
+
+    def _mesh(self, element: Element, form: Element) -> list[Shape]:
+        name = self.values.text(form, "filename", '<mesh filename="package://…"/>')
+        if not name:
+            return []
+        x, y, z = self.values.numbers(form, "scale", (1.0, 1.0, 1.0))
+        asset = self._asset(name, form.at_value("filename"))
+        return [Shape("mesh", (x, y, z), self.values.pose(element), self._material(element), asset)]
+
+    def _asset(self, name: str, at: Span) -> Asset:
+        asset, wrong = self.find(name, at)
+        if wrong:
+            self.found.append(wrong)
+        return asset
+
+    def _material(self, element: Element) -> Material | None:
+        """Return the colour or texture of a visual; one that is only named is described elsewhere in the document."""
+        material = element.first("material")
+        if material is None:
+            return None
+        name = material.attributes.get("name", "")
+        return self._described(name, material) or (self._named(name) if name else None)
+
+    def _named(self, name: str) -> Material | None:
+        if name not in self._materials:
+            visuals = [one for link in self.root.all("link") for one in link.all("visual")]
+            everywhere = [material for around in (self.root, *visuals) for material in around.all("material")]
+            described = (self._described(name, one) for one in everywhere if one.attributes.get("name") == name)
+            self._materials[name] = next((one for one in described if one), None)
+        return self._materials[name]
+
+    def _described(self, name: str, material: Element) -> Material | None:
+        colour, texture = material.first("color"), material.first("texture")
+        if colour is None and texture is None:
+            return None
+        red, green, blue, opacity = self.values.numbers(colour, "rgba", (0.5, 0.5, 0.5, 1.0))
+        file = texture.attributes.get("filename") if texture is not None else None
+        image = self._asset(file, texture.at_value("filename")) if texture is not None and file else None
+        rgba = (red, green, blue, opacity) if colour is not None else None
+        return Material(name or colour_name(rgba or ()), rgba, image, material.at)
+
+    def _inertial(
+        self, name: str, element: Element, visuals: tuple[Shape, ...], collisions: tuple[Shape, ...]
+    ) -> Inertial | None:
+        weight, tensor = element.first("mass"), element.first("inertia")
+        if weight is None or tensor is None:
+            missing = "mass" if weight is None else "inertia"
+            self.values.refuse(f"the inertial of {name} has no {missing}", element.at, f"<{missing} …/>")
+            return None
+        self.values.text(weight, "value", '<mass value="1.5"/>')
+        mass = self.values.number(weight, "value", 0.0)
+        if not 0 < mass < HUGE:
+            severity: Severity = "warning" if mass == 0 else "error"
+            advice = "in kg, greater than 0; a link without a body has no inertial"
+            self.values.refuse(f"the mass of {name} is {mass:g} kg", weight.at_value("value"), advice, severity)
+            return None
+        xx, xy, xz, yy, yz, zz = (self.values.number(tensor, key, 0.0) for key in MOMENTS)
+        of_shapes = traces(mass, visuals, collisions)
+        return Inertial(mass, self.values.pose(element), (xx, xy, xz, yy, yz, zz), of_shapes, tensor.at)

@@ -1,0 +1,218 @@
+"""Xacro files, expanded by xacro itself; what xacro refuses is a finding at its place in the xacro file.
+
+xacro names the expression and the macros that it stopped at, and neither line nor column: they are looked for here.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import xacro
+from xacro import substitution_args
+
+from tfcompose.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Mapping
+
+    from tfcompose.urdf.packages import Packages
+
+#: How a file declares an argument, and how it asks for one.
+_ARGUMENT = re.compile(r"""<xacro:arg\b[^>]*?\bname\s*=\s*["']([^"']+)["']|\$\(arg\s+(\w+)\s*\)""")
+#: What xacro's messages name, and how that begins in a file.
+_NAMED = (
+    (re.compile(r"when evaluating expression '(.+)'"), r"\$\{{\s*{}\s*\}}"),
+    (re.compile(r"unknown macro name: (xacro:\S+)"), r"<{}(?=[\s/>])"),
+)
+#: At most so many of the macros around an error are named.
+_MOST_MACROS = 5
+
+
+def expand(file: str, packages: Packages, arguments: Mapping[str, Any], text: str | None = None) -> str:
+    """Return the URDF that xacro makes of a file, or of a ``text`` that stands for it; ``packages`` answer $(find …).
+
+    Raises:
+        RejectedError: if xacro refuses the file.
+    """
+    given = {name: str(value) for name, value in arguments.items()}
+    try:
+        xacro.all_includes.clear()
+        with _finding_in(packages, file):
+            document = _processed(file, text, given)
+        _refuse_unknown(given, [file, *xacro.all_includes], file)
+        _raise_comments(document)
+        result: str = document.toprettyxml(indent="  ")
+    except RejectedError:
+        raise
+    except Exception as error:  # noqa: BLE001 (xacro evaluates Python: anything can come out of it)
+        raise RejectedError([_refused(error, file)]) from None
+    return result
+
+
+def _processed(file: str, text: str | None, arguments: dict[str, str]) -> Any:
+    """Return the DOM document that xacro makes."""
+    if text is None:
+        return xacro.process_file(file, mappings=arguments)
+    document = xacro.parse(text, file)
+    xacro.init_stacks(file)  # relative includes begin beside the file
+    xacro.process_doc(document, mappings=arguments)
+    return document
+
+
+class _MissingError(LookupError):
+    """A package is not to be found; ``found`` says where it was looked for."""
+
+    def __init__(self, found: Finding) -> None:
+        super().__init__(found.message)
+        self.found = found
+
+
+@contextlib.contextmanager
+def _finding_in(packages: Packages, file: str) -> Iterator[None]:
+    """Let $(find NAME) be answered by the robot's packages too, for as long as ``file`` is expanded."""
+    before = substitution_args._eval_find  # noqa: SLF001 (xacro offers no other way)
+
+    def find(name: str) -> str:
+        folder = packages.folder(name, file)
+        if folder is None:
+            raise _MissingError(packages.not_found(name, None))
+        return str(Path(folder).absolute())  # relative paths in xacro begin at the file that includes
+
+    substitution_args._eval_find = find  # noqa: SLF001 (as above)
+    try:
+        yield
+    finally:
+        substitution_args._eval_find = before  # noqa: SLF001 (as above)
+
+
+def _refuse_unknown(given: Mapping[str, str], files: list[str], file: str) -> None:
+    """Refuse arguments that none of the files declares or asks for; xacro itself ignores them."""
+    texts = [Path(name).read_text("utf-8", "replace") for name in files]
+    known = dict.fromkeys(
+        name for text in texts for found in _ARGUMENT.finditer(text) for name in found.groups() if name
+    )
+    wrong = [name for name in given if name not in known]
+    if wrong:
+        raise RejectedError([_no_argument(name, known, file) for name in wrong])
+
+
+def _no_argument(name: str, known: Collection[str], file: str) -> Finding:
+    there = f"there is {', '.join(known)}" if known else "it takes none"
+    return finding("TF106", f"no argument {name}", Span(file), help=did_you_mean(name, known, there))
+
+
+def _raise_comments(node: Any) -> None:
+    """Put comments that allow findings above the tag on whose line they stood: printing gives each its own line."""
+    for child in list(node.childNodes):
+        _raise_comments(child)
+        before = child.previousSibling
+        if child.nodeType != child.COMMENT_NODE or "tfcompose:" not in child.data or before is None:
+            continue
+        if before.nodeType == child.TEXT_NODE and ("\n" in before.data or before.data.strip()):
+            continue
+        while before is not None and before.nodeType != child.ELEMENT_NODE:
+            before = before.previousSibling
+        over = before or node
+        over.parentNode.insertBefore(child, over)
+
+
+def _refused(error: Exception, file: str) -> Finding:
+    """Return what xacro, or something that it called, did not like, and where, or in which other file."""
+    chain: list[Any] = [error]
+    while getattr(chain[-1], "exc", None) is not None:  # xacro wraps what it calls, again and again
+        chain.append(chain[-1].exc)
+    root = chain[-1]
+    if isinstance(root, _MissingError):
+        return replace(root.found, severity="error", span=Span(file))
+    if type(root).__name__ == "ArgException":
+        message = f"the argument {root} has no value: the file gives it none"
+        return finding("TF106", message, Span(file), help=f"{root}:=…; of a part, args: {{{root}: …}}")
+    reason = _reason(chain) or type(error).__name__
+    found = finding("TF018", f"xacro: {reason}", Span(file))
+    files, macros = list(xacro.filestack or ()), list(xacro.macrostack or ())
+    placed = _seen_from(file, _placed(found, root, files, macros))
+    others = [name for name in files[-1:] if name and Path(name).absolute() != Path(file).absolute()]
+    if others and placed.span == found.span:
+        return replace(placed, message=f"{placed.message} (in {os.path.relpath(others[0])})")
+    return placed
+
+
+def _reason(chain: list[Any]) -> str:
+    """Return in one line what a chain of exceptions says; the last one is what the others are about."""
+    root = chain[-1]
+    if isinstance(root, OSError):
+        words = [f"{root.strerror}: {root.filename}"]
+    else:
+        heads = [str(one.args[0]) for one in chain[:-1] if one.args and one.args[0]]
+        own = str(root) if hasattr(root, "suffix") or "line" in str(root) else f"{type(root).__name__}: {root}"
+        words = [*(head for head in heads if str(root) not in head), own]
+        words += [str(one.suffix) for one in reversed(chain[:-1]) if getattr(one, "suffix", None)]
+    return " ".join(" ".join(words).split())
+
+
+def _placed(found: Finding, error: Any, files: list[str], macros: list[Any]) -> Finding:
+    """Return the finding at the words that it is about, with notes about the macros that were expanded then.
+
+    ``files`` are those that were being read, the innermost last, and so are ``macros``. The finding stays where it is
+    if the words are not to be found. Places are in the files as xacro names them.
+    """
+    files = [file for file in files if file]
+    around = dict.fromkeys((macro.body.getAttribute("name"), macro.history[-1][-1]) for macro in reversed(macros))
+    inner = [(name, begin) for name, file in around if (begin := _definition(file, name))]
+    notes = [Note(f"in the macro {name}", at) for name, at in inner[:_MOST_MACROS]]
+    if getattr(error, "lineno", None) is not None and files:  # an ExpatError; its columns count from 0
+        line, column = error.lineno, error.offset + 1
+        at: Span | None = Span(files[-1], line, column, line, column + 1)
+    else:
+        begins = [(macro.file, macro.line) for _, macro in inner] + [(file, 0) for file in reversed(files)]
+        at = next((word for file, line in begins for word in _named_at(found.message, file, line)), found.span)
+    return replace(found, span=at, notes=(*found.notes, *notes))
+
+
+def _definition(file: str | None, macro: str) -> Span | None:
+    """Return where a file defines a macro, or None."""
+    return _first(file, rf"""<xacro:macro\s[^>]*?\bname\s*=\s*["'](?:xacro:)?{re.escape(macro)}["']""", 0)
+
+
+def _named_at(message: str, file: str, line: int) -> Iterator[Span]:
+    """Yield where the file has what the message names, from a line on."""
+    for naming, pattern in _NAMED:
+        for found in naming.finditer(message):
+            words = r"\s+".join(re.escape(word) for word in found[1].split())
+            at = _first(file, pattern.format(words), line)
+            if at:
+                yield at
+
+
+def _first(file: str | None, pattern: str, line: int) -> Span | None:
+    """Return the first place of the pattern in the file from a line on, or None."""
+    if not file:
+        return None
+    text = Path(file).read_text("utf-8", "replace")
+    start = sum(map(len, text.splitlines(keepends=True)[: max(line - 1, 0)]))
+    found = re.compile(pattern).search(text, start)
+    if found is None:
+        return None
+    return Span(file, *_position(text, found.start()), *_position(text, found.end()))
+
+
+def _position(text: str, index: int) -> tuple[int, int]:
+    return text.count("\n", 0, index) + 1, index - text.rfind("\n", 0, index)
+
+
+def _seen_from(file: str, found: Finding) -> Finding:
+    """Return the finding with its places in files as seen from the working folder, and ``file`` as it is named."""
+
+    def shown(span: Span | None) -> Span | None:
+        if span is None or span.file == file:
+            return span
+        same = Path(span.file).absolute() == Path(file).absolute()
+        return span._replace(file=file if same else os.path.relpath(span.file))
+
+    notes = tuple(replace(note, span=shown(note.span)) for note in found.notes)
+    return replace(found, span=shown(found.span), notes=notes)

@@ -21,7 +21,7 @@ from tests.domains import reserved_domain
 from tests.support import processes
 from tests.waiting import TIMEOUT_S, until
 from tfcompose.geometry import Pose
-from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.plan.file import write_plan
 from tfcompose.ros.environment import missing_ros
 
@@ -184,7 +184,7 @@ def edge() -> Callable[..., PlanEdge]:
         parent, child = names.split()
         kind = "joint" if joint else "static" if owner == "static" else "dynamic"
         node = f"/rover/{owner}"
-        source = ("rover.yaml", 1)
+        source = SourceLine("rover.yaml", 1)
         return PlanEdge(parent, child, kind, owner, node, pose or Pose(), None, source, joint)  # type: ignore[arg-type]
 
     return make

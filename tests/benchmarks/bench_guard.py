@@ -18,7 +18,7 @@ import psutil
 import pytest
 
 from tfcompose.geometry import Pose
-from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.plan.file import write_plan
 
 EDGES, TOGETHER, HERTZ = 1000, 100, 50.0
@@ -47,7 +47,9 @@ with open_node("owner", "/bench") as node:
 def plan() -> Plan:
     """Return the plan whose edges the owner sends."""
     edges = tuple(
-        PlanEdge("base", f"frame_{n}_link", "dynamic", "owner", "/bench/owner", Pose(), HERTZ, ("bench.yaml", n))
+        PlanEdge(
+            "base", f"frame_{n}_link", "dynamic", "owner", "/bench/owner", Pose(), HERTZ, SourceLine("bench.yaml", n)
+        )
         for n in range(EDGES)
     )
     owns = tuple((edge.parent, edge.child) for edge in edges)

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tfcompose.geometry import Pose
-from tfcompose.plan import Joint, Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.plan import Joint, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.plan.file import write_plan
 
 if TYPE_CHECKING:
@@ -67,8 +67,8 @@ def plan_file(folder: Path, joints: int) -> Path:
     """Write the plan of a robot with so many joints."""
     edges = tuple(
         PlanEdge(
-            f"link_{n}", f"link_{n + 1}", "joint", "joints", "/rover/joints", Pose((0.1, 0.0, 0.2)), None, ("r", 1),
-            Joint(f"joint_{n}", "revolute", (0.0, 0.0, 1.0)),
+            f"link_{n}", f"link_{n + 1}", "joint", "joints", "/rover/joints", Pose((0.1, 0.0, 0.2)), None,
+            SourceLine("r", 1), Joint(f"joint_{n}", "revolute", (0.0, 0.0, 1.0)),
         )
         for n in range(joints)
     )  # fmt: skip

@@ -10,7 +10,7 @@ from tfcompose.cli import main
 from tfcompose.cli.live_graph import graph_of_censuses
 from tfcompose.geometry import Pose
 from tfcompose.observe.census import Census, Publisher
-from tfcompose.plan import Plan, PlanEdge, RosSettings
+from tfcompose.plan import Plan, PlanEdge, RosSettings, SourceLine
 
 SECOND = 1_000_000_000
 
@@ -47,8 +47,8 @@ def test_poses_stand_below_and_a_rotation_that_is_none_is_said(census: Census) -
 
 def test_what_the_plan_expects_and_nobody_publishes_is_said_to_be_missing(census: Census) -> None:
     edges = (
-        PlanEdge("odom", "base", "dynamic", "drive", "/drive", Pose(), 1.0, ("rover.yaml", 1)),
-        PlanEdge("base", "imu", "static", "static", "/static", Pose(), None, ("rover.yaml", 2)),
+        PlanEdge("odom", "base", "dynamic", "drive", "/drive", Pose(), 1.0, SourceLine("rover.yaml", 1)),
+        PlanEdge("base", "imu", "static", "static", "/static", Pose(), None, SourceLine("rover.yaml", 2)),
     )
     plan = Plan("rover", "0", "base", RosSettings(), edges, ())
     graph = graph_of_censuses([census], "rover", plan)

@@ -24,7 +24,7 @@ from tfcompose.cli.printable import coloured_only, plain
 from tfcompose.cli.status import Status
 from tfcompose.findings import finding
 from tfcompose.geometry import Pose
-from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.plan.file import write_plan
 from tfcompose.run.launcher.notice import Ended, FindingShown, LogLine, OwnerLive, ProcessState, Stopping
 
@@ -53,7 +53,7 @@ sys.exit(code)
 
 
 def plan_of(*names: str, owner: str = "") -> Plan:
-    edge = PlanEdge("base_link", "lidar", "static", owner, f"/{owner}", Pose(), None, ("r.yaml", 1))
+    edge = PlanEdge("base_link", "lidar", "static", owner, f"/{owner}", Pose(), None, SourceLine("r.yaml", 1))
     processes = [PlanProcess(name, "run", owns=((edge.parent, edge.child),) * (name == owner)) for name in names]
     return Plan("rover", "", None, RosSettings(), (edge,) if owner else (), tuple(processes))
 

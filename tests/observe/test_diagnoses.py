@@ -13,7 +13,7 @@ from tfcompose.observe.diagnose import diagnose
 from tfcompose.observe.diagnose.surroundings import differences
 from tfcompose.observe.joint_list import joints_of
 from tfcompose.observe.seen import RosProcess, Seen, Stamped, Topic
-from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.plan import EdgePattern, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.ros.settings import RANGE
 from tfcompose.verdict.clock import seconds
 
@@ -74,8 +74,10 @@ def plan(*edges: PlanEdge, **more: Any) -> Plan:
 
 
 def planned() -> tuple[PlanEdge, ...]:
-    moving = PlanEdge("odom", "base_link", "dynamic", "drive", "/drive", Pose(), 50.0, ("rover.yaml", 7))
-    return moving, PlanEdge("base_link", "laser", "static", "static", "/static", Pose(), None, ("rover.yaml", 9))
+    moving = PlanEdge("odom", "base_link", "dynamic", "drive", "/drive", Pose(), 50.0, SourceLine("rover.yaml", 7))
+    return moving, PlanEdge(
+        "base_link", "laser", "static", "static", "/static", Pose(), None, SourceLine("rover.yaml", 9)
+    )
 
 
 def messages(seen: Seen) -> dict[str, str]:
@@ -408,7 +410,9 @@ def test_processes_with_other_settings_are_not_looked_for_where_there_is_tf_belo
 
 
 def test_edges_that_a_plan_allows_or_that_are_another_robots_are_no_finding() -> None:
-    seen = robot().moving("base_link tag_1", b"x").seen(plan=plan(guard=GuardPolicy(allow=(("*", "tag_*"),))))
+    seen = (
+        robot().moving("base_link tag_1", b"x").seen(plan=plan(guard=GuardPolicy(allow=(EdgePattern("*", "tag_*"),))))
+    )
     assert messages(seen) == {}
 
 

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.observe.census import Census, Publisher
 from tfcompose.observe.verify import verify
-from tfcompose.plan import Driven, GuardPolicy, Joint, Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.plan import Driven, EdgePattern, GuardPolicy, Joint, Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.ros.topics import parts_of
 from tfcompose.verdict.offset import Offset, offset_of
 
@@ -125,7 +125,7 @@ def test_an_edge_that_nobody_declared_counts_as_the_policy_says(
 
 def test_an_allowed_edge_is_not_told(plan: Plan, tree: Tree) -> None:
     tree.sent["tag_1"] = {"parent": "lens", "node": OTHER, "rate": 10.0}
-    assert tree.told(replace(plan, guard=GuardPolicy(allow=(("lens", "tag_*"),)))) == []
+    assert tree.told(replace(plan, guard=GuardPolicy(allow=(EdgePattern("lens", "tag_*"),)))) == []
 
 
 def test_a_frame_under_another_parent_is_told(plan: Plan, tree: Tree) -> None:

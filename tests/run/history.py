@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from tfcompose.geometry import Pose
-from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.run.launcher.action import Action, Finish, Kill, Order, Start, Tell, TellLate
 from tfcompose.run.launcher.happening import Begin, Event, Started, Tick
 from tfcompose.run.launcher.machine import step
@@ -29,7 +29,7 @@ SLAM = PlanProcess("slam", "run", owns=(("map", "odom"),))
 
 
 def edge(parent: str, child: str, owner: str) -> PlanEdge:
-    return PlanEdge(parent, child, "static", owner, f"/{owner}", Pose(), None, ("robot.yaml", 1))
+    return PlanEdge(parent, child, "static", owner, f"/{owner}", Pose(), None, SourceLine("robot.yaml", 1))
 
 
 def plan_of(*processes: PlanProcess, guard: GuardPolicy | None = None) -> Plan:

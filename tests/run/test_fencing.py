@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tfcompose.geometry import Pose
-from tfcompose.plan import FenceWay, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.plan import FenceWay, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.ros.environment import child_environment
 from tfcompose.run.fenced import REMAPPED, private_topics
 from tfcompose.run.launcher.launch_wrapper import LAUNCH
@@ -33,7 +33,7 @@ SLAM = PlanProcess("slam", "run", argv=("true",), nodes=("/slam",), owns=(("map"
 
 def plan_of(*processes: PlanProcess, fence: FenceWay = "auto") -> Plan:
     edges = tuple(
-        PlanEdge(parent, child, "dynamic", one.name, f"/{one.name}", Pose(), None, ("rover.yaml", 1))
+        PlanEdge(parent, child, "dynamic", one.name, f"/{one.name}", Pose(), None, SourceLine("rover.yaml", 1))
         for one in processes
         for parent, child in one.owns
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tfcompose.geometry import Pose
-from tfcompose.plan import Plan, PlanEdge, PlanProcess, Ready, RosSettings, Simulation
+from tfcompose.plan import Plan, PlanEdge, PlanProcess, Ready, RosSettings, Simulation, SourceLine
 from tfcompose.plan.file import write_plan
 from tfcompose.run.launcher.notice import AllReady, FindingShown, Notice, ProcessReady
 from tfcompose.run.launcher.supervisor import supervise
@@ -74,7 +74,7 @@ def simulated(ready: Ready) -> PlanProcess:
 def run(tmp_path: Path, *processes: PlanProcess, late: int = 0) -> list[Notice]:
     """Run the plan until all are ready, or as many gates were said to stay shut."""
     edges = tuple(
-        PlanEdge(parent, child, "dynamic", one.name, one.nodes[0], Pose(), None, ("robot.yaml", 1))
+        PlanEdge(parent, child, "dynamic", one.name, one.nodes[0], Pose(), None, SourceLine("robot.yaml", 1))
         for one in processes
         for parent, child in one.owns
     )

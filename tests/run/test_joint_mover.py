@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from tfcompose.geometry import Pose, angle_between, normalised
-from tfcompose.plan import Joint, PlanEdge
+from tfcompose.plan import Joint, PlanEdge, SourceLine
 from tfcompose.ros.joint_message import encode_names, fill
 from tfcompose.ros.message import Transform, decode
 from tfcompose.run.publishing.joint_mover import JointMover, Told
@@ -48,7 +48,7 @@ class Robot:
 
 
 def joint_edge(joint: Joint, pose: Pose | None = None, child: str = "") -> PlanEdge:
-    source = ("rover.yaml", 1)
+    source = SourceLine("rover.yaml", 1)
     return PlanEdge("base", child or joint.name, "joint", "joints", "/joints", pose or Pose(), None, source, joint)
 
 

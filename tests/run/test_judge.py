@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.run.watched import FIXED, LOOK_S, SETTLE_S, History, Publisher
-from tfcompose.plan import GuardPolicy
+from tfcompose.plan import EdgePattern, GuardPolicy
 from tfcompose.run.events import Clear, Complete, Found, Live, OwnerReady, Recovered
 
 
@@ -46,7 +46,7 @@ def test_a_restarted_owner_is_right_also_while_its_old_publisher_is_still_in_the
 
 
 def test_an_owner_may_send_other_edges_that_are_allowed() -> None:
-    running = History(GuardPolicy(unknown_edges="error", allow=(("map", "goal_*"),))).clear()
+    running = History(GuardPolicy(unknown_edges="error", allow=(EdgePattern("map", "goal_*"),))).clear()
     running.repeat(running.joins("/slam"), "map odom, map goal_1", 5)
     assert running.said() == []
 
@@ -168,7 +168,7 @@ def test_an_undeclared_edge_is_reported_as_the_policy_says(policy: str, severiti
 
 
 def test_only_undeclared_edges_that_no_pattern_allows_are_reported() -> None:
-    running = History(GuardPolicy(allow=(("map", "person_*"),))).clear()
+    running = History(GuardPolicy(allow=(EdgePattern("map", "person_*"),))).clear()
     tracker = running.joins("/tracker")
     running.repeat(tracker, "map person_1, odom person_2, map person", 3)
     (found,) = running.found()

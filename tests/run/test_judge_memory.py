@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tests.run.watched import EDGES, FIXED, History, edge, wall
 from tfcompose.geometry import Pose
-from tfcompose.plan import Claim, GuardPolicy, PlanEdge, PlanProcess
+from tfcompose.plan import Claim, EdgePattern, GuardPolicy, PlanEdge, PlanProcess, SourceLine
 from tfcompose.run.events import Clear, Found, Live, Recovered
 from tfcompose.run.guard.health import statuses
 from tfcompose.run.guard.judge import Writer
@@ -22,7 +22,7 @@ def test_remembered_verdicts_are_those_that_would_be_given_anew(sends: list[tupl
     """The same history, judged with and without memory of what was judged before."""
     said = []
     for forgets in (False, True):
-        running = History(GuardPolicy(allow=(("map", "person"),))).clear()
+        running = History(GuardPolicy(allow=(EdgePattern("map", "person"),))).clear()
         senders = {
             "s": (running.joins("/slam"), "map odom"),
             "d": (running.joins("/drive"), "odom base, map person"),
@@ -41,7 +41,8 @@ def test_remembered_verdicts_are_those_that_would_be_given_anew(sends: list[tupl
 
 def test_edges_that_waited_for_a_name_share_a_history_all_the_same(running: History) -> None:
     rates = tuple(
-        PlanEdge("base", f"part_{n}", "dynamic", "drive", "/drive", Pose(), 10.0, ("r.yaml", 1)) for n in range(99)
+        PlanEdge("base", f"part_{n}", "dynamic", "drive", "/drive", Pose(), 10.0, SourceLine("r.yaml", 1))
+        for n in range(99)
     )
     running = History(edges=rates).clear()
     drive, names = running.joins(None), ", ".join(f"base part_{n}" for n in range(99))

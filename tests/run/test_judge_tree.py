@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from tests.run.watched import EDGES, PROCESSES, SETTLE_S, TOOL, History
-from tfcompose.plan import GuardPolicy, Plan, RosSettings
+from tfcompose.plan import EdgePattern, GuardPolicy, Plan, RosSettings
 from tfcompose.run.events import Found, Recovered, Taken
 from tfcompose.run.guard.judge import Judge, Writer
 
@@ -31,7 +31,9 @@ def test_another_node_may_not_publish_a_switched_edge_on_any_of_its_parents() ->
     assert "/rogue" in history.found()[0].message
 
 
-@pytest.mark.parametrize("policy", [GuardPolicy(), GuardPolicy(allow=(("*", "*"),)), GuardPolicy("watch", "ignore")])
+@pytest.mark.parametrize(
+    "policy", [GuardPolicy(), GuardPolicy(allow=(EdgePattern("*", "*"),)), GuardPolicy("watch", "ignore")]
+)
 def test_an_edge_that_closes_a_loop_is_an_error_whatever_is_allowed_and_the_loop_is_named(policy: GuardPolicy) -> None:
     running = History(policy).clear()
     running.repeat(running.joins("/rogue"), "base map", 5)
@@ -56,7 +58,7 @@ def test_a_loop_through_several_strangers_is_found_when_the_last_edge_comes(runn
 
 
 def test_a_loop_among_frames_of_others_is_not_the_robots_business_where_these_are_allowed() -> None:
-    running = History(GuardPolicy(allow=(("cup", "saucer"), ("saucer", "cup")))).clear()
+    running = History(GuardPolicy(allow=(EdgePattern("cup", "saucer"), EdgePattern("saucer", "cup")))).clear()
     running.repeat(running.joins("/waiter"), "cup saucer, saucer cup", 10)
     assert running.said() == []
 
@@ -96,7 +98,7 @@ def test_a_frame_in_itself_is_said_to_be_dropped_and_is_no_second_parent(running
 
 
 def test_two_nodes_that_publish_one_allowed_frame_are_named(running: History) -> None:
-    running = History(GuardPolicy(allow=(("*", "person_*"),))).clear()
+    running = History(GuardPolicy(allow=(EdgePattern("*", "person_*"),))).clear()
     a, b = running.joins("/a"), running.joins("/b")
     for _ in range(10):
         running.send(a, "map person_1").send(b, "odom person_1").wait(0.1)
@@ -107,7 +109,7 @@ def test_two_nodes_that_publish_one_allowed_frame_are_named(running: History) ->
 
 
 def test_a_node_that_was_started_anew_is_no_second_writer() -> None:
-    running = History(GuardPolicy(allow=(("*", "person_*"),))).clear()
+    running = History(GuardPolicy(allow=(EdgePattern("*", "person_*"),))).clear()
     for _ in range(3):
         tracker = running.joins("/tracker")
         running.repeat(tracker, "map person_1", 5).leaves(tracker)

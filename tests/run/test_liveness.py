@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tfcompose.geometry import Pose
-from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.run.events import Complete, Found, GuardEvent, Live, OwnerReady, Recovered, from_line, to_line
 from tfcompose.run.guard.liveness import Liveness
 
@@ -24,7 +24,7 @@ LOOK_S = 0.1
 
 def edge(names: str, owner: str, rate: float | None = None, kind: EdgeKind = "dynamic") -> PlanEdge:
     parent, child = names.split()
-    return PlanEdge(parent, child, kind, owner, f"/{owner}", Pose(), rate, ("rover.yaml", 3))
+    return PlanEdge(parent, child, kind, owner, f"/{owner}", Pose(), rate, SourceLine("rover.yaml", 3))
 
 
 @dataclass

@@ -47,7 +47,7 @@ def test_a_process_that_the_plan_does_not_have_is_refused(write: Callable[..., P
 
 def test_a_simulation_without_a_rate_is_refused(write: Callable[..., Path]) -> None:
     file = str(write([], PlanProcess("body", "simulate", simulate=Simulation("fixed", 0.0))))
-    with pytest.raises(RejectedError, match="rate above 0"):
+    with pytest.raises(RejectedError, match=r"processes\[0\]\.simulate\.rate"):
         read_own([file, "body"], "simulate")
 
 

@@ -7,7 +7,7 @@ from math import nan
 import pytest
 
 from tfcompose.geometry import OPTICAL_XYZW, Pose, multiply, quat_from_rpy
-from tfcompose.plan import Driven, Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.plan import Driven, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.run.events import Found
 from tfcompose.run.guard.senders import Message, Senders, Writer
 from tfcompose.run.guard.sent_poses import SentPoses
@@ -20,8 +20,8 @@ PLAN = Plan(
     "base",
     RosSettings(),
     (
-        PlanEdge("link", "lens", "static", "front", "/front/front", LENS, None, ("r.yaml", 1)),
-        PlanEdge("lens", "optical", "static", "front", "/front/front", OPTICAL, None, ("r.yaml", 1)),
+        PlanEdge("link", "lens", "static", "front", "/front/front", LENS, None, SourceLine("r.yaml", 1)),
+        PlanEdge("lens", "optical", "static", "front", "/front/front", OPTICAL, None, SourceLine("r.yaml", 1)),
     ),
     (PlanProcess("front", "run", nodes=("/front/front",), drives=(DRIVEN,)),),
 )

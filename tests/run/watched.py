@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.geometry import Pose
-from tfcompose.plan import Claim, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
+from tfcompose.plan import Claim, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.run.events import Clear, Found, GuardEvent, Taken
 from tfcompose.run.guard.judge import Judge, Message, Writer
 
@@ -24,7 +24,7 @@ SETTLE_S = 1.0
 
 def edge(names: str, owner: str, kind: EdgeKind = "dynamic", rate: float | None = None) -> PlanEdge:
     parent, child = names.split()
-    return PlanEdge(parent, child, kind, owner, f"/{owner}", Pose(), rate, ("rover.yaml", 7))
+    return PlanEdge(parent, child, kind, owner, f"/{owner}", Pose(), rate, SourceLine("rover.yaml", 7))
 
 
 EDGES = (
@@ -83,7 +83,7 @@ class History:
 
     def __post_init__(self) -> None:
         settings = RosSettings(clock=self.clock)
-        plan = Plan("rover", "0", "base", settings, self.edges, self.processes, self.guard, self.claims)
+        plan = Plan("rover", "0", "base", settings, self.edges, self.processes, self.guard, claims=self.claims)
         self.judge = Judge(plan, self.settle_s, self.now, self.wall_ns(), says_who=self.says_who)
         self.looked = self.now
 

@@ -15,7 +15,7 @@ from tfcompose.emit.params import written_params
 from tfcompose.files import AS_WRITTEN, Target
 from tfcompose.model import JOINTS, STATIC
 from tfcompose.numbers import clean
-from tfcompose.plan import DESCRIPTION, Claim, Joint, Plan, PlanEdge, PlanProcess, switch_text
+from tfcompose.plan import DESCRIPTION, Claim, Joint, Plan, PlanEdge, PlanProcess, SourceLine, switch_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -106,7 +106,7 @@ def _edge(edge: Edge, node: str, file: str, prefix: str) -> PlanEdge:
         node=node,
         pose=clean(edge.pose),
         rate=edge.rate,
-        source=(file, edge.at.line),
+        source=SourceLine(file, edge.at.line),
         joint=joint,
         switched=edge.switched,
     )

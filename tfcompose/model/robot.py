@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import slip_of
-from tfcompose.plan import GuardPolicy, RosSettings
+from tfcompose.plan import EdgePattern, GuardPolicy, RosSettings
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -103,8 +103,8 @@ class Robot:
             return self
         final = self.final
         allow = tuple(
-            (final(parent) if parent in self.frames else parent, final(child) if child in self.frames else child)
-            for parent, child in self.guard.allow
+            EdgePattern(*(final(pattern) if pattern in self.frames else pattern for pattern in edge))
+            for edge in self.guard.allow
         )
         return replace(
             self,

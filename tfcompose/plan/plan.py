@@ -6,9 +6,10 @@ import json
 import re
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
-from typing import Any
+from typing import Annotated, Any, Literal, NamedTuple
 
-from tfcompose.geometry import Pose
+from tfcompose.geometry import Pose, norm
+from tfcompose.plan.codec import FLAT, OMITTED, Rule
 from tfcompose.plan.words import (  # noqa: TC001 (plan.json is read by these types)
     Clock,
     Discovery,
@@ -34,6 +35,36 @@ SILENT_AT_LEAST_S = 0.6
 SILENT_PERIODS = 4.0
 #: It is too slow below this part of the rate that is declared.
 SLOW_BELOW = 0.8
+
+
+def _unit_quaternion(pose: Pose) -> None:
+    if abs(norm(pose.quat_xyzw) - 1) > 1e-6:  # noqa: PLR2004 (what was written is normalised to the last bit)
+        raise ValueError("has a quat_xyzw that is not a unit quaternion")
+
+
+def _above_0(value: float) -> None:
+    if value <= 0:
+        raise ValueError(f"is {value:g}, not above 0")
+
+
+#: A pose as it is read from a plan.
+UnitPose = Annotated[Pose, Rule(_unit_quaternion)]
+#: A time or rate.
+AboveZero = Annotated[float, Rule(_above_0, {"exclusiveMinimum": 0})]
+
+
+class SourceLine(NamedTuple):
+    """A line of a robot file; the file is relative to the robot's."""
+
+    file: str
+    line: int
+
+
+class EdgePattern(NamedTuple):
+    """Edges by the names of their frames, in which ``*`` and ``?`` are wildcards."""
+
+    parent: str
+    child: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +95,11 @@ class PlanEdge:
     kind: EdgeKind
     owner: str
     node: str
-    pose: Pose
+    pose: UnitPose = field(metadata=FLAT)
     rate: float | None
-    source: tuple[str, int]
-    joint: Joint | None = None
-    switched: tuple[str, ...] = ()
+    source: SourceLine
+    joint: Joint | None = field(default=None, metadata=OMITTED)
+    switched: tuple[str, ...] = field(default=(), metadata=OMITTED)
 
     @property
     def name(self) -> str:
@@ -101,9 +132,13 @@ class Sweep:
     Without them it turns round and round, once in that time.
     """
 
-    period_s: float
+    period_s: AboveZero
     lower: float | None = None
     upper: float | None = None
+
+    def __post_init__(self) -> None:
+        if (self.lower is None) != (self.upper is None):
+            raise ValueError("has one of lower and upper without the other")
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,12 +149,12 @@ class Simulation:
     """
 
     kind: SimulationKind
-    rate: float
+    rate: AboveZero
     radius: float = 0.0
     speed: float = 0.0
-    pose: Pose = field(default_factory=Pose)
     joints: dict[str, float] = field(default_factory=dict)
     sweep: dict[str, Sweep] = field(default_factory=dict)
+    pose: UnitPose = field(default_factory=Pose, metadata=FLAT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +180,10 @@ class StopRule:
     timeout_s: float | None = None
 
 
+#: A node's parameter that is not a list.
+ParameterValue = str | int | float | bool
+
+
 @dataclass(frozen=True, slots=True)
 class Driven:
     """A sensor that a process drives. ``publishes`` says that the frames inside the sensor are the driver's.
@@ -156,7 +195,7 @@ class Driven:
     sensor: str
     preset: str
     publishes: bool
-    switch: dict[str, str | int | float | bool] = field(default_factory=dict)
+    switch: dict[str, ParameterValue] = field(default_factory=dict)
     frames: dict[str, PoseKnowledge] = field(default_factory=dict)
 
 
@@ -192,11 +231,11 @@ class PlanProcess:
     ready: Ready | None = None
     host: str | None = None
     owns: tuple[tuple[str, str], ...] = ()
-    simulate: Simulation | None = None
-    description: str | None = None
-    drives: tuple[Driven, ...] = ()
-    switches: dict[str, dict[str, str | int | float | bool]] = field(default_factory=dict)
-    namespace: str | None = None
+    description: str | None = field(default=None, metadata=OMITTED)
+    drives: tuple[Driven, ...] = field(default=(), metadata=OMITTED)
+    switches: dict[str, dict[str, ParameterValue]] = field(default_factory=dict, metadata=OMITTED)
+    namespace: str | None = field(default=None, metadata=OMITTED)
+    simulate: Simulation | None = field(default=None, metadata=OMITTED)
 
     @property
     def topics(self) -> tuple[str, str]:
@@ -226,7 +265,7 @@ class RosSettings:
 
 @dataclass(frozen=True, slots=True)
 class GuardPolicy:
-    """What the guard does. ``allow`` holds (parent, child) patterns of edges that need no declaration.
+    """What the guard does. ``allow`` holds patterns of edges that need no declaration.
 
     ``fence`` says how a strict guard fences processes off.
     """
@@ -234,8 +273,8 @@ class GuardPolicy:
     mode: GuardMode = "watch"
     unknown_edges: UnknownEdges = "warn"
     on_violation: OnViolation = "report"
-    allow: tuple[tuple[str, str], ...] = ()
-    fence: FenceWay = "auto"
+    allow: tuple[EdgePattern, ...] = ()
+    fence: FenceWay = field(default="auto", metadata=OMITTED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,7 +292,7 @@ def switch_text(switch: dict[str, Any]) -> str:
     return ", ".join(f"{key}: {json.dumps(value, ensure_ascii=False)}" for key, value in switch.items())
 
 
-VERSION = 1
+VERSION: Literal[1] = 1
 
 #: The file beside the plan that holds the whole robot's description.
 DESCRIPTION = "robot.full.urdf"
@@ -269,17 +308,17 @@ class Plan:
     the whole plan, and empty the share of the machine that the plan does not name.
     """
 
+    version: Literal[1] = field(default=VERSION, kw_only=True)
     robot: str
     spec_digest: str
+    description: str = field(default=DESCRIPTION, kw_only=True)
     base: str | None
+    host: str | None = field(default=None, kw_only=True, metadata=OMITTED)
     ros: RosSettings
     edges: tuple[PlanEdge, ...]
     processes: tuple[PlanProcess, ...]
+    claims: tuple[Claim, ...] = field(default=(), kw_only=True)
     guard: GuardPolicy = field(default_factory=GuardPolicy)
-    claims: tuple[Claim, ...] = ()
-    description: str = DESCRIPTION
-    version: int = VERSION
-    host: str | None = None
 
     def process(self, name: str) -> PlanProcess:
         """Return the process of that name.

@@ -1,47 +1,24 @@
-"""The JSON Schema of ``plan.json``, made from the classes that hold a plan and what ``file`` writes of them."""
+"""The JSON Schema of ``plan.json``, made from the classes that a plan is read by.
+
+``schemas/plan.schema.json`` holds it; a test says when it must be made anew, by ``tfcompose schema plan``.
+"""
 
 from __future__ import annotations
 
 import inspect
 import types
-from dataclasses import fields, is_dataclass
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from tfcompose.geometry import Pose
-from tfcompose.plan import VERSION, Plan
+from tfcompose.plan import Plan
+from tfcompose.plan.codec import Rule, fields_of, is_record
 
-_NUMBER = {"type": "number"}
-_TEXT = {"type": "string"}
 _TYPES: dict[Any, dict[str, Any]] = {
-    str: _TEXT,
-    float: _NUMBER,
+    str: {"type": "string"},
+    float: {"type": "number"},
     int: {"type": "integer"},
     bool: {"type": "boolean"},
+    type(None): {"type": "null"},
     Any: {},
-}
-_EDGE = {
-    "type": "object",
-    "properties": {"parent": _TEXT, "child": _TEXT},
-    "required": ["parent", "child"],
-}
-
-#: Fields that are written otherwise than they are held, by class and field.
-_WRITTEN: dict[tuple[str, str], dict[str, Any]] = {
-    ("Plan", "version"): {"const": VERSION},
-    ("PlanEdge", "source"): {
-        "type": "object",
-        "description": "where the edge stands in the robot file",
-        "properties": {"file": _TEXT, "line": {"type": "integer"}},
-        "required": ["file", "line"],
-    },
-    ("GuardPolicy", "allow"): {"type": "array", "items": _EDGE},
-}
-#: Fields that are left out where there is nothing to say.
-_LEFT_OUT = {
-    "GuardPolicy": {"fence"},
-    "Plan": {"host"},
-    "PlanEdge": {"joint", "switched"},
-    "PlanProcess": {"simulate", "description", "drives", "switches", "namespace"},
 }
 
 
@@ -56,44 +33,44 @@ def plan_schema() -> dict[str, Any]:
     )
 
 
-def _object(cls: type, made: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    name, hints = cls.__name__, get_type_hints(cls)
+def _object(cls: Any, made: dict[str, dict[str, Any]]) -> dict[str, Any]:
     properties: dict[str, dict[str, Any]] = {}
-    for one in fields(cls):
-        if hints[one.name] is Pose:
-            properties["xyz"], properties["quat_xyzw"] = _list(_NUMBER, 3), _list(_NUMBER, 4)
+    required = []
+    for field in fields_of(cls):
+        if field.flat:
+            inner = _object(get_args(field.kind)[0] if get_origin(field.kind) is Annotated else field.kind, made)
+            properties |= inner["properties"]
+            required += inner["required"]
         else:
-            properties[one.name] = _WRITTEN.get((name, one.name)) or _of(hints[one.name], made)
-    return {
-        "type": "object",
-        "description": inspect.cleandoc(cls.__doc__ or ""),
-        "properties": properties,
-        "required": [key for key in properties if key not in _LEFT_OUT.get(name, ())],
-    }
+            properties[field.name] = _of(field.kind, made)
+            required += [] if field.omitted else [field.name]
+    description = inspect.cleandoc(cls.__doc__ or "")
+    return {"type": "object", "description": description, "properties": properties, "required": required}
 
 
 def _of(kind: Any, made: dict[str, dict[str, Any]]) -> dict[str, Any]:
     """Return the schema of a type; a class is put into ``made`` and referred to."""
     if kind in _TYPES:
         return _TYPES[kind]
-    if is_dataclass(kind) and isinstance(kind, type):
+    if is_record(kind):
         if kind.__name__ not in made:
             made[kind.__name__] = {}
             made[kind.__name__] = _object(kind, made)
         return {"$ref": f"#/$defs/{kind.__name__}"}
     origin, inner = get_origin(kind), get_args(kind)
     if origin is Literal:
-        return {"enum": list(inner)}
+        return {"enum": list(inner)} if inner[1:] else {"const": inner[0]}
+    if origin is Annotated:
+        schema = _of(inner[0], made)
+        return schema | {
+            key: value for rule in inner[1:] if isinstance(rule, Rule) for key, value in rule.schema.items()
+        }
     if origin in (Union, types.UnionType):
-        return {"anyOf": [{"type": "null"} if one is type(None) else _of(one, made) for one in inner]}
+        return {"anyOf": [_of(one, made) for one in inner]}
     if origin is dict:
         return {"type": "object", "additionalProperties": _of(inner[1], made)}
     if origin is tuple and inner[-1] is Ellipsis:
         return {"type": "array", "items": _of(inner[0], made)}
-    if origin is tuple:
-        return _list(_of(inner[0], made), len(inner))
+    if origin is tuple and len(set(inner)) == 1:
+        return {"type": "array", "items": _of(inner[0], made), "minItems": len(inner), "maxItems": len(inner)}
     raise TypeError(f"a plan holds no {kind}")  # a field of a new kind must be described here
-
-
-def _list(items: dict[str, Any], count: int) -> dict[str, Any]:
-    return {"type": "array", "items": items, "minItems": count, "maxItems": count}

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.model import BUILT_IN
+from tfcompose.plan import EdgePattern
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -172,7 +173,7 @@ def _policy(policy: GuardPolicy, robot: Robot, names: Names) -> GuardPolicy:
     def final(pattern: str) -> str:
         return names.frame(pattern) if pattern in robot.frames else pattern
 
-    return replace(policy, allow=tuple((final(parent), final(child)) for parent, child in policy.allow))
+    return replace(policy, allow=tuple(EdgePattern(final(parent), final(child)) for parent, child in policy.allow))
 
 
 def _names_of(section: str, name: str, names: Names) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 from tfcompose.findings import Finding, finding
 from tfcompose.load import path_named
 from tfcompose.model import Edge, Process, Robot
-from tfcompose.plan import GuardPolicy
+from tfcompose.plan import EdgePattern, GuardPolicy
 from tfcompose.resolve.bodies import Bodies, with_colours
 from tfcompose.resolve.built_in import built_in
 from tfcompose.resolve.completed import completed
@@ -254,7 +254,7 @@ def _written(source: Source, joined: list[Joined]) -> dict[str, Any]:
 
 
 def _guard(said: GuardSpec, parts: list[Robot]) -> GuardPolicy:
-    allow = tuple((edge.parent, edge.child) for edge in said.allow)
+    allow = tuple(EdgePattern(edge.parent, edge.child) for edge in said.allow)
     allow += tuple(pattern for part in parts for pattern in part.guard.allow if pattern not in allow)
     return GuardPolicy(
         cast("GuardMode", said.mode),

@@ -89,8 +89,8 @@ def read_own(argv: Sequence[str], kind: str) -> Own:
         raise _unfit(f"the plan has no process {name}", file) from None
     if process.kind != kind:
         raise _unfit(f"process {name} is of kind {process.kind}, not {kind}", file)
-    if kind == "simulate" and (process.simulate is None or process.simulate.rate <= 0):
-        raise _unfit(f"process {name} does not say what to simulate at a rate above 0", file)
+    if kind == "simulate" and process.simulate is None:
+        raise _unfit(f"process {name} does not say what to simulate", file)
     return Own(plan, process, Path(file), tuple(words[at + 1 :]))
 
 

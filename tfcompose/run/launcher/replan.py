@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from tfcompose.plan import SourceLine
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -42,7 +44,11 @@ def _data(plan: Plan, process: PlanProcess, folder: Path) -> tuple[object, ...]:
     """Return what the process reads beside its own entry; where an edge stands in the file does not matter."""
     edges = plan.edges if process.kind == "guard" else plan.edges_of(process.name)
     policy = plan.guard if process.kind == "guard" else None
-    return (tuple(replace(edge, source=("", 0)) for edge in edges), policy, _bytes(folder, process.params_file))
+    return (
+        tuple(replace(edge, source=SourceLine("", 0)) for edge in edges),
+        policy,
+        _bytes(folder, process.params_file),
+    )
 
 
 def _fence(plan: Plan) -> tuple[str, str] | None:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from tfcompose.check import check, silenced, with_replaced
 from tfcompose.findings import Allow, Finding, RejectedError, without_duplicates
-from tfcompose.load import Source, composed, load, with_includes
+from tfcompose.language import composed, validate, with_includes
+from tfcompose.load import Source, load
 from tfcompose.resolve import Disk, Library, resolve
-from tfcompose.validate import validate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -18,7 +18,8 @@ from tfcompose.cli.compiling import library
 from tfcompose.cli.fixing import Fixer, edited, rewrite
 from tfcompose.compile import compile_robot
 from tfcompose.findings import Edit, RejectedError, Span, finding, slip_of
-from tfcompose.load import load, with_includes
+from tfcompose.language import with_includes
+from tfcompose.load import load
 
 if TYPE_CHECKING:
     import subprocess

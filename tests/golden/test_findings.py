@@ -28,8 +28,8 @@ from tfcompose.cli.shelves import PRESETS, library
 from tfcompose.cli.terminal import read_text
 from tfcompose.compile import compile_robot, profiles_of
 from tfcompose.findings import Edit, Finding, RejectedError, Span
-from tfcompose.load import load, set_value
-from tfcompose.validate import validate_node_preset
+from tfcompose.language import set_value, validate_node_preset
+from tfcompose.load import load
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tfcompose.findings import Finding, RejectedError, Span, finding
-from tfcompose.load import Source, composed, load, set_value, with_includes
+from tfcompose.language import composed, set_value, with_includes
+from tfcompose.load import Source, load
 
 
 def included(files: dict[str, str], file: str = "robot.yaml") -> Source:

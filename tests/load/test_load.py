@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 
 from tests.support.tables import for_each
 from tfcompose.findings import RejectedError, Span
-from tfcompose.load import Source, composed, load
+from tfcompose.language import composed, validate
+from tfcompose.load import Source, load
 from tfcompose.load.nodes import MOST_VALUES
 from tfcompose.load.places import Place
 
@@ -309,9 +310,8 @@ def test_laying_a_profile_over_leaves_the_source_as_it_was() -> None:
 
 
 def test_a_null_that_removes_nothing_is_a_finding_at_its_place_also_in_a_list() -> None:
-    source = laid("a:\nb: {c: ~}\nd: [1, null]\n")
-    assert source.data == {"b": {}, "d": [1]}
-    assert [(one.code, one.span and one.span.line) for one in source.found] == [("TF006", n) for n in (1, 2, 3)]
+    found = validate(laid("tfcompose: 1\nrobot: r\nbase:\nvars: {c: ~}\ninclude: [a, null]\n")).found
+    assert [(one.code, one.span and one.span.line) for one in found] == [("TF006", n) for n in (3, 4, 5)]
 
 
 @pytest.mark.parametrize("profiles", ["5", "[a]", "{a: 5}", "{a: {profiles: {b: {}}}}"])

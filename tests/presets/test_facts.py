@@ -17,7 +17,7 @@ from tfcompose.resolve.presets import filled
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.validate.preset import PresetFrame
+    from tfcompose.language.preset import PresetFrame
 
 FACTS: dict[str, dict[str, dict[str, Any]]] = yaml.safe_load(Path(__file__).with_name("facts.yaml").read_text("utf-8"))
 KNOWN = library()

@@ -18,8 +18,8 @@ from tfcompose.cli.shelves import library
 from tfcompose.cli.terminal import read_text
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
+from tfcompose.language.preset import Chosen
 from tfcompose.resolve.presets import filled
-from tfcompose.validate.preset import Chosen
 
 if TYPE_CHECKING:
     from tfcompose.model import Edge, Process, Robot
@@ -323,10 +323,10 @@ def test_a_folder_that_is_not_there_is_said(tmp_path: Path) -> None:
         ("model: mast camera", "model: mast camera\nextends: me/mist", "me/mast extends me/mist, which is not there"),
         ("model: mast camera", "model: mast camera\nextends: me/mast", "me/mast extends me/mast, which is not there"),
         ("about: a", "abut: a", "unknown key abut"),
-        ("frames:\n", "options: {o: {type: choice, variants: {a: 5}, default: a}}\nframes:\n", "5 is no mapping"),
+        ("frames:\n", "options: {o: {type: choice, variants: {a: 5}, default: a}}\nframes:\n", "5 is not a mapping"),
         ("frames:\n", "options: {o: {type: choice, variants: {a: {}}, default: [a]}}\nframes:\n", "cannot be ['a']"),
         ("frames:\n", "options: {o: {type: set, values: [a], default: b}}\nframes:\n", "cannot be 'b'"),
-        ("frames:\n", 'body: {frame: "{name}_foot", shape: {xyz: [0, 0, 1]}}\nframes:\n', "a shape without a form"),
+        ("frames:\n", 'body: {frame: "{name}_foot", shape: {xyz: [0, 0, 1]}}\nframes:\n', "no shape is given"),
         ("rpy: [-90 deg", "look: up, rpy: [-90 deg", "rpy and look exclude each other"),
         ("frames:\n", "driver: {package: p, node: n}\nframes:\n", "one of executable and launch says what is started"),
         ("frames:\n", 'body: {frame: "{name}_case", shape: {box: [1, 1, 1]}}\nframes:\n', "no frame {name}_case"),

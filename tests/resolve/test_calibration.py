@@ -14,7 +14,7 @@ from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.findings import RejectedError, Span, finding
 from tfcompose.geometry import Pose, angle_between
-from tfcompose.validate.calibration_file import read_calibration
+from tfcompose.language.calibration import read_calibration
 
 if TYPE_CHECKING:
     from tfcompose.model import Edge

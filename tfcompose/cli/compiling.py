@@ -10,7 +10,8 @@ from tfcompose.cli.shelves import library
 from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
 from tfcompose.compile import compile_robot
 from tfcompose.findings import RejectedError
-from tfcompose.load import load, set_value, with_includes
+from tfcompose.language import set_value, with_includes
+from tfcompose.load import load
 
 if TYPE_CHECKING:
     from argparse import Namespace

@@ -10,7 +10,7 @@ from tfcompose.resolve.node_presets import node_preset, node_preset_names
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from tfcompose.validate.claims import ClaimSpec
+    from tfcompose.language.node_preset import ClaimSpec
 
 _ROLE = re.compile(r"\{(\w+)\}")
 

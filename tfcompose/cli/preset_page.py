@@ -7,17 +7,17 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.geometry import IDENTITY_XYZW
+from tfcompose.language.preset import Chosen
 from tfcompose.numbers import clean_quat, clean_rpy, number
 from tfcompose.resolve.poses import rotation_of
 from tfcompose.resolve.presets import filled
-from tfcompose.validate.preset import Chosen
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from tfcompose.language.bodies import Shape
+    from tfcompose.language.preset import Option, PresetDriver, PresetFrame, PresetSpec
     from tfcompose.resolve import Library
-    from tfcompose.validate.bodies import Shape
-    from tfcompose.validate.preset import Option, PresetDriver, PresetFrame, PresetSpec
 
 #: What stands in names where the sensor's name will.
 NAME = "NAME"

@@ -11,7 +11,8 @@ from tfcompose.cli.terminal import read_text
 from tfcompose.compile import compile_robot
 from tfcompose.emit.plan import plan_of
 from tfcompose.findings import RejectedError
-from tfcompose.load import load, with_includes
+from tfcompose.language import with_includes
+from tfcompose.load import load
 from tfcompose.ros.environment import child_environment
 from tfcompose.run.launcher.preflight import commands_of, started_by_us
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import posixpath
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Allow, Finding, RejectedError, Span, finding
 from tfcompose.load.comments import allows_in
@@ -11,7 +12,10 @@ from tfcompose.load.nodes import MOST_VALUES, Reader
 from tfcompose.load.not_yaml import no_yaml
 from tfcompose.load.places import Path, Place
 
-__all__ = ["MOST_VALUES", "Path", "Source", "load", "refuse_unreadable"]
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+__all__ = ["MOST_VALUES", "Path", "Source", "load", "path_named", "refuse_unreadable"]
 
 MOST_CHARACTERS = 4_000_000
 
@@ -57,6 +61,10 @@ class Source:
         """Return whether there is a value at the path."""
         return self.places.get(path) is not None
 
+    def in_order(self, path: Path, keys: Iterable[str]) -> list[str]:
+        """Return keys of the mapping at the path in the order in which they stand in the file."""
+        return sorted(keys, key=lambda key: self.at_key((*path, key)))
+
     def part(self, path: Path) -> Source:
         """Return the mapping at ``path`` as a source of its own, without what was found."""
         data: Any = self.data
@@ -101,3 +109,9 @@ def refuse_unreadable(text: str, file: str, most_characters: int = MOST_CHARACTE
         raise RejectedError(
             [finding("TF001", "not a text file: it holds a NUL byte", Span(file, line), help="remove it")]
         )
+
+
+def path_named(named: str, at: Span) -> str:
+    """Return the path of a file that is named at a place: relative to the file there, or to the working folder."""
+    folder = "" if at.file.startswith("--") else posixpath.dirname(at.file)  # --set and its like
+    return posixpath.normpath(posixpath.join(folder, named))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar
+
+from tfcompose.units import JointDamping, JointEffort, JointPosition, JointVelocity, Number  # noqa: TC001 (read by them)
 
 if TYPE_CHECKING:
     from tfcompose.findings import Span
@@ -21,36 +23,48 @@ FREE: tuple[JointType, ...] = ("floating", "planar")
 class Limit:
     """What a joint can do: rad or m, N m or N, rad/s or m/s."""
 
-    lower: float | None = None
-    upper: float | None = None
-    effort: float | None = None
-    velocity: float | None = None
+    __pydantic_config__: ClassVar = {"extra": "forbid"}
+
+    lower: JointPosition | None = field(default=None, metadata={"description": "the lowest position"})
+    upper: JointPosition | None = field(default=None, metadata={"description": "the highest position"})
+    effort: JointEffort | None = field(
+        default=None, metadata={"description": "the largest torque, or force of a prismatic joint"}
+    )
+    velocity: JointVelocity | None = field(default=None, metadata={"description": "the largest speed"})
 
 
 @dataclass(frozen=True, slots=True)
 class Dynamics:
     """What slows a joint down: N m s/rad and N m, or N s/m and N."""
 
-    damping: float = 0.0
-    friction: float = 0.0
+    __pydantic_config__: ClassVar = {"extra": "forbid"}
+
+    damping: JointDamping = field(default=0.0, metadata={"description": "the damping"})
+    friction: JointEffort = field(default=0.0, metadata={"description": "the static friction"})
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SafetyController:
-    """Where a controller begins to hold a joint back, and how hard."""
+    """Where a controller begins to hold a joint back before its limits, and how hard."""
 
-    soft_lower_limit: float = 0.0
-    soft_upper_limit: float = 0.0
-    k_position: float = 0.0
-    k_velocity: float = 0.0
+    __pydantic_config__: ClassVar = {"extra": "forbid"}
+
+    soft_lower_limit: JointPosition = field(default=0.0, metadata={"description": "where the lower soft limit begins"})
+    soft_upper_limit: JointPosition = field(default=0.0, metadata={"description": "where the upper soft limit begins"})
+    k_position: Number = field(
+        default=0.0, metadata={"description": "the gain from position to velocity inside the soft limits"}
+    )
+    k_velocity: Number = field(metadata={"description": "the gain from velocity to effort", "examples": [10]})
 
 
 @dataclass(frozen=True, slots=True)
 class ReferencePositions:
     """Where a joint's reference switch changes; URDF calls it calibration."""
 
-    rising: float | None = None
-    falling: float | None = None
+    __pydantic_config__: ClassVar = {"extra": "forbid"}
+
+    rising: JointPosition | None = field(default=None, metadata={"description": "where the switch goes on"})
+    falling: JointPosition | None = field(default=None, metadata={"description": "where the switch goes off"})
 
 
 @dataclass(frozen=True, slots=True)

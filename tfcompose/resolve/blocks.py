@@ -15,8 +15,8 @@ from tfcompose.urdf.blocks import faults_of, read_block, unexpanded
 if TYPE_CHECKING:
     from collections.abc import Collection
 
+    from tfcompose.language.robot import ComponentSpec, HardwareSpec
     from tfcompose.load import Path, Source
-    from tfcompose.validate.hardware import ComponentSpec, HardwareSpec
 
 
 def hardware_of(specs: dict[str, HardwareSpec], source: Source) -> tuple[Hardware, ...]:

@@ -14,8 +14,8 @@ from tfcompose.urdf.packages import Packages
 
 if TYPE_CHECKING:
     from tfcompose.findings import Span
+    from tfcompose.language import bodies as said
     from tfcompose.load import Path, Source
-    from tfcompose.validate import bodies as said
 
 FORMS = ("box", "cylinder", "sphere", "capsule", "mesh")
 
@@ -41,8 +41,7 @@ class Bodies:
 
     def _parts(self, body: said.LinkSpec, at: Path) -> tuple[tuple[Shape, ...], tuple[Shape, ...], Inertial | None]:
         visuals = self._shapes(body.visual, (*at, "visual"))
-        same = self.source.data["links"][at[1]].get("collision") == "same"
-        collisions = visuals if same else self._shapes(body.collision, (*at, "collision"))
+        collisions = visuals if body.collision == "same" else self._shapes(body.collision, (*at, "collision"))
         inertial = None
         if body.inertial:
             inertial = self._inertial(body.inertial, visuals, collisions, (*at, "inertial"))

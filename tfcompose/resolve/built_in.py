@@ -11,10 +11,10 @@ from tfcompose.model import BUILT_IN, GUARD, JOINTS, STATIC, Node, Process
 from tfcompose.resolve.nodes import full_name
 
 if TYPE_CHECKING:
+    from tfcompose.language.process import ProcessSpec
+    from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Path, Source
     from tfcompose.plan import ProcessKind
-    from tfcompose.validate.process import ProcessSpec
-    from tfcompose.validate.spec import RobotSpec
 
 _BUILT_IN_KEYS = frozenset({"rate", "remap", "env", "host", "after"})
 #: The parameters of ``joints``: robot_state_publisher's, where it has them, each with an example.
@@ -43,7 +43,7 @@ def built_in_keys(name: str, said: ProcessSpec, source: Source) -> list[Finding]
     """Return findings about what stands under the name of one of tfcompose's own processes."""
     at: Path = ("processes", name)
     known = _BUILT_IN_KEYS | ({"params"} if name == JOINTS else set())
-    wrong = [key for key in source.data["processes"][name] if key not in known]
+    wrong = said.model_fields_set - known
     advice = f"its keys can be: {', '.join(sorted(known))}"
     found = [
         finding("TF101", f"{name} is built in and has no {key}", source.at_key((*at, key)), help=advice)

@@ -11,19 +11,18 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, RejectedError, Span, did_you_mean, finding, nearest
+from tfcompose.language.calibration import CalibrationFile, read_calibration
+from tfcompose.language.pose import ROTATIONS, CalibrationLimit, CalibrationSpec, MountKeys
 from tfcompose.load import path_named
-from tfcompose.load.choices import ROTATIONS
 from tfcompose.model import Calibration
-from tfcompose.validate.calibration import CalibrationLimit, CalibrationSpec
-from tfcompose.validate.calibration_file import CalibrationFile, read_calibration
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
+    from tfcompose.language.calibration import Entry
+    from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Source
     from tfcompose.resolve.poses import Draft
-    from tfcompose.validate.entries import Entry
-    from tfcompose.validate.spec import RobotSpec
 
     Reader = Callable[[str], str]
 
@@ -35,11 +34,11 @@ def calibrated(
     drafts: Sequence[Draft], frames: Collection[str], spec: RobotSpec, source: Source, read: Reader | None
 ) -> tuple[list[Draft], list[Finding]]:
     """Return the drafts, those with a calibration measured, and what is wrong with the calibrations."""
-    work = _Work(_Files(read), frozenset(frames), source)
+    work = _Work(_Files(read), frozenset(frames), spec, source)
     for draft in drafts:
         if draft.group:
             work.inside.setdefault(draft.group, set()).add(draft.edge.child)
-    result = [work.own(draft, spec) for draft in drafts]
+    result = [work.own(draft) for draft in drafts]
     for index, name in enumerate(spec.calibrations):
         path = ("calibrations", index)
         result = work.apply(name, source.at(path), result)
@@ -105,14 +104,15 @@ def _matches(entries: Sequence[Entry], parents: Collection[str], children: Colle
 class _Work:
     files: _Files
     frames: frozenset[str]
+    spec: RobotSpec
     source: Source
     found: list[Finding] = field(default_factory=list)
     used: set[int] = field(default_factory=set)
     inside: dict[tuple[str, str], set[str]] = field(default_factory=dict)
 
-    def own(self, draft: Draft, spec: RobotSpec) -> Draft:
+    def own(self, draft: Draft) -> Draft:
         """Return the draft with what its own ``calibration`` says."""
-        said = _said(draft, spec)
+        said = _said(draft, self.spec)
         if said is None:
             return draft
         at = self.source.at((*draft.at, "calibration", "file"))
@@ -178,7 +178,7 @@ class _Work:
             limit_rad=limit.rot,
             inverted=match.inverted,
         )
-        return replace(draft, measured=calibration, has_nominal=_has_pose(draft, self.source))
+        return replace(draft, measured=calibration, has_nominal=_has_pose(draft, self.spec))
 
     def apply(self, named: str, at: Span, drafts: list[Draft]) -> list[Draft]:
         """Return the drafts with every entry of a file applied; one that nothing takes is a finding."""
@@ -234,8 +234,7 @@ def _alias(name: str) -> set[str]:
     return {name, "imu"} if name == "imu0" else {name}
 
 
-def _has_pose(draft: Draft, source: Source) -> bool:
-    written: Any = source.data
-    for step in draft.at:
-        written = written[step]
-    return bool((ROTATIONS | {"xyz"}) & set(written))
+def _has_pose(draft: Draft, spec: RobotSpec) -> bool:
+    section, name = draft.at
+    entry: MountKeys = getattr(spec, str(section))[name]
+    return bool((ROTATIONS | {"xyz"}) & entry.model_fields_set)

@@ -17,10 +17,10 @@ from tfcompose.resolve.roles import Roles
 from tfcompose.resolve.told import Told, flat
 
 if TYPE_CHECKING:
+    from tfcompose.language.node_preset import ClaimSpec, NodePresetSpec
+    from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Path, Source
     from tfcompose.model import Robot
-    from tfcompose.validate.claims import ClaimSpec, NodePresetSpec
-    from tfcompose.validate.spec import RobotSpec
 
 
 def settled(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Finding]]:

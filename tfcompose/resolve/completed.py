@@ -14,10 +14,10 @@ from tfcompose.resolve.nodes import has_claims
 from tfcompose.urdf.ros2_control import unknown_joints
 
 if TYPE_CHECKING:
+    from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Source
     from tfcompose.model import Robot
     from tfcompose.urdf.packages import Disk
-    from tfcompose.validate.spec import RobotSpec
 
 
 def completed(robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None) -> tuple[Robot, list[Finding]]:
@@ -30,7 +30,7 @@ def completed(robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None) 
     if spec.ros.state_publisher == "stock":
         robot, refused = import_module("tfcompose.resolve.stock").with_stock(robot)
         found += refused
-    robot, refused = isolate(robot, spec.ros, source, disk)
+    robot, refused = isolate(robot, spec, source, disk)
     found += refused
     if has_claims(spec):  # what knows them is loaded only then
         robot, refused = import_module("tfcompose.resolve.claims").settled(robot, spec, source)

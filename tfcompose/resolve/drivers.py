@@ -6,40 +6,41 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, did_you_mean, finding
+from tfcompose.language.preset import Chosen
 from tfcompose.model import BUILT_IN, Node, Process
 from tfcompose.resolve.isolation import settings_of
 from tfcompose.resolve.nodes import full_name, namespace_of
 from tfcompose.resolve.presets import DRIVER
-from tfcompose.resolve.processes import starts
 from tfcompose.resolve.running import EXTERNAL_KEYS, KEYS, how, program
-from tfcompose.validate.preset import Chosen
 
 if TYPE_CHECKING:
+    from tfcompose.language import Validated
+    from tfcompose.language.preset import DriverClaim, PresetDriver
+    from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Path, Source
     from tfcompose.resolve.presets import Sensor
-    from tfcompose.validate.preset import Claim, PresetDriver
-    from tfcompose.validate.spec import RobotSpec
 
 #: In an argument, the file that holds the parameters of a process.
 PARAMS_FILE = "${params_file}"
 
 
-def driver_process(sensor: Sensor, spec: RobotSpec, source: Source) -> tuple[Process | None, list[Finding]]:
+def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None, list[Finding]]:
     """Return the process of a sensor's driver, with the parameters that make it do what the spec says.
 
     It is the preset's with the user's keys over it, the user's alone where the preset has none, or None.
     """
     driver, said = sensor.preset.driver, sensor.spec.driver
+    spec, source = validated.spec, validated.source
     at: Path = ("sensors", sensor.name, "driver")
     if said and said.process is not None:
-        return None, _named_driver(sensor, said.process, source)
+        return None, _named_driver(sensor, said.process, validated)
     if said and said.simulate:
         advice = "driver: none, and tf: tfcompose, where there is no device"
         return None, [finding("TF604", "a driver cannot be simulated", source.at_key((*at, "simulate")), help=advice)]
     run, external = (said.run, bool(said.external)) if said else (None, False)
     if driver is None and said is None:
         return None, []
-    if not external and not starts(run) and (run or driver is None):
+    if not external and not (run and run.is_startable) and (run or driver is None):
         place, advice = source.at_key((*at, "run")), "run: {package: …, executable: …}, or external: true"
         return None, [finding("TF102", f"the driver of {sensor.name} does not say how it runs", place, help=advice)]
     launched = driver is not None and driver.launch is not None and run is None
@@ -82,7 +83,7 @@ def driver_parameters(sensor: Sensor, prefix: str = "") -> dict[str, Any]:
     return fill.table(driver.args if driver.launch else driver.params) | named | fill.table(claims | switch)
 
 
-def claims_of(sensor: Sensor) -> tuple[Claim, ...]:
+def claims_of(sensor: Sensor) -> tuple[DriverClaim, ...]:
     """Return the edges outside the sensor that its driver publishes by default, unless it owns the mount's."""
     driver, said = sensor.preset.driver, sensor.spec
     own = {sensor.name, said.driver.process if said.driver else None}
@@ -167,22 +168,23 @@ def _unreached(sensor: Sensor, spec: RobotSpec, source: Source) -> list[Finding]
     return found
 
 
-def _named_driver(sensor: Sensor, name: str, source: Source) -> list[Finding]:
+def _named_driver(sensor: Sensor, name: str, validated: Validated) -> list[Finding]:
     """Return findings about a driver that is the name of a process: it must be one, and has its own keys."""
     at: Path = ("sensors", sensor.name, "driver")
-    known = [*source.data.get("processes", {}), *source.data["sensors"], *BUILT_IN]
+    spec, source = validated.spec, validated.source
+    broken = (entry for section, entry in validated.broken if section in {"processes", "sensors"})
+    known = [*dict.fromkeys([*spec.processes, *spec.sensors, *broken]), *BUILT_IN]
     found = []
     if name != "none" and name not in known:
         advice = did_you_mean(name, known, f"processes: {{{name}: {{external: true}}}}")
         found.append(
             finding("TF813", f"the driver of {sensor.name} is {name}, which is no process", source.at(at), help=advice)
         )
-    written = source.data["sensors"][sensor.name]["driver"]
-    for key in written if isinstance(written, dict) else ():
-        if key != "process":
-            place = source.at_key((*at, key))
-            advice = f"write it under processes: {name}"
-            found.append(finding("TF107", f"{key} and process exclude each other", place, help=advice))
+    driver = sensor.spec.driver
+    for key in driver.model_fields_set - {"process"} if driver else ():
+        place = source.at_key((*at, key))
+        advice = f"write it under processes: {name}"
+        found.append(finding("TF107", f"{key} and process exclude each other", place, help=advice))
     return found
 
 

@@ -15,21 +15,21 @@ from tfcompose.resolve.poses import Draft, pose_of
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from tfcompose.language import Validated
+    from tfcompose.language.pose import EdgeKeys
+    from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Path, Source
     from tfcompose.plan import EdgeKind
     from tfcompose.resolve.bodies import Bodies
     from tfcompose.resolve.part import Joined
     from tfcompose.resolve.presets import Sensor
-    from tfcompose.validate.edges import EdgeKeys
-    from tfcompose.validate.spec import RobotSpec
 
 
 @dataclass(slots=True)
 class Drafts:
     """What is known of a robot while it is resolved."""
 
-    spec: RobotSpec
-    source: Source
+    validated: Validated
     simulated: frozenset[str]
     bodies: Bodies
     frames: dict[str, Span] = field(default_factory=dict)
@@ -39,6 +39,16 @@ class Drafts:
     drivers: list[Process] = field(default_factory=list)
     sensors: list[MountedSensor] = field(default_factory=list)
     found: list[Finding] = field(default_factory=list)
+
+    @property
+    def spec(self) -> RobotSpec:
+        """What the user wrote."""
+        return self.validated.spec
+
+    @property
+    def source(self) -> Source:
+        """Where it stands."""
+        return self.validated.source
 
     def add_frames(self) -> None:
         """Take the bare frames; one without a parent is a root, said so."""
@@ -60,7 +70,7 @@ class Drafts:
         """Take the edges between bodies."""
         for name, joint in self.spec.joints.items():
             moving = joint_of(name, joint, self.source.at_key(("joints", name)))
-            self.found += idle_keys(name, joint.type, self.source.data["joints"][name], self.source)
+            self.found += idle_keys(name, joint, self.source)
             self.add(("joints", name), joint.parent, joint.child, joint, joint=moving, joint_name=name)
 
     def add_part(self, part: Joined) -> bool:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import re
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 from tfcompose.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
 from tfcompose.geometry import rpy_from_quat
+from tfcompose.language.robot import Origin
 from tfcompose.load import path_named
 from tfcompose.model import BUILT_IN, Node, Process, Robot
 from tfcompose.resolve.isolation import topics_below
@@ -20,7 +21,6 @@ from tfcompose.urdf.convert import robot_of
 from tfcompose.urdf.read import read_xml
 from tfcompose.urdf.ros2_control import with_hardware
 from tfcompose.urdf.xacro import calling, macros_in
-from tfcompose.validate.part import Block
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -150,7 +150,7 @@ def _document(part: PartEntry, file: str, packages: Packages, absolute: Callable
     return calling(spec.macro, attributes, blocks, map(absolute, files))
 
 
-def _is_markup(value: Any) -> bool:
+def _is_markup(value: Any) -> TypeGuard[str]:
     return isinstance(value, str) and value.lstrip().startswith("<")
 
 
@@ -164,7 +164,7 @@ def _refuse_broken(name: str, text: str, at: Span) -> None:
 
 def _block(value: Any) -> str | None:
     """Return the element that a parameter is, or None for one that is a word."""
-    if isinstance(value, Block):
+    if isinstance(value, Origin):
         pose = pose_of(value)
         xyz, rpy = (" ".join(map(repr, numbers)) for numbers in (pose.xyz, rpy_from_quat(pose.quat_xyzw)))
         return f'<origin xyz="{xyz}" rpy="{rpy}"/>'

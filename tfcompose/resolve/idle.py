@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, finding
-from tfcompose.load.choices import RUNNING
+from tfcompose.language.process import RUNNING
 from tfcompose.model import JOINTS, STATIC
 from tfcompose.resolve.running import EXTERNAL_KEYS, SIMULATED_KEYS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from tfcompose.language.process import Started
+    from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Path, Source
-    from tfcompose.validate.process import Started
-    from tfcompose.validate.spec import RobotSpec
 
 #: What is read of every process; of two ways of running one is refused elsewhere, as is a rate.
 _ALWAYS = frozenset({*RUNNING, "node", "nodes", "namespace", "rate"})
@@ -64,7 +64,6 @@ def _idle(path: Path, name: str, process: Started, source: Source) -> Iterator[F
     if way is None or (*path, way) in source.replaced or (way == "simulate" and path[0] == "sensors"):
         return  # no driver is simulated: that is refused
     read, how, whom = _READ[way]
-    for key in source.part(path).data:
-        if key not in read:
-            message, advice = f"{name} is {how}: {key} does nothing there", f"remove it: it is for {whom}"
-            yield finding("TF851", message, source.at_key((*path, key)), help=advice, severity="warning")
+    for key in process.model_fields_set - read:
+        message, advice = f"{name} is {how}: {key} does nothing there", f"remove it: it is for {whom}"
+        yield finding("TF851", message, source.at_key((*path, key)), help=advice, severity="warning")

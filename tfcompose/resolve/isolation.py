@@ -15,10 +15,10 @@ from tfcompose.plan import RosSettings
 from tfcompose.resolve.filling import Filler
 
 if TYPE_CHECKING:
+    from tfcompose.language.robot import RobotSpec, RosSpec
     from tfcompose.load import Source
     from tfcompose.model import Robot
     from tfcompose.urdf.packages import Disk
-    from tfcompose.validate.spec import RosSpec
 
 TF_TOPICS = ("/tf", "/tf_static")
 
@@ -38,10 +38,10 @@ def topics_below(namespace: str, isolate: str) -> dict[str, str]:
     return {topic: f"/{namespace}{topic}" for topic in TF_TOPICS} if moves else {}
 
 
-def isolate(robot: Robot, ros: RosSpec, source: Source, disk: Disk | None = None) -> tuple[Robot, list[Finding]]:
+def isolate(robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None = None) -> tuple[Robot, list[Finding]]:
     """Return the robot with its processes' topics moved, and frames and files in them named; and what is wrong."""
-    found = _wrong(robot, ros, source)
-    remap = topics_below(robot.ros.namespace, ros.isolate)
+    found = _wrong(robot, spec, source)
+    remap = topics_below(robot.ros.namespace, spec.ros.isolate)
     processes = []
     filler = Filler(robot, source, disk)
     for process in robot.processes:
@@ -50,9 +50,10 @@ def isolate(robot: Robot, ros: RosSpec, source: Source, disk: Disk | None = None
     return replace(robot, processes=tuple(processes)), [*found, *filler.found]
 
 
-def _wrong(robot: Robot, ros: RosSpec, source: Source) -> list[Finding]:
-    found = []
-    named = robot.ros.namespace or source.data.get("parts") or (ros.isolate == "frames" and ros.frame_prefix)
+def _wrong(robot: Robot, spec: RobotSpec, source: Source) -> list[Finding]:
+    found, ros = [], spec.ros
+    has_parts = spec.parts or any(section == "parts" for section, _ in robot.broken)
+    named = robot.ros.namespace or has_parts or (ros.isolate == "frames" and ros.frame_prefix)
     if ros.isolate != "none" and not named:
         message = f"isolate: {ros.isolate} needs a namespace"
         found.append(finding("TF304", message, source.at(("ros", "isolate")), help="ros: {namespace: robot1}"))

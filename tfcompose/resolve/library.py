@@ -11,15 +11,16 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 from tfcompose.findings import RejectedError, finding
+from tfcompose.language import validate_preset
+from tfcompose.language.overlay import lay_over, without
+from tfcompose.language.preset import PresetSpec
 from tfcompose.load import load
-from tfcompose.load.overlay import lay_over, without
-from tfcompose.validate import validate_preset
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from tfcompose.load import Source
-    from tfcompose.validate.preset import PresetSpec
+
 
 #: vendor/model; a model that begins with _ is there to be extended only, and nodes/ holds no sensors.
 _NAME = re.compile(r"(?!nodes/)[A-Za-z0-9][A-Za-z0-9_.-]*/_?[A-Za-z0-9][A-Za-z0-9_.-]*")
@@ -104,7 +105,7 @@ class Library:
             source = self.source(name)
             for option, value in taken:
                 variant = source.part(("options", option, "variants", value))
-                source = lay_over(source, variant, is_overlay=False)
+                source = lay_over(source, variant, is_overlay=False, of=PresetSpec)
             self._specs[name, taken] = validate_preset(source)
         return self._specs[name, taken]
 
@@ -122,7 +123,7 @@ class Library:
             below = self.source(base, deep + 1) if self.file(base) else None
         if below is None:
             raise RejectedError([finding("TF606", f"{name} extends {base}, which is not there", at)])
-        return lay_over(without(below, "extends"), own, is_overlay=False)
+        return lay_over(without(below, "extends"), own, is_overlay=False, of=PresetSpec)
 
     def _later(self, file: str) -> str | None:
         """Return the file of the preset that stands behind this file's, under the same name."""

@@ -6,11 +6,11 @@ import os
 from functools import cache
 from typing import TYPE_CHECKING
 
+from tfcompose.language import validate_node_preset
 from tfcompose.load import load
-from tfcompose.validate import validate_node_preset
 
 if TYPE_CHECKING:
-    from tfcompose.validate.claims import NodePresetSpec
+    from tfcompose.language.node_preset import NodePresetSpec
 
 FOLDER = os.path.join(os.path.dirname(os.path.dirname(__file__)), "presets", "nodes")
 

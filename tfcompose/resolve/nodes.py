@@ -9,9 +9,9 @@ from tfcompose.model import Node
 from tfcompose.resolve.node_presets import node_preset, node_preset_names
 
 if TYPE_CHECKING:
+    from tfcompose.language.process import ProcessSpec, Started
+    from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Path, Source
-    from tfcompose.validate.process import ProcessSpec, Started
-    from tfcompose.validate.spec import RobotSpec
 
 #: The key among a process's parameters that names files with more of them.
 FILE_KEY = "file"

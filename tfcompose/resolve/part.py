@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, finding
-from tfcompose.load import Place, Source, lay_over
+from tfcompose.language import lay_over
+from tfcompose.load import Place, Source
 from tfcompose.model import Part
 from tfcompose.plan import RosSettings
 from tfcompose.resolve.renamed import Names, renamed
@@ -15,10 +16,9 @@ from tfcompose.resolve.subtree import subtree
 
 if TYPE_CHECKING:
     from tfcompose.findings import Span
+    from tfcompose.language.robot import PartSpec, RobotSpec
     from tfcompose.load import Path
     from tfcompose.model import Edge, Robot
-    from tfcompose.validate.part import PartSpec
-    from tfcompose.validate.spec import RobotSpec
 
 #: What may stand in front of names so that they can be looked up.
 _PREFIX = re.compile(r"([\w.:+@-]+/)*[\w.:+@-]*")

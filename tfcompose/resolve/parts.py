@@ -11,20 +11,20 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, finding
-from tfcompose.load import composed, load, path_named, with_includes
+from tfcompose.language import composed, validate, with_includes
+from tfcompose.load import load, path_named
 from tfcompose.resolve.part import Joined, PartEntry
 from tfcompose.resolve.whole import Whole
-from tfcompose.validate import validate
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from tfcompose.language import Validated
     from tfcompose.load import Source
     from tfcompose.model import Robot
     from tfcompose.resolve.library import Library
     from tfcompose.resolve.resolve import Resolved
     from tfcompose.urdf.packages import Disk, Packages
-    from tfcompose.validate import Validated
 
     Reader = Callable[[str], str]
 

@@ -15,23 +15,24 @@ from tfcompose.model import STATIC, is_optical
 
 if TYPE_CHECKING:
     from tfcompose.findings import Span
+    from tfcompose.language.pose import Posed, Rotated
     from tfcompose.load import Path
     from tfcompose.model import Calibration, Edge
-    from tfcompose.validate.posed import Posed, Turned
 
 
 def pose_of(posed: Posed, child: str = "") -> Pose:
-    """Return the pose as it is written; ``look`` of an optical frame is where its z axis points."""
+    """Return the pose as it is written."""
     turned = rotation_of(posed, child)
-    return Pose(posed.xyz, turned if turned is not None else IDENTITY_XYZW)
+    x, y, z = posed.xyz
+    return Pose((float(x), float(y), float(z)), turned if turned is not None else IDENTITY_XYZW)
 
 
-def rotation_of(turned: Turned, child: str = "") -> tuple[float, float, float, float] | None:
-    """Return the rotation that is written, or None if there is none."""
-    if turned.look is not None:
-        return multiply(turned.look, OPTICAL_XYZW) if is_optical(child) else turned.look
-    written = (turned.rpy, turned.quat_xyzw, turned.axis_angle, turned.matrix)
-    return next((quat for quat in written if quat is not None), None)
+def rotation_of(turned: Rotated, child: str = "") -> tuple[float, float, float, float] | None:
+    """Return the rotation that is written, or None if there is none; ``look`` of an optical frame is where z points."""
+    rotation = turned.rotation
+    if rotation is not None and turned.look is not None and is_optical(child):
+        return multiply(rotation, OPTICAL_XYZW)
+    return rotation
 
 
 @dataclass(frozen=True, slots=True)

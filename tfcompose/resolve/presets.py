@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
 
 if TYPE_CHECKING:
+    from tfcompose.language.preset import Option, PresetFrame, PresetSpec
+    from tfcompose.language.robot import SensorSpec
     from tfcompose.load import Path, Source
     from tfcompose.resolve.library import Library
-    from tfcompose.validate.preset import Option, PresetFrame, PresetSpec
-    from tfcompose.validate.spec import SensorSpec
 
 DRIVER, TFCOMPOSE = "driver", "tfcompose"
 

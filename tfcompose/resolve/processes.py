@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, TypeGuard
+from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, Note, did_you_mean, finding
-from tfcompose.load.choices import SIMULATIONS
+from tfcompose.language.process import SIMULATIONS
 from tfcompose.model import BUILT_IN, Node, Process
 from tfcompose.plan import Simulation
 from tfcompose.resolve.built_in import built_in_keys
@@ -15,14 +15,15 @@ from tfcompose.resolve.poses import pose_of
 from tfcompose.resolve.running import EXTERNAL_KEYS, SIMULATED_KEYS, how, program
 
 if TYPE_CHECKING:
+    from tfcompose.language import Validated
+    from tfcompose.language.process import ProcessSpec, Simulate
+    from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Path, Source
-    from tfcompose.validate.process import ProcessSpec
-    from tfcompose.validate.running import Run, Simulate
-    from tfcompose.validate.spec import RobotSpec
 
 
-def user_process(name: str, said: ProcessSpec, spec: RobotSpec, source: Source) -> tuple[Process | None, list[Finding]]:
+def user_process(name: str, said: ProcessSpec, validated: Validated) -> tuple[Process | None, list[Finding]]:
     """Return the process that the user describes, or None and what is missing."""
+    spec, source = validated.spec, validated.source
     at: Path = ("processes", name)
     place = source.at_key(at)
     if name in BUILT_IN:
@@ -34,13 +35,13 @@ def user_process(name: str, said: ProcessSpec, spec: RobotSpec, source: Source) 
         return replace(Process(name, "external", place, nodes), **keys), found
     if said.simulate:
         one = (Node(nodes[0].name, nodes[0].at),)
-        process, refused = _simulated(Process(name, "simulate", place, one), said.simulate, source)
+        process, refused = _simulated(Process(name, "simulate", place, one), said.simulate, validated)
         keys = how(said, namespace, SIMULATED_KEYS)
         return process and replace(process, **keys), [*found, *refused]
-    if starts(said.run):
+    if said.run and said.run.is_startable:
         process = Process(name, "run", place, nodes)
         return replace(process, **how(said, namespace), **program(said.run, shell=bool(said.shell))), found
-    if _was_refused(source.data["processes"][name].get("run")):
+    if _is_run_refused(name, validated):
         return None, found
     if said.run:
         advice = "run: {package: …, executable: …}, or {launch: package/file.launch.py}"
@@ -50,7 +51,8 @@ def user_process(name: str, said: ProcessSpec, spec: RobotSpec, source: Source) 
     return None, [finding("TF102", f"{name} does not say how it runs", place, help=advice)]
 
 
-def _simulated(process: Process, simulate: Simulate, source: Source) -> tuple[Process | None, list[Finding]]:
+def _simulated(process: Process, simulate: Simulate, validated: Validated) -> tuple[Process | None, list[Finding]]:
+    at: Path = ("processes", process.name, "simulate")
     if simulate.circle:
         circle = simulate.circle
         simulation = Simulation("circle", simulate.rate, radius=circle.radius, speed=circle.speed)
@@ -58,24 +60,18 @@ def _simulated(process: Process, simulate: Simulate, source: Source) -> tuple[Pr
         simulation = Simulation("fixed", simulate.rate, pose=pose_of(simulate.fixed))
     elif simulate.joints is not None:
         simulation = Simulation("joints", simulate.rate)
-    elif SIMULATIONS & source.data["processes"][process.name]["simulate"].keys():
-        return None, []  # it was refused already
+    elif any(path[:3] == at and path[3:4] and path[3] in SIMULATIONS for path in validated.refused):
+        return None, []
     else:
         message = f"{process.name}: simulate needs circle, fixed or joints"
-        return None, [finding("TF102", message, source.at_key(("processes", process.name, "simulate")))]
+        return None, [finding("TF102", message, validated.source.at_key(at))]
     return replace(process, simulate=simulation), []
 
 
-def starts(run: Run | None) -> TypeGuard[Run]:
-    """Return whether it says what to start."""
-    return run is not None and bool(run.argv or run.launch or (run.package and run.executable))
-
-
-def _was_refused(run: Any) -> bool:
-    """Whether the command is whole as it was written, and so missing only because a part was refused."""
-    return isinstance(run, (str, list)) or (
-        isinstance(run, dict) and ("launch" in run or {*run} >= {"package", "executable"})
-    )
+def _is_run_refused(name: str, validated: Validated) -> bool:
+    """Whether what says what to start was refused, and is missing only therefore."""
+    refused = [path[3:] for path in validated.refused if path[:3] == ("processes", name, "run")]
+    return any(not rest or isinstance(rest[0], int) or rest[0] != "args" for rest in refused)
 
 
 def name_clashes(processes: list[Process], spec: RobotSpec, source: Source) -> list[Finding]:

@@ -22,9 +22,9 @@ from tfcompose.resolve.presets import TFCOMPOSE, filled, holds
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from tfcompose.language.preset import PresetFrame, PresetSpec
     from tfcompose.model import Edge, Robot
     from tfcompose.resolve.library import Library
-    from tfcompose.validate.preset import PresetFrame, PresetSpec
 
 #: As near (m, rad) as a pose must be to a preset's to be taken for it.
 NEAR = 1e-6

@@ -16,7 +16,6 @@ from tfcompose.resolve.completed import completed
 from tfcompose.resolve.edges import Drafts
 from tfcompose.resolve.idle import idle_keys
 from tfcompose.resolve.isolation import settings_of
-from tfcompose.resolve.joints import unjoined
 from tfcompose.resolve.nodes import names_files
 from tfcompose.resolve.poses import Solver
 from tfcompose.resolve.presets import sensor_of
@@ -30,16 +29,15 @@ from tfcompose.urdf.packages import Packages
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from tfcompose.language import Validated
+    from tfcompose.language.robot import GuardSpec, RobotSpec
     from tfcompose.load import Source
     from tfcompose.model import Block
-    from tfcompose.plan import FenceWay, GuardMode, OnViolation, UnknownEdges
     from tfcompose.resolve.library import Library
     from tfcompose.resolve.part import Joined
     from tfcompose.resolve.parts import Parts
     from tfcompose.resolve.poses import Draft
     from tfcompose.urdf.packages import Disk
-    from tfcompose.validate import Validated
-    from tfcompose.validate.spec import GuardSpec, RobotSpec
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,13 +93,13 @@ class _Work:
 
     def resolved(self) -> Resolved:
         """Return the robot and what was found; each step knows what the ones before it refused."""
-        self.broken.update(self.validated.broken, unjoined(self.validated))
-        own = _processes(self.spec, self.source, self.found)
+        self.broken.update(self.validated.broken)
+        own = _processes(self.validated, self.found)
         packages = self._packages()
         self._join_parts(packages)
         bodies = Bodies(self.source, packages)
         simulated = frozenset(one.name for one in self._everybody(own) if one.kind == "simulate")
-        drafts = Drafts(self.spec, self.source, simulated, bodies)
+        drafts = Drafts(self.validated, simulated, bodies)
         self._draft(drafts)
         solver = Solver(self._measured(drafts), drafts.frames, self.validated.broken)
         edges = solver.solve()
@@ -196,7 +194,7 @@ class _Work:
     def _robot(self, drafts: Drafts, edges: tuple[Edge, ...], everybody: list[Process]) -> Robot:
         parts = [part.robot for part in self.joined]
         in_tree = [part.robot for part in self.joined if not part.said.namespace]
-        written = as_written(self.validated.data, self.source)
+        written = as_written(self.spec, self.source)
         return Robot(
             name=self.spec.robot,
             file=self.source.file,
@@ -238,10 +236,10 @@ def _has_calibrations(spec: RobotSpec) -> bool:
     return bool(spec.calibrations) or any(entry.calibration for entry in entries)
 
 
-def _processes(spec: RobotSpec, source: Source, found: list[Finding]) -> list[Process]:
-    processes = built_in(spec, source)
-    for name, said in spec.processes.items():
-        process, refused = user_process(name, said, spec, source)
+def _processes(validated: Validated, found: list[Finding]) -> list[Process]:
+    processes = built_in(validated.spec, validated.source)
+    for name, said in validated.spec.processes.items():
+        process, refused = user_process(name, said, validated)
         found += refused
         if process:
             processes.append(process)
@@ -256,13 +254,7 @@ def _written(source: Source, joined: list[Joined]) -> dict[str, Any]:
 def _guard(said: GuardSpec, parts: list[Robot]) -> GuardPolicy:
     allow = tuple(EdgePattern(edge.parent, edge.child) for edge in said.allow)
     allow += tuple(pattern for part in parts for pattern in part.guard.allow if pattern not in allow)
-    return GuardPolicy(
-        cast("GuardMode", said.mode),
-        cast("UnknownEdges", said.unknown_edges),
-        cast("OnViolation", said.on_violation),
-        allow,
-        cast("FenceWay", said.fence),
-    )
+    return GuardPolicy(said.mode, said.unknown_edges, said.on_violation, allow, said.fence)
 
 
 def _with_rates(edges: tuple[Edge, ...], processes: list[Process]) -> tuple[Edge, ...]:

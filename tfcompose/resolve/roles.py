@@ -6,8 +6,8 @@ import re
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tfcompose.language.node_preset import ClaimSpec, NodePresetSpec
     from tfcompose.model import Edge, Robot
-    from tfcompose.validate.claims import ClaimSpec, NodePresetSpec
 
 _HOLE = re.compile(r"\{(\w+)\}")
 

@@ -9,8 +9,7 @@ from tfcompose.plan import Ready, StopRule
 from tfcompose.resolve.nodes import full_name
 
 if TYPE_CHECKING:
-    from tfcompose.validate.process import ReadySpec, Started
-    from tfcompose.validate.running import Run
+    from tfcompose.language.process import ReadySpec, Run, Started
 
 #: Keys of a process that have the same name in the model.
 _AS_WRITTEN = ("after", "cwd", "env", "host", "log_level", "max_restarts", "remap", "required", "restart")

@@ -15,11 +15,11 @@ from tfcompose.urdf.inertia import of_primitives
 
 if TYPE_CHECKING:
     from tfcompose.findings import Span
+    from tfcompose.language.preset import PresetFrame
+    from tfcompose.language.robot import FrameOverride
     from tfcompose.load import Path
     from tfcompose.resolve.edges import Drafts
     from tfcompose.resolve.presets import Sensor
-    from tfcompose.validate.preset import PresetFrame
-    from tfcompose.validate.spec import FrameOverride
 
 
 def add_sensor(drafts: Drafts, sensor: Sensor) -> None:
@@ -102,7 +102,7 @@ class _Mounting:
         """Return who publishes the frames inside the sensor that a driver can publish; note what cannot be."""
         sensor, said, driver = self.sensor, self.sensor.spec, self.sensor.preset.driver
         named = said.driver.process if said.driver else None
-        process, found = driver_process(sensor, self.drafts.spec, self.drafts.source)
+        process, found = driver_process(sensor, self.drafts.validated)
         self.drafts.found += found
         if process:
             self.drafts.drivers.append(process)

@@ -7,15 +7,15 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, did_you_mean, finding
+from tfcompose.language.process import SWEEP
 from tfcompose.plan import Sweep
-from tfcompose.validate.running import SWEEP
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Source
     from tfcompose.model import Edge, Joint, Process
-    from tfcompose.validate.spec import RobotSpec
 
 #: The time of one sweep, in seconds; longer where a joint may not move that fast.
 PERIOD_S = 6.0

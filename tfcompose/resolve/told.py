@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.model import SHELL, AsInFile, Node, Process
 
 if TYPE_CHECKING:
+    from tfcompose.language.node_preset import ClaimSpec, NodePresetSpec
     from tfcompose.resolve.roles import Roles
-    from tfcompose.validate.claims import ClaimSpec, NodePresetSpec
 
 
 def flat(params: dict[str, Any], above: str = "") -> dict[str, Any]:

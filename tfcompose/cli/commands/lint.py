@@ -20,7 +20,8 @@ from tfcompose.cli.options import DEFAULT_FILE, add_variant
 from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
 from tfcompose.compile import compile_source, profiles_of
 from tfcompose.findings import Finding, Note, RejectedError, Span, finding
-from tfcompose.load import load, with_includes
+from tfcompose.language import with_includes
+from tfcompose.load import load
 from tfcompose.render.text import summary
 
 if TYPE_CHECKING:

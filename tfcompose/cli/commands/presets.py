@@ -22,8 +22,8 @@ from tfcompose.resolve.node_presets import node_preset_names
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
+    from tfcompose.language.preset import PresetSpec
     from tfcompose.resolve import Library
-    from tfcompose.validate.preset import PresetSpec
 
 
 def arguments(parser: ArgumentParser) -> None:

@@ -10,9 +10,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, RejectedError, Span, finding
-from tfcompose.load.overlay import lay_over, without
-from tfcompose.load.places import Path, Place
-from tfcompose.load.source import Source, load
+from tfcompose.language.overlay import lay_over, without
+from tfcompose.load import Path, Place, Source, load
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,12 +19,6 @@ if TYPE_CHECKING:
     Reader = Callable[[str], str]
 
 MOST_FILES = 50
-
-
-def path_named(named: str, at: Span) -> str:
-    """Return the path of a file that is named at a place: relative to the file there, or to the working folder."""
-    folder = "" if at.file.startswith("--") else posixpath.dirname(at.file)  # --set and its like
-    return posixpath.normpath(posixpath.join(folder, named))
 
 
 def with_includes(source: Source, read: Reader) -> Source:

@@ -11,8 +11,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, finding
-from tfcompose.load.choices import choices_at
-from tfcompose.load.places import Path, Place
+from tfcompose.language.base import Spec, choices
+from tfcompose.language.robot import RobotSpec
+from tfcompose.load import Path, Place, Source
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,15 +48,15 @@ def composed(source: Source, profiles: Sequence[str] = (), overlays: Sequence[So
         rest = without(overlay, "profiles")
         if rest.data or rest is overlay:
             result = lay_over(result, rest)
-    return replace(_without_nulls(result), is_variant=bool(profiles or overlays))
+    return replace(result, is_variant=bool(profiles or overlays))
 
 
-def lay_over(base: Source, overlay: Source, *, is_overlay: bool = True) -> Source:
+def lay_over(base: Source, overlay: Source, *, is_overlay: bool = True, of: type[Spec] = RobotSpec) -> Source:
     """Return ``base`` with ``overlay`` merged into it; each key remembers where it is from, and what it replaced.
 
-    With ``is_overlay`` a value that changes nothing is a finding.
+    With ``is_overlay`` a value that changes nothing is a finding. ``of`` is the language that both are written in.
     """
-    merger = _Merger(base.replaced, overlay.replaced, is_overlay=is_overlay)
+    merger = _Merger(base.replaced, overlay.replaced, of, is_overlay=is_overlay)
     if is_overlay and not overlay.data:
         merger.found.append(_idle("nothing is laid over the robot here", overlay.places))
     data, places = merger.merge((base.data, base.places), (overlay.data, overlay.places), ())
@@ -82,8 +83,9 @@ Part = tuple[dict[str, Any], Place]
 class _Merger:
     """Merges in time proportional to the overlay and to the mappings that it reaches; neither side is changed."""
 
-    def __init__(self, below: Replaced, above: Replaced, *, is_overlay: bool) -> None:
+    def __init__(self, below: Replaced, above: Replaced, of: type[Spec], *, is_overlay: bool) -> None:
         self.is_overlay = is_overlay
+        self.of = of
         self.below = below
         self.above = above
         self.replaced = below | above
@@ -92,14 +94,14 @@ class _Merger:
     def merge(self, base: Part, overlay: Part, path: Path) -> Part:
         """Return ``base`` with ``overlay`` laid over it."""
         data, inside, keys = dict(base[0]), dict(base[1].inside), dict(base[1].keys)
-        for choice in choices_at(path, overlay[0]):
+        for choice in self.choices_at(path, overlay[0]):
             for dropped in choice & (data.keys() - overlay[0].keys()):
                 new = next(key for key in overlay[0] if key in choice and overlay[0][key] is not None)
                 self.remember((*path, new), inside[dropped])
                 _drop(dropped, data, inside, keys)
         for key, value in overlay[0].items():
             at, place = (*path, key), overlay[1].inside[key]
-            if value is None and not _is_for_later(path):
+            if value is None and not is_for_later(path):
                 self.note_removal(key in data, overlay[1].keys[key], at)
                 _drop(key, data, inside, keys)
             elif isinstance(value, dict):
@@ -117,6 +119,16 @@ class _Merger:
                     self.note(data[key], inside[key], value, place, at)
                 data[key], inside[key], keys[key] = value, place, overlay[1].keys[key]
         return data, base[1].with_inside(inside, keys)
+
+    def choices_at(self, path: Path, data: dict[str, Any]) -> list[frozenset[str]]:
+        """Return the choices that a mapping at the path makes: of each, it holds a key with a value."""
+        return [
+            keys
+            for pattern, keys in choices(self.of)
+            if len(pattern) == len(path)
+            and all(want in {"*", step} for want, step in zip(pattern, path, strict=True))
+            and any(data.get(key) is not None for key in keys)
+        ]
 
     def note_removal(self, was_there: bool, key: Place, path: Path) -> None:  # noqa: FBT001 (the fact itself)
         """Say so if nothing was removed."""
@@ -141,8 +153,8 @@ def _idle(message: str, place: Place, old: Place | None = None) -> Finding:
     return finding("TF014", message, place.span, notes=notes, help="remove it", severity="warning")
 
 
-def _is_for_later(path: Path) -> bool:
-    """Whether what stands there is laid over something only later: a robot's profile, or a variant in a preset."""
+def is_for_later(path: Path) -> bool:
+    """Return whether what stands there is merged over something only later: a profile, or a variant of a preset."""
     return path[:1] == ("profiles",) or (path[:1] == ("options",) and path[2:3] == ("variants",))
 
 
@@ -168,33 +180,6 @@ def without(source: Source, key: str) -> Source:
     keys = {name: below for name, below in place.keys.items() if name != key}
     data = {name: value for name, value in source.data.items() if name != key}
     return replace(source, data=data, places=place.with_inside(inside, keys))
-
-
-def _without_nulls(source: Source) -> Source:
-    """Report what is null after all overlays: a key without a value says nothing."""
-    if not source.has_nulls:
-        return source
-    found: list[Finding] = []
-
-    def clean(value: Any, path: Path) -> Any:
-        if isinstance(value, list):
-            for index in [index for index, item in enumerate(value) if item is None]:
-                advice = "give a value, or remove the item"
-                found.append(
-                    finding("TF006", "an item of the list has no value", source.at((*path, index)), help=advice)
-                )
-            return [clean(item, (*path, index)) for index, item in enumerate(value) if item is not None]
-        if not isinstance(value, dict):
-            return value
-        for key in [key for key, item in value.items() if item is None]:
-            message = f"{key} has no value"
-            found.append(
-                finding("TF006", message, source.at_key((*path, key)), help=f"write {key}: {{}}, or remove it")
-            )
-        return {key: clean(item, (*path, key)) for key, item in value.items() if item is not None}
-
-    data = clean(source.data, ())
-    return replace(source, data=data, found=(*source.found, *found))
 
 
 def _wrong_profiles(source: Source) -> list[Finding]:

@@ -6,10 +6,9 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import did_you_mean
-from tfcompose.validate.arithmetic import ExpressionError, Value
-from tfcompose.validate.expression import IDENTIFIER, RESERVED, fill, names_in
-from tfcompose.validate.quantity import NUMBER, Quantity, UnitError, quantity
-from tfcompose.validate.schema import BROKEN, Problems, shown
+from tfcompose.language.expressions import IDENTIFIER, RESERVED, ExpressionError, Value, fill, names_in
+from tfcompose.language.reading import Refusal
+from tfcompose.units import NUMBER, Quantity, UnitError, quantity, shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -17,15 +16,17 @@ if TYPE_CHECKING:
     from tfcompose.load import Path
 
 
-def compute(data: dict[str, Any], problems: Problems) -> dict[str, Any]:
-    """Return the data with every ``${…}`` replaced by its value: a ``Quantity`` where it is the whole text.
+def compute(data: dict[str, Any]) -> tuple[dict[str, Any], list[Refusal], list[Path]]:
+    """Return the data with every ``${…}`` computed, what was refused, and the paths of what could not be computed.
 
-    What cannot be computed becomes ``BROKEN``, and a problem.
+    What is one expression becomes a ``Quantity`` or a string. What could not be computed stays as it is; there is no
+    second refusal of what only needs a variable that was refused.
     """
-    variables = _Variables(data.get("vars"), problems)
+    variables = _Variables(data.get("vars"))
     variables.read_all()
     filled = {key: _filled(value, (key,), variables) for key, value in data.items() if key != "vars"}
-    return filled | ({"vars": data["vars"]} if "vars" in data else {})
+    filled |= {"vars": data["vars"]} if "vars" in data else {}
+    return filled, variables.refusals, variables.uncomputed
 
 
 def unused(data: dict[str, Any], aside: Any = None) -> tuple[str, ...]:
@@ -78,15 +79,16 @@ class _NothingNewError(ExpressionError):
 
 
 class _Variables:
-    def __init__(self, written: Any, problems: Problems) -> None:
-        self.written: dict[str, Any] = written if isinstance(written, dict) else {}
-        self.problems = problems
-        self.known: dict[str, Value] = {}
+    def __init__(self, given: Any) -> None:
+        self.given: dict[str, Any] = given if isinstance(given, dict) else {}
+        self.refusals: list[Refusal] = []
+        self.uncomputed: list[Path] = []
+        self.known: dict[str, Value | None] = {}  # None: it was refused
         self.open: list[str] = []
 
     def read_all(self) -> None:
         """Compute every variable, first those that it needs; without recursion, however long the chain."""
-        for first in self.written:
+        for first in self.given:
             self.open = [first]
             waiting = [self._names_in(first)]
             while waiting:
@@ -100,51 +102,57 @@ class _Variables:
                 self.open.pop()
 
     def _names_in(self, name: str) -> Iterator[str]:
-        written = self.written[name]
+        written = self.given[name]
         names = names_in(written) if isinstance(written, str) else []
-        return iter([other for other in names if other in self.written])
+        return iter([other for other in names if other in self.given])
 
     def _read(self, name: str) -> None:
         if name in self.known:
             return
+        if self.given[name] is None:  # a null is refused as such
+            self.known[name] = None
+            return
         try:
-            self.known[name] = self._value(name, self.written[name])
+            self.known[name] = self._value(name, self.given[name])
         except ExpressionError as error:
-            self.known[name] = self._refuse(error, ("vars", name))
+            self.known[name] = None
+            self._refuse(error, ("vars", name))
 
     def fill(self, text: str, path: Path) -> Any:
         try:
             return fill(text, self.lookup, LATER if _is_of_a_process(path) else None)
         except ExpressionError as error:
-            return self._refuse(error, path)
+            self._refuse(error, path)
+            return text
 
-    def _refuse(self, error: ExpressionError, path: Path) -> Any:
+    def _refuse(self, error: ExpressionError, path: Path) -> None:
+        self.uncomputed.append(path)
         if not isinstance(error, _NothingNewError):
             advice = f"{error.advice}; {_LITERALLY}" if path[0] == "xml" else error.advice
-            self.problems.refuse("TF105", path, str(error), advice)
-        return BROKEN
+            self.refusals.append(Refusal("TF105", path, str(error), advice))
 
     def lookup(self, name: str) -> Value:
         if name in self.known:
-            if self.known[name] is BROKEN:
+            value = self.known[name]
+            if value is None:
                 raise _NothingNewError(name)
-            return self.known[name]
+            return value
         if name in self.open:
             circle = " → ".join([*self.open[self.open.index(name) :], name])
             raise ExpressionError(f"the variable {self.open[-1]} needs itself: {circle}")
-        there = f"vars has {', '.join(self.written)}" if self.written else "the file has no vars"
-        raise ExpressionError(f"unknown variable {name}", did_you_mean(name, self.written, there))
+        there = f"vars has {', '.join(self.given)}" if self.given else "the file has no vars"
+        raise ExpressionError(f"unknown variable {name}", did_you_mean(name, self.given, there))
 
-    def _value(self, name: str, written: Any) -> Value:
+    def _value(self, name: str, given: Any) -> Value:
         if name in RESERVED:
             raise ExpressionError(f"{name} is {RESERVED[name]}", "give the variable another name")
         if not IDENTIFIER.fullmatch(name):
             raise ExpressionError(f"{name!r} cannot name a variable", "letters, digits and _: for example mast_height")
-        if isinstance(written, bool) or not isinstance(written, (int, float, str)):
-            raise ExpressionError(f"the variable {name} is {shown(written)}", "a number, a quantity or a text")
-        if not isinstance(written, str):
-            return Quantity(written)
-        value = fill(written, self.lookup) if "${" in written else written
+        if isinstance(given, bool) or not isinstance(given, (int, float, str)):
+            raise ExpressionError(f"the variable {name} is {shown(given)}", "a number, a quantity or a text")
+        if not isinstance(given, str):
+            return Quantity(given)
+        value = fill(given, self.lookup) if "${" in given else given
         if not isinstance(value, str):
             return value
         try:

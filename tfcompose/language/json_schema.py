@@ -1,0 +1,172 @@
+"""The language as JSON Schema (draft 2020-12), made from the models; editors and check-jsonschema read it."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from typing import TYPE_CHECKING, Any
+
+from pydantic.json_schema import GenerateJsonSchema
+
+from tfcompose.catalogue import CATALOGUE
+from tfcompose.language.base import described, examples_of, fields_of, walk
+from tfcompose.language.node_preset import NodePresetSpec
+from tfcompose.language.preset import PresetSpec
+from tfcompose.language.robot import RobotSpec
+from tfcompose.load.scalars import plain
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from tfcompose.language.base import Spec
+    from tfcompose.language.preset import Option
+
+LANGUAGES: dict[str, type[Spec]] = {"robot": RobotSpec, "preset": PresetSpec, "node": NodePresetSpec}
+
+
+def json_schema(language: str, presets: Mapping[str, PresetSpec], nodes: Iterable[str]) -> dict[str, Any]:
+    """Return the schema of ``robot``, ``preset`` or ``node``, which is a preset of a node that publishes TF.
+
+    The schema of ``robot`` knows the names and options of ``presets``, and the names of ``nodes``, their presets.
+    """
+    root = LANGUAGES[language]
+    own = root.model_json_schema(schema_generator=_Generator)
+    definitions = own.pop("$defs", {})
+    for _, kind in walk(root):
+        schema = own if kind is root else definitions[kind.__name__]
+        for name, field in fields_of(kind).items():
+            schema["properties"][name] |= {"description": described(field), "examples": examples_of(field)}
+    if language == "preset":
+        _overlaid(own, definitions)
+    if language == "robot":
+        own["patternProperties"] = {"^x-": {"description": "your own anchors, which tfcompose does not read"}}
+        _add_codes(own["properties"]["rules"])
+        _add_presets(own, definitions["SensorSpec"], presets)
+        for kind in ("NamedNode", "NodeSpec"):
+            definitions[kind]["properties"]["preset"] |= {"enum": sorted(nodes)}
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": f"tfcompose {language}, version 1"}
+    return head | own | {"$defs": dict(sorted(definitions.items()))}
+
+
+class _Generator(GenerateJsonSchema):
+    """Leaves out what tells an editor nothing: titles, empty defaults, and null for what may be left out."""
+
+    def get_title_from_name(self, name: str) -> str:
+        """Return no title: the key says it."""
+        del name
+        return ""
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        """Return that no key has one."""
+        del schema
+        return False
+
+    def model_schema(self, schema: Any) -> dict[str, Any]:
+        """Return the schema of a model with its docstring."""
+        made = super().model_schema(schema)
+        made.pop("title", None)
+        return {"description": inspect.getdoc(schema["cls"]), **made}
+
+    def dataclass_schema(self, schema: Any) -> dict[str, Any]:
+        """Return the schema of a dataclass with its docstring."""
+        made = super().dataclass_schema(schema)
+        made.pop("title", None)
+        return {"description": inspect.getdoc(schema["cls"]), **made}
+
+    def nullable_schema(self, schema: Any) -> dict[str, Any]:
+        """Return the schema without null, which only an overlay holds, to remove a key."""
+        return self.generate_inner(schema["schema"])
+
+    def default_schema(self, schema: Any) -> dict[str, Any]:
+        """Return the schema with its default, where that is a plain value."""
+        made = super().default_schema(schema)
+        if made.get("default") in (None, [], {}, "") or isinstance(made.get("default"), dict):
+            made.pop("default", None)
+        return made
+
+    def literal_schema(self, schema: Any) -> dict[str, Any]:
+        """Return the choice alone."""
+        return {"enum": list(schema["expected"])}
+
+    def tagged_union_schema(self, schema: Any) -> dict[str, Any]:
+        """Return the schema of forms that are told apart by what stands there, not by a key."""
+        made = super().tagged_union_schema(schema)
+        return {"anyOf": made["oneOf"]} if "oneOf" in made else made
+
+    def tuple_schema(self, schema: Any) -> dict[str, Any]:
+        """Return the schema of a list; editors know ``items`` and not ``prefixItems``."""
+        made = super().tuple_schema(schema)
+        items = made.pop("prefixItems", None)
+        return made | {"items": items[0]} if items else made
+
+
+def _overlaid(own: dict[str, Any], definitions: dict[str, Any]) -> None:
+    """Let a file that is merged over another one leave out what that one has, and remove it with null."""
+    own["required"] = ["preset"]
+    for model in (own, *definitions.values()):
+        if model is not own:
+            model.pop("required", None)
+        model["properties"] = {
+            name: schema if name == "preset" else _removable(schema) for name, schema in model["properties"].items()
+        }
+
+
+def _removable(schema: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of what may be null instead, and so may what is in it."""
+    about = {key: schema[key] for key in ("description", "examples", "default") if key in schema}
+    form = {key: value for key, value in schema.items() if key not in about}
+    if isinstance(form.get("additionalProperties"), dict) and form["additionalProperties"]:
+        form["additionalProperties"] = {"anyOf": [form["additionalProperties"], {"type": "null"}]}
+    return about | ({"anyOf": [form, {"type": "null"}]} if form else {})
+
+
+def _add_codes(rules: dict[str, Any]) -> None:
+    """Let ``rules`` know the codes of findings that can be switched."""
+    level = rules.pop("additionalProperties")
+    codes = [code for code in CATALOGUE.values() if code.can_be_allowed]
+    rules["properties"] = {code.code: level | {"description": code.name.replace("_", " ")} for code in codes}
+    rules["additionalProperties"] = False
+
+
+def _add_presets(own: dict[str, Any], sensor: dict[str, Any], presets: Mapping[str, PresetSpec]) -> None:
+    """Let ``preset`` know the presets, and ``options`` those of the one that is chosen.
+
+    A name that is not known can only be a user's own, from ``preset_path`` or an included file that has one.
+    """
+    sensor["properties"]["preset"] |= {"anyOf": [{"enum": sorted(presets)}, {"pattern": "^[^/]+/[^/]+$"}]}
+    by_options: dict[str, list[str]] = {}
+    schemas: dict[str, dict[str, Any]] = {}
+    for name, preset in sorted(presets.items()):
+        options = {key: _option(option) for key, option in preset.options.items()}
+        by_options.setdefault(repr(options), []).append(name)
+        schemas[repr(options)] = options
+    sensor["allOf"] = [
+        {
+            "if": {"properties": {"preset": {"enum": names}}, "required": ["preset"]},
+            "then": {"properties": {"options": {"properties": schemas[key], "additionalProperties": False}}},
+        }
+        for key, names in by_options.items()
+    ]
+    vendors = sorted({re.escape(name.partition("/")[0]) for name in presets})
+    known = {"anyOf": [{"enum": sorted(presets)}, {"pattern": f"^(?!({'|'.join(vendors)})/)"}]}
+    own["if"] = {"anyOf": [{"required": ["preset_path"]}, {"required": ["include"]}]}
+    own["else"] = {
+        "properties": {"sensors": {"additionalProperties": {"properties": {"preset": known}}}},
+    }
+
+
+def _option(option: Option) -> dict[str, Any]:
+    """Return the schema of one of a preset's options."""
+    computed = {"type": "string", "pattern": r"^\$\{"}
+    forms: dict[str, dict[str, Any]] = {
+        "bool": {"type": "boolean"},
+        "text": {"type": "string"},
+        "choice": {"enum": list(dict.fromkeys([*option.variants, *map(plain, option.variants)]))},
+        "set": {"type": "array", "items": {"enum": list(option.values)}},
+    }
+    schema: dict[str, Any] = {"anyOf": [forms[option.type], computed]}
+    if option.about:
+        schema["description"] = option.about
+    if option.default is not None:
+        schema["default"] = option.default
+    return schema

@@ -1,0 +1,307 @@
+"""Processes as users describe them: what is started, or expected to run, and how."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag
+
+from tfcompose.language.base import Checked, Spec, key, several
+from tfcompose.language.expressions import inserted
+from tfcompose.language.node_preset import ClaimSpec
+from tfcompose.language.pose import Posed
+from tfcompose.language.values import (
+    Boolean,
+    Matches,
+    Namespace,
+    NodeName,
+    OnlyTrue,
+    Parameters,
+    Text,
+    Whole,
+    short,
+)
+from tfcompose.plan import LifecycleState, LogLevel, RestartPolicy, StartCondition, StopSignal
+from tfcompose.units import Duration, JointPosition, Quantity, Rate, Size, TurnRate, refused, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from pydantic_core import PydanticCustomError
+
+    from tfcompose.load import Path
+
+
+def _inserted(value: Any) -> Any:
+    return inserted(value) if isinstance(value, Quantity) else value
+
+
+#: A string; a computed number is written as one.
+Word = Annotated[Text, BeforeValidator(_inserted)]
+Words = tuple[Word, ...]
+
+
+def _arguments(value: Any) -> Any:
+    """Return a command's arguments as words; a launch file's are given by name."""
+    if not isinstance(value, dict):
+        return value
+    wrong = [name for name, item in value.items() if isinstance(item, (dict, list))]
+    if wrong:
+        raise several(
+            *(((name,), refused("TF103", f"{shown(value[name])} is not a string or number")) for name in wrong)
+        )
+    return [f"{name}:={_argument(item)}" for name, item in value.items()]
+
+
+def _argument(value: Any) -> str:
+    if isinstance(value, Quantity):
+        value = int(value.value) if value.value == int(value.value) else value.value
+    return value if isinstance(value, str) else shown(value)
+
+
+Arguments = Annotated[Words, BeforeValidator(_arguments, Words | dict[str, Any])]
+
+COMMANDS = (
+    *(frozenset({"argv", name}) for name in ("package", "executable", "args", "launch")),
+    *(frozenset({"launch", name}) for name in ("package", "executable")),
+)
+
+
+class Run(Checked):
+    """An installed executable, a launch file, or a command, word by word."""
+
+    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = COMMANDS
+
+    package: Text | None = key(None, "the package of an executable", "slam_toolbox")
+    executable: Text | None = key(None, "an executable of the package", "async_slam_toolbox_node")
+    launch: Annotated[Text, Matches(r"[^/]+/[^/]+(/[^/]+)*", "package/file.launch.py")] | None = key(
+        None, "a package's launch file, run as one process", "nav2_bringup/navigation_launch.py"
+    )
+    args: Arguments = key((), "arguments; of a launch file by name", ["--verbose"], {"use_composition": False})
+    argv: Words = key((), "the whole command, instead of package and executable", ["python3", "-m", "my_robot.drive"])
+
+    @property
+    def is_startable(self) -> bool:
+        """Whether it says what to start."""
+        return bool(self.argv or self.launch or (self.package and self.executable))
+
+
+def _command(value: Any) -> Any:
+    return {"argv": value if isinstance(value, list) else [value]} if isinstance(value, (list, str)) else value
+
+
+Command = Annotated[
+    Run,
+    BeforeValidator(
+        _command,
+        Annotated[Words, Field(min_length=1)] | Annotated[Text, Field(description="with shell: true")] | Run,
+    ),
+]
+
+
+class Circle(Spec):
+    """A body that drives on a circle, counter-clockwise."""
+
+    radius: Size = key(1.0, "the circle's radius")
+    speed: TurnRate = key(0.5, "how fast it turns")
+
+
+SWEEP = "sweep"
+
+
+def _form(value: Any) -> str:
+    return "[word]" if isinstance(value, str) and value.isalpha() else "[other]"
+
+
+SimulatedJoint = Annotated[
+    Annotated[Literal["sweep"], Tag("[word]")] | Annotated[JointPosition, Tag("[other]")], Discriminator(_form)
+]
+SimulatedJoints = Annotated[
+    Annotated[Literal["zero", "sweep"], Tag("[word]")] | Annotated[dict[str, SimulatedJoint], Tag("[other]")],
+    Discriminator(lambda value: "[word]" if isinstance(value, str) else "[other]"),
+]
+SIMULATIONS = frozenset({"circle", "fixed", "joints"})
+
+
+class Simulate(Checked):
+    """A simulated owner: on a circle, at a fixed pose, or a publisher of joint states."""
+
+    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (SIMULATIONS,)
+
+    circle: Circle | None = key(None, "its edge moves on a circle", {"radius": "1 m", "speed": "0.5 rad/s"})
+    fixed: Posed | None = key(None, "its edge stays at one pose", {"xyz": [1, 0, 0]})
+    joints: SimulatedJoints | None = key(
+        None, "joint states: zero, sweep, or a position or sweep by joint; the others are at 0", "zero", {"lift": 0.2}
+    )
+    rate: Rate = key(20.0, "how often it publishes")
+
+
+class StopSpec(Spec):
+    """How a process is stopped: a first signal to its whole group, then firmer ones."""
+
+    signal: StopSignal = key("SIGINT", "the first signal")
+    timeout: Duration | None = key(None, "how long until the next, firmer one", "5 s")
+
+
+def _is_regular(value: str) -> str:
+    try:
+        re.compile(value)
+    except (re.error, RecursionError, OverflowError) as error:
+        raise refused("TF106", f"{shown(value)} is not a regular expression: {error}") from None
+    return value
+
+
+READY_WAYS = frozenset({"edges", "topic", "service", "lifecycle", "log", "exit", "time"})
+
+
+class ReadySpec(Checked):
+    """When a process counts as ready; by default, when all the edges that it owns are live."""
+
+    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (READY_WAYS,)
+
+    edges: OnlyTrue | None = key(None, "true: when all the edges that it owns are live", True)
+    topic: Text | None = key(
+        None, "when this topic has a publisher; below the process's namespace unless it begins with /", "scan"
+    )
+    service: Text | None = key(
+        None, "when this service is there; below the process's namespace unless it begins with /", "map_server/load_map"
+    )
+    lifecycle: LifecycleState | None = key(None, "when its nodes are in this state, whoever brought them there")
+    log: Annotated[Text, AfterValidator(_is_regular)] | None = key(
+        None, "when a line of its output matches this regular expression", "server started"
+    )
+    exit: Annotated[int, Strict(), Field(ge=0, le=255), Whole] | None = key(
+        None, "when it has ended with this exit code", 0
+    )
+    time: Duration | None = key(None, "this long after its start", "2 s")
+    timeout: Duration | None = key(None, "when to stop waiting and report what was there instead", "30 s")
+
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
+        """Yield also that nothing is waited for."""
+        yield from super().check(data)
+        if not READY_WAYS & data.keys():
+            advice = f"one of: {', '.join(sorted(READY_WAYS))}"
+            yield (), refused("TF102", "ready does not say what to wait for", advice, on_key=True)
+
+
+Ready = Annotated[
+    ReadySpec,
+    BeforeValidator(lambda value: {"edges": True} if value == "edges" else value, Literal["edges"] | ReadySpec),
+]
+
+_PARAMS = "the node's parameters, passed on as they are; file: names parameter files, which the others are merged over"
+_PUBLISHES = "edges that the node publishes by default, and what stops it; a preset knows them"
+_PRESET = "what is known about this node: its edges and parameters"
+
+
+class NodeSpec(Spec):
+    """One node of a process."""
+
+    preset: Text | None = key(None, _PRESET, "slam_toolbox")
+    publishes: tuple[ClaimSpec, ...] = key((), _PUBLISHES, [{"parent": "map", "child": "odom", "off": "none"}])
+    params: Parameters = key({}, _PARAMS, {"use_sim_time": False})
+    lifecycle: LifecycleState | None = key(None, "the state that a lifecycle node is brought into after the start")
+
+
+class NamedNode(Spec):
+    """The one node of a process: its name, and what is known about it."""
+
+    name: NodeName | None = key(
+        None, "its name; default: the process's, or its usual one where others start it", "slam_toolbox"
+    )
+    preset: Text | None = key(None, _PRESET, "slam_toolbox")
+
+
+def _names_a_variable(name: str) -> str:
+    if not name or "=" in name:
+        raise refused("TF106", f"{name!r} cannot name a variable")
+    return name
+
+
+RUNNING = frozenset({"run", "simulate", "external"})
+
+
+class Started(Checked):
+    """What is started, simulated, or expected to run."""
+
+    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (RUNNING,)
+
+    run: Command | None = key(
+        None,
+        "{package, executable, args}, {launch, args}, or a command as a list",
+        {"package": "slam_toolbox", "executable": "async_slam_toolbox_node"},
+    )
+    simulate: Simulate | None = key(None, "a simulation of it", {"circle": {"radius": "1 m"}, "rate": "50 Hz"})
+    external: OnlyTrue | None = key(None, "true: somebody else starts it", True)
+    shell: OnlyTrue | None = key(None, "true: run is one string, which /bin/sh reads", True)
+    node: Annotated[NamedNode, short("name", NamedNode)] | None = key(
+        None,
+        "its node's name, or {preset, name}; below its namespace unless it begins with /",
+        "slam_toolbox",
+        {"preset": "slam_toolbox"},
+    )
+    namespace: Namespace | None = key(
+        None, "the namespace of its nodes; below ros.namespace unless it begins with /", "front"
+    )
+    publishes: tuple[ClaimSpec, ...] = key((), _PUBLISHES, [{"parent": "map", "child": "odom", "off": "none"}])
+    params: Parameters = key({}, _PARAMS, {"use_sim_time": False})
+    lifecycle: LifecycleState | None = key(None, "the state that its lifecycle node is brought into after the start")
+    log_level: LogLevel | None = key(None, "the level of its nodes' loggers")
+    remap: dict[str, Text] = key({}, "topics, services and actions under other names", {"scan": "front/scan"})
+    env: dict[Annotated[Text, AfterValidator(_names_a_variable)], Word] = key(
+        {}, "environment variables", {"RCUTILS_COLORIZED_OUTPUT": "1"}
+    )
+    cwd: Text | None = key(
+        None, "the folder that it runs in, relative to this file; default: where up is called", "maps"
+    )
+    rate: Rate | None = key(None, "of joints alone: how often joint states come", "50 Hz")
+    host: Text | None = key(None, "the computer that it runs on", "jetson")
+    required: Boolean | None = key(
+        None,
+        "true: its end stops everything; false: the rest goes on when it fails; default: its failure stops everything",
+    )
+    restart: RestartPolicy = key("no", "when it is started again after it has ended")
+    max_restarts: Annotated[int, Strict(), Field(ge=0, le=1_000_000), Whole] | None = key(
+        None, "how often in a row it is started again before it is given up", 5
+    )
+    stop: StopSpec | None = key(None, "how it is stopped", {"signal": "SIGTERM", "timeout": "5 s"})
+    ready: Ready | None = key(None, "when it counts as ready", {"topic": "scan"})
+    after: dict[str, StartCondition] = key({}, "what must have happened before it is started", {"base_drive": "ready"})
+
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
+        """Yield also a command in one string that is not marked for a shell, and the other way round."""
+        yield from super().check(data)
+        run, shell = data.get("run"), data.get("shell") is True
+        if isinstance(run, str) and not shell:
+            advice = "write a list, one item a word; or {package: …, executable: …}; or add shell: true"
+            yield ("run",), refused("TF103", "the command is one string, which only a shell reads", advice)
+        elif shell and run is not None and not isinstance(run, str):
+            advice = "run: one string, for example 'zcat log.gz | player'"
+            yield ("shell",), refused("TF107", "shell: true, but run is not a string", advice, on_key=True, keeps=True)
+
+
+class ProcessSpec(Started):
+    """What is started, simulated, or expected to run."""
+
+    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (
+        *Started.EXCLUSIVE,
+        *(frozenset({"nodes", name}) for name in ("node", "lifecycle")),
+    )
+
+    nodes: dict[NodeName, NodeSpec] = key(
+        {},
+        "the nodes of a process that holds several, by name; node, params and lifecycle are the short form for one",
+        {"planner_server": {"lifecycle": "active"}, "controller_server": {"lifecycle": "active"}},
+    )
+
+
+class DriverSpec(Started):
+    """Keys over those of the preset's driver; or the name of the process that drives this sensor; or none."""
+
+    process: Text | None = key(None, "the process that drives this sensor, or none", "camera_rig")
+
+
+Driver = Annotated[DriverSpec, short("process", DriverSpec)]

@@ -1,0 +1,220 @@
+"""From plain data to a model: everything that is refused, in this project's words, and a model of the rest.
+
+pydantic gives all or nothing. So what it refuses is taken out of the data and the rest is read again; each turn finds
+everything at once, and what is refused then only because something is gone is not reported. Most files with faults take
+two turns, and none takes more than it has levels.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin
+
+from pydantic import ValidationError
+
+from tfcompose.findings import Edit, Finding, Note, did_you_mean, finding, slip_of
+from tfcompose.language.base import FIRST, at, fields_of, kinds_of, mapping_at
+from tfcompose.units import shown
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from pydantic_core import ErrorDetails
+
+    from tfcompose.language.base import Spec
+    from tfcompose.load import Path, Source
+
+M = TypeVar("M", bound="Spec")
+
+#: How often the rest is read again at most: no file is nested deeper.
+_MOST_TURNS = 50
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """One value or key that the language does not take. ``path`` is its place.
+
+    ``on_key`` says that the key is wrong, not its value; ``other`` is the key that it conflicts with. ``instead`` is
+    the key or string that belongs there, where only one can be meant.
+    """
+
+    code: str
+    path: Path
+    message: str
+    help: str = ""
+    on_key: bool = False
+    other: Path | None = None
+    instead: str | None = None
+
+    def finding(self, source: Source, code: str = "") -> Finding:
+        """Return the finding at its place in the source; ``code`` replaces its own."""
+        span = source.at_key(self.path) if self.on_key else source.at(self.path)
+        notes = [Note("the other one", source.at_key(self.other))] if self.other else []
+        edits = [Edit(span, self.instead)] if self.instead is not None else []
+        return finding(code or self.code, self.message, span, help=self.help, notes=notes, edits=edits)
+
+
+def read(model: type[M], data: Any, already: Iterable[Path] = ()) -> tuple[M | None, list[Refusal]]:
+    """Return the model of the data without what is refused, and the refusals.
+
+    ``already`` are paths of what was refused before: it is left out, and so is what is refused only because of it. The
+    model is None where a required key of the whole is missing.
+    """
+    refusals: list[Refusal] = []
+    gone: set[Path] = set()
+    rest = _without(data, already, gone)
+    for turn in range(_MOST_TURNS):
+        if rest is None:
+            break
+        try:
+            return model.model_validate(rest, context=None if turn else FIRST), refusals
+        except ValidationError as error:
+            errors = [(_path_of(one["loc"], data), one) for one in error.errors(include_url=False)]
+        follows = {path[:end] for path in gone for end in range(1, len(path) + 1)}
+        new = [(path, one) for path, one in errors if path not in (gone if one["type"] in _UNKNOWN else follows)]
+        refusals += _refusals(model, new, data)
+        rest = _without(
+            rest, [_culprit(path, one) for path, one in errors if not one.get("ctx", {}).get("keeps")], gone
+        )
+    return None, refusals
+
+
+def _culprit(path: Path, error: ErrorDetails) -> Path:
+    """Return the path of what has to go: of a key that is missing, the mapping that it is missing in."""
+    return path[:-1] if error["type"] == "missing" else path
+
+
+def _path_of(loc: tuple[int | str, ...], data: Any) -> Path:
+    """Return the path in the file: pydantic's has labels of unions, and indexes where one item stands for a list."""
+    steps: list[int | str] = []
+    for step in loc:
+        is_index = isinstance(step, int)
+        if (isinstance(data, dict) and step in data) or (isinstance(data, list) and is_index):
+            data = data[step]  # type: ignore[index]
+        elif is_index or isinstance(data, list) or str(step).startswith("["):  # [key], and labels of unions
+            continue
+        else:
+            data = None
+        steps.append(step)
+    return tuple(steps)
+
+
+def _without(data: Any, paths: Iterable[Path], gone: set[Path]) -> Any:
+    """Return the data without what stands at the paths, or None if that is all of it; the paths are added to ``gone``.
+
+    A list goes with one of its items. Nothing that is given changes.
+    """
+    tree: dict[Any, Any] = {}
+    for path in paths:
+        steps = _existing(data, path)
+        if not steps:
+            return None
+        gone.add(steps)
+        node = tree
+        for step in steps[:-1]:
+            node = node.setdefault(step, {})
+            if node is _ALL:
+                break
+        else:
+            node[steps[-1]] = _ALL
+    return _pruned(data, tree) if tree else data
+
+
+#: Marks what goes as a whole.
+_ALL: Any = {None: None}
+
+
+def _existing(data: Any, path: Path) -> Path:
+    """Return the path as far as it leads to something of its own: short forms and items of lists have no keys."""
+    end = 0
+    for count, step in enumerate(path, 1):
+        if isinstance(data, dict) and step in data:
+            end = count
+        elif not (isinstance(data, list) and isinstance(step, int)):
+            break
+        data = data[step]
+    return path[:end]
+
+
+def _pruned(data: Any, tree: dict[Any, Any]) -> Any:
+    if isinstance(data, list):
+        return [_pruned(item, tree[index]) if index in tree else item for index, item in enumerate(data)]
+    return {
+        name: _pruned(item, tree[name]) if name in tree else item
+        for name, item in data.items()
+        if tree.get(name) is not _ALL
+    }
+
+
+def _refusals(model: type[Spec], errors: list[tuple[Path, ErrorDetails]], data: Any) -> list[Refusal]:
+    """Return what pydantic refused in one turn, in this project's words."""
+    unknown = [path for path, one in errors if one["type"] in _UNKNOWN]
+    meant = Counter((path[:-1], _slip(model, path)) for path in unknown)
+    return [
+        _unknown_key(model, path, data, meant) if one["type"] in _UNKNOWN else _refusal(model, path, one)
+        for path, one in errors
+    ]
+
+
+#: The kinds of errors for a key that a model, or a dataclass, does not have.
+_UNKNOWN = frozenset({"extra_forbidden", "unexpected_keyword_argument"})
+
+
+def _slip(model: type[Spec], path: Path) -> str | None:
+    known = mapping_at(model, path[:-1])
+    return slip_of(str(path[-1]), fields_of(known))
+
+
+def _unknown_key(model: type[Spec], path: Path, data: Any, meant: Counter[tuple[Path, str | None]]) -> Refusal:
+    """Return the refusal of a key; one that is there already, or is meant by two, is not proposed."""
+    name, known = str(path[-1]), list(fields_of(mapping_at(model, path[:-1])))
+    slip = _slip(model, path)
+    around = data
+    for step in path[:-1]:
+        around = around[step]
+    is_safe = slip not in around and meant[path[:-1], slip] == 1
+    advice = did_you_mean(name, known, f"known here: {', '.join(known)}")
+    return Refusal("TF101", path, f"unknown key {name}", advice, on_key=True, instead=slip if is_safe else None)
+
+
+def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> Refusal:
+    kind, value = error["type"], error["input"]
+    context, on_key = error.get("ctx", {}), "[key]" in error["loc"]
+    if kind.startswith("TF"):
+        other = (*path[:-1], context["other"]) if "other" in context else None
+        is_on_key = on_key or context.get("on_key", False)
+        return Refusal(kind, path, context["message"], context["help"], is_on_key, other, context.get("instead"))
+    if kind == "missing":
+        field = fields_of(mapping_at(model, path[:-1]))[str(path[-1])]
+        advice = f"for example {path[-1]}: {field.examples[0]}" if field.examples else ""
+        return Refusal("TF102", path[:-1], f"{path[-1]} is missing", advice, on_key=True)
+    if kind == "literal_error":
+        allowed = [
+            str(word) for one in kinds_of(at(model, path)) if get_origin(one) is Literal for word in get_args(one)
+        ]
+        advice = f"one of: {', '.join(allowed)}"
+        advice = did_you_mean(value, allowed, advice) if isinstance(value, str) else advice
+        return Refusal("TF106", path, f"{shown(value)} is not allowed here", advice, on_key)
+    code, message, advice = WORDS.get(kind, UNFORESEEN)
+    if kind == "string_type" and isinstance(value, (int, float)):
+        advice = "put it in quotes"
+    elif kind in {"model_type", "dataclass_type"}:
+        advice = f"its keys can be: {', '.join(fields_of(mapping_at(model, path)))}"
+    return Refusal(code, path, message.format(value=shown(value), **context), advice, on_key)
+
+
+#: pydantic's kinds of errors that the models can raise: code, message and help.
+WORDS = {
+    "bool_type": ("TF103", "{value} is not true or false", ""),
+    "dataclass_type": ("TF103", "{value} is not a mapping", ""),
+    "dict_type": ("TF103", "{value} is not a mapping", "for example name: {…}"),
+    "greater_than_equal": ("TF106", "{value} is less than {ge}", ""),
+    "int_type": ("TF103", "{value} is not a whole number", ""),
+    "less_than_equal": ("TF106", "{value} is greater than {le}", ""),
+    "model_type": ("TF103", "{value} is not a mapping", ""),
+    "string_type": ("TF103", "{value} is not a string", ""),
+    "tuple_type": ("TF103", "{value} is not a list", ""),
+}
+#: For a kind that a later pydantic may bring.
+UNFORESEEN = ("TF103", "{value} cannot stand here", "")

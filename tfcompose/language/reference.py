@@ -1,0 +1,125 @@
+"""The language as a reference for people, in Markdown: every key with its type, unit, default, meaning and example."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import types
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
+
+from tfcompose.language.base import described, examples_of, fields_of, is_mapping, measure_of, walk
+from tfcompose.language.json_schema import LANGUAGES
+from tfcompose.language.values import InARow
+from tfcompose.units import Measure
+
+if TYPE_CHECKING:
+    from pydantic.fields import FieldInfo
+
+_HEAD = {
+    "robot": "The language of robot files",
+    "preset": "The language of sensor presets",
+    "node": "The language of node presets",
+}
+_INTRODUCTION = """\
+A bare number is in SI units and radians; a string may carry a unit: `30 cm`, `15 deg`, `50 Hz`. `${…}` computes from
+`vars`; inside `[ ]` and `{ }` it needs quotes: `[0, 0, "${mast}"]`. Keys without a default are required.
+"""
+
+
+def reference(language: str) -> str:
+    """Return the reference of ``robot``, ``preset`` or ``node``."""
+    root = LANGUAGES[language]
+    sections: dict[Any, list[str]] = {}
+    for pattern, kind in walk(root):
+        sections.setdefault(kind, []).append(".".join(pattern).replace("*", "NAME"))
+    lines = [f"# {_HEAD[language]}, version 1", "", _INTRODUCTION]
+    for kind, places in sections.items():
+        lines += [f"## {_title(kind)}", "", *_places(places), *(inspect.getdoc(kind) or "").splitlines(), ""]
+        lines += ["| key | type | default | meaning | example |", "|---|---|---|---|---|"]
+        lines += [_row(name, field) for name, field in fields_of(kind).items()]
+        lines.append("")
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _title(kind: Any) -> str:
+    return str(kind.__name__).removesuffix("Spec")
+
+
+_MOST_PLACES = 6
+
+
+def _places(places: list[str]) -> list[str]:
+    """Return where a mapping stands; the whole file needs no word."""
+    named = [f"`{place}`" for place in places if place]
+    more = [f"{len(named) - _MOST_PLACES} more places"] if len(named) > _MOST_PLACES else []
+    return [f"At {', '.join([*named[:_MOST_PLACES], *more])}.", ""] if named else []
+
+
+def _row(name: str, field: FieldInfo) -> str:
+    examples = " or ".join(f"`{_yaml(one)}`" for one in examples_of(field)) if field.examples else _example(field)
+    cells = (f"`{name}`", _type(field.rebuild_annotation()), _default(field), described(field), examples)
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def _example(field: FieldInfo) -> str:
+    """Return an example where the type itself does not list what there is."""
+    measure = measure_of(field.rebuild_annotation())
+    return f"`{measure.example}`" if measure else ""
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "required"
+    default = field.default
+    if default is None or default in ((), {}, "") or is_mapping(type(default)):
+        return ""
+    return f"`{_yaml(default)}`"
+
+
+def _yaml(value: Any) -> str:
+    """Return a value on one line as people write it in YAML."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_yaml(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(_yaml, value)) + "]"
+    if isinstance(value, str):
+        is_plain = value.replace(" ", "a").replace("_", "a").replace("/", "a").replace(".", "a").isalnum()
+        return value if is_plain else json.dumps(value, ensure_ascii=False)
+    if isinstance(value, float) and value.is_integer():
+        return str(int(value))
+    return json.dumps(value)
+
+
+def _type(annotation: Any) -> str:
+    """Return a type in words: what it is called, of what it is a list, or its choices."""
+    origin, inner = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return _annotated(inner[0], inner[1:])
+    if origin in {Union, types.UnionType}:
+        return " or ".join(dict.fromkeys(_type(one) for one in inner if one is not type(None)))
+    if origin is Literal:
+        return " \\| ".join(f"`{_yaml(word)}`" for word in inner).replace("\\|", "|")
+    if origin is dict:
+        return f"{_plural(_type(inner[1]))} by name"
+    if origin is tuple:
+        return f"list of {_plural(_type(inner[0]))}"
+    if is_mapping(annotation):
+        return f"[{_title(annotation)}](#{_title(annotation).lower()})"
+    return {str: "string", bool: "true or false", int: "whole number", float: "number", Any: "anything"}[annotation]
+
+
+def _annotated(inner: Any, metadata: tuple[Any, ...]) -> str:
+    for one in metadata:
+        if isinstance(one, Measure):
+            return "number" if not one.unit else "quantity"
+        if isinstance(one, InARow):
+            return f"list of {one.count} {_plural(_type(get_args(inner)[0]))}"
+        other = getattr(one, "json_schema_input_type", None)
+        if get_origin(other) in {Union, types.UnionType, Literal}:
+            return _type(other)
+    return _type(inner)
+
+
+def _plural(word: str) -> str:
+    known = {"string": "strings", "number": "numbers", "quantity": "quantities", "whole number": "whole numbers"}
+    return known.get(word, word)

@@ -1,0 +1,122 @@
+"""From a source to a typed spec, with everything that is wrong found in one pass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.findings import Finding, RejectedError
+from tfcompose.language.node_preset import NodePresetSpec
+from tfcompose.language.overlay import is_for_later
+from tfcompose.language.preset import PresetSpec, wrong_names
+from tfcompose.language.reading import Refusal, read
+from tfcompose.language.robot import RobotSpec
+from tfcompose.language.variables import compute, unused
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from tfcompose.load import Path, Source
+
+
+@dataclass(frozen=True, slots=True)
+class Validated:
+    """A spec without what was refused, and the findings about that.
+
+    ``refused`` are the paths of what was; ``broken`` the entries, as (section, name), that they are in: what is missing
+    because of them is not reported a second time. ``unused`` are the variables that nothing uses.
+    """
+
+    spec: RobotSpec
+    source: Source
+    found: tuple[Finding, ...]
+    refused: frozenset[Path] = frozenset()
+    unused: tuple[str, ...] = ()
+    broken: frozenset[tuple[str, str]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        entries = {(str(path[0]), str(path[1])) for path in self.refused if len(path) > 1}
+        object.__setattr__(self, "broken", frozenset(entries | set(_children(entries, self.source.data.get("joints")))))
+
+
+def _children(broken: set[tuple[str, str]], joints: Any) -> Iterator[tuple[str, str]]:
+    """Yield the links, as entries, that have no parent only because their joints were refused."""
+    for section, name in broken:
+        joint = joints.get(name) if section == "joints" and isinstance(joints, dict) else None
+        child = joint.get("child") if isinstance(joint, dict) else None
+        if isinstance(child, str):
+            yield ("links", child)
+
+
+def validate(source: Source, aside: Any = None) -> Validated:
+    """Return the typed spec; ``aside`` is data that is not merged over it now, and may use its variables too.
+
+    Raises:
+        RejectedError: if so much is missing that no robot is left (its name, or the version).
+    """
+    nulls = _nulls(source)
+    data, wrong, uncomputed = compute(source.data)
+    already = [*(one.path for one in nulls), *uncomputed]
+    spec, refusals = read(RobotSpec, data, already)
+    found = (*source.found, *_findings([*nulls, *wrong, *refusals], source))
+    if spec is None:
+        raise RejectedError(found)
+    refused = frozenset([*already, *(one.path for one in refusals)])
+    return Validated(spec, source, found, refused, unused(source.data, aside))
+
+
+def validate_preset(source: Source) -> PresetSpec:
+    """Return the typed preset.
+
+    Raises:
+        RejectedError: with every finding, if anything is wrong with it.
+    """
+    nulls = _nulls(source)
+    preset, refusals = read(PresetSpec, source.data, [one.path for one in nulls])
+    refusals = [*nulls, *refusals]
+    if preset is not None and not refusals:
+        refusals = list(wrong_names(preset))
+    found = (*source.found, *_findings(refusals, source))
+    if found or preset is None:
+        raise RejectedError(found)
+    return preset
+
+
+def validate_node_preset(source: Source) -> NodePresetSpec:
+    """Return the typed preset of a node.
+
+    Raises:
+        RejectedError: with every finding, if anything is wrong with it.
+    """
+    nulls = _nulls(source)
+    preset, refusals = read(NodePresetSpec, source.data, [one.path for one in nulls])
+    found = (*source.found, *_findings([*nulls, *refusals], source))
+    if found or preset is None:
+        raise RejectedError(found)
+    return preset
+
+
+def _nulls(source: Source) -> list[Refusal]:
+    """Return a refusal of each key and item without a value; null only removes what it is merged over."""
+    found: list[Refusal] = []
+
+    def look(value: Any, path: Path) -> None:
+        for step, item in value.items() if isinstance(value, dict) else enumerate(value):
+            at = (*path, step)
+            if isinstance(item, (dict, list)):
+                look(item, at)
+            elif item is None and isinstance(value, list):
+                message = "an item of the list has no value"
+                found.append(Refusal("TF006", at, message, "give a value, or remove the item"))
+            elif item is None and not is_for_later(path):
+                message, advice = f"{step} has no value", f"write {step}: {{}}, or remove it"
+                found.append(Refusal("TF006", at, message, advice, on_key=True))
+
+    if source.has_nulls:
+        look(source.data, ())
+    return found
+
+
+def _findings(refusals: Iterable[Refusal], source: Source) -> list[Finding]:
+    """Return the findings, each once: what stands in an anchor is refused wherever an alias names it."""
+    return list(dict.fromkeys(one.finding(source) for one in refusals))

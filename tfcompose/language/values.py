@@ -1,0 +1,146 @@
+"""The simple values of the language: strings, lists, numbers in a row, and short forms of mappings."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator, Field, Strict
+from pydantic_core import core_schema
+
+from tfcompose.geometry import Vector, norm
+from tfcompose.units import NUMBER, SMALLEST, Length, Number, Quantity, Size, refused, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from pydantic_core import CoreSchema
+
+
+@dataclass(frozen=True, slots=True)
+class Matches:
+    """Annotates a string that has to match a pattern, in whole; ``means`` says the pattern in words."""
+
+    pattern: str
+    means: str
+
+    def check(self, value: str) -> str:
+        """Return the string.
+
+        Raises:
+            PydanticCustomError: if it does not match.
+        """
+        if re.fullmatch(self.pattern, value):
+            return value
+        raise refused("TF106", f"{shown(value)} is not {self.means}")
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], CoreSchema]) -> CoreSchema:
+        return core_schema.no_info_after_validator_function(self.check, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: Any) -> dict[str, Any]:
+        return {**handler(schema), "pattern": f"^{self.pattern}$"}
+
+
+@dataclass(frozen=True, slots=True)
+class InARow:
+    """Annotates a tuple that is written as a list of ``count`` items, for example ``sample``."""
+
+    count: int
+    sample: str
+
+    def check(self, value: Any) -> Any:
+        """Return the list.
+
+        Raises:
+            PydanticCustomError: if it is none, or of another length.
+        """
+        if isinstance(value, list) and len(value) == self.count:
+            return value
+        raise refused("TF103", f"expected a list of {self.count}, got {shown(value)}", f"for example {self.sample}")
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], CoreSchema]) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.check, handler(source))
+
+
+def short(name: str, of: Any) -> BeforeValidator:
+    """Return what lets a string stand for a mapping of the type ``of`` with only that key."""
+    return BeforeValidator(lambda value: {name: value} if isinstance(value, str) else value, str | of)
+
+
+def listed(value: Any) -> Any:
+    """Return a list, for which one item may stand."""
+    return value if isinstance(value, list) else [value]
+
+
+def plain(value: Any) -> Any:
+    """Return data as they are passed on: a computed quantity is its number."""
+    if isinstance(value, Quantity):
+        return value.value
+    if isinstance(value, dict):
+        return {name: plain(item) for name, item in value.items()}
+    return [plain(item) for item in value] if isinstance(value, list) else value
+
+
+def _whole(value: Any) -> Any:
+    is_whole = isinstance(value, Quantity) and value.dimension == NUMBER and value.value == int(value.value)
+    return int(value.value) if is_whole else value
+
+
+def _is_true(value: Any) -> bool:
+    if value is True:
+        return True
+    raise refused("TF106", f"{shown(value)} is not true", "remove the key")
+
+
+def _colour_part(value: float) -> float:
+    if 0 <= value <= 1:
+        return value
+    raise refused("TF106", f"{shown(value)} is not a part of a colour: 0 to 1", "divide values up to 255 by 255")
+
+
+def _has_direction(axis: Vector) -> Vector:
+    length = norm(axis)
+    if length > SMALLEST:
+        return axis
+    raise refused("TF106", f"an axis of length {length:g} has no direction", "for example [0, 0, 1]")
+
+
+def _is_visible(factors: Vector) -> Vector:
+    if all(abs(factor) > SMALLEST for factor in factors):
+        return factors
+    raise refused("TF106", "a scale of 0: nothing is left of the mesh", "for example 0.001")
+
+
+Anything = Annotated[Any, BeforeValidator(plain)]
+NoMapping = Annotated[Anything, Field(json_schema_extra={"not": {"type": "object"}})]
+Parameters = dict[str, Anything]
+Text = Annotated[str, Strict()]
+Boolean = Annotated[bool, Strict()]
+OnlyTrue = Annotated[bool, BeforeValidator(_is_true), Field(json_schema_extra={"const": True})]
+#: Annotates a whole number, which may be computed.
+Whole = BeforeValidator(_whole)
+Name = Annotated[Text, Matches(r"[A-Za-z][A-Za-z0-9_]*", "a name: a letter, then letters, digits and _")]
+Namespace = Annotated[
+    Text,
+    Matches(r"(/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?", "a namespace such as robot1 or fleet/robot1"),
+]
+NodeName = Annotated[
+    Text, Matches(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*", "a node's name: letters, digits and _")
+]
+Texts = tuple[Text, ...]
+#: A list of strings, or one string for a list of one.
+OneOrMore = Annotated[Texts, BeforeValidator(listed, Text | Texts)]
+Xyz = Annotated[tuple[Length, Length, Length], InARow(3, "[0.2, 0, 30 cm]")]
+Sizes = Annotated[tuple[Size, Size, Size], InARow(3, "[0.5, 0.4, 0.15]")]
+Numbers = Annotated[tuple[Number, Number, Number], InARow(3, "[0, 0, 1]")]
+Axis = Annotated[Numbers, AfterValidator(_has_direction)]
+_Factors = Annotated[tuple[Number, Number, Number], InARow(3, "[0.001, 0.001, 0.001]")]
+#: Three factors, or one for all three; a negative one mirrors.
+Scale = Annotated[
+    _Factors,
+    AfterValidator(_is_visible),
+    BeforeValidator(lambda value: value if isinstance(value, list) else [value] * 3, Number | _Factors),
+]
+_ColourPart = Annotated[Number, AfterValidator(_colour_part)]
+Rgba = Annotated[tuple[_ColourPart, _ColourPart, _ColourPart, _ColourPart], InARow(4, "[0.2, 0.4, 0.8, 1]")]

@@ -196,16 +196,16 @@ def _safety(name: str, element: Element | None, values: Values) -> SafetyControl
     if element is not None and "k_velocity" not in element.attributes:
         message = f"the safety_controller of {name} has no k_velocity"
         values.refuse(message, element.at, 'URDF requires it: k_velocity="10"')
-    return _numbers(SafetyController, element, values)
+    return _numbers(SafetyController, element, values, k_velocity=0.0)
 
 
-def _numbers(cls: type[T], element: Element | None, values: Values) -> T | None:
+def _numbers(cls: type[T], element: Element | None, values: Values, **defaults: float) -> T | None:
     """Return the object whose fields are the element's attributes; those that are missing have their defaults."""
     if element is None:
         return None
     read = values.bound if cls in _BOUNDS else values.number
     given = {name: read(element, name) for name in cls.__slots__}
-    return cls(**{name: value for name, value in given.items() if value is not None})
+    return cls(**defaults | {name: value for name, value in given.items() if value is not None})
 
 
 @dataclass(slots=True)

@@ -41,7 +41,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "ros": {"findings", "interrupt", "plan", "geometry"},
     "verdict": {"catalogue", "findings", "plan", "geometry"},
     "run": {"findings", "interrupt", "plan", "geometry", "ros", "verdict"},
-    "observe": {"catalogue", "findings", "model", "plan", "geometry", "ros", "verdict"},
+    "tf2": {"geometry", "ros"},
+    "observe": {"catalogue", "findings", "model", "plan", "geometry", "ros", "tf2", "verdict"},
     "compile": FOUNDATIONS | STAGES,
     "pages": {"catalogue", "check"},
     "cli": {"*"},
@@ -53,7 +54,7 @@ ONLY_IN: dict[str, set[str]] = {
     "yaml": {"load"},
     "pydantic": {"language"},
     "pydantic_core": {"language", "units"},
-    "numpy": {"observe", "ros", "run", "urdf"},  # urdf: what trimesh gives are its arrays
+    "numpy": {"ros", "run", "tf2", "urdf"},  # urdf: what trimesh gives are its arrays
     "xacro": {"urdf"},
     "trimesh": {"urdf"},
     "pypdfium2": {"draw"},
@@ -159,7 +160,7 @@ def test_nothing_is_imported_inside_a_function() -> None:
         for function in ast.walk(ast.parse(file.read_text("utf-8")))
         if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef))
         for node in ast.walk(function)
-        if isinstance(node, (ast.Import, ast.ImportFrom)) and part_of(file) not in {"cli", "ros", "run"}
+        if isinstance(node, (ast.Import, ast.ImportFrom)) and part_of(file) not in {"cli", "ros", "run", "tf2"}
     ]
     assert not inside
 
@@ -218,10 +219,21 @@ def test_reading_and_supervising_a_plan_loads_nothing_from_elsewhere_and_no_comp
 
 
 def test_the_buffer_loads_neither_ros_nor_numpy_until_arrays_are_asked_for(bare: set[str]) -> None:
-    one = "from tfcompose.observe import Buffer; from tfcompose.geometry import Pose; b = Buffer(); "
+    one = "from tfcompose.tf2 import Buffer; from tfcompose.geometry import Pose; b = Buffer(); "
     one += "b.set('a', 'b', Pose(), 1, static=False); b.lookup_transform('a', 'b', 0)"
     assert not foreign(loaded_by(one), bare)
     assert "numpy" in foreign(loaded_by(one + "; b.lookup_many('a', 'b', [1])"), bare)
+
+
+def test_the_buffer_stands_on_its_own() -> None:
+    """It needs the geometry and nothing else of the package; what needs ROS are listeners and nodes."""
+    loaded = {name.removeprefix("tfcompose.") for name in loaded_by("import tfcompose.tf2") if "tfcompose." in name}
+    assert {name for name in loaded if name.partition(".")[0] not in {"tf2", "geometry"}} == {
+        "ros",
+        "ros.decoder",
+        "ros.environment",
+        "ros.message",
+    }
 
 
 @pytest.mark.ros

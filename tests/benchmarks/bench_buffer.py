@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tfcompose.geometry import Pose, quat_from_rpy
-from tfcompose.observe import Buffer
 from tfcompose.ros.decoder import Decoder
 from tfcompose.ros.message import Transform, encode
+from tfcompose.tf2 import Buffer
 
 if TYPE_CHECKING:
     from collections.abc import Callable

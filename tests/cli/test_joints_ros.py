@@ -14,9 +14,9 @@ from std_msgs.msg import String
 
 from tests.support import processes
 from tests.waiting import until
-from tfcompose.observe import Buffer, Listener
 from tfcompose.ros.node import JOINT_STATES, LATCHED, open_node
 from tfcompose.ros.tf import Subscription
+from tfcompose.tf2 import Buffer, TransformListener
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -65,7 +65,7 @@ def test_simulated_joints_move_the_robot_and_a_new_description_comes_while_it_ru
 ) -> None:
     """Positions are those of yourdfpy, from the description that was heard."""
     tfc("up", "--wait")
-    with open_node("ears", "") as node, Listener(buffer := Buffer()):
+    with open_node("ears", "") as node, TransformListener(buffer := Buffer()):
         states = Subscription(node, JointState, "/joint_states", JOINT_STATES)
         texts = Subscription(node, String, "/robot_description", LATCHED)
         heard: list[str] = []

@@ -9,7 +9,7 @@ import pytest
 
 from tfcompose.observe import census as module
 from tfcompose.observe.census import Census, EdgeSeen, Publisher
-from tfcompose.observe.refusal import Refusal
+from tfcompose.tf2.exceptions import Rejection
 
 S = 10**9
 A, B = b"a" * 16, b"b" * 16
@@ -103,16 +103,16 @@ def test_stamps_that_go_back_or_repeat_are_counted() -> None:
 @pytest.mark.parametrize(
     ("bad", "why"),
     [
-        (row("a a"), Refusal.SELF),
-        (row("a "), Refusal.NO_CHILD),
-        (row(" b"), Refusal.NO_PARENT),
-        (row("a b", x=NAN), Refusal.NOT_FINITE),
-        (row("a b", x=float("inf")), Refusal.NOT_FINITE),
-        (row("a b", w=NAN), Refusal.NOT_FINITE),
-        (row("a b", w=1.1), Refusal.DENORMALISED),
+        (row("a a"), Rejection.SELF),
+        (row("a "), Rejection.NO_CHILD),
+        (row(" b"), Rejection.NO_PARENT),
+        (row("a b", x=NAN), Rejection.NOT_FINITE),
+        (row("a b", x=float("inf")), Rejection.NOT_FINITE),
+        (row("a b", w=NAN), Rejection.NOT_FINITE),
+        (row("a b", w=1.1), Rejection.DENORMALISED),
     ],
 )
-def test_what_tf2_refuses_is_counted_with_the_reason(bad: tuple[object, ...], why: Refusal) -> None:
+def test_what_tf2_refuses_is_counted_with_the_reason(bad: tuple[object, ...], why: Rejection) -> None:
     census = Census()
     census.take([bad], static=True, gid=A, received_ns=S)  # type: ignore[list-item]
     strand = only(census, S).strand

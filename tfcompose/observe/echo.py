@@ -6,14 +6,14 @@ import time
 from typing import TYPE_CHECKING
 
 from tfcompose.observe.asked import Asked, Missed
-from tfcompose.observe.buffer import Buffer, TransformException
 from tfcompose.observe.elsewhere import advice, tf_elsewhere
-from tfcompose.observe.refusal import Refusal
 from tfcompose.ros.clock import SimClock
 from tfcompose.ros.decoder import Decoder
 from tfcompose.ros.graph import topics as topics_of
 from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFSubscription, wait
+from tfcompose.tf2 import Buffer, TransformException
+from tfcompose.tf2.exceptions import Rejection
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -77,7 +77,7 @@ class _Ear:
         self._decoder = Decoder()
         self.messages = 0
         self._clock_ns = 0
-        self._refused: tuple[str, Refusal] | None = None
+        self._refused: tuple[str, Rejection] | None = None
 
     def take(self, subscription: TFSubscription, *, static: bool) -> None:
         for received in subscription.take():
@@ -107,7 +107,7 @@ class _Ear:
         if self._refused is None:
             return reason
         child, why = self._refused
-        if why is Refusal.OLD:
+        if why is Rejection.OLD:
             return f"{reason}; what came for {child} was too old to be taken: did a bag or a simulation start again?"
         if child in self.buffer.frames:  # what came at other times was taken
             return reason

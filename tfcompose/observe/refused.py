@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, finding
-from tfcompose.observe.refusal import Refusal
 from tfcompose.observe.seen import who
+from tfcompose.tf2.exceptions import Rejection
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,13 +25,13 @@ _NORMALISE = (
 def refused_transform(edge: EdgeSeen) -> Iterator[Finding]:
     """Give the finding for an edge of which tf2 drops transforms, unless it is a frame in itself."""
     strand = edge.strand
-    if strand.refused is None or strand.refused is Refusal.SELF:
+    if strand.refused is None or strand.refused is Rejection.SELF:
         return
     what, why, advice = "which tf2 drops", strand.refused.text, _MEND
     if strand.refusals < strand.tally.count:
         advice = _MEND_SOME
     length = sum(part * part for part in (strand.refused_row or strand.row)[7:11]) ** 0.5
-    if strand.refused is Refusal.DENORMALISED:
+    if strand.refused is Rejection.DENORMALISED:
         why = f"its quaternion has length {length:.3f}"
         if length > _ZERO:
             what, advice = "which is no rotation", _NORMALISE

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 from tfcompose.observe.asked import Asked, Missed
 from tfcompose.observe.bag import Recording
-from tfcompose.observe.buffer import CACHE_NS, Buffer, TransformException
 from tfcompose.observe.census import topics_below
+from tfcompose.tf2 import Buffer, TransformException
+from tfcompose.tf2.core import CACHE_NS
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -7,7 +7,7 @@ from math import isfinite
 from typing import TYPE_CHECKING
 
 from tfcompose.geometry import Pose
-from tfcompose.observe.refusal import DENORMALISED, Refusal, refusal
+from tfcompose.tf2.exceptions import DENORMALISED, Rejection, rejection_of
 
 if TYPE_CHECKING:
     from tfcompose.observe.tally import Tally
@@ -59,7 +59,7 @@ class Strand:
     lag_ns: int = 0
     stamps_back: int = 0
     stamps_repeated: int = 0
-    refused: Refusal | None = None
+    refused: Rejection | None = None
     refused_row: Row | None = None
     refusals: int = 0
     slashed: bool = False
@@ -103,7 +103,7 @@ class Strand:
 
     def refuse(self) -> None:
         """Count the newest transform as one that tf2 does not take, if that is so."""
-        why = refusal(self.parent, self.child, self.row[4:])
+        why = rejection_of(self.parent, self.child, self.row[4:])
         if why is not None:
             self.refused, self.refused_row, self.refusals = why, self.row, self.refusals + 1
 

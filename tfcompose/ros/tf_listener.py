@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import threading
 from contextlib import ExitStack, suppress
-from importlib import import_module
 from importlib.util import find_spec
 from itertools import count
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import geometry_msgs.msg  # noqa: F401 (a program that listens gets its messages: stamped looks whether it is loaded)
+import geometry_msgs.msg  # noqa: F401 (a program that listens gets its messages: tf2.messages looks whether it is loaded)
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration
@@ -28,8 +27,8 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node
 
-    #: Is given the bytes of each message, and whether it came on the static topic.
-    Hear = Callable[[bytes, bool], None]
+    #: Is called with the bytes of each message, and whether it came on the static topic.
+    OnMessage = Callable[[bytes, bool], None]
 
 _numbers = count(1)
 
@@ -50,15 +49,15 @@ class Topic(NamedTuple):
         return self.qos or default
 
 
-class GuestEar:
-    """Subscriptions in a node that is handed over; its executor calls ``hear``, or ``poll`` does.
+class NodeListener:
+    """Subscriptions in a node that is handed over; its executor calls ``on_message``, or ``poll`` does.
 
     With ``spin`` an executor in a thread of its own spins the whole node, as tf2_ros's listener does.
     """
 
-    def __init__(self, node: Node, hear: Hear, topics: Sequence[Topic], *, spin: bool) -> None:
+    def __init__(self, node: Node, on_message: OnMessage, topics: Sequence[Topic], *, spin: bool) -> None:
         self.node: Any = node
-        self._hear = hear
+        self._on_message = on_message
         group = ReentrantCallbackGroup()  # another callback of the node may wait for what these bring
         self._subscriptions = [(self._subscribe(topic, group), topic.static) for topic in topics]
         self._executor: Any = None
@@ -72,7 +71,7 @@ class GuestEar:
         for subscription, static in self._subscriptions:
             with suppress(_rclpy.InvalidHandle), subscription.handle:
                 while (taken := subscription.handle.take_message(subscription.msg_type, True)) is not None:  # noqa: FBT003 (rclpy's: as bytes)
-                    self._hear(taken[0], static)
+                    self._on_message(taken[0], static)
 
     def close(self) -> None:
         """End the thread, if there is one, and the subscriptions; the node stays."""
@@ -87,7 +86,7 @@ class GuestEar:
 
     def _subscribe(self, topic: Topic, group: ReentrantCallbackGroup) -> Any:
         def callback(data: bytes) -> None:
-            self._hear(data, topic.static)
+            self._on_message(data, topic.static)
 
         return self.node.create_subscription(
             tf_message_type(), topic.name, callback, topic.profile, callback_group=group, raw=True
@@ -99,8 +98,8 @@ class GuestEar:
             self._executor.spin()
 
 
-class OwnEar:
-    """A node of its own, in a context of its own, with a thread that waits for messages and calls ``hear``.
+class ThreadListener:
+    """A node of its own, in a context of its own, with a thread that waits for messages and calls ``on_message``.
 
     With ``use_sim_time`` the node's clock follows /clock.
 
@@ -108,8 +107,8 @@ class OwnEar:
         RosError: if ROS cannot start a node.
     """
 
-    def __init__(self, hear: Hear, topics: Sequence[Topic], *, use_sim_time: bool) -> None:
-        self._hear = hear
+    def __init__(self, on_message: OnMessage, topics: Sequence[Topic], *, use_sim_time: bool) -> None:
+        self._on_message = on_message
         self._stop = Stop()
         self._stack = ExitStack()
         self.node = self._stack.enter_context(open_node(f"tfcompose_listener_{next(_numbers)}", ""))
@@ -117,9 +116,9 @@ class OwnEar:
             (Subscription(self.node, tf_message_type(), topic.name, topic.profile), topic.static) for topic in topics
         ]
         self._clock = SimClock(self.node) if use_sim_time else None
-        self._thread = threading.Thread(target=self._listen, name="tf listener", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="tf listener", daemon=True)
 
-    def listen(self) -> None:
+    def start(self) -> None:
         """Start the thread."""
         self._thread.start()
 
@@ -131,7 +130,7 @@ class OwnEar:
         self._clock = None
         self._stack.close()
 
-    def _listen(self) -> None:
+    def _run(self) -> None:
         awaited: list[Subscription] = [subscription for subscription, _ in self._subscriptions]
         if self._clock:
             awaited.append(self._clock.subscription)
@@ -140,7 +139,7 @@ class OwnEar:
             self._follow()
             for subscription, static in self._subscriptions:
                 for received in subscription.take():
-                    self._hear(received.data, static)
+                    self._on_message(received.data, static)
 
     def _follow(self) -> None:
         """Set the node's clock to the simulated time, so that whoever watches it hears of jumps."""
@@ -176,10 +175,10 @@ def offer_frames(node: Node, text: Callable[[], str]) -> Any:
     """Offer the service ``tf2_frames``, which answers with the text; return it, or None where there is no tf2_msgs."""
     if find_spec("tf2_msgs") is None:
         return None
-    type_ = import_module("tf2_msgs.srv").FrameGraph
+    from tf2_msgs.srv import FrameGraph  # noqa: PLC0415 (there is none with the wheels from PyPI)
 
     def answer(_: object, response: Any) -> Any:
         response.frame_yaml = text()
         return response
 
-    return node.create_service(type_, "tf2_frames", answer)
+    return node.create_service(FrameGraph, "tf2_frames", answer)

@@ -14,10 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.tables import for_each
 from tfcompose.geometry import Pose, normalised, quat_from_rpy
-from tfcompose.observe import Buffer, InvalidArgumentException
-from tfcompose.observe.exceptions import TypeException
-from tfcompose.observe.stamped import Header, Quaternion, Time, Vector3
-from tfcompose.observe.transforms import do_transform_cloud, transform_covariance
+from tfcompose.tf2 import Buffer, InvalidArgumentException
+from tfcompose.tf2.exceptions import TypeException
+from tfcompose.tf2.messages import Header, Quaternion, Time, Vector3, do_transform_cloud, transform_covariance
 
 S = 1_000_000_000
 QUAT = normalised((0.1, -0.7, 0.3, 0.6))

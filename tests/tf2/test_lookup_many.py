@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tfcompose.geometry import Pose, quat_from_rpy
-from tfcompose.observe import Buffer, ConnectivityException, ExtrapolationException, InvalidArgumentException
+from tfcompose.tf2 import Buffer, ConnectivityException, ExtrapolationException, InvalidArgumentException
 
 S = 1_000_000_000
 

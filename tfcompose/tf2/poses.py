@@ -1,7 +1,7 @@
-"""Poses as seven numbers, x y z and the quaternion x y z w, for what is computed many times a second.
+"""Poses as seven plain numbers, for what is computed many times a second: x y z in metres, quaternion x y z w.
 
-``tfcompose.geometry`` is the same arithmetic with types; its quaternions are normalised at every step, these at the
-end.
+``tfcompose.geometry.Pose`` is the same arithmetic with a type; it normalises quaternions at every step, this module
+only at the end. The functions take numpy arrays for the numbers as well, and then work on many poses at once.
 """
 
 from __future__ import annotations
@@ -12,15 +12,16 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-Seven = tuple[float, float, float, float, float, float, float]
+#: x y z in metres, quaternion x y z w.
+PoseTuple = tuple[float, float, float, float, float, float, float]
 
-IDENTITY: Seven = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+IDENTITY: PoseTuple = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 # From here on the chord and the arc between two unit quaternions agree to the last bits.
 _CHORD = 1 - 1e-9
 
 
-def product(a: Seven, b: Seven) -> Seven:
+def product(a: PoseTuple, b: PoseTuple) -> PoseTuple:
     """Return the pose of C in A from that of B in A and that of C in B."""
     px, py, pz, ax, ay, az, aw = a
     x, y, z, bx, by, bz, bw = b
@@ -36,7 +37,7 @@ def product(a: Seven, b: Seven) -> Seven:
     )
 
 
-def inverse_product(a: Seven, b: Seven) -> Seven:
+def inverse_product(a: PoseTuple, b: PoseTuple) -> PoseTuple:
     """Return the pose of C in B, from those of B in A and of C in A."""
     px, py, pz, ax, ay, az, aw = a
     x, y, z, bx, by, bz, bw = b
@@ -53,12 +54,12 @@ def inverse_product(a: Seven, b: Seven) -> Seven:
     )
 
 
-def inverse(a: Seven) -> Seven:
+def inverse(a: PoseTuple) -> PoseTuple:
     """Return the pose of A in B from that of B in A."""
     return inverse_product(a, IDENTITY)
 
 
-def unit(a: Seven) -> Seven:
+def unit(a: PoseTuple) -> PoseTuple:
     """Return the pose with a quaternion of length 1 and w ≥ 0; of the two for one rotation this is the shorter turn."""
     x, y, z, qx, qy, qz, qw = a
     squared = qx * qx + qy * qy + qz * qz + qw * qw
@@ -68,7 +69,7 @@ def unit(a: Seven) -> Seven:
     return (x, y, z, qx * scale, qy * scale, qz * scale, qw * scale)
 
 
-def between(two: Sequence[float], part: float) -> Seven:
+def between(two: Sequence[float], part: float) -> PoseTuple:
     """Return the pose that is ``part`` (0 to 1) of the way from the first to the second of two, 14 numbers.
 
     Positions go straight and rotations on the great circle, the short way (Shoemake, 1985), as in tf2.
@@ -79,8 +80,8 @@ def between(two: Sequence[float], part: float) -> Seven:
     p, q = 1 - part, part
     if cosine < _CHORD:
         angle = acos(cosine)
-        whole = 1 / sin(angle)
-        p, q = sin(p * angle) * whole, sin(part * angle) * whole
+        per_sine = 1 / sin(angle)
+        p, q = sin(p * angle) * per_sine, sin(part * angle) * per_sine
     if dot < 0:
         q = -q
     return (

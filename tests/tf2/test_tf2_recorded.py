@@ -1,7 +1,7 @@
 """The buffer gives the answers that tf2's BufferCore (geometry2 for Jazzy) gave to the same histories and questions.
 
 ``tf2_answers.jsonl`` holds them, a step a line, since PyPI has no tf2. Where ``tf2_py`` is installed,
-``python tests/observe/test_tf2_recorded.py`` asks it anew.
+``python tests/tf2/test_tf2_recorded.py`` asks it anew.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from tfcompose.geometry import angle_between, normalised
-from tfcompose.observe import Buffer, TransformException
+from tfcompose.tf2 import Buffer, TransformException
 
 FILE = Path(__file__).with_name("tf2_answers.jsonl")
 S = 1_000_000_000

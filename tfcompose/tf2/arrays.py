@@ -1,21 +1,23 @@
-"""The poses of one frame in another at many times at once; needs numpy."""
+"""Many poses and points at once: trajectories, arrays of points and PointCloud2. This module needs numpy."""
 
 from __future__ import annotations
 
+from array import array
+from copy import copy, deepcopy
 from math import factorial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from tfcompose.observe.exceptions import ExtrapolationException, TransformException
-from tfcompose.observe.rotation import IDENTITY, inverse, inverse_product, product
+from tfcompose.geometry import matrix_from_quat
+from tfcompose.tf2.exceptions import ExtrapolationException, InvalidArgumentException, TransformException
+from tfcompose.tf2.poses import IDENTITY, PoseTuple, inverse, inverse_product, product
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from tfcompose.observe.chain import Chain
-    from tfcompose.observe.core import BufferCore
-    from tfcompose.observe.history import History
+    from tfcompose.tf2.cache import Chain, TimeCache
+    from tfcompose.tf2.core import BufferCore
 
     Floats = NDArray[np.float64]
     Stamps = NDArray[np.int64]
@@ -23,10 +25,14 @@ if TYPE_CHECKING:
 # So many times are handled at once, with so many arrays of their length at most.
 _BLOCK = 1 << 14
 _ARRAYS = 64
+# So many points at a time stay in the processor's cache.
+_POINTS = 1 << 13
 # Angles, in radians, up to which sine and cosine are summed up, to x¹³ and x¹².
 _SMALL = 0.4
 _SINE = [(-1) ** k / factorial(2 * k + 1) for k in range(6, -1, -1)]
 _COSINE = [(-1) ** k / factorial(2 * k) for k in range(6, -1, -1)]
+# sensor_msgs/PointField: FLOAT32 and FLOAT64.
+_FIELD_TYPES = {7: "f4", 8: "f8"}
 
 
 class Trajectory(NamedTuple):
@@ -61,7 +67,7 @@ def stamps_of(stamps: ArrayLike) -> Stamps:
 def lookup_many(buffer: BufferCore, target: str, source: str, stamps: ArrayLike, outside: str) -> Trajectory:
     """Return what ``Buffer.lookup_many`` does."""
     times = stamps_of(stamps)
-    with buffer.at_rest():
+    with buffer.locked():
         if not times.all():
             times = np.where(times == 0, buffer.lookup(target, source)[1], times)
         chain = buffer.chain_for_all_times(target, source)
@@ -116,8 +122,8 @@ def _keep_memory(count: int) -> None:
 def _along(chain: Chain, stamps: Stamps, known: NDArray[np.bool_]) -> tuple[Any, ...]:
     """Return the chain's poses at ascending times, and unset ``known`` where an edge has none."""
     pose: Any = None
-    for history, fixed, backwards in chain.links:
-        link: Any = fixed if history is None else _poses(history, stamps, known)
+    for cache, fixed, backwards in chain.links:
+        link: Any = fixed if cache is None else _poses(cache, stamps, known)
         if pose is None:
             pose = inverse(link) if backwards else link
         else:
@@ -136,11 +142,11 @@ def _of_unit_length(pose: tuple[Any, ...], count: int) -> Trajectory:
     return Trajectory(xyz, quat)
 
 
-def _poses(history: History, stamps: Stamps, known: NDArray[np.bool_]) -> tuple[Floats, ...]:
+def _poses(cache: TimeCache, stamps: Stamps, known: NDArray[np.bool_]) -> tuple[Floats, ...]:
     """Return the edge's poses at those ascending times, seven arrays, and unset ``known`` where there is none."""
-    count = len(history)
-    at = np.array(history.stamps)[-count:]
-    samples = np.array(history.poses)[-7 * count :].reshape(count, 7).T.copy()
+    count = len(cache)
+    at = np.array(cache.stamps)[-count:]
+    samples = np.array(cache.poses)[-7 * count :].reshape(count, 7).T.copy()
     known[: np.searchsorted(stamps, at[0])] = False
     known[np.searchsorted(stamps, at[-1], "right") :] = False
     if count == 1:
@@ -199,3 +205,81 @@ def _sine_cosine(angles: Floats) -> tuple[Floats, Floats]:
     for p, q in zip(_SINE[1:], _COSINE[1:], strict=True):
         sine, cosine = sine * squared + p, cosine * squared + q
     return sine * angles, cosine
+
+
+def moved_points(points: ArrayLike, pose: PoseTuple) -> NDArray[Any]:
+    """Return points in the parent's frame, from points in the child's whose pose in the parent is given.
+
+    ``points`` has the shape (…, 3), in metres; the result has it too. float32 and float64 stay what they are, other
+    numbers become float64; what is computed is float64. NaN stays NaN.
+
+    Raises:
+        InvalidArgumentException: if the last dimension is not 3.
+    """
+    given = np.asarray(points)
+    if given.ndim == 0 or given.shape[-1] != 3:  # noqa: PLR2004 (x, y, z)
+        raise InvalidArgumentException(f"points have the shape (…, 3), not {given.shape}")
+    moved = np.empty(given.shape, given.dtype if given.dtype in (np.float32, np.float64) else np.float64)
+    turned, to = turn_and_shift(pose)
+    rows, out = given.reshape(-1, 3), moved.reshape(-1, 3)
+    for start in range(0, len(rows), _POINTS):
+        block = slice(start, start + _POINTS)
+        out[block] = rows[block].astype(np.float64, copy=False) @ turned + to
+    return moved
+
+
+def turn_and_shift(pose: PoseTuple) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return what takes rows of points along: ``rows @ turn + shift``; 3×3 and 3."""
+    x, y, z, qx, qy, qz, qw = pose
+    return np.array(matrix_from_quat((qx, qy, qz, qw))).T.copy(), np.array((x, y, z))
+
+
+def moved_cloud(cloud: Any, pose: PoseTuple) -> Any:
+    """Return a copy of the cloud with x, y and z moved; its header is a copy of the cloud's.
+
+    Raises:
+        InvalidArgumentException: if there is no x, y or z of type float32 or float64, or too little data.
+    """
+    given = cloud.data if isinstance(cloud.data, (array, bytes, bytearray, memoryview)) else bytes(cloud.data)
+    data = np.frombuffer(given, np.uint8).copy()
+    columns = [_column(cloud, name, data) for name in "xyz"]
+    turned, to = turn_and_shift(pose)
+    for row in range(cloud.height):
+        for start in range(0, cloud.width, _POINTS):
+            block = slice(start, start + _POINTS)
+            points = np.stack([column[row, block] for column in columns], axis=1, dtype=np.float64)
+            points = points @ turned + to
+            for index, column in enumerate(columns):
+                column[row, block] = points[:, index]
+    moved = copy(cloud)
+    moved.header = deepcopy(cloud.header)
+    moved.data = array("B")
+    moved.data.frombytes(data.data)
+    return moved
+
+
+def _column(cloud: Any, name: str, data: NDArray[np.uint8]) -> NDArray[Any]:
+    """Return the values of a field as an array of height × width that lies in ``data``."""
+    field = next((each for each in cloud.fields if each.name == name), None)
+    if field is None:
+        there = ", ".join(each.name for each in cloud.fields) or "none"
+        raise InvalidArgumentException(f"the cloud has no field {name}; its fields are: {there}")
+    if field.datatype not in _FIELD_TYPES:
+        raise InvalidArgumentException(
+            f"the cloud's {name} is of type {field.datatype}, not float32 (7) or float64 (8)"
+        )
+    kind = np.dtype((">" if cloud.is_bigendian else "<") + _FIELD_TYPES[field.datatype])
+    rows = [cloud.row_step] * (cloud.height > 1)
+    if field.offset + kind.itemsize > cloud.point_step or any(cloud.width * cloud.point_step > row for row in rows):
+        raise InvalidArgumentException(
+            f"the cloud's steps do not fit: {name} ends at byte {field.offset + kind.itemsize} of a point, a point has "
+            f"{cloud.point_step} bytes, a row has {cloud.width} points and {cloud.row_step} bytes"
+        )
+    size = sum(rows) * (cloud.height - 1) + cloud.width * cloud.point_step
+    if cloud.height and size > len(data):
+        wanted = f"{cloud.height} × {cloud.width} points need {size}"
+        raise InvalidArgumentException(f"the cloud has {len(data)} bytes, and {wanted}")
+    shape = (cloud.height, cloud.width) if cloud.height and cloud.width else (0, 0)
+    strides = (cloud.row_step, cloud.point_step)
+    column: NDArray[Any] = np.ndarray(shape, kind, data.data, field.offset if shape[0] else 0, strides)
+    return column

@@ -1,9 +1,8 @@
-"""Fills a buffer with what comes on /tf and /tf_static, as tf2_ros's ``TransformListener`` does."""
+"""tf2_ros's ``TransformListener``: fills a buffer with what comes on /tf and /tf_static. It needs rclpy."""
 
 from __future__ import annotations
 
 import weakref
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.ros.decoder import Decoder
@@ -12,13 +11,13 @@ from tfcompose.ros.environment import RosError, missing_ros
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-    from tfcompose.observe.buffer import Buffer
+    from tfcompose.tf2.buffer import Buffer
 
-# So many different complaints are logged at most, each once.
-_MOST_COMPLAINTS = 200
+# So many different warnings are logged at most, each once.
+_MOST_WARNINGS = 200
 
 
-class Listener:
+class TransformListener:
     """Subscribes to TF and puts it into a buffer, until it is closed.
 
     Args:
@@ -34,7 +33,7 @@ class Listener:
         use_sim_time: the listener's own node follows /clock; a node that is handed over has its own parameter.
 
     When a node's clock goes back, as a simulator's or a bag's does, the buffer forgets all moving edges, and the node's
-    log says so. What is refused is logged once for each frame and reason.
+    log says so. What is rejected is logged once for each frame and reason.
 
     Raises:
         RosError: if rclpy is not there or cannot be used.
@@ -57,24 +56,26 @@ class Listener:
         missing = missing_ros()
         if missing:
             raise RosError(missing)
-        listening = import_module("tfcompose.ros.listening")
+        from tfcompose.ros.tf_listener import NodeListener, ThreadListener, Topic  # noqa: PLC0415 (ROS is optional)
+
         prefix = f"/{namespace.strip('/')}" if namespace.strip("/") else ""
-        topics = [listening.Topic(prefix + tf_static_topic, static=True, qos=static_qos)]
+        topics = [Topic(prefix + tf_static_topic, static=True, qos=static_qos)]
         if not static_only:
-            topics.append(listening.Topic(prefix + tf_topic, static=False, qos=qos))
+            topics.append(Topic(prefix + tf_topic, static=False, qos=qos))
         self.buffer = buffer
         self.node = node
         self._decoder = Decoder()
-        self._complaints: set[str] = set()
+        self._warnings: set[str] = set()
+        self._ros: NodeListener | ThreadListener
         if node is None:
-            self._ear = listening.OwnEar(self._hear, topics, use_sim_time=use_sim_time)
-            buffer.follow_clock(self._ear.node)
-            self._ear.listen()
+            self._ros = ThreadListener(self._take, topics, use_sim_time=use_sim_time)
+            buffer.follow_clock(self._ros.node)
+            self._ros.start()
         else:
-            self._ear = listening.GuestEar(node, self._hear, topics, spin=spin_thread)
+            self._ros = NodeListener(node, self._take, topics, spin=spin_thread)
             buffer.follow_clock(node)
-            buffer.pollers.append(self._ear.poll)
-        self._end = weakref.finalize(self, self._ear.close)  # at the latest when the program ends
+            buffer.pollers.append(self._ros.poll)
+        self._end = weakref.finalize(self, self._ros.close)  # at the latest when the program ends
 
     def unregister(self) -> None:
         """End the subscriptions; tf2's name for ``close``."""
@@ -82,7 +83,7 @@ class Listener:
 
     def close(self) -> None:
         """End the subscriptions, and the listener's own thread and node; the buffer keeps what it has."""
-        poll = getattr(self._ear, "poll", None)
+        poll = getattr(self._ros, "poll", None)
         if poll in self.buffer.pollers:
             self.buffer.pollers.remove(poll)
         self._end()
@@ -93,22 +94,16 @@ class Listener:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _hear(self, data: bytes, static: bool) -> None:  # noqa: FBT001 (called with what the subscription is)
+    def _take(self, data: bytes, static: bool) -> None:  # noqa: FBT001 (called with what the subscription is)
         try:
-            refused = self.buffer.insert(self._decoder.rows(data), static=static, authority="default_authority")
+            rejected = self.buffer.insert(self._decoder.rows(data), static=static, authority="default_authority")
         except ValueError as error:
-            self._complain(f"a message that is no TFMessage was dropped: {error}")
+            self._warn(f"a message that is no TFMessage was dropped: {error}")
             return
-        for child, reason in refused:
-            self._complain(
-                f"{reason.value}: a transform of {child or 'a frame without name'} was dropped: {reason.text}"
-            )
+        for child, reason in rejected:
+            self._warn(f"{reason.value}: a transform of {child or 'a frame without name'} was dropped: {reason.text}")
 
-    def _complain(self, complaint: str) -> None:
-        if complaint not in self._complaints and len(self._complaints) < _MOST_COMPLAINTS:
-            self._complaints.add(complaint)
-            self._ear.node.get_logger().warning(complaint)
-
-
-#: tf2_ros's name.
-TransformListener = Listener
+    def _warn(self, warning: str) -> None:
+        if warning not in self._warnings and len(self._warnings) < _MOST_WARNINGS:
+            self._warnings.add(warning)
+            self._ros.node.get_logger().warning(warning)

@@ -20,12 +20,12 @@ from rclpy.time import Time
 from tests.support import processes
 from tests.waiting import none_but
 from tfcompose.geometry import Pose
-from tfcompose.observe import Buffer, LookupException, TransformException, TransformListener
 from tfcompose.plan import PlanProcess, Simulation
 from tfcompose.ros.graph import writers
 from tfcompose.ros.message import Transform, encode
 from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFPublisher
+from tfcompose.tf2 import Buffer, LookupException, TransformException, TransformListener
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -37,10 +37,10 @@ pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
 PROGRAMS = Path(__file__).parent / "programs"
 #: What is changed of a program for tf2, and nothing else.
 IMPORTS = {
-    "from tf2_ros import": "from tfcompose.observe import",
-    "import tf2_ros$": "from tfcompose import observe as tf2_ros",
-    "import tf2_py as tf2$": "from tfcompose import observe as tf2",
-    "import tf2_geometry_msgs$": "from tfcompose.observe import transforms as tf2_geometry_msgs",
+    "from tf2_ros import": "from tfcompose.tf2 import",
+    "import tf2_ros$": "from tfcompose import tf2 as tf2_ros",
+    "import tf2_py as tf2$": "from tfcompose import tf2",
+    "import tf2_geometry_msgs$": "from tfcompose.tf2 import messages as tf2_geometry_msgs",
 }
 S = 1_000_000_000
 UNIT = (0.0, 0.0, 0.0, 1.0)
@@ -213,14 +213,14 @@ def test_when_the_clock_goes_back_moving_edges_are_forgotten(node: Any) -> None:
 
 
 def test_a_program_that_never_closes_its_listener_ends(domain: Any) -> None:
-    code = "from tfcompose.observe import Buffer, Listener; Listener(Buffer()); print('up', flush=True)"
+    code = "from tfcompose.tf2 import Buffer, TransformListener; TransformListener(Buffer()); print('up', flush=True)"
     done = processes.run([sys.executable, "-c", code], env=domain.environment)
     assert (done.returncode, done.stdout, done.stderr) == (0, "up\n", "")
 
 
 def test_a_wait_is_ended_by_ctrl_c(domain: Any) -> None:
     code = (
-        "from tfcompose.observe import Buffer, Listener\nbuffer = Buffer()\nListener(buffer)\n"
+        "from tfcompose.tf2 import Buffer, TransformListener\nbuffer = Buffer()\nTransformListener(buffer)\n"
         "try:\n    print('up', flush=True)\n    buffer.lookup_transform('a', 'b', 0, 60 * 10**9)\n"
         "except KeyboardInterrupt:\n    print('out')"
     )
@@ -233,7 +233,7 @@ def test_a_wait_is_ended_by_ctrl_c(domain: Any) -> None:
 
 
 def test_rclpy_is_not_started_by_importing_the_classes() -> None:
-    code = "import tfcompose.observe, sys; print([m for m in ('rclpy', 'numpy') if m in sys.modules])"
+    code = "import tfcompose.tf2, sys; print([m for m in ('rclpy', 'numpy') if m in sys.modules])"
     assert processes.run([sys.executable, "-c", code], check=True).stdout == "[]\n"
     assert issubclass(LookupException, TransformException)
     assert rclpy is not None

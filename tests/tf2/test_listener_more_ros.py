@@ -16,10 +16,10 @@ from rosgraph_msgs.msg import Clock
 from tests.support import processes
 from tests.waiting import none_but
 from tfcompose.geometry import Pose
-from tfcompose.observe import Buffer, Listener, TransformListener
 from tfcompose.ros.message import Transform, encode
 from tfcompose.ros.node import open_node
 from tfcompose.ros.tf import TFPublisher
+from tfcompose.tf2 import Buffer, TransformListener
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -86,7 +86,7 @@ def test_a_callback_that_awaits_lets_the_executor_hear_what_it_waits_for(
 
     def asked() -> bool:
         executor.spin_once(timeout_sec=0.05)
-        return bool(buffer.on_news)
+        return bool(buffer.on_insert)
 
     assert until(asked)
     publisher.publish(one(1.0, 4 * S))
@@ -109,8 +109,8 @@ def test_a_listener_of_its_own_follows_the_simulated_clock_and_says_when_it_goes
     clock = other.create_publisher(Clock, "/clock", 1)
     publisher = TFPublisher(other, static=False)
 
-    with Listener(buffer, use_sim_time=True) as listener:
-        own = listener._ear.node.get_clock()
+    with TransformListener(buffer, use_sim_time=True) as listener:
+        own = listener._ros.node.get_clock()
 
         def at(seconds: int) -> bool:
             clock.publish(Clock(clock=Time(seconds=seconds).to_msg()))
@@ -134,7 +134,7 @@ def test_a_node_with_use_sim_time_clears_the_buffer_that_it_was_given_to_once(do
     code = """
 import rclpy, sys
 from rclpy.time import Time
-from tfcompose.observe import Buffer, TransformListener
+from tfcompose.tf2 import Buffer, TransformListener
 from tfcompose.geometry import Pose
 rclpy.init(args=["--ros-args", "-p", "use_sim_time:=true"])
 node = rclpy.create_node("asks")
@@ -190,8 +190,8 @@ def test_a_listener_to_fixed_edges_alone_has_one_subscription(node: Any, other: 
         publisher = TFPublisher(other, static=True)
         publisher.publish(one(0.5, 0, "base_link", "laser"))
         assert buffer.lookup_transform("base_link", "laser", 0, timeout=60 * S).transform.translation.x == 0.5
-    with Listener(buffer, static_only=True) as listener:
-        own = listener._ear.node
+    with TransformListener(buffer, static_only=True) as listener:
+        own = listener._ros.node
         assert [len(own.get_subscriptions_info_by_topic(name)) for name in ("/tf", "/tf_static")] == [0, 1]
 
 
@@ -199,8 +199,8 @@ def test_a_listener_to_fixed_edges_alone_has_one_subscription(node: Any, other: 
 def test_profiles_and_depths_are_those_that_were_asked_for(node: Any, *, handed_over: bool) -> None:
     profile: Any = QoSProfile
     asked = profile(depth=7, reliability=2)  # best effort
-    with Listener(Buffer(), node if handed_over else None, qos=asked, static_qos=5) as listener:
-        own = listener._ear.node
+    with TransformListener(Buffer(), node if handed_over else None, qos=asked, static_qos=5) as listener:
+        own = listener._ros.node
         moving, fixed = (own.get_subscriptions_info_by_topic(name)[0].qos_profile for name in ("/tf", "/tf_static"))
     assert moving.reliability.name == "BEST_EFFORT"
     assert (fixed.reliability.name, fixed.durability.name) == ("RELIABLE", "TRANSIENT_LOCAL"), "still latched"

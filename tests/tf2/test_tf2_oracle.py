@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from tfcompose.geometry import Pose, Quaternion, angle_between, normalised
-from tfcompose.observe import Buffer, TransformException
+from tfcompose.tf2 import Buffer, TransformException
 
 tf2 = pytest.importorskip("tf2_py")
 messages = pytest.importorskip("geometry_msgs.msg")

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import PointCloud2, PointField
 
 from tfcompose.geometry import Pose, normalised
-from tfcompose.observe import Buffer, TypeException
+from tfcompose.tf2 import Buffer, TypeException
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tfcompose.geometry import Pose, angle_between, quat_from_rpy
-from tfcompose.observe import (
+from tfcompose.tf2 import (
     Buffer,
     ConnectivityException,
     ExtrapolationException,
@@ -16,8 +16,8 @@ from tfcompose.observe import (
     LookupException,
     TransformException,
 )
-from tfcompose.observe.refusal import Refusal
-from tfcompose.observe.stamped import Header, Quaternion, Time, Transform, TransformStamped, Vector3
+from tfcompose.tf2.exceptions import Rejection
+from tfcompose.tf2.messages import Header, Quaternion, Time, Transform, TransformStamped, Vector3
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,24 +46,24 @@ def x_of(buffer: Buffer, target: str, source: str, seconds: float = 0.0) -> floa
 @pytest.mark.parametrize(
     ("parent", "child", "numbers", "why"),
     [
-        ("a", "a", (0, 0, 0, 0, 0, 0, 1), Refusal.SELF),
-        ("/a", "a", (0, 0, 0, 0, 0, 0, 1), Refusal.SELF),
-        ("a", "", (0, 0, 0, 0, 0, 0, 1), Refusal.NO_CHILD),
-        ("a", "/", (0, 0, 0, 0, 0, 0, 1), Refusal.NO_CHILD),
-        ("", "b", (0, 0, 0, 0, 0, 0, 1), Refusal.NO_PARENT),
-        ("a", "b", (math.nan, 0, 0, 0, 0, 0, 1), Refusal.NOT_FINITE),
-        ("a", "b", (0, 0, math.inf, 0, 0, 0, 1), Refusal.NOT_FINITE),
-        ("a", "b", (0, 0, 0, 0, math.nan, 0, 1), Refusal.NOT_FINITE),
-        ("a", "b", (0, 0, 0, 0, 0, 0, 0), Refusal.DENORMALISED),
-        ("a", "b", (0, 0, 0, 0, 0, 0, math.sqrt(1.0101)), Refusal.DENORMALISED),
-        ("a", "b", (0, 0, 0, 0, 0, 0, math.sqrt(0.9899)), Refusal.DENORMALISED),
+        ("a", "a", (0, 0, 0, 0, 0, 0, 1), Rejection.SELF),
+        ("/a", "a", (0, 0, 0, 0, 0, 0, 1), Rejection.SELF),
+        ("a", "", (0, 0, 0, 0, 0, 0, 1), Rejection.NO_CHILD),
+        ("a", "/", (0, 0, 0, 0, 0, 0, 1), Rejection.NO_CHILD),
+        ("", "b", (0, 0, 0, 0, 0, 0, 1), Rejection.NO_PARENT),
+        ("a", "b", (math.nan, 0, 0, 0, 0, 0, 1), Rejection.NOT_FINITE),
+        ("a", "b", (0, 0, math.inf, 0, 0, 0, 1), Rejection.NOT_FINITE),
+        ("a", "b", (0, 0, 0, 0, math.nan, 0, 1), Rejection.NOT_FINITE),
+        ("a", "b", (0, 0, 0, 0, 0, 0, 0), Rejection.DENORMALISED),
+        ("a", "b", (0, 0, 0, 0, 0, 0, math.sqrt(1.0101)), Rejection.DENORMALISED),
+        ("a", "b", (0, 0, 0, 0, 0, 0, math.sqrt(0.9899)), Rejection.DENORMALISED),
         ("a", "b", (0, 0, 0, 0, 0, 0, math.sqrt(1.0099)), None),
         ("a", "b", (1e308, 1e308, 1e308, 0, 0, 0, 1), None),
         ("a", "/b", (0, 0, 0, 0, 0, 0, -1), None),
     ],
 )
 def test_what_is_refused_is_refused_for_tf2s_reason_and_leaves_nothing(
-    parent: str, child: str, numbers: Sequence[float], why: Refusal | None
+    parent: str, child: str, numbers: Sequence[float], why: Rejection | None
 ) -> None:
     buffer = Buffer()
     row: Any = (parent, child, 5, 0, *numbers)
@@ -83,7 +83,7 @@ def test_a_quaternion_a_little_off_is_brought_to_length_1() -> None:
 def test_data_older_than_the_cache_is_refused_and_the_rest_of_the_message_is_taken() -> None:
     buffer = moving(("odom", "base", 0.0, 100.0))
     rows: list[Any] = [("odom", "base", 89, 999_999_999, *[0.0] * 6, 1.0), ("odom", "arm", 1, 0, *[0.0] * 6, 1.0)]
-    assert buffer.insert(rows, static=False) == [("base", Refusal.OLD)]
+    assert buffer.insert(rows, static=False) == [("base", Rejection.OLD)]
     assert buffer.set("odom", "base", at(1), 90 * S, static=False), "exactly as old as the cache is not too old"
     assert buffer.frames == {"odom", "base", "arm"}
 

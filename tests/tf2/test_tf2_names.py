@@ -16,9 +16,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.support.tables import for_each
-from tfcompose import observe
+from tfcompose import tf2
 from tfcompose.geometry import Pose, quat_from_rpy
-from tfcompose.observe import (
+from tfcompose.tf2 import (
     Buffer,
     BufferInterface,
     ConvertRegistration,
@@ -31,9 +31,8 @@ from tfcompose.observe import (
     TransformRegistration,
     TypeException,
     convert,
-    stamped,
 )
-from tfcompose.observe.stamped import Header, Time, Vector3
+from tfcompose.tf2.messages import Header, Time, Vector3
 
 S = 1_000_000_000
 
@@ -43,7 +42,7 @@ def _without_ros(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have nothing of ROS loaded, whatever ran before in this process."""
     for name in ("rclpy.task", "rclpy.time", "std_msgs.msg", "geometry_msgs.msg"):
         monkeypatch.delitem(sys.modules, name, raising=False)
-    monkeypatch.setattr(stamped, "_makers", {})
+    monkeypatch.setattr(tf2.messages, "_makers", {})
 
 
 # As geometry2 for Jazzy has them; of keyword-only arguments the names, since their order does not matter.
@@ -97,7 +96,7 @@ def test_what_is_exported_has_the_names_of_tf2_ros() -> None:
     )
     wanted += " TypeException NotImplementedException TransformException ConnectivityException LookupException"
     wanted += " ExtrapolationException InvalidArgumentException TimeoutException"
-    assert set(wanted.split()) <= set(observe.__all__)
+    assert set(wanted.split()) <= set(tf2.__all__)
 
 
 def rover() -> Buffer:
@@ -137,13 +136,13 @@ def test_a_future_is_done_at_once_when_the_transform_is_there_and_else_when_it_c
     buffer.set("odom", "base", Pose((5.0, 0.0, 0.0)), 5 * S, static=False)
     assert later.result(0).transform.translation.x == 4.0
     assert full.result(0).transform.translation.x == 2.0
-    assert not buffer.on_news, "nothing is waited for any longer"
+    assert not buffer.on_insert, "nothing is waited for any longer"
 
 
 def test_a_future_that_is_given_up_is_forgotten_and_a_name_that_cannot_be_ends_it() -> None:
     buffer = rover()
     assert buffer.wait_for_transform_async("odom", "arm", Time()).cancel()
-    assert not buffer.on_news
+    assert not buffer.on_insert
     with pytest.raises(InvalidArgumentException, match="starts with a slash"):
         buffer.wait_for_transform_async("/odom", "arm", Time()).result(0)
 
@@ -181,7 +180,7 @@ def test_many_futures_are_done_by_many_threads_each_once() -> None:
     for thread in threads:
         thread.join()
     assert all(future.done() and future.exception() is None for future in asked)
-    assert not buffer.on_news
+    assert not buffer.on_insert
 
 
 @dataclass

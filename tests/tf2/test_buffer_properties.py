@@ -14,9 +14,9 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from tests.support.tables import for_each
 from tfcompose.geometry import Pose, Quaternion, angle_between, normalised
-from tfcompose.observe import Buffer, TransformException
 from tfcompose.ros.decoder import Decoder
 from tfcompose.ros.message import Transform, encode
+from tfcompose.tf2 import Buffer, TransformException
 
 S = 1_000_000_000
 TOLERANCE = 1e-9

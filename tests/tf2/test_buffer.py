@@ -10,15 +10,15 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 from tfcompose.geometry import OPTICAL_XYZW, Pose, Quaternion, angle_between, quat_from_rpy
-from tfcompose.observe.buffer import (
-    CACHE_NS,
+from tfcompose.tf2 import (
     Buffer,
     ConnectivityException,
     ExtrapolationException,
     InvalidArgumentException,
     LookupException,
 )
-from tfcompose.observe.rotation import IDENTITY, between, unit
+from tfcompose.tf2.core import CACHE_NS
+from tfcompose.tf2.poses import IDENTITY, between, unit
 
 S = 1_000_000_000
 

@@ -6,10 +6,9 @@ import threading
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from tfcompose.ros.message import decode
-from tfcompose.ros.node import open_node
+from tfcompose.ros.node import TFSubscription, open_node, wait
 from tfcompose.ros.stop import Stop
-from tfcompose.ros.tf import TFSubscription, wait
+from tfcompose.ros.tf_codec import decode
 
 if TYPE_CHECKING:
     from typing_extensions import Self

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tfcompose.geometry import Pose, quat_from_rpy
-from tfcompose.ros.decoder import Decoder
-from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.tf_codec import Decoder, Transform, encode
 from tfcompose.tf2 import Buffer
 
 if TYPE_CHECKING:

@@ -27,9 +27,8 @@ LIMIT = 0.10
 DOMAIN = "101"
 OWNER = f"""
 import time
-from tfcompose.ros.message import Template
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.tf_codec import Template
+from tfcompose.ros.node import TFPublisher, open_node
 with open_node("owner", "/bench") as node:
     publisher = TFPublisher(node, static=False)
     names = [("base", f"frame_{{n}}_link") for n in range({EDGES})]

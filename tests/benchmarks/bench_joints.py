@@ -39,7 +39,7 @@ import contextlib
 import rclpy
 from rclpy.executors import ExternalShutdownException
 from sensor_msgs.msg import JointState
-from tfcompose.ros.message import Template
+from tfcompose.ros.tf_codec import Template
 from tfcompose.ros.typesupport import tf_message_type
 rclpy.init()
 node = rclpy.create_node("plain", namespace="/rover")
@@ -98,8 +98,8 @@ def _sender(node: Any, joints: int) -> Callable[[], float | None]:
     from rclpy.serialization import serialize_message  # noqa: PLC0415 (after ROS's variables are set)
     from sensor_msgs.msg import JointState  # noqa: PLC0415 (the same)
 
+    from tfcompose.ros.node import TFSubscription, wait  # noqa: PLC0415 (the same)
     from tfcompose.ros.stop import Stop  # noqa: PLC0415 (the same)
-    from tfcompose.ros.tf import TFSubscription, wait  # noqa: PLC0415 (the same)
 
     message = JointState(name=[f"joint_{n}" for n in range(joints)], position=[0.01 * n for n in range(joints)])
     data = bytearray(serialize_message(message))

@@ -18,9 +18,8 @@ DOMAIN = "101"
 
 def measure() -> dict[str, float]:
     """Return the microseconds that a message of ``EDGES`` edges costs, by step."""
-    from tfcompose.ros.message import Template  # noqa: PLC0415 (after ROS's variables are set)
-    from tfcompose.ros.node import open_node  # noqa: PLC0415 (the same)
-    from tfcompose.ros.tf import TFPublisher  # noqa: PLC0415 (the same)
+    from tfcompose.ros.node import TFPublisher, open_node  # noqa: PLC0415 (after ROS's variables are set)
+    from tfcompose.ros.tf_codec import Template  # noqa: PLC0415 (after ROS's variables are set)
 
     pose = Pose((1.0, 2.0, 3.0))
     template = Template([(f"frame_{n}", f"frame_{n + 1}") for n in range(EDGES)])

@@ -21,9 +21,8 @@ from typing import TYPE_CHECKING
 import psutil
 import pytest
 
-from tfcompose.ros.message import Transform, encode
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.ros.tf_codec import Transform, encode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

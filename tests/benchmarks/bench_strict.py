@@ -17,10 +17,9 @@ from statistics import median, quantiles
 
 import pytest
 
-from tfcompose.ros.message import decode
-from tfcompose.ros.node import open_node
+from tfcompose.ros.node import TFSubscription, open_node, wait
 from tfcompose.ros.stop import Stop
-from tfcompose.ros.tf import TFSubscription, wait
+from tfcompose.ros.tf_codec import decode
 
 EDGES, HERTZ = 50, 200.0
 ROUNDS, ROUND_S, BEFORE_S = 5, 2.5, 1.0
@@ -30,9 +29,8 @@ DOMAIN = "94"
 WAYS = {"watch": "mode: watch", "strict": "mode: strict, fence: partition", "remapped": "mode: strict, fence: remap"}
 OWNER = f"""
 import signal, sys, time
-from tfcompose.ros.message import Template
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.tf_codec import Template
+from tfcompose.ros.node import TFPublisher, open_node
 signal.signal(signal.SIGINT, lambda *_: sys.exit())
 with open_node("owner", "/", args=sys.argv[2:]) as node:
     publisher = TFPublisher(node, static=False)

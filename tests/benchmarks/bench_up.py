@@ -40,7 +40,7 @@ LISTENER = f"""
 import time
 import rclpy
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from tfcompose.ros.message import decode
+from tfcompose.ros.tf_codec import decode
 from tfcompose.ros.typesupport import tf_message_type
 began = time.monotonic()
 rclpy.init()
@@ -59,7 +59,7 @@ rclpy.shutdown()
 PLAIN = f"""
 import rclpy
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from tfcompose.ros.message import Template
+from tfcompose.ros.tf_codec import Template
 from tfcompose.ros.typesupport import tf_message_type
 rclpy.init()
 node = rclpy.create_node("plain")

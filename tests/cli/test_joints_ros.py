@@ -14,8 +14,7 @@ from std_msgs.msg import String
 
 from tests.support import processes
 from tests.waiting import until
-from tfcompose.ros.node import JOINT_STATES, LATCHED, open_node
-from tfcompose.ros.tf import Subscription
+from tfcompose.ros.node import JOINT_STATES, LATCHED, Subscription, open_node
 from tfcompose.tf2 import Buffer, TransformListener
 
 if TYPE_CHECKING:

@@ -15,8 +15,7 @@ from std_msgs.msg import String
 
 from tests.waiting import until
 from tfcompose.ros.graph import UNKNOWN_NODE, writers
-from tfcompose.ros.node import LATCHED, open_node
-from tfcompose.ros.tf import Subscription
+from tfcompose.ros.node import LATCHED, Subscription, open_node
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -51,10 +50,10 @@ from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from tfcompose.geometry import Pose, quat_from_rpy
-from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.tf_codec import Transform, encode
 from tfcompose.ros.node import JOINT_STATES, latch, open_node
 from tfcompose.ros.stop import Stop
-from tfcompose.ros.tf import Subscription, TFPublisher, wait
+from tfcompose.ros.node import Subscription, TFPublisher, wait
 at = sys.argv.index("--ros-args")
 with Stop() as stop, open_node("robot_state_publisher", "", args=sys.argv[at + 1:]) as node:
     for name, kind in (("robot_description", Parameter.Type.STRING), ("frame_prefix", Parameter.Type.STRING)):

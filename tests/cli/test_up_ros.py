@@ -28,9 +28,8 @@ pytestmark = pytest.mark.ros
 #: Publishes odom → base_link on /tf without end.
 ROGUE = """
 import time
-from tfcompose.ros.message import Template
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.tf_codec import Template
+from tfcompose.ros.node import TFPublisher, open_node
 template = Template([("odom", "base_link")])
 with open_node("rogue", "/strange") as node:
     publisher = TFPublisher(node, static=False)

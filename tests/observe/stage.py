@@ -11,9 +11,8 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 from tests.support import processes
-from tfcompose.ros.message import Transform, encode
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.ros.tf_codec import Transform, encode
 from tfcompose.ros.typesupport import tf_message_type
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from tfcompose.observe.diagnose.surroundings import differences
 from tfcompose.observe.joint_list import joints_of
 from tfcompose.observe.seen import RosProcess, Seen, Stamped, Topic
 from tfcompose.plan import EdgePattern, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
-from tfcompose.ros.settings import RANGE
+from tfcompose.ros.environment import RANGE
 from tfcompose.verdict.clock import seconds
 
 if TYPE_CHECKING:

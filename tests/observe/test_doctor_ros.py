@@ -24,8 +24,7 @@ from std_msgs.msg import String
 from tests.observe.stage import at_last, doctor, doctor_finds, finds_nothing, message, said
 from tests.support import processes
 from tests.waiting import until
-from tfcompose.ros.node import LATCHED, open_node, qos
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.node import LATCHED, TFPublisher, open_node, qos
 from tfcompose.ros.typesupport import tf_message_type
 
 if TYPE_CHECKING:
@@ -452,9 +451,8 @@ int clock_gettime(clockid_t id, struct timespec *now) {
 """
 TALKER = """
 import time
-from tfcompose.ros.message import Transform, encode
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.tf_codec import Transform, encode
+from tfcompose.ros.node import TFPublisher, open_node
 with open_node("far", "") as node:
     publisher = TFPublisher(node, static=False)
     print("up", flush=True)

@@ -22,9 +22,9 @@ from tfcompose.observe.asked import Asked
 from tfcompose.observe.echo import echo as run_echo
 from tfcompose.plan import PlanProcess, Simulation
 from tfcompose.ros.clock import SimClock
-from tfcompose.ros.message import Transform, encode
-from tfcompose.ros.node import Stop, open_node
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.ros.stop import Stop
+from tfcompose.ros.tf_codec import Transform, encode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

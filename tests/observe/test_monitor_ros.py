@@ -15,9 +15,8 @@ import pytest
 
 from tests.observe.stage import LOOKS_S, at_last
 from tests.support import processes
-from tfcompose.ros.message import Transform, encode
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.ros.tf_codec import Transform, encode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -12,7 +12,7 @@ import pytest
 from tests.observe.stage import LOOKS_S, doctor, finds_nothing, message, said, says
 from tests.support import processes
 from tfcompose.geometry import OPTICAL_XYZW
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.node import TFPublisher
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -29,8 +29,8 @@ STAND_IN = """
 import os, signal, sys, threading, time
 import rclpy
 from rclpy.node import Node
-from tfcompose.ros.message import Transform, encode
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.tf_codec import Transform, encode
+from tfcompose.ros.node import TFPublisher
 rclpy.init(args=sys.argv)
 node = Node("camera", automatically_declare_parameters_from_overrides=True)
 told = {name: node.get_parameter(name).value for name in node._parameters}

@@ -24,8 +24,8 @@ from tfcompose.emit import emit
 from tfcompose.geometry import Pose
 from tfcompose.plan import RosSettings
 from tfcompose.plan.file import read_plan
-from tfcompose.ros.joint_message import encode_names, fill
-from tfcompose.ros.message import decode
+from tfcompose.ros.joint_codec import encode_names, fill
+from tfcompose.ros.tf_codec import decode
 from tfcompose.run.publishing.joint_mover import JointMover, Told
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""What is decoded by a remembered layout is what ``message.decode`` reads."""
+"""What is decoded by a remembered layout is what ``decode`` reads."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tfcompose.ros.decoder import Decoder, Row
-from tfcompose.ros.message import Transform, decode, encode
+from tfcompose.ros.tf_codec import Decoder, Row, Transform, decode, encode
 
 S = 1_000_000_000
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tfcompose.ros.joint_message import Names, encode_names, fill, read_names
+from tfcompose.ros.joint_codec import Names, encode_names, fill, read_names
 
 names = st.lists(st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=9), max_size=7)
 

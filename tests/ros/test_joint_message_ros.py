@@ -6,7 +6,7 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
-from tfcompose.ros.joint_message import encode_names, fill, read_names
+from tfcompose.ros.joint_codec import encode_names, fill, read_names
 
 pytestmark = pytest.mark.ros
 NAMES = [[], ["a"], ["left", "grippér"], [f"joint_{n}" for n in range(11)]]

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tfcompose.geometry import Pose
-from tfcompose.ros.message import Template, Transform, decode, encode
+from tfcompose.ros.tf_codec import Template, Transform, decode, encode
 
 doubles = st.floats(allow_nan=False)
 names = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=20)

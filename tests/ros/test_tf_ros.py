@@ -12,10 +12,9 @@ from sensor_msgs.msg import JointState
 from tests.waiting import none_but
 from tfcompose.ros.environment import RosError
 from tfcompose.ros.graph import writers
-from tfcompose.ros.message import Transform, decode, encode
-from tfcompose.ros.node import JOINT_STATES, open_node
+from tfcompose.ros.node import JOINT_STATES, Subscription, TFPublisher, TFSubscription, open_node, wait
 from tfcompose.ros.stop import Stop
-from tfcompose.ros.tf import Subscription, TFPublisher, TFSubscription, wait
+from tfcompose.ros.tf_codec import Transform, decode, encode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

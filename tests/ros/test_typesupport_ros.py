@@ -5,11 +5,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tfcompose.ros import rosidl, typesupport
+from tfcompose.ros import typesupport
 from tfcompose.ros.environment import RosError
-from tfcompose.ros.message import TF_MESSAGE_HASH, Transform, encode
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.ros.tf_codec import TF_MESSAGE_HASH, Transform, encode
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,18 +23,18 @@ def own() -> Any:
 
 
 def _address(own: Any) -> int:
-    return rosidl.capsule_address(own.__class__._TYPE_SUPPORT)
+    return typesupport.capsule_address(own.__class__._TYPE_SUPPORT)
 
 
 def test_the_hash_is_that_of_the_description(own: Any) -> None:
     address = _address(own)
-    assert rosidl.hash_text(address) == TF_MESSAGE_HASH
-    assert rosidl.type_hash(rosidl.description_json(address)) == TF_MESSAGE_HASH
+    assert typesupport.hash_text(address) == TF_MESSAGE_HASH
+    assert typesupport.type_hash(typesupport.description_json(address)) == TF_MESSAGE_HASH
 
 
 def test_the_description_is_that_of_tf_message(own: Any) -> None:
     gc.collect()
-    found = rosidl.description_json(_address(own))
+    found = typesupport.description_json(_address(own))
     kind = {
         "type_id": 145,
         "capacity": 0,

@@ -14,16 +14,16 @@ _SITE = """
 import sys
 if "tfcompose.run.guard" in sys.orig_argv:
     import dataclasses
-    import tfcompose.ros.identity as identity
-    gid_of = identity.gid_of
-    identity.ids_say_who = lambda node: False
-    identity.gid_of = lambda publisher: gid_of(publisher)[::-1]
-    import tfcompose.ros.tf as tf
-    received = tf.Subscription._received
+    import tfcompose.ros.graph as graph
+    gid_of = graph.gid_of
+    graph.ids_say_who = lambda node: False
+    graph.gid_of = lambda publisher: gid_of(publisher)[::-1]
+    import tfcompose.ros.node as node
+    received = node.Subscription._received
     def turned(self):
         one = received(self)
         return dataclasses.replace(one, raw_gid=one.raw_gid[::-1])
-    tf.Subscription._received = turned
+    node.Subscription._received = turned
 """
 
 

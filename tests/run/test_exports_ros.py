@@ -37,8 +37,8 @@ ARM = """
 import signal, sys
 import rclpy
 from rclpy.lifecycle import LifecycleNode
-from tfcompose.ros.message import Transform, encode
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.tf_codec import Transform, encode
+from tfcompose.ros.node import TFPublisher
 
 class Arm(LifecycleNode):
     def on_activate(self, state):
@@ -247,10 +247,10 @@ STOCK = """#!{python}
 import sys, yaml
 import xml.etree.ElementTree as ET
 from tfcompose.geometry import quat_from_rpy
-from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.tf_codec import Transform, encode
 from tfcompose.ros.node import open_node
 from tfcompose.ros.stop import Stop
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.node import TFPublisher
 at = sys.argv.index("--ros-args")
 said, told = dict(zip(sys.argv[1:at:2], sys.argv[2:at:2])), sys.argv[at + 1 :]
 files = [told[n + 1] for n, word in enumerate(told) if word == "--params-file"]

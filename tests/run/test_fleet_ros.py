@@ -16,9 +16,8 @@ pytestmark = pytest.mark.ros
 ROBOT = Path(__file__).parents[2] / "robots" / "two_rovers.yaml"
 STRANGER = """
 import sys, time
-from tfcompose.ros.message import Transform, encode
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.tf_codec import Transform, encode
+from tfcompose.ros.node import TFPublisher, open_node
 topic, parent, child = sys.argv[1:]
 with open_node("stranger", "", args=["-r", f"/tf:={topic}"]) as node:
     publisher = TFPublisher(node, static=False)

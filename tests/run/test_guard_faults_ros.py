@@ -49,7 +49,7 @@ ISOLATED = ROBOT.replace("discovery: localhost", "discovery: localhost, namespac
 NODE = """
 import os, signal, sys, time
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.tf_codec import Transform, encode
 from tfcompose.ros.node import open_node, qos
 from tfcompose.ros.typesupport import tf_message_type
 name, reliability, stamps, *edges = sys.argv[1:]
@@ -196,9 +196,8 @@ def test_an_owner_whose_stamps_are_wrong_is_named(
 #: A node that latches its edges one message each: before anybody can have found it, if nobody looks meanwhile.
 LATCHES = """
 import signal, sys, time
-from tfcompose.ros.message import Transform, encode
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.tf_codec import Transform, encode
+from tfcompose.ros.node import TFPublisher, open_node
 signal.signal(signal.SIGTERM, lambda *_: sys.exit())
 with open_node("mounts", "/") as node:
     publisher = TFPublisher(node, static=True)
@@ -334,9 +333,8 @@ def test_the_policy_stop_offender_stops_the_plans_own_offender_and_no_stranger(
 #: A node that sends edges of others at 1 kHz.
 FLOOD = """
 import signal, sys, time
-from tfcompose.ros.message import Template
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.tf_codec import Template
+from tfcompose.ros.node import TFPublisher, open_node
 signal.signal(signal.SIGTERM, lambda *_: sys.exit())
 with open_node("rogue", "/") as node:
     publisher, template, due = TFPublisher(node, static=False), Template([("map", "odom")]), time.monotonic()
@@ -367,9 +365,8 @@ rclpy.spin(node)
 #: A node with so many latched publishers: one for each frame, as a static_transform_publisher is.
 MANY = """
 import signal
-from tfcompose.ros.message import Transform, encode
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.tf_codec import Transform, encode
+from tfcompose.ros.node import TFPublisher, open_node
 with open_node("foreign", "/") as node:
     publishers = [TFPublisher(node, static=True) for _ in range(120)]
     for n, publisher in enumerate(publishers):

@@ -16,10 +16,9 @@ import pytest
 from tests.domains import reserved_domain
 from tests.support import processes
 from tests.waiting import TIMEOUT_S, in_one_of_a_few, offences, until, whole_lines
-from tfcompose.ros.message import decode
-from tfcompose.ros.node import open_node
+from tfcompose.ros.node import TFSubscription, open_node, wait
 from tfcompose.ros.stop import Stop
-from tfcompose.ros.tf import TFSubscription, wait
+from tfcompose.ros.tf_codec import decode
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -32,9 +31,8 @@ ROBOT = Path(__file__).parents[2] / "robots" / "autonomous_robot.yaml"
 STRANGER = """
 import signal, sys, time
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-from tfcompose.ros.message import Transform, encode
-from tfcompose.ros.node import open_node, qos
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.tf_codec import Transform, encode
+from tfcompose.ros.node import TFPublisher, open_node, qos
 from tfcompose.ros.typesupport import tf_message_type
 name, kind, hertz, seconds, *edges = sys.argv[1:]
 signal.signal(signal.SIGTERM, lambda *_: sys.exit())  # leave in order: what is killed haunts the graph for 20 s

@@ -5,8 +5,8 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tfcompose.ros.message import Transform, decode, encode
-from tfcompose.ros.tf import Received
+from tfcompose.ros.node import Received
+from tfcompose.ros.tf_codec import Transform, decode, encode
 from tfcompose.run.guard.hearing import Hearing
 
 NAMES = st.sampled_from(["a", "b", "odom", "base_link", "käse", "", "x" * 9])

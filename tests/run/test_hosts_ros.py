@@ -57,9 +57,8 @@ def test_two_hosts_start_their_shares_and_each_sees_the_whole_tree(
 #: A node that sends its own edge, and another machine's.
 LIAR = """
 import signal, sys, time
-from tfcompose.ros.message import Transform, encode
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.tf_codec import Transform, encode
+from tfcompose.ros.node import TFPublisher, open_node
 signal.signal(signal.SIGINT, lambda *_: sys.exit())
 with open_node("arm_drive", "/", args=sys.argv[2:]) as node:
     publisher = TFPublisher(node, static=False)

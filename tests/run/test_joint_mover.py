@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from tfcompose.geometry import Pose, angle_between, normalised
 from tfcompose.plan import Joint, PlanEdge, SourceLine
-from tfcompose.ros.joint_message import encode_names, fill
-from tfcompose.ros.message import Transform, decode
+from tfcompose.ros.joint_codec import encode_names, fill
+from tfcompose.ros.tf_codec import Transform, decode
 from tfcompose.run.publishing.joint_mover import JointMover, Told
 
 if TYPE_CHECKING:

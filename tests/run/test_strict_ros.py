@@ -17,26 +17,24 @@ from tests.run.nameless import nameless_guard
 from tests.support import processes
 from tests.waiting import TIMEOUT_S, gone, until, whole_lines
 from tfcompose.ros.graph import writers
-from tfcompose.ros.message import Transform, decode, encode
-from tfcompose.ros.node import open_node
+from tfcompose.ros.node import TFPublisher, TFSubscription, open_node, wait
 from tfcompose.ros.stop import Stop
-from tfcompose.ros.tf import TFPublisher, TFSubscription, wait
+from tfcompose.ros.tf_codec import Transform, decode, encode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
     from tests.conftest import Started
-    from tfcompose.ros.tf import Received
+    from tfcompose.ros.node import Received
 
 pytestmark = pytest.mark.ros
 
 #: A node that latches edges, sends others at 20 Hz with stamps that do not change, and says whom it hears on TF.
 CHILD = """
 import json, signal, sys, time
-from tfcompose.ros.message import Transform, decode, encode
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFPublisher, TFSubscription
+from tfcompose.ros.tf_codec import Transform, decode, encode
+from tfcompose.ros.node import TFPublisher, TFSubscription, open_node
 name, fixed, moving = sys.argv[1], json.loads(sys.argv[2]), json.loads(sys.argv[3])
 signal.signal(signal.SIGINT, lambda *_: sys.exit())
 def message(edges):
@@ -244,10 +242,10 @@ def test_while_the_guard_is_dead_nothing_passes_and_the_next_one_passes_all_on_a
 LISTENER = """
 import json, signal, sys, time
 from collections import Counter
-from tfcompose.ros.message import Transform, decode, encode
+from tfcompose.ros.tf_codec import Transform, decode, encode
 from tfcompose.ros.node import open_node
 from tfcompose.ros.stop import Stop
-from tfcompose.ros.tf import TFPublisher, TFSubscription, wait
+from tfcompose.ros.node import TFPublisher, TFSubscription, wait
 signal.signal(signal.SIGINT, lambda *_: sys.exit())
 with open_node("ear", "/", args=sys.argv[2:]) as node:
     readers = [TFSubscription(node, static=static) for static in (False, True)]

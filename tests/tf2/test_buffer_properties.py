@@ -14,8 +14,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from tests.support.tables import for_each
 from tfcompose.geometry import Pose, Quaternion, angle_between, normalised
-from tfcompose.ros.decoder import Decoder
-from tfcompose.ros.message import Transform, encode
+from tfcompose.ros.tf_codec import Decoder, Transform, encode
 from tfcompose.tf2 import Buffer, TransformException
 
 S = 1_000_000_000

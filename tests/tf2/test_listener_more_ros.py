@@ -16,9 +16,8 @@ from rosgraph_msgs.msg import Clock
 from tests.support import processes
 from tests.waiting import none_but
 from tfcompose.geometry import Pose
-from tfcompose.ros.message import Transform, encode
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.ros.tf_codec import Transform, encode
 from tfcompose.tf2 import Buffer, TransformListener
 
 if TYPE_CHECKING:

@@ -22,9 +22,8 @@ from tests.waiting import none_but
 from tfcompose.geometry import Pose
 from tfcompose.plan import PlanProcess, Simulation
 from tfcompose.ros.graph import writers
-from tfcompose.ros.message import Transform, encode
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.node import TFPublisher, open_node
+from tfcompose.ros.tf_codec import Transform, encode
 from tfcompose.tf2 import Buffer, LookupException, TransformException, TransformListener
 
 if TYPE_CHECKING:

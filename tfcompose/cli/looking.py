@@ -12,8 +12,7 @@ from tfcompose.cli.options import namespace, positive
 from tfcompose.cli.terminal import UNREADABLE, complain, print_findings
 from tfcompose.findings import Note, finding
 from tfcompose.plan import RosSettings
-from tfcompose.ros.environment import RosError, child_environment
-from tfcompose.ros.settings import ros_trouble
+from tfcompose.ros.environment import RosError, child_environment, ros_trouble
 from tfcompose.ros.stop import Stop
 
 if TYPE_CHECKING:

@@ -14,8 +14,7 @@ from tfcompose.cli.built_plan import PLAN, as_asked, plan_in
 from tfcompose.cli.console import Console
 from tfcompose.cli.status import Status, columns_of
 from tfcompose.cli.terminal import UNREADABLE, coloured, complain, draws, print_findings
-from tfcompose.ros.environment import child_environment
-from tfcompose.ros.settings import no_ros, ros_trouble
+from tfcompose.ros.environment import child_environment, no_ros, ros_trouble
 from tfcompose.run.launcher.control import listen
 from tfcompose.run.launcher.logs import Logs
 from tfcompose.run.launcher.outlet import Outlet

@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.observe.bag_files import BagError, damaged, files_at
 from tfcompose.observe.census import nearer_clock
 from tfcompose.observe.elsewhere import namespace_words
-from tfcompose.ros.decoder import Decoder
-from tfcompose.ros.message import TF_MESSAGE, TF_MESSAGE_HASH
+from tfcompose.ros.tf_codec import TF_MESSAGE, TF_MESSAGE_HASH, Decoder
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from tfcompose.observe.census import Census
-    from tfcompose.ros.decoder import Row
+    from tfcompose.ros.tf_codec import Row
 
     Topics = tuple[str, str]
 

@@ -15,7 +15,7 @@ from tfcompose.observe.tally import Tally, Timing
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from tfcompose.ros.decoder import Row
+    from tfcompose.ros.tf_codec import Row
 
 #: So many edges are kept, counting an edge once for each publisher; what comes beyond is counted only.
 MOST_STRANDS = 20_000

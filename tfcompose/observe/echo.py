@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 from tfcompose.observe.asked import Asked, Missed
 from tfcompose.observe.elsewhere import advice, tf_elsewhere
 from tfcompose.ros.clock import SimClock
-from tfcompose.ros.decoder import Decoder
 from tfcompose.ros.graph import topics as topics_of
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFSubscription, wait
+from tfcompose.ros.node import TFSubscription, open_node, wait
+from tfcompose.ros.tf_codec import Decoder
 from tfcompose.tf2 import Buffer, TransformException
 from tfcompose.tf2.exceptions import Rejection
 

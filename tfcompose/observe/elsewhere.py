@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.observe.seen import listed
-from tfcompose.ros.message import TF_MESSAGE
-from tfcompose.ros.settings import DOMAIN, RANGE, RMW
+from tfcompose.ros.environment import DOMAIN, RANGE, RMW
+from tfcompose.ros.tf_codec import TF_MESSAGE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 
 from tfcompose.observe.census import Census, Publisher, nearer_clock
 from tfcompose.ros.clock import SimClock, wall_ns
-from tfcompose.ros.decoder import Decoder
 from tfcompose.ros.graph import UNKNOWN_NODE, nodes, own_gid, writers
-from tfcompose.ros.origin import origin
-from tfcompose.ros.tf import TFSubscription, wait
+from tfcompose.ros.node import TFSubscription, wait
+from tfcompose.ros.processes import origin
+from tfcompose.ros.tf_codec import Decoder
 
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-    from tfcompose.ros.decoder import Row
     from tfcompose.ros.stop import Stop
+    from tfcompose.ros.tf_codec import Row
 
 #: The graph is looked at so often, in seconds, and sooner where somebody sends who has no name yet.
 LOOK_EVERY_S = 0.5

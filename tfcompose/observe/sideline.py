@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from tfcompose.observe.joint_list import joints_of
 from tfcompose.observe.seen import Stamped
 from tfcompose.ros.headers import HEADED, HeaderSubscription
-from tfcompose.ros.joint_message import read_names
+from tfcompose.ros.joint_codec import read_names
 from tfcompose.ros.joint_states import JOINT_STATE_TYPE, JointStateSubscription
-from tfcompose.ros.node import LATCHED
-from tfcompose.ros.text import TextSubscription
+from tfcompose.ros.node import LATCHED, TextSubscription
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -11,7 +11,7 @@ from tfcompose.tf2.exceptions import DENORMALISED, Rejection, rejection_of
 
 if TYPE_CHECKING:
     from tfcompose.observe.tally import Tally
-    from tfcompose.ros.decoder import Row
+    from tfcompose.ros.tf_codec import Row
 
 #: A frame that stays in each parent for so many transforms, or more, in the mean, is handed over.
 SOME_IN_TURN = 3

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from tfcompose.ros.message import BIG_ENDIAN, LITTLE_ENDIAN
-from tfcompose.ros.node import qos
-from tfcompose.ros.tf import Subscription
+from tfcompose.ros.node import Subscription, qos
+from tfcompose.ros.tf_codec import BIG_ENDIAN, LITTLE_ENDIAN
 
 if TYPE_CHECKING:
     from rclpy.node import Node

@@ -1,13 +1,18 @@
 """What a process needs around it to speak ROS: rclpy, and the variables that ROS reads when it starts.
 
-This module imports no ROS, so that everything can ask whether there is one.
+Some settings make ROS end the process that starts a node, without a sentence: ``ros_trouble`` finds them before. This
+module imports no ROS, so that everything can ask whether there is one.
 """
 
 from __future__ import annotations
 
+import ctypes
+import os
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from tfcompose.findings import Finding, finding
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,6 +25,10 @@ FASTDDS_PROFILE_LOCALHOST = Path(__file__).with_name("fastdds_localhost.xml")
 
 # Fast DDS 2 reads the first, Fast DDS 3 the second. A user who sets either has decided.
 PROFILE_VARIABLES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
+
+DOMAIN, RANGE, RMW = "ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "RMW_IMPLEMENTATION"
+#: A port number holds no more domains (RTPS: 7400 + 250 times the domain, below 65536).
+LAST_DOMAIN = 232
 
 
 class RosError(Exception):
@@ -46,10 +55,50 @@ def child_environment(base: Mapping[str, str], ros: RosSettings, *, own: bool) -
     """
     environment = {**base, "PYTHONUNBUFFERED": "1"}
     if ros.domain_id is not None:
-        environment["ROS_DOMAIN_ID"] = str(ros.domain_id)
+        environment[DOMAIN] = str(ros.domain_id)
     if ros.discovery is not None:
-        environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = ros.discovery.upper()
+        environment[RANGE] = ros.discovery.upper()
     if own and not any(base.get(name) for name in PROFILE_VARIABLES):
-        alone = environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == "LOCALHOST"
+        alone = environment.get(RANGE) == "LOCALHOST"
         environment[PROFILE_VARIABLES[0]] = str(FASTDDS_PROFILE_LOCALHOST if alone else FASTDDS_PROFILE)
     return environment
+
+
+def ros_trouble(environment: Mapping[str, str]) -> Finding | None:
+    """Return what keeps a process with this environment from starting a node, or None."""
+    return no_ros() or _domain(environment.get(DOMAIN, "")) or _middleware(environment.get(RMW, ""))
+
+
+def no_ros() -> Finding | None:
+    """Return the finding that there is no ROS, with what to install, or None."""
+    missing = missing_ros()
+    if not missing:
+        return None
+    message, _, advice = missing.partition(": ")
+    return finding("TF901", message, None, help=advice)
+
+
+def _domain(domain: str) -> Finding | None:
+    if not domain or (domain.isascii() and domain.isdigit() and int(domain) <= LAST_DOMAIN):
+        return None
+    advice = f"unset {DOMAIN}, which is domain 0, or set it to the robot's"
+    return finding("TF909", f"{DOMAIN}={domain} is no domain: they go from 0 to {LAST_DOMAIN}", None, help=advice)
+
+
+def _middleware(name: str) -> Finding | None:
+    """Look for the library as ROS does; where it is not, ROS ends the process as soon as it is imported."""
+    if not name:
+        return None
+    try:
+        ctypes.CDLL(f"lib{name}.so")
+    except OSError:
+        found = {file.stem.removeprefix("lib") for folder in _folders() for file in folder.glob("librmw_*_cpp.so")}
+        here = sorted(name for name in found if "_shared_" not in name and "__" not in name)
+        advice = f"unset {RMW}, or install ros-jazzy-{name.replace('_', '-')}"
+        advice += f"; here is {', '.join(here)}" if here else ""
+        return finding("TF909", f"{RMW}={name}, and this ROS has no such middleware", None, help=advice)
+    return None
+
+
+def _folders() -> list[Path]:
+    return [Path(folder) for folder in os.environ.get("LD_LIBRARY_PATH", "").split(os.pathsep) if folder]

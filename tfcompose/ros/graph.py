@@ -1,11 +1,24 @@
-"""Who publishes on a topic, as the graph says."""
+"""Who publishes and who listens, as the graph says, and whose messages are whose.
+
+rmw says a publisher's id twice: with each message, and in the graph, where its node's name stands. With rmw_fastrtps
+the two are equal. With rmw_cyclonedds that which comes with a message is a number of the receiving process's own
+(rmw_cyclonedds#446), and tells senders apart without saying who they are. What a publisher of one's own has in
+messages is what ``rmw_get_gid_for_publisher`` returns; by that every rmw can be asked which kind it is.
+"""
 
 from __future__ import annotations
 
+import ctypes
+import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from functools import cache
+from typing import TYPE_CHECKING, Any, Literal
 
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from rclpy.utilities import get_rmw_implementation_identifier
+from std_msgs.msg import String
+
+from tfcompose.ros.environment import RosError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -15,6 +28,12 @@ if TYPE_CHECKING:
 
 #: What rmw says instead of a name while it does not know whose node a publisher is.
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
+#: Where the rmw is asked whose ids come with messages; hidden from lists of topics by its first underscore.
+ASKING = "/_tfcompose/who_am_i"
+#: How long one's own publisher may take to come into the graph, in seconds.
+SHOWN_WITHIN_S = 0.5
+
+_says_who: dict[str, bool] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,3 +153,70 @@ def nodes(node: Node) -> list[str]:
     own = _full_name(node.get_namespace(), node.get_name())
     names = {_full_name(namespace, name) for name, namespace in node.get_node_names_and_namespaces()}
     return sorted(names - {own, UNKNOWN_NODE})
+
+
+# Ids.
+
+
+class Allocator(ctypes.Structure):
+    """rcutils_allocator_t."""
+
+    _fields_ = (("functions_and_state", ctypes.c_void_p * 5),)
+
+
+class _Gid(ctypes.Structure):
+    """rmw_gid_t, with 16 bytes of storage since Iron, and room behind it."""
+
+    _fields_ = (("implementation", ctypes.c_char_p), ("data", ctypes.c_uint8 * 16), ("room", ctypes.c_uint8 * 64))
+
+
+def ids_say_who(node: Node) -> bool:
+    """Return whether the id of a message is that of its publisher in the graph; asked once for each rmw."""
+    rmw: str = get_rmw_implementation_identifier()
+    if rmw.startswith("rmw_fastrtps"):
+        return True
+    if rmw not in _says_who:
+        _says_who[rmw] = _ask(node)
+    return _says_who[rmw]
+
+
+def gid_of(publisher: Any) -> bytes:
+    """Return the id, 16 bytes, that comes with the messages of this publisher of one's own; empty where none does."""
+    library, gid = rcl(), _Gid()
+    handle = library.rcl_publisher_get_rmw_handle(publisher.handle.pointer)
+    return bytes(gid.data) if handle and library.rmw_get_gid_for_publisher(handle, ctypes.byref(gid)) == 0 else b""
+
+
+def _ask(node: Node) -> bool:
+    publisher = node.create_publisher(String, ASKING, 1)
+    try:
+        end = time.monotonic() + SHOWN_WITHIN_S
+        while not (shown := writers(node, ASKING)) and time.monotonic() < end:
+            time.sleep(0.01)
+        return gid_of(publisher) in {one.gid for one in shown}
+    finally:
+        node.destroy_publisher(publisher)
+
+
+@cache
+def rcl() -> ctypes.CDLL:
+    """Return rcl, which rclpy has loaded, with what is called of it; rmw's and rcutils' functions are found with it.
+
+    Raises:
+        RosError: if the library cannot be opened.
+    """
+    try:
+        library = ctypes.CDLL("librcl.so")
+    except OSError as error:
+        raise RosError(f"rcl's library cannot be opened: {error}") from None
+    library.rcl_publisher_get_rmw_handle.restype = ctypes.c_void_p
+    library.rcl_publisher_get_rmw_handle.argtypes = (ctypes.c_void_p,)
+    library.rmw_get_gid_for_publisher.restype = ctypes.c_int32
+    library.rmw_get_gid_for_publisher.argtypes = (ctypes.c_void_p, ctypes.c_void_p)
+    library.rcutils_get_default_allocator.restype = Allocator
+    library.rcutils_get_default_allocator.argtypes = ()
+    library.rcutils_uint8_array_fini.argtypes = (ctypes.c_void_p,)
+    library.rcutils_reset_error.argtypes = ()
+    library.rcutils_reset_error.restype = None
+    library.rcl_take_serialized_message.argtypes = (ctypes.c_void_p,) * 4
+    return library

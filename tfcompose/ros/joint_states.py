@@ -1,4 +1,4 @@
-"""The topic ``joint_states``, below the node's namespace; its messages are bytes, see ``joint_message``."""
+"""The topic ``joint_states``, below the node's namespace; its messages are bytes, see ``joint_codec``."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from sensor_msgs.msg import JointState
 
-from tfcompose.ros.joint_message import encode_names, fill
-from tfcompose.ros.node import JOINT_STATES
-from tfcompose.ros.tf import Subscription
+from tfcompose.ros.joint_codec import encode_names, fill
+from tfcompose.ros.node import JOINT_STATES, Subscription
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,6 +1,8 @@
-"""Other processes on this machine that have ROS loaded, and the settings that they were started with.
+"""Processes of this machine, read from /proc: those that have ROS loaded, and whose a publisher's id is.
 
-It is read from /proc, and so of one's own processes on Linux only. This module imports no ROS.
+With Fast DDS an id begins with the vendor's number (01 0f), two bytes for the host, and the lower half of the process
+id (``GuidUtils``, Fast DDS 2.14). Two machines can have the same two bytes, so a process is named only where one fits.
+Of other users' processes, and other systems than Linux, nothing is known. This module imports no ROS.
 """
 
 from __future__ import annotations
@@ -15,7 +17,10 @@ if TYPE_CHECKING:
 _PROC = Path("/proc")
 _LIBRARY = b"librcl.so"
 _PREFIXES = ("ROS_", "RMW_")
+#: Of a command line so much is shown.
 _SHOWN = 100
+_VENDOR = b"\x01\x0f"
+_WORD = 1 << 16
 
 
 def ros_processes() -> Iterator[tuple[int, str, dict[str, str]]]:
@@ -39,6 +44,75 @@ def settings_in(environment: bytes) -> dict[str, str]:
     return {name: value for name, _, value in pairs if name.startswith(_PREFIXES)}
 
 
+def origin(gid: bytes, own_gid: bytes) -> str:
+    """Return where a publisher runs: ``on this machine as pid 7: …``, ``on another machine``; empty if unknown.
+
+    ``own_gid`` is an id of this process's own.
+    """
+    if not _is_known(gid, own_gid):
+        return ""
+    if gid[2:4] != own_gid[2:4]:
+        return "on another machine"
+    fitting = [(pid, line) for pid in _candidates(gid) if (line := _command(pid))]
+    if len(fitting) != 1:
+        return "on this machine"
+    pid, line = fitting[0]
+    return f"on this machine as pid {pid}: {line}"
+
+
+def has_variable(gid: bytes, own_gid: bytes, variable: str) -> bool | None:
+    """Return whether a publisher's process has ``variable`` (NAME=VALUE) in its environment; None: nobody can say."""
+    if not _is_known(gid, own_gid):
+        return None
+    if gid[2:4] != own_gid[2:4]:
+        return False
+    found = [_environment(pid) for pid in _candidates(gid) if _command(pid)]
+    return any(variable.encode() in one for one in found)
+
+
+def variable_of(gid: bytes, own_gid: bytes, name: str) -> str:
+    """Return an environment variable of a publisher's process; empty where it has none, or nobody can say."""
+    if not _is_known(gid, own_gid) or gid[2:4] != own_gid[2:4]:
+        return ""
+    begin = f"{name}=".encode()
+    found = {
+        word.removeprefix(begin).decode(errors="replace")
+        for pid in _candidates(gid)
+        for word in _environment(pid)
+        if word.startswith(begin)
+    }
+    return found.pop() if len(found) == 1 else ""
+
+
+def _is_known(gid: bytes, own_gid: bytes) -> bool:
+    return gid[:2] == _VENDOR and own_gid[:2] == _VENDOR
+
+
+def _candidates(gid: bytes) -> range:
+    """Return the pids whose lower half is that of the id."""
+    try:
+        most = int((_PROC / "sys/kernel/pid_max").read_text(encoding="ascii"))
+    except (OSError, ValueError):
+        most = _WORD
+    return range(int.from_bytes(gid[4:6], "little"), most + 1, _WORD)
+
+
+def _environment(pid: int) -> list[bytes]:
+    try:
+        return (_PROC / str(pid) / "environ").read_bytes().split(b"\0")
+    except OSError:
+        return []
+
+
+def _command(pid: int) -> str:
+    """Return the process's command line, empty where there is none; a thread of a process's own has none."""
+    try:
+        return _shown((_PROC / str(pid) / "cmdline").read_bytes())
+    except OSError:
+        return ""
+
+
 def _shown(command: bytes) -> str:
     line = " ".join(command.decode(errors="replace").replace("\0", " ").split())
+    line = "".join(c if c.isprintable() else "?" for c in line)
     return line if len(line) <= _SHOWN else f"{line[:_SHOWN]}…"

@@ -17,9 +17,8 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.time import Time
 
 from tfcompose.ros.clock import SimClock
-from tfcompose.ros.node import TF_READER, TF_STATIC_READER, open_node, qos
+from tfcompose.ros.node import TF_READER, TF_STATIC_READER, Subscription, open_node, qos, wait
 from tfcompose.ros.stop import Stop
-from tfcompose.ros.tf import Subscription, wait
 from tfcompose.ros.typesupport import tf_message_type
 
 if TYPE_CHECKING:

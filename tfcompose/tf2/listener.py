@@ -5,9 +5,6 @@ from __future__ import annotations
 import weakref
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.ros.decoder import Decoder
-from tfcompose.ros.environment import RosError, missing_ros
-
 if TYPE_CHECKING:
     from typing_extensions import Self
 
@@ -53,10 +50,13 @@ class TransformListener:
         namespace: str = "",
         use_sim_time: bool = False,
     ) -> None:
+        from tfcompose.ros.environment import RosError, missing_ros  # noqa: PLC0415 (ROS is optional)
+
         missing = missing_ros()
         if missing:
             raise RosError(missing)
-        from tfcompose.ros.tf_listener import NodeListener, ThreadListener, Topic  # noqa: PLC0415 (ROS is optional)
+        from tfcompose.ros.tf_codec import Decoder  # noqa: PLC0415 (the same)
+        from tfcompose.ros.tf_listener import NodeListener, ThreadListener, Topic  # noqa: PLC0415 (the same)
 
         prefix = f"/{namespace.strip('/')}" if namespace.strip("/") else ""
         topics = [Topic(prefix + tf_static_topic, static=True, qos=static_qos)]

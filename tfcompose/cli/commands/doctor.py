@@ -23,8 +23,7 @@ from tfcompose.findings import finding
 from tfcompose.observe.census import topics_below
 from tfcompose.observe.seen import counted
 from tfcompose.plan import RosSettings
-from tfcompose.ros.environment import RosError, child_environment
-from tfcompose.ros.settings import no_ros, ros_trouble
+from tfcompose.ros.environment import RosError, child_environment, no_ros, ros_trouble
 from tfcompose.ros.stop import Stop
 from tfcompose.ros.topics import parts_of
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, Note, finding
 from tfcompose.observe.seen import listed
-from tfcompose.ros.message import TF_MESSAGE
+from tfcompose.ros.tf_codec import TF_MESSAGE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

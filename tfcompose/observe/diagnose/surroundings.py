@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from tfcompose.findings import Finding, Note, finding
 from tfcompose.observe.elsewhere import namespace_words, said
 from tfcompose.observe.seen import counted, listed
-from tfcompose.ros.message import TF_MESSAGE
-from tfcompose.ros.settings import DOMAIN, RANGE, RMW
+from tfcompose.ros.environment import DOMAIN, RANGE, RMW
+from tfcompose.ros.tf_codec import TF_MESSAGE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

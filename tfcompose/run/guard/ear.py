@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from tfcompose.ros.tf import TFSubscription
+from tfcompose.ros.node import TFSubscription
 from tfcompose.run.guard.neighbours import id_of_topic
 
 if TYPE_CHECKING:
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node
 
-    from tfcompose.ros.tf import Received
+    from tfcompose.ros.node import Received
 
     Topics = tuple[str, str]
 

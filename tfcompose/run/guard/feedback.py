@@ -9,15 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.ros.message import encode
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.node import TFPublisher
+from tfcompose.ros.tf_codec import encode
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
     from rclpy.node import Node
 
-    from tfcompose.ros.message import Transform
+    from tfcompose.ros.tf_codec import Transform
 
     Topics = tuple[str, str]
 

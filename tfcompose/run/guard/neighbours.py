@@ -6,9 +6,8 @@ import os
 from hashlib import blake2b
 from typing import TYPE_CHECKING
 
-from tfcompose.ros.graph import UNKNOWN_NODE, own_gid, writers, writers_unmapped
-from tfcompose.ros.identity import ids_say_who
-from tfcompose.ros.origin import carries, origin, told
+from tfcompose.ros.graph import UNKNOWN_NODE, ids_say_who, own_gid, writers, writers_unmapped
+from tfcompose.ros.processes import has_variable, origin, variable_of
 from tfcompose.ros.topics import GLOBAL
 from tfcompose.run.guard.senders import PARTICIPANT, Writer
 from tfcompose.run.place import PROCESS, RUN_ID
@@ -100,8 +99,8 @@ class Graph:
         where = self._where.get(one.gid)
         if where is None:
             where = self._where[one.gid] = origin(one.gid, self._own_gid())
-            self._ours[one.gid] = carries(one.gid, self._own_gid(), self._run) if self._run else None
-            self._process[one.gid] = told(one.gid, self._own_gid(), PROCESS) if self._ours[one.gid] else ""
+            self._ours[one.gid] = has_variable(one.gid, self._own_gid(), self._run) if self._run else None
+            self._process[one.gid] = variable_of(one.gid, self._own_gid(), PROCESS) if self._ours[one.gid] else ""
         node = None if one.node.endswith(UNKNOWN_NODE) else one.node
         process = self._process[one.gid]
         volatile, best_effort = one.durability == "volatile", one.reliability == "best_effort"

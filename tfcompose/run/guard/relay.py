@@ -11,8 +11,8 @@ from base64 import b64decode, b64encode
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.ros.message import Transform, decode, encode
-from tfcompose.ros.tf import TFPublisher
+from tfcompose.ros.node import TFPublisher
+from tfcompose.ros.tf_codec import Transform, decode, encode
 from tfcompose.run.guard.held import Held
 from tfcompose.run.guard.senders import Message
 from tfcompose.run.own import say

@@ -6,9 +6,8 @@ import os
 import time
 from typing import TYPE_CHECKING
 
-from tfcompose.ros.identity import ids_say_who
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import wait
+from tfcompose.ros.graph import ids_say_who
+from tfcompose.ros.node import open_node, wait
 from tfcompose.ros.topics import GLOBAL
 from tfcompose.run.clock_watch import ClockWatch
 from tfcompose.run.events import SETTLE

@@ -6,8 +6,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.ros.graph import UNKNOWN_NODE, writers
-from tfcompose.ros.node import LATCHED, latch
-from tfcompose.ros.text import TextSubscription
+from tfcompose.ros.node import LATCHED, TextSubscription, latch
 from tfcompose.run.own import say
 from tfcompose.run.publishing.addresses import with_whole_addresses
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.ros.joint_message import read_names
+from tfcompose.ros.joint_codec import read_names
 from tfcompose.run.publishing.follow import SLIDING, TURNING, Joints
 from tfcompose.run.publishing.moving import Moving
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from tfcompose.plan import PlanEdge
-    from tfcompose.ros.joint_message import Names
+    from tfcompose.ros.joint_codec import Names
 
 _SECOND_NS = 1_000_000_000
 # Joint states come with one list of names from each driver; one that never repeats itself must not fill the memory.

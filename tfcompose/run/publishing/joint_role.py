@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 from tfcompose.ros.clock import SimClock
 from tfcompose.ros.graph import writers
 from tfcompose.ros.joint_states import JointStateSubscription
-from tfcompose.ros.node import open_node, parameter
-from tfcompose.ros.tf import TFPublisher, wait
+from tfcompose.ros.node import TFPublisher, open_node, parameter, wait
 from tfcompose.run.clock_watch import CLOCK_AFTER_S, no_clock
 from tfcompose.run.notify import ready
 from tfcompose.run.own import count, say

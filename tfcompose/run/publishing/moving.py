@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tfcompose.geometry import multiply, rotate
-from tfcompose.ros.tf_array import TFArray
+from tfcompose.ros.tf_codec import ArrayTemplate
 from tfcompose.run.publishing.follow import SLIDING
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ class Moving:
         self._follows = any((one.multiplier, one.offset) != (1.0, 0.0) for one in ordered)
         moved = [(edges[one.joint], joints[one.joint]) for one in ordered]
         self._turning = turning = sum(joint.type not in SLIDING for _, joint in moved)
-        self._message = TFArray([(e.parent, e.child) for e, _ in moved], [e.pose for e, _ in moved])
+        self._message = ArrayTemplate([(e.parent, e.child) for e, _ in moved], [e.pose for e, _ in moved])
         self._quat_at = self._message.quat_at[:turning]
         self._xyz_at = self._message.xyz_at[turning:]
         poses = [(edge.pose, joint.axis) for edge, joint in moved]

@@ -8,9 +8,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.ros.clock import SimClock
-from tfcompose.ros.message import Template
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFPublisher, wait
+from tfcompose.ros.node import TFPublisher, open_node, wait
+from tfcompose.ros.tf_codec import Template
 from tfcompose.run.clock_watch import CLOCK_AFTER_S, no_clock
 from tfcompose.run.notify import ready
 from tfcompose.run.own import count, say

@@ -5,9 +5,8 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from tfcompose.ros.message import Transform, encode
-from tfcompose.ros.node import open_node
-from tfcompose.ros.tf import TFPublisher, wait
+from tfcompose.ros.node import TFPublisher, open_node, wait
+from tfcompose.ros.tf_codec import Transform, encode
 from tfcompose.run.notify import ready
 from tfcompose.run.own import count, say
 from tfcompose.run.publishing.description import LOOK_EVERY_S, Description

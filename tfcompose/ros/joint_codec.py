@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tfcompose.ros.message import BIG_ENDIAN, LITTLE_ENDIAN
+from tfcompose.ros.tf_codec import BIG_ENDIAN, LITTLE_ENDIAN
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.check.rule import rule
 from tfcompose.findings import Finding, Note, Span, did_you_mean, finding
+from tfcompose.tree import below, children_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -207,16 +208,8 @@ def _trees(robot: Robot) -> dict[str, set[str]]:
 
     A frame with parents in two trees is in both; frames that are each other's ancestors are in none.
     """
-    children = robot.children()
-    grown: dict[str, set[str]] = {}
-    for root in robot.roots():
-        frames, todo = {root}, [root]
-        while todo:
-            below = {edge.child for edge in children.get(todo.pop(), ())} - frames
-            frames |= below
-            todo += below
-        grown[root] = frames
-    return grown
+    children = children_of((edge.parent, edge.child) for edge in robot.edges)
+    return {root: below(children, root) for root in robot.roots()}
 
 
 def _main_root(robot: Robot, grown: dict[str, set[str]]) -> str:

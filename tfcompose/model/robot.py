@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import slip_of
 from tfcompose.plan import EdgePattern, GuardPolicy, RosSettings
+from tfcompose.tree import below, children_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -156,9 +157,4 @@ class Robot:
 
     def below(self, frame: str) -> set[str]:
         """Return the frame and every frame that hangs below it, over edges of any owner."""
-        children, found, waiting = self.children(), {frame}, [frame]
-        while waiting:
-            new = [edge.child for edge in children.get(waiting.pop(), ()) if edge.child not in found]
-            found.update(new)
-            waiting += new
-        return found
+        return below(children_of((edge.parent, edge.child) for edge in self.edges), frame)

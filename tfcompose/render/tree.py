@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from tfcompose.draw import Arrow, Graph, Group
 from tfcompose.model import JOINTS, STATIC
 from tfcompose.numbers import clean_rpy, clean_xyz, number
+from tfcompose.tree import drawn
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,13 +23,7 @@ def tree(robot: Robot) -> str:
     rows: list[tuple[str, Edge | None]] = []
     for root in robot.roots():
         rows.append((root, None))
-        waiting = [("", edge, edge is last) for last in children.get(root, [])[-1:] for edge in children[root]][::-1]
-        while waiting:
-            indent, edge, is_last = waiting.pop()
-            rows.append((f"{indent}{'└── ' if is_last else '├── '}{edge.child}", edge))
-            below = children.get(edge.child, [])
-            deeper = indent + ("    " if is_last else "│   ")
-            waiting += [(deeper, child, child is below[-1]) for child in below][::-1]
+        rows += [(lines + edge.child, edge) for lines, edge in drawn(children, root, lambda edge: edge.child)]
     width = max((len(name) for name, _ in rows), default=0)
     owners = max((len(edge.owner) for _, edge in rows if edge), default=0)
     return "".join(f"{_row(name, edge, width, owners)}\n" for name, edge in rows)

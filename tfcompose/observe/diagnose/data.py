@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.observe.seen import listed, who
+from tfcompose.tree import way_up
 from tfcompose.verdict.clock import WRONG_BY_NS, other_clock, seconds
 
 if TYPE_CHECKING:
@@ -130,11 +131,6 @@ def _moving_above(seen: Seen, frame: str) -> list[EdgeSeen]:
         known = newest.get(edge.strand.child)
         if known is None or known.age_s > edge.age_s:
             newest[edge.strand.child] = edge
-    found: list[EdgeSeen] = []
-    passed: set[str] = set()
-    while frame in newest and frame not in passed:
-        passed.add(frame)
-        edge = newest[frame]
-        found += [] if edge.strand.static else [edge]
-        frame = edge.strand.parent
-    return found
+    parents = {child: edge.strand.parent for child, edge in newest.items()}
+    way = [newest[child] for child in way_up(frame, parents.get) if child in newest]
+    return [edge for edge in way if not edge.strand.static]

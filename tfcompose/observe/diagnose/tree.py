@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from tfcompose.findings import Finding, Note, finding, slip_of
 from tfcompose.observe.refused import refused_transform
 from tfcompose.observe.seen import counted, listed, who
+from tfcompose.tree import loops, trees
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -51,8 +52,7 @@ def slash_in_front(seen: Seen) -> Iterator[Finding]:
 
 def loop(seen: Seen) -> Iterator[Finding]:
     """Frames are each other's ancestors, so that tf2 finds no way through them."""
-    above = _above(seen)
-    for frames in _loops(above):
+    for frames in loops(_pairs(seen)):
         on_it = [edge for edge in seen.taken if _is_on(edge, frames)]
         way = " → ".join((*frames, frames[0]))
         message = f"the frames {way} are a loop: tf2 finds no way through them"
@@ -69,7 +69,7 @@ def loop(seen: Seen) -> Iterator[Finding]:
 def second_parent(seen: Seen) -> Iterator[Finding]:
     """A frame hangs on two parents; tf2 takes whichever came last."""
     above, planned = _above(seen), seen.planned
-    in_loops = {frame for frames in _loops(above) for frame in frames}
+    in_loops = {frame for frames in loops(_pairs(seen)) for frame in frames}
     for child, edges in above.items():
         parents = sorted({edge.strand.parent for edge in edges})
         if len(parents) < 2 or child in in_loops or child in planned:  # noqa: PLR2004 (two parents)
@@ -87,35 +87,23 @@ def second_parent(seen: Seen) -> Iterator[Finding]:
 
 def two_trees(seen: Seen) -> Iterator[Finding]:
     """Frames are in trees that nothing connects."""
-    trees = trees_of(seen)
+    found = trees_of(seen)
     expected = {edge.parent for edge in seen.plan.edges} - seen.planned if seen.plan else frozenset()
-    if len(trees) < 2 or set(trees) <= expected:  # noqa: PLR2004 (one tree is right)
+    if len(found) < 2 or set(found) <= expected:  # noqa: PLR2004 (one tree is right)
         return
-    first, *others = trees
+    first, *others = found
     for root in others:
-        if trees[root] & trees[first]:
+        if found[root] & found[first]:
             continue  # a frame with two parents connects them, and is a finding of its own
-        message = f"nothing connects {_tree(root, trees[root])} with {_tree(first, trees[first])}"
-        publishers = {who(edge): None for edge in seen.taken if edge.strand.child in trees[root]}
+        message = f"nothing connects {_tree(root, found[root])} with {_tree(first, found[first])}"
+        publishers = {who(edge): None for edge in seen.taken if edge.strand.child in found[root]}
         notes = [Note(f"{root} and what is below it is published by {listed(list(publishers))}")]
-        yield finding("TF830", message, None, notes=notes, help=_bridge(seen, root, trees[first], trees[root]))
+        yield finding("TF830", message, None, notes=notes, help=_bridge(seen, root, found[first], found[root]))
 
 
 def trees_of(seen: Seen) -> dict[str, set[str]]:
     """Return the frames of each tree by its root, the largest tree first; frames on loops have no root."""
-    below: dict[str, set[str]] = {}
-    for edge in seen.taken:
-        below.setdefault(edge.strand.parent, set()).add(edge.strand.child)
-    children = {edge.strand.child for edge in seen.taken}
-    trees = {}
-    for root in sorted(set(below) - children):
-        frames, waiting = {root}, [root]
-        while waiting:
-            new = below.get(waiting.pop(), set()) - frames
-            frames |= new
-            waiting += new
-        trees[root] = frames
-    return dict(sorted(trees.items(), key=lambda item: -len(item[1])))
+    return trees(_pairs(seen))
 
 
 def _bridge(seen: Seen, root: str, main: set[str], own: set[str]) -> str:
@@ -169,30 +157,5 @@ def _is_on(edge: EdgeSeen, frames: tuple[str, ...]) -> bool:
     return (edge.strand.parent, edge.strand.child) in set(pairs)
 
 
-def _loops(above: dict[str, list[EdgeSeen]]) -> list[tuple[str, ...]]:
-    """Return each loop once, from its first frame by name downwards; at most one for each edge that closes it."""
-    found: dict[frozenset[str], tuple[str, ...]] = {}
-    for start in sorted(above):
-        way = _way_up(above, start)
-        if way and frozenset(way) not in found:
-            first = way.index(min(way))
-            found[frozenset(way)] = (*way[first:], *way[:first])
-    return list(found.values())
-
-
-def _way_up(above: dict[str, list[EdgeSeen]], start: str) -> tuple[str, ...]:
-    """Return the frames from ``start`` down to it again, by the shortest way, or nothing."""
-    came_from: dict[str, str] = {}
-    waiting = [start]
-    for frame in waiting:
-        for edge in above.get(frame, ()):
-            parent = edge.strand.parent
-            if parent == start:
-                way = [frame]
-                while way[-1] != start:
-                    way.append(came_from[way[-1]])
-                return (start, *way[:-1])
-            if parent not in came_from:
-                came_from[parent] = frame
-                waiting.append(parent)
-    return ()
+def _pairs(seen: Seen) -> list[tuple[str, str]]:
+    return [(edge.strand.parent, edge.strand.child) for edge in seen.taken]

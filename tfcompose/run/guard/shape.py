@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import OrderedDict
 from typing import TYPE_CHECKING
 
+from tfcompose.tree import loop_closed_by
+
 if TYPE_CHECKING:
     from tfcompose.plan import Plan
 
@@ -31,13 +33,7 @@ class Shape:
 
     def loop(self, parent: str, child: str, now: float) -> tuple[str, ...]:
         """Return the frames of the loop that the edge closes, from ``child`` down to it again; () if it closes none."""
-        above = [parent]
-        while above[-1] != child:
-            next_up = self._parent(above[-1], now)
-            if next_up is None or next_up in above:
-                return ()
-            above.append(next_up)
-        return (*reversed(above), child)
+        return loop_closed_by((parent, child), lambda frame: self._parent(frame, now))
 
     def is_planned(self, parent: str, child: str) -> bool:
         """Whether the plan has this edge."""

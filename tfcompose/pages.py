@@ -10,31 +10,31 @@ from tfcompose.catalogue import CATALOGUE, Family
 from tfcompose.check import RULES
 
 PAGES = {
-    "TF001": """A file cannot be read, or is no text.
+    "TF001": """A file cannot be read, or is not text.
 
-A robot file is UTF-8 text. Check the name, and that it is a file that you may read.""",
+A robot file is UTF-8 text. Check its name, and that you may read it.""",
     "TF002": """The file is not YAML, not one document, or not a mapping.
 
-The place is where reading stopped; the fault is there or just above. A robot file is one mapping and begins with
+The place is where the parser stopped; the mistake is there or just above. A robot file is one mapping and begins with
 tfcompose: 1.""",
-    "TF003": """A key is given twice in one mapping.
+    "TF003": """A key occurs twice in one mapping.
 
-YAML readers take one of the two without a word. Keep the one that is meant.""",
+YAML parsers silently take one of the two. Keep the one that is meant.""",
     "TF004": """A key is a number, true, false, null, a list or a mapping.
 
-Names are texts. Put the key in quotes.""",
-    "TF005": """A value carries a tag that the language does not have.
+Names are strings. Put the key in quotes.""",
+    "TF005": """A value has a tag that the language does not have.
 
-Tags such as !degrees are not used: a text may carry a unit instead, 15 deg.""",
+Tags such as !degrees are not used: a string may carry a unit instead, 15 deg.""",
     "TF006": """A key has no value.
 
-map: says nothing; map: {} says that there is such a frame. In an overlay, null removes a key.""",
+map: alone is incomplete; map: {} declares a frame of that name. In an overlay, null removes a key.""",
     "TF007": """A number is not finite.
 
-Infinity and NaN have no place in a robot; tf2 drops transforms that hold one.""",
-    "TF008": """The file is larger, deeper, or by its aliases longer than a robot can be.
+A robot has no infinite values and no NaN; tf2 drops transforms that contain one.""",
+    "TF008": """The file is larger, more deeply nested, or through its aliases longer than a robot can be.
 
-The limits keep a mistake, or a file that is meant to do harm, from taking all memory.""",
+The limits keep a mistake, or a malicious file, from using up all memory.""",
     "TF009": """There is no such profile.
 
 Profiles are the entries of the section profiles.""",
@@ -46,400 +46,410 @@ Probably the key has another name, or the overlay is out of date.""",
 << takes an alias of a mapping, or a list of such aliases.""",
     "TF012": """A comment allows a finding that is not there.
 
-The fault has been mended, or the code is another. Remove the comment, so that it does not hide the next fault.""",
-    "TF013": """A comment allows a finding and does not say why.
+The problem has been fixed, or has another code. Remove the comment, so that it does not hide the next problem.""",
+    "TF013": """A comment allows a finding without a reason.
 
-Write the reason behind it: allow TF401 because the lens is turned.""",
-    "TF014": """An overlay sets a value that is there already.
+Write the reason after the code: allow TF401 because the lens is rotated.""",
+    "TF014": """An overlay sets a value that is already set.
 
-It hides that the value is no longer meant to differ, or that the overlay was meant for another key.""",
-    "TF015": """Files include each other, or are too many.
+Either the value is no longer meant to differ, or the overlay was meant for another key.""",
+    "TF015": """Files include each other, or there are too many of them.
 
-A file cannot be laid over itself.""",
+A file cannot include itself, directly or through others.""",
     "TF016": """A setting on the command line is not PATH=VALUE.
 
 PATH has dots between its keys: sensors.camera.tf=driver.""",
-    "TF017": """An entry under rules is no code, or one that cannot be set.
+    "TF017": """An entry under rules is not a code, or is a code that cannot be set.
 
-Findings about text and keys (TF0 and TF1) always count, and those without whose end there is no robot to build: two
-parents, cycles, frames and owners that are not there, processes that wait for each other.""",
+Findings about text and keys (TF0 and TF1) cannot be silenced, nor can those that make the robot unbuildable: two
+parents, cycles, unknown frames and owners, processes that wait for each other.""",
     "TF018": """A file is not XML, not a robot, or declares entities.
 
-The place is where reading stopped. A URDF is one <robot>; with xacro the message is xacro's own.""",
-    "TF019": """A file or folder that ${file(…)} or cwd names is not there.
+The place is where the parser stopped. A URDF is one <robot>; for xacro files the message comes from xacro.""",
+    "TF019": """A file or folder that ${file(…)} or cwd names does not exist.
 
-A path is relative to the file that writes it, not to the folder that tfcompose is started in.""",
+Paths are relative to the file that contains them, not to the folder in which tfcompose is started.""",
     "TF101": """A key is not known here.
 
-Probably it is misspelt; unknown keys are refused, because a key that is silently dropped is a frame in the wrong
+Probably it is misspelt. Unknown keys are refused, because a key that is silently ignored puts a frame in the wrong
 place.""",
-    "TF102": """A key is missing.
+    "TF102": """A required key is missing.
 
-Without it the entry has no meaning.""",
-    "TF103": """A value is of another kind than expected: a text for a number, a list of another length.""",
-    "TF104": """A unit is not known, or is of another kind of quantity.
+The entry is incomplete without it.""",
+    "TF103": """A value has the wrong type: a string instead of a number, or a list of another length.""",
+    "TF104": """A unit is unknown, or belongs to another quantity.
 
-Bare numbers are SI: m, rad, kg, s, Hz. A text may carry a unit: 30 cm, 15 deg, 50 Hz, 200 ms.""",
+Bare numbers are SI: m, rad, kg, s, Hz. A string may carry a unit: 30 cm, 15 deg, 50 Hz, 200 ms.""",
     "TF105": """An expression ${…} cannot be computed.
 
-It may hold vars, quantities, pi, + - * / ( ), and sin cos tan sqrt radians degrees.""",
-    "TF106": """A value is not one of those that are allowed here.""",
+It may contain vars, quantities, pi, + - * / ( ), and sin cos tan sqrt radians degrees.""",
+    "TF106": """A value is not allowed here.""",
     "TF107": """Two keys exclude each other.
 
-A rotation is written in one way, a process runs in one way, a shape has one form.""",
-    "TF304": """A robot is to be isolated and has no name for it.
+There are several ways to write a rotation, to run a process or to give a shape: choose one.""",
+    "TF304": """A robot is to be isolated but has no namespace.
 
-isolate moves topics below the namespace, or makes the namespace the frames' prefix. Give ros: {namespace: robot1}.""",
-    "TF312": """A part has another clock, domain or discovery than the robot that holds it.
+isolate moves topics into the namespace, or prefixes frames with it. Add ros: {namespace: robot1}.""",
+    "TF312": """A part has another clock, domain or discovery range than the robot that contains it.
 
-All processes of a plan share them. Set it in the robot that holds the part, or leave it out of the part's file.""",
-    "TF313": """A part that is bolted on has no root, or several.
+All processes of a plan share them. Set them in the robot that contains the part, and remove them from the part's
+file.""",
+    "TF313": """A part with a parent has no root, or several.
 
-The part's pose is that of its root. Say which frame that is with root: what is not below it is left out. A root that
-is shared needs no parent: it is the holder's frame.""",
-    "TF315": """A joint is not in the description that a stock robot_state_publisher gets.
+The part's pose is that of its root. Name it with root: FRAME; frames that are not below it are left out. A part
+whose root is a shared frame needs no parent.""",
+    "TF315": """A joint is not in the description for the stock robot_state_publisher.
 
-ros: {state_publisher: stock} hands everything below the base to it, and nothing else publishes joints then. Choose a
-base above the joint, or leave joints to tfcompose.""",
-    "TF316": """A shared frame is in the description that a stock robot_state_publisher gets.
+With ros: {state_publisher: stock} that node publishes everything below the base, and nothing else publishes joints.
+Choose a base above the joint, or let tfcompose publish the joints.""",
+    "TF316": """A shared frame is in the description for the stock robot_state_publisher.
 
-It writes its frame_prefix in front of every frame, shared or not. Leave joints to tfcompose, which knows the
+That node adds its frame_prefix to every frame, shared or not. Let tfcompose publish the joints: it knows the
 difference.""",
-    "TF330": """A node publishes an edge by default that somebody else owns, and tfcompose cannot switch it off.
+    "TF330": """A node publishes an edge that another process owns, and tfcompose cannot switch it off.
 
-Both would publish, and tf2 takes the last writer. tfcompose writes the switch into the parameters of processes that it
-starts itself; the help names the parameter for the others, or says that there is none.""",
-    "TF331": """A node publishes an edge by default that nobody declared.
+Both would publish, and tf2 takes the last message. tfcompose sets the parameter of processes that it starts itself; for
+the others, the help names the parameter, or says that there is none.""",
+    "TF331": """A node publishes an edge that is not declared.
 
-Declare the edge with the node's process as its owner, so that the guard expects it; or give the parameter that stops
-it. Edges that come and go, such as those of tags, are allowed in the guard.""",
+Declare the edge with the node's process as its owner, so that the guard expects it, or set the parameter that stops it.
+Edges that come and go, such as those of tags, are allowed under guard: allow.""",
     "TF332": """An edge's owner is not known to publish it.
 
-The process has nodes of which it is known what they publish, or several nodes, and none of them publishes this edge.
-The guard blames whoever sends it. Name another owner, or say which node does: publishes: [{parent, child, off}].""",
-    "TF333": """A parameter of a node says something else than the tree.
+The process has several nodes, or nodes whose edges are known, and none of them publishes this edge. The guard would
+report whoever does. Name another owner, or declare which node publishes it: publishes: [{parent, child, off}].""",
+    "TF333": """A node's parameter contradicts the tree.
 
-Names of frames, and the switches of what a node publishes, follow from the tree and its owners, and are written by
-tfcompose. Remove the parameter, or change the tree.""",
+tfcompose sets the names of frames, and what a node publishes, from the tree and its owners. Remove the parameter, or
+change the tree.""",
     "TF402": """A quaternion does not have length 1.
 
-It is no rotation. A few digits that are missing change the angle by as much; a length far from 1 says that an order is
-wrong (it is x, y, z, w) or a number is. tf2 on Jazzy brings it to length 1 and says nothing; stricter readers drop
-it.""",
-    "TF403": """A matrix is no rotation.
+It is not a rotation. A few missing digits change the angle accordingly; a length far from 1 means that the order is
+wrong (it is x, y, z, w) or a number is. tf2 on Jazzy silently normalises it; stricter readers drop it.""",
+    "TF403": """A matrix is not a rotation.
 
-Its rows are not orthonormal, or it mirrors. It holds three rows; column i is the child's axis i in the parent.""",
+Its rows are not orthonormal, or it mirrors. It has three rows; column i is the child's axis i in the parent.""",
     "TF404": """A pose cannot be solved.
 
-relative_to and place go through fixed edges only: what moves has no pose before the robot runs.""",
+relative_to and place work through fixed edges only: the pose of a moving frame is not known before the robot runs.""",
     "TF405": """A sensor is placed through values that its driver replaces.
 
-The pose is that of a frame whose edge the driver publishes with its own unit's calibration. The mount is solved with
-the nominal values, so the frame ends up off by the difference. Give this unit's values under sensors.NAME.frames.""",
+The pose is that of a frame whose edge the driver publishes with the calibration of the individual device. The mount is
+solved with nominal values, so the frame ends up off by the difference. Give the device's values under
+sensors.NAME.frames.""",
     "TF502": """One name is used for two things.
 
-Sensors and processes share one name space, because a sensor's driver is a process; joints share another.""",
-    "TF505": """A part brings a frame or a joint of a name that is taken.
+Sensors and processes share a namespace, because a sensor's driver is a process; so do all joints.""",
+    "TF505": """A part has a frame or joint whose name is taken.
 
-Frames of all robots in one file need different names, because listeners know frames by nothing else; so do the joints
-of one robot, which joint states and the URDF know by name. Give the part a prefix; or, if both mean one and the same
-frame, name it under ros: shared_frames.""",
+All frames in one file need different names, because listeners know them by name only; so do the joints of one robot, in
+joint states and in the URDF. Give the part a prefix or, if both names mean the same frame, list it under
+ros: shared_frames.""",
     "TF601": """There is no such preset.
 
 tfcompose presets lists those that come with it; preset_path names folders with your own, VENDOR/MODEL.yaml.""",
-    "TF603": """A preset does not have this option, or not this value of it.""",
+    "TF603": """A preset does not have this option, or not this value of it.
+
+tfcompose presets NAME lists its options.""",
     "TF604": """A driver cannot do what is asked.
 
-It has no switch for its frames, there is no driver, or the parameter is one that tfcompose computes.""",
-    "TF605": """The preset does not know where a frame is, and a zero would be a lie.
+It has no parameter that switches off its frames, there is no driver, or tfcompose sets the parameter itself.""",
+    "TF605": """The preset does not know where a frame is.
 
-The vendor publishes no value, or only the device knows its own. Measure it, or read it from the running driver with
-tfcompose echo, and give it under sensors.NAME.frames; or choose options without that frame.""",
-    "TF606": """A preset contradicts itself: it names a frame or an option that it does not have, or is no tree.""",
-    "TF607": """A preset of your own has the name of one that comes with tfcompose, and stands before it.
+The vendor publishes no value, or only the device knows its own; 0 would be wrong. Measure it, or read it from the
+running driver with tfcompose echo, and give it under sensors.NAME.frames; or choose options without that frame.""",
+    "TF606": """A preset contradicts itself: it names a frame or option that it does not have, or is not a tree.""",
+    "TF607": """A preset of your own hides one that comes with tfcompose.
 
-If that is meant, allow the finding; else give it another name, so that a reader knows which one is used.""",
+If that is intended, allow the finding; if not, rename the preset, so that readers know which one is used.""",
     "TF610": """A calibration file, or a value in it, cannot be read.
 
-The note shows where. An entry holds numbers: no expressions, no units; of tags only xacro's !degrees and !radians.""",
-    "TF611": """A calibration file is in no format that is known, or not in the one that is named.
+The note shows where. An entry contains numbers, without expressions and units; xacro's !degrees and !radians are the
+only tags.""",
+    "TF611": """A calibration file has an unknown format, or not the one that is named.
 
-Formats: autoware, easy_handeye2, moveit, kalibr, matrix, transform_stamped. Left out, the format is recognised.""",
-    "TF612": """A calibration file holds no pose of this frame in its parent.
+Formats: autoware, easy_handeye2, moveit, kalibr, matrix, transform_stamped. Without format: it is recognised.""",
+    "TF612": """A calibration file has no pose of this frame in its parent.
 
-The entry is that of the edge: its parent, and the frame or one of those inside the sensor. Where the file has other
-names, pick the entry with parent: and child:.""",
+The entry must have the parent of the edge, and its child or a frame inside the sensor. If the file uses other names,
+choose the entry with parent: and child:.""",
     "TF613": """Several entries of calibration files fit one edge.
 
-Which one is right cannot be guessed. Pick one with parent: and child:, or remove the others.""",
-    "TF614": """A calibration is no rigid transform.
+Only you know which one is right. Choose it with parent: and child:, or remove the others.""",
+    "TF614": """A calibration is not a rigid transform.
 
-A quaternion has length 1; the rows of a rotation are orthonormal; the last row of a 4×4 matrix is 0 0 0 1, and the
-position stands in its last column. Copy all digits.""",
-    "TF619": """Nothing in the robot takes an entry of a file under calibrations.
+A quaternion has length 1; the rows of a rotation are orthonormal; the last row of a 4×4 matrix is 0 0 0 1, with the
+position in its last column. Copy all digits.""",
+    "TF619": """An entry of a file under calibrations is not used.
 
-It is the pose of a frame that is not there, or of one that is no mount. Its name may be misspelt, or it is out of
-date.""",
-    "TF703": """A stand-in names a joint that does not move or does not exist.""",
-    "TF719": """An element of a raw XML block has no place there.
+It is the pose of a frame that does not exist, or is not a mount. Its name may be misspelt, or it is out of date.""",
+    "TF703": """A simulated process names a joint that does not exist or does not move.
 
-A block stands beside links and joints in the URDF: <gazebo>, <transmission>, and what other programs read. Links and
-joints are written under links: and joints:, so that they are checked and have an owner.""",
-    "TF720": """An element or an attribute is not one of URDF's.
+Name a moving joint of the robot.""",
+    "TF719": """A raw XML block contains an element that does not belong there.
 
-Readers pass over it without a word: with <orign> a joint is at its parent's origin. An error where a known name is
-misspelt; else it may be somebody's extension, and is a warning.""",
-    "TF721": """A value of a URDF is missing, or is none.
+A block is for what the URDF contains besides links and joints: <gazebo>, <transmission>, and what other programs read.
+Write links and joints under links: and joints:, where they are checked and have an owner.""",
+    "TF720": """An element or attribute is not part of URDF.
 
-Numbers are SI: m, rad, kg. Readers refuse the robot, take a default without a word, or compute with what is there.""",
-    "TF722": """Two links, two joints or two materials of a URDF have one name.
+Readers silently ignore it: with <orign> a joint is at its parent's origin. It is an error where a known name is
+misspelt; otherwise it may be an extension, and is a warning.""",
+    "TF721": """A value of a URDF is missing or invalid.
 
-Readers refuse the robot or keep one of the two. Often a xacro macro was used twice with one prefix, or a file of
-materials was included twice; for materials it is a warning, since what is built of the robot is right.""",
-    "TF723": """The file of a mesh or a texture is not there.
+Numbers are SI: m, rad, kg. Readers refuse the robot, silently use a default, or compute with what is there.""",
+    "TF722": """Two links, joints or materials of a URDF have the same name.
 
-The body does not appear, and the collision with it is not checked. A relative path begins at the file that writes
-it. A warning where a checkout without Git LFS has a pointer in the file's place: what is built is right, once the file
-is fetched.""",
-    "TF724": """A package is not to be found here.
+Readers refuse the robot, or keep one of the two. Often a xacro macro was used twice with one prefix, or a file of
+materials was included twice. For materials it is a warning, because tfcompose builds the right robot.""",
+    "TF723": """The file of a mesh or texture does not exist.
 
-It was looked for where packages: says, then in share/PACKAGE of each folder in AMENT_PREFIX_PATH; a file's own package
-is also the one around it, by its package.xml. Source the workspace's setup file first, or name the folder:
+The body is not drawn, and its collisions are not checked. A relative path starts at the file that contains it. It is a
+warning if the file is a Git LFS pointer: what is built is right once the file is fetched.""",
+    "TF724": """A package was not found.
+
+tfcompose looks in the folder under packages:, then in share/PACKAGE of each folder in AMENT_PREFIX_PATH; a file's own
+package is also the one around it, by its package.xml. Source the workspace's setup file first, or name the folder:
 packages: {my_robot_description: ../description}.""",
-    "TF725": """A mass is to be spread over a mesh that has no volume.
+    "TF725": """A mass is to be distributed over a mesh that has no volume.
 
-Only a closed mesh has one whose triangles all face outwards, or all inwards, and only one that is found here. Mend it
-(normals: recalculate outside), give a closed collision shape (the tensor is
-computed from collision shapes where there are any), or give mass and inertia from CAD.""",
-    "TF726": """A mesh is to be addressed by package, and is in none.
+Only a closed mesh has one, whose triangles all face outwards or all inwards, and only one that is found here. Repair
+the mesh (normals: recalculate outside), give a closed collision shape (the tensor is computed from collision shapes if
+there are any), or give mass and inertia from CAD.""",
+    "TF726": """A mesh is to be addressed by package, but is not in one.
 
 build --mesh package needs a package.xml in a folder above the file, or an address that begins with package://.""",
-    "TF727": """A joint says something that joints of its type do not have.
+    "TF727": """A joint has keys that joints of its type do not use.
 
-A fixed or floating joint has no axis, limits or mimic, and a continuous one turns for ever, whatever its lower and
-upper limit: it is not written, or no reader takes it. Often the type is what is wrong.""",
-    "TF729": """A raw XML block has $(find …), or another substitution of xacro files or launch files.
+A fixed or floating joint has no axis, limits or mimic. A continuous joint has no lower and upper limit: readers ignore
+them, or they are not written. Often the type is wrong.""",
+    "TF729": """A raw XML block contains $(find …), or another substitution of xacro or launch files.
 
-A block stands in the URDF as it is written, and no reader of a URDF expands that: Gazebo looks for a folder called
-$(find my_robot). Write the path itself; a variable keeps it in one place, and --set changes it on another machine.""",
+Blocks are copied into the URDF as they are, and URDF readers do not expand substitutions: Gazebo looks for a folder
+called $(find my_robot). Write the path itself; a variable keeps it in one place, and --set changes it on another
+machine.""",
     "TF801": """A node publishes an edge that another process owns.
 
-tf2 takes whatever came last, so the frame jumps between two values. The finding names the node. End it, or switch its
-TF off.""",
-    "TF802": """A frame was seen under a second parent.
+tf2 takes the last message, so the frame jumps between two values. The finding names the node. End it, or switch off its
+TF.""",
+    "TF802": """A frame is published with a second parent.
 
 tf2 keeps the parent of the newest message: everything below the frame jumps.""",
-    "TF803": """An edge was seen that nobody declared.
+    "TF803": """A published edge is not declared.
 
-Declare it, or allow it under guard: allow. guard: unknown_edges says how much it matters.""",
-    "TF804": """An owner sends nothing any more, or is gone.
+Declare it, or allow it under guard: allow. guard: unknown_edges sets the severity.""",
+    "TF804": """An owner no longer publishes its edge.
 
-For an edge with a rate: nothing came for four periods, and at least 0.6 s. For fixed edges: the publisher left.""",
-    "TF805": """An owner sends less often than its edge declares.
+For an edge with a rate: no message for four periods, and at least 0.6 s. For fixed edges: the publisher is gone.""",
+    "TF805": """An owner publishes below the declared rate.
 
-Listeners interpolate over longer gaps, and lookups near now fail. Below 80 % of the declared rate over 2 s.""",
-    "TF806": """A publisher on /tf_static is volatile.
+Listeners interpolate over longer gaps, and lookups near now fail. The limit is 80 % of the declared rate over 2 s.""",
+    "TF806": """A publisher on /tf_static is volatile, so no listener receives it.
 
-Listeners ask for transient_local and DDS does not connect the two: nobody receives these frames.""",
-    "TF807": """An edge of the plan was published before the start.
+Listeners request transient_local, and DDS does not connect the two.""",
+    "TF807": """An edge of the plan is already published before the start.
 
 Starting would give it two publishers. End the node that is named, or make it the owner.""",
-    "TF808": """A process ended that should run, or could not be started.
+    "TF808": """A process ended unexpectedly, or could not be started.
 
-Its last lines are with the finding.""",
-    "TF809": """An owner sends its edge on the wrong topic.
+The finding has its last lines of output.""",
+    "TF809": """An owner publishes its edge on the wrong topic.
 
-Fixed edges belong on /tf_static, moving ones on /tf; tf2 throws its history away when an edge changes between them.""",
-    "TF810": """An executable, or the folder that a process runs in, was not found.
+Fixed edges belong on /tf_static, moving ones on /tf; when an edge changes between them, tf2 discards its history.""",
+    "TF810": """An executable, or a process's working folder, was not found.
 
-The finding says where it was looked for. A package's programs are found once its setup file was sourced.""",
+The finding lists where tfcompose looked. A package's executables are found once its setup file is sourced.""",
     "TF811": """An edge was not published while the plan ran.
 
-Its owner is named: a process that somebody else starts may not be running, or its node has another name.""",
-    "TF813": """A process waits for one that is not there, or for its end where it has none.
+The finding names its owner: a process that somebody else starts may not be running, or its node has another name.""",
+    "TF813": """A process waits for one that does not exist, or for the end of one that never ends.
 
-tfcompose's own processes, and those that somebody else starts, are never done; they are started, and ready.""",
+tfcompose's own processes, and those that somebody else starts, have no end; they can be started and ready.""",
     "TF814": """There is no live pose of one frame in another.
 
 A frame is unknown, the two are in two trees, their edges have no time in common, or nothing is published at all.""",
-    "TF816": """A path that is known at the start only stands where nobody can fill it in.
+    "TF816": """A path that is known only at the start is used where it cannot be filled in.
 
-${file(…)}, ${build_dir} and ${params_file} are filled in when the plan is started: in the arguments and the environment
-of a process, and in parameters of a process with one node that tfcompose starts itself. A launch file, a command or
-somebody else's process takes a path as an argument; and without parameters there is no ${params_file}.""",
+${file(…)}, ${build_dir} and ${params_file} are filled in when the plan starts: in the arguments and environment of a
+process, and in the parameters of a process with one node that tfcompose starts itself. A launch file, a command or an
+external process takes the path as an argument; without parameters there is no ${params_file}.""",
     "TF817": """A process is not ready in time.
 
-The finding says what its ``ready`` waits for, what was seen instead, and what the process said last. Processes that
-wait for it wait on.""",
+The finding says what its ``ready`` waits for, what happened instead, and the process's last output. Processes that wait
+for it keep waiting.""",
     "TF819": """The plan does not say what this machine starts.
 
-A process may name a ``host:``. ``up --host NAME`` starts that host's share; without it, the machine's own name decides,
-and a machine that the plan does not name starts what has no host. All others are expected, and the guard sees them.""",
-    "TF820": """Somebody publishes an edge that closes a loop.
+A process may name a ``host:``. ``up --host NAME`` starts the processes of that host; without it, the name of the
+machine decides, and a machine that the plan does not name starts the processes without a host. All other processes are
+expected, and the guard observes them.""",
+    "TF820": """A published edge closes a cycle.
 
-The frames of the loop are each other's ancestors; tf2 finds no way through them, and every lookup that needs one fails.
-The finding names the loop and who closes it: end that node, or turn its edge round. That an edge is allowed, or need
-not be declared, does not make a loop right.""",
-    "TF821": """Somebody publishes a frame in itself.
+The frames of the cycle are each other's ancestors; tf2 finds no way through them, and every lookup that needs one
+fails. The finding names the cycle and the node that closes it: end that node, or swap parent and child of its edge.
+This is an error even if the edge is allowed, or need not be declared.""",
+    "TF821": """A node publishes a frame in itself.
 
-Parent and child have one name; tf2 drops the transform and writes an error for each. The node has two parameters for
-frames that are the same, probably.""",
-    "TF822": """Two nodes publish one frame that the plan does not have.
+Parent and child have the same name; tf2 drops the transform and logs an error for each. Probably two of the node's
+parameters name the same frame.""",
+    "TF822": """Two nodes publish a frame that the plan does not have.
 
-It is allowed, or need not be declared, but tf2 takes whatever came last, so the frame jumps between the two.""",
-    "TF823": """An owner sends an edge with the same stamp again and again.
+The frame is allowed, or need not be declared, but tf2 takes the last message, so it jumps between the two.""",
+    "TF823": """An owner publishes an edge with the same stamp again and again.
 
-tf2 keeps the first and drops the others, with a warning for each: it looks like a rate that is not there. The stamp is
-that of the measurement; where there is no new one, nothing needs to be sent.""",
+tf2 keeps the first message and drops the others with a warning each: the rate is lower than it looks. The stamp is that
+of the measurement; without a new one there is nothing to publish.""",
     "TF824": """An owner's stamps go back in time.
 
-tf2 sorts such a transform in behind newer ones, or drops it when it is older than its memory of 10 s. A bag is being
-played, a clock was set, or several threads stamp and send in another order. Where simulated time itself goes back,
-nothing is said.""",
-    "TF825": """An owner's stamps are of another clock than the plan's.
+tf2 sorts such a transform in before newer ones, or drops it if it is older than its buffer of 10 s. A bag is being
+played, a clock was set, or several threads stamp and publish in different orders. Jumps of simulated time itself are
+not reported.""",
+    "TF825": """An owner's stamps come from another clock than the plan's.
 
-They are more than 10 s off: simulated time in a plan on the system's time or the other way round, no stamp at all, or
-a host whose clock is not in sync. No lookup brings such an edge together with the others.""",
-    "TF826": """A node writes TF best effort.
+They are more than 10 s off: simulated time in a plan with the system clock or the other way round, no stamp at all, or
+a host whose clock is not synchronised. No lookup can combine such an edge with the others.""",
+    "TF826": """A node publishes TF as best effort, so no listener receives it.
 
-Listeners ask for reliable, so none of them accepts it, and nothing arrives. Publish as tf2_ros does: reliable, on
-/tf_static transient_local too.""",
-    "TF827": """A node of an isolated plan writes the global /tf or /tf_static.
+Listeners request reliable, and DDS does not connect the two. Publish as tf2_ros does: reliable, and transient_local on
+/tf_static.""",
+    "TF827": """A node of an isolated plan publishes on the global /tf or /tf_static.
 
-The plan keeps its transforms on topics of its own, so that robots do not hear each other; this node's go to all the
-others instead, and are missing here. Start it with the remappings /tf:=… and /tf_static:=….""",
-    "TF828": """A driver sends a frame elsewhere than its preset has it.
+The plan has its own topics for transforms, so that robots do not receive each other's. This node's transforms reach all
+the others and are missing here. Start it with the remappings /tf:=… and /tf_static:=….""",
+    "TF828": """A driver publishes a frame at another pose than its preset has.
 
 Calibration moves a nominal frame by millimetres; beyond 2 cm or 5 degrees the device is another model, or its
-calibration is broken. A frame that the preset calls exact, such as the turn of an optical frame, may differ by 1 mm and
-0.2 degrees. Name the right preset, or give the unit's own values under sensors.NAME.frames.""",
-    "TF829": """A node has not taken a switch that the plan wrote for it.
+calibration is broken. A frame whose pose the preset calls exact, such as the rotation of an optical frame, may differ
+by 1 mm and 0.2 degrees. Choose the right preset, or give the device's own values under sensors.NAME.frames.""",
+    "TF829": """A node does not have the parameter that the plan set to switch off its TF.
 
-The parameter was read back from the running node, after it appeared: the value is another one, or there is no such
-parameter. Somebody else started the node, or a launch file overrides it, or this version has another switch. What the
-node publishes is then not what the plan says.""",
-    "TF830": """Frames are in trees that nothing connects.
+The parameter was read back from the running node: its value differs, or it does not exist. Somebody else started the
+node, a launch file overrides the parameter, or this version has another one. What the node publishes is then not what
+the plan says.""",
+    "TF830": """Frames are in trees that are not connected.
 
 Every lookup between the two fails with "could not find a connection between", or "two or more unconnected trees". An
-edge is missing: its publisher does not run, its name is misspelt, or one of the trees has a frame_prefix that the other
-does not have. tfcompose tree --live shows both.""",
-    "TF831": """tf2 refuses a transform that is published.
+edge is missing: its publisher is not running, its name is misspelt, or one of the trees has a frame_prefix that the
+other does not have. tfcompose tree --live shows both.""",
+    "TF831": """A published transform is refused by tf2.
 
-A value is not a finite number, the quaternion is zero, a name is empty, or the frame is its own parent: the frame is
-not there for any listener. Or the quaternion is not of length 1: tf2 on Jazzy brings it to that length when it takes
-it, so that RViz shows the frame, and its angle is a guess; stricter readers, and tfcompose's buffer, drop it.""",
-    "TF832": """Something else than transforms is published on a topic of TF.
+If a value is not finite, the quaternion is zero, a name is empty, or the frame is its own parent, no listener has the
+frame. If the quaternion does not have length 1, tf2 on Jazzy normalises it, so RViz shows the frame with an uncertain
+angle; stricter readers, such as tfcompose's buffer, drop it.""",
+    "TF832": """A TF topic carries messages of another type.
 
-ROS does not connect publishers and listeners of different types: nobody receives it. Often it is a bag of ROS 1 that
-was converted with the old type, tf/msg/tfMessage.""",
-    "TF833": """An edge's stamps are old when they come.
+ROS does not connect publishers and subscribers of different types: nobody receives them. Often it is a bag of ROS 1
+that was converted with the old type, tf/msg/tfMessage.""",
+    "TF833": """An edge's stamps are already old when they arrive.
 
-A lookup of now, or of a scan that was just measured, is "extrapolation into the future" until the edge has come up:
-message filters wait, or drop. The node stamps with an old time, sends late, is overloaded, or its machine's clock is
-behind. Listeners can look up the latest time (time 0), or wait with a timeout.""",
-    "TF834": """The clock of another machine is not this one's.
+A lookup of now, or of a scan that was just taken, is "extrapolation into the future" until the edge arrives: message
+filters wait, or drop. The node uses an old stamp, publishes late, is overloaded, or its machine's clock is behind.
+Listeners can look up the latest time (time 0), or wait with a timeout.""",
+    "TF834": """The clock of another machine differs from this one.
 
-Stamps of that machine's nodes are ahead or behind by as much, and lookups across machines extrapolate. It is measured
-by DDS, which writes into each message when it was sent: one that arrives before it was sent comes from a clock that is
-ahead; the least delay of all is what a clock is behind, or a network is slow. Use chrony or ptp on all machines.""",
+Stamps of that machine's nodes are ahead or behind by as much, and lookups across machines extrapolate. DDS writes into
+each message when it was sent: one that arrives before that comes from a clock that is ahead; the shortest delay of all
+is by how much a clock is behind, or a network is slow. Use chrony or ptp on all machines.""",
     "TF835": """An edge is stamped ahead of time.
 
-AMCL, SLAM and others date map → odom forward by a tolerance of up to a second, so that lookups of now find it. More
-than that, or odometry and joints that are ahead at all, is a guess about where the robot will be, or a clock that is
-ahead: a lookup for a scan gets the pose from before the scan, and what was seen lands beside where it is.""",
-    "TF836": """Nodes use simulated time, and it does not come.
+AMCL, SLAM and others stamp map → odom up to a second ahead, so that lookups of now find it. A larger tolerance, or
+odometry and joints that are ahead at all, is a guess about where the robot will be, or a clock that is ahead: a lookup
+for a scan returns the pose from before the scan, and obstacles appear beside where they are.""",
+    "TF836": """Nodes use simulated time, but nobody publishes it.
 
-A node with use_sim_time: true takes its time from /clock; until that comes its time is 0 and stands: timers do not
-fire, and transforms are stamped 0. Start the simulator, play the bag with --clock, or set use_sim_time: false.""",
+A node with use_sim_time: true takes its time from /clock; until the first message its time is 0 and does not advance:
+timers do not fire, and transforms are stamped 0. Start the simulator, play the bag with --clock, or set
+use_sim_time: false.""",
     "TF837": """Two nodes publish /clock.
 
-Time jumps to and fro between the two, and with each jump back listeners forget what they had heard. It is a second
-simulator, or a bag that is played with --clock beside one.""",
-    "TF838": """A moving edge comes so seldom that lookups fail between two messages.
+Time jumps back and forth between the two, and with each jump back listeners clear their buffers. There is a second
+simulator, or a bag is played with --clock at the same time.""",
+    "TF838": """The rate of a moving edge is so low that lookups fail between two messages.
 
-Between two messages tf2 interpolates, and after the last one it refuses: scans are dropped with "extrapolation into the
-future", controllers act on an old pose, and frames jump. Odometry should come with 20 Hz (better 50), map → odom with
-5 (better 10), and what other frames hang on with 5. A plan says what it expects: rate, at the edge.""",
-    "TF839": """A moving edge comes often, and then not at all for a while.
+tf2 interpolates between two messages and fails after the last one: scans are dropped with "extrapolation into the
+future", controllers act on an old pose, and frames jump. Odometry needs 20 Hz (better 50), map → odom 5 Hz (better 10),
+and every moving edge with children 5 Hz. A plan declares what it expects: rate, on the edge.""",
+    "TF839": """A moving edge with a good mean rate has long gaps.
 
-Its mean rate looks right, and lookups fail all the same while it stays away. Its node blocks in a callback, its
-computer or the network is overloaded, or a large message holds up the small ones.""",
-    "TF840": """Data come in a frame that is not in the tree.
+Lookups fail during the gaps. The node blocks in a callback, its computer or the network is overloaded, or a large
+message delays the small ones.""",
+    "TF840": """The frame of data is not in the tree.
 
-RViz shows nothing, and message filters drop each message: its frame_id is misspelt, has a leading / (which tf2 refuses
+RViz shows nothing, and message filters drop each message: the frame_id is misspelt, has a leading / (which tf2 refuses
 in lookups), lacks a frame_prefix, or the edge that leads to it is not published.""",
-    "TF841": """The stamps of data and of the tree do not meet.
+    "TF841": """The stamps of data and of the tree do not overlap.
 
-Data that are stamped later than the newest transform are "extrapolation into the future"; data that are older than the
-10 s that listeners keep are "extrapolation into the past". Both come from stamps that do not mean the same: one is the
-time of the measurement, the other that of sending; or one is another machine's, or the sensor's own clock.""",
-    "TF842": """Joint states come, and nobody makes transforms of them.
+Data with a stamp later than the newest transform are "extrapolation into the future"; data older than the 10 s that
+listeners keep are "extrapolation into the past". The stamps mean different things: one is the time of the measurement,
+the other that of publishing; or one comes from another machine, or from the sensor's own clock.""",
+    "TF842": """Joint states are published, but nobody turns them into transforms.
 
-The frames below moving joints are missing: robot_state_publisher does not run, or listens in another namespace.""",
-    "TF843": """A robot state publisher waits for joint states that nobody sends.
+The frames below moving joints are missing: robot_state_publisher is not running, or subscribes in another
+namespace.""",
+    "TF843": """A robot state publisher waits for joint states that nobody publishes.
 
-Its fixed frames are there, and those below moving joints are not. Start joint_state_broadcaster (ros2_control) or
-joint_state_publisher, and look whether the topic is in another namespace.""",
-    "TF844": """Joint states come, and a moving joint of the description is not in them.
+Its fixed frames are there, but those below moving joints are not. Start joint_state_broadcaster (ros2_control) or
+joint_state_publisher, and check whether the topic is in another namespace.""",
+    "TF844": """A moving joint of the description is missing from the joint states.
 
 Its frame, and all below it, is missing. The joint has another name in the controller's configuration, or no state
 interface there.""",
     "TF845": """Nobody publishes TF here.
 
-Nothing runs, it publishes below a namespace (then --namespace), or it cannot be heard: another ROS_DOMAIN_ID, another
-ROS_AUTOMATIC_DISCOVERY_RANGE, or a network that does not pass multicast.""",
-    "TF846": """A frame is not where the robot's file says.
+Nothing is running, it publishes in a namespace (use --namespace), or it cannot be reached: another ROS_DOMAIN_ID,
+another ROS_AUTOMATIC_DISCOVERY_RANGE, or a network without multicast.""",
+    "TF846": """A live pose differs from the robot file.
 
-verify compares what is fixed: millimetres and degrees beyond --tolerance are told. A build that is older than the file,
-another calibration, or a driver with values of its own are the usual reasons.""",
-    "TF849": """A node listens to /tf_static with durability volatile, and misses what was sent before it came.
+verify compares fixed poses and reports differences beyond --tolerance. Usual reasons are a build that is older than the
+file, another calibration, or a driver with values of its own.""",
+    "TF849": """A node subscribes to /tf_static as volatile, and misses what was published before it started.
 
-Fixed frames are sent once and kept for those who come later, who get them only if they ask for durability
-transient_local. tf2's own listeners do; a subscription of one's own has durability volatile unless it says otherwise,
-and so has ros2 topic echo: ros2 topic echo --qos-durability transient_local --qos-reliability reliable /tf_static.""",
-    "TF850": """An owner replaced a latched edge with its next message before anybody heard it.
+Fixed frames are published once, and kept for later subscribers that request durability transient_local. tf2's listeners
+do; a plain subscription is volatile unless it says otherwise, and so is ros2 topic echo:
+ros2 topic echo --qos-durability transient_local --qos-reliability reliable /tf_static.""",
+    "TF850": """An owner replaced a latched edge with its next message before anybody received it.
 
-A publisher on /tf_static keeps its last message for those that find it later, and to be found takes a moment. What it
-sent before that one, in messages of their own, nobody gets any more. A subscriber that is counted before sending may
-be a listener of the node's own. Send all fixed edges in each message, as tf2's StaticTransformBroadcaster does.""",
-    "TF851": """A process has a key that does nothing there.
+A publisher on /tf_static keeps its last message for later subscribers, and discovery takes a moment. What it published
+before, in separate messages, reaches nobody any more. A subscriber that the node waits for may be its own listener.
+Publish all fixed edges in each message, as tf2's StaticTransformBroadcaster does.""",
+    "TF851": """A process has a key that has no effect.
 
-A process that somebody else starts is neither restarted nor stopped here, and its environment, folder, remappings and
-log level are for whoever starts it; a stand-in has no parameters of the node that it stands in for. Keys of a base file
-that an overlay turns into a stand-in, or leaves to somebody else, are not meant: they say how the base starts it.""",
-    "TF901": """ROS 2 is missing, or cannot be used.""",
-    "TF902": """A plan cannot be used: it is not one, not whole, or of another version.
+An external process is neither restarted nor stopped by tfcompose, and its environment, folder, remappings and log level
+are up to whoever starts it; a simulated process has no parameters of the node that it replaces. Keys of a base file are
+exempt if an overlay makes the process simulated or external: they apply when the base is started.""",
+    "TF901": """ROS 2 is missing, or cannot be used.
+
+pip install 'tfcompose[ros]' brings it on x86-64 Linux; elsewhere source your distribution's setup file.""",
+    "TF902": """A plan cannot be used: the file is not a plan, is incomplete, or has another version.
 
 Build it again.""",
     "TF903": """A rule crashed.
 
-The other rules went on. This is a fault of tfcompose; please report it with the robot file.""",
-    "TF904": """A xacro file is to be read, and xacro is not installed.
+The other rules still ran. This is a bug in tfcompose; please report it with the robot file.""",
+    "TF904": """A xacro file is to be read, but xacro is not installed.
 
 It comes with ROS, and from PyPI: pip install xacro.""",
-    "TF905": """An inertia is to be computed from a mesh, and trimesh is not installed.
+    "TF905": """An inertia is to be computed from a mesh, but trimesh is not installed.
 
 pip install 'tfcompose[mesh]', or give the inertia.""",
-    "TF906": """A bag is to be read, and the package rosbags is not there.
+    "TF906": """A bag is to be read, but rosbags is not installed.
 
-pip install 'tfcompose[bag]' brings it. ROS is not needed to read bags.""",
-    "TF907": """A bag cannot be read: it is not there, is damaged, is none of ROS 2, or holds no TF.
+pip install 'tfcompose[bag]' brings it. Reading bags does not need ROS.""",
+    "TF907": """A bag cannot be read: it does not exist, is damaged, is not from ROS 2, or contains no TF.
 
-MCAP and SQLite bags are read, as folders with metadata.yaml or as single .mcap and .db3 files.""",
-    "TF908": """A ROS process on this machine is set up so that it cannot be heard here.
+MCAP and SQLite bags can be read, as folders with metadata.yaml or as single .mcap and .db3 files.""",
+    "TF908": """A ROS process on this machine has settings with which it cannot be reached from here.
 
-Processes hear each other with the same ROS_DOMAIN_ID, where neither has ROS_AUTOMATIC_DISCOVERY_RANGE=OFF, and surely
-only with the same RMW_IMPLEMENTATION. What a process was started with is read from /proc, for one's own processes; of
-other machines, and of containers, it cannot be seen.""",
-    "TF909": """Variables that set up ROS contradict each other, leave nobody to be heard, or say what cannot be.
+Processes reach each other with the same ROS_DOMAIN_ID, if neither has ROS_AUTOMATIC_DISCOVERY_RANGE=OFF, and reliably
+only with the same RMW_IMPLEMENTATION. The settings of your own processes are read from /proc; those of other machines
+and of containers are not visible.""",
+    "TF909": """Environment variables of ROS contradict each other, exclude every other process, or are invalid.
 
-A domain is a whole number from 0 to 232. RMW_IMPLEMENTATION names a middleware that has to be installed: ROS ends a
-process that asks for another. ROS_LOCALHOST_ONLY=1 overrides ROS_AUTOMATIC_DISCOVERY_RANGE and is out of use since
-Iron; OFF discovers nobody, not even on the same machine.""",
-    "TF910": """A URDF that was to be written does not read back as the robot.
+A domain is an integer from 0 to 232. RMW_IMPLEMENTATION names a middleware that must be installed: ROS ends a process
+that requests another. ROS_LOCALHOST_ONLY=1 overrides ROS_AUTOMATIC_DISCOVERY_RANGE and is deprecated since Iron; OFF
+discovers nobody, not even on the same machine.""",
+    "TF910": """A URDF that was to be written does not read back as the same robot.
 
 build --read-back reads each description with another parser and compares links, joints, poses, limits, masses and
-shapes. Nothing is written then. It is a fault of tfcompose: report it, with the robot file.""",
+shapes. Nothing is written then. This is a bug in tfcompose; please report it with the robot file.""",
 }
 
 

@@ -221,13 +221,13 @@ def test_a_warning_fails_lint_only_where_it_is_asked_to(folder: Path) -> None:
 
 def test_lint_shows_the_line_and_a_caret_under_the_place(folder: Path) -> None:
     (folder / "robot.yaml").write_text(GOOD + "frames: {a: {parent: bas_link}}\n")
-    assert tfcompose("lint", cwd=folder).stdout == (
-        "robot.yaml:4:22: error[TF203] a hangs on bas_link, which is no frame\n"
-        "    4 | frames: {a: {parent: bas_link}}\n"
-        "      |                      ^^^^^^^^\n"
-        "   help: did you mean base_link?\n"
-        "1 error in 1 file\n"
-    )
+    head, line, caret, advice, last = tfcompose("lint", cwd=folder).stdout.splitlines()
+    assert head.startswith("robot.yaml:4:22: error[TF203] ")
+    assert line == "    4 | frames: {a: {parent: bas_link}}"
+    assert caret == "      |                      ^^^^^^^^"
+    assert advice.startswith("   help: ")
+    assert "base_link" in advice
+    assert last == "1 error in 1 file"
 
 
 def test_lint_checks_a_file_with_each_of_its_profiles(folder: Path) -> None:

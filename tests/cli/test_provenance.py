@@ -72,7 +72,7 @@ def test_the_values_of_parts_have_their_places_in_the_files_of_the_parts(
         "xyz: [1, 0, 0]  cell.yaml:4:66",
         "xyz: [0, 0, 0.4]  robot.yaml:3:15, over base.yaml:5:34",
     ]
-    assert "note: base.yaml:6:37: it replaces the value here" in said.err
+    assert "note: base.yaml:6:37: " in said.err
 
 
 def test_explain_names_the_rotation_that_another_way_to_write_it_replaced(
@@ -83,34 +83,31 @@ def test_explain_names_the_rotation_that_another_way_to_write_it_replaced(
 
 
 @pytest.mark.parametrize(
-    ("profile", "found_at", "note"),
+    ("profile", "found_at", "replaced"),
     [
-        ("far", "TF414 robot.yaml:6:37", ("it replaces the value here", "robot.yaml:3:15")),
-        ("lost", "TF203 robot.yaml:7:34", ("it replaces the value here", "base.yaml:5:18")),
-        (
-            "tilt",
-            "TF401 base.yaml:6:26",
-            ("axis_angle is given at robot.yaml:5:46, and replaces the value here", "base.yaml:6:37"),
-        ),
+        ("far", "TF414 robot.yaml:6:37", ["robot.yaml:3:15"]),
+        ("lost", "TF203 robot.yaml:7:34", ["base.yaml:5:18"]),
+        ("tilt", "TF401 base.yaml:6:26", ["base.yaml:6:37", "axis_angle", "robot.yaml:5:46"]),
     ],
 )
 def test_a_finding_about_a_replaced_value_names_what_it_replaced(
-    robot: str, profile: str, found_at: str, note: tuple[str, str], capsys: pytest.CaptureFixture[str]
+    robot: str, profile: str, found_at: str, replaced: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     main(["lint", robot, "--profile", profile, "--format", "json"])
     found = {
         f"{one['code']} {one['file']}:{one['line']}:{one['column']}": one["notes"]
         for one in json.loads(capsys.readouterr().out)
     }
-    notes = [(n["message"], f"{n['file']}:{n['line']}:{n['column']}") for n in found[found_at]]
-    assert notes == [note]
+    (note,) = found[found_at]
+    assert f"{note['file']}:{note['line']}:{note['column']}" == replaced[0]
+    assert all(name in note["message"] for name in replaced[1:])
 
 
 def test_a_finding_in_a_setting_names_what_it_replaced(robot: str, capsys: pytest.CaptureFixture[str]) -> None:
     main(["build", robot, "-o", "out", "--set", "frames.mast.xyz=[0, 0, 400]"])
     said = capsys.readouterr().err
     assert "TF414" in said
-    assert "robot.yaml:3:15: it replaces the value here" in said
+    assert "note: robot.yaml:3:15: " in said
 
 
 def test_a_finding_about_what_nothing_replaced_has_no_such_note(robot: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -238,7 +238,7 @@ def test_an_error_of_xacro_in_a_macro_of_another_file_is_found_there(cell: Any, 
 def test_a_floating_joint_of_somebody_elses_file_is_told_where_it_can_have_an_owner(cell: Any, tmp_path: Path) -> None:
     (tmp_path / "third/arm/arm.urdf").write_text(ARM.replace('name="end" type="fixed"', 'name="end" type="floating"'))
     (found,) = cell(LEFT).found
-    assert (found.code, found.help.startswith("tfcompose import")) == ("TF715", True)
+    assert (found.code, "tfcompose import" in found.help) == ("TF715", True)
 
 
 def test_each_number_of_the_urdf_is_still_there(cell: Any) -> None:
@@ -336,10 +336,7 @@ def test_what_hangs_on_a_part_that_was_refused_says_nothing_of_its_own(cell: Any
         f"ros2_control: {{hw: {{plugin: a/B, joints: {{{name}: {{state: {{position: {{}}}}}}}}}}}}\n"
         f"base: {name}",
     )
-    assert [(one.code, one.message.split(",")[0]) for one in result.found] == [
-        ("TF724", "no package ur"),
-        ("TF203", "off hangs on tabel"),
-    ]
+    assert [(one.code, one.message.split()[-1]) for one in result.found] == [("TF724", "ur"), ("TF203", "tabel")]
 
 
 def test_what_is_wrong_with_hardware_of_a_part_is_said_at_its_line_with_every_use(cell: Any, tmp_path: Path) -> None:

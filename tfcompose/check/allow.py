@@ -64,10 +64,12 @@ def _unknown_rules(rules: Mapping[str, Span]) -> list[Finding]:
     for word, at in rules.items():
         code = code_of(word)
         if code is None:
-            advice = did_you_mean(word, codes_and_names(), "lint prints codes: TF401")
-            found.append(finding("TF017", f"rules: there is no code {word}", at, help=advice))
+            advice = did_you_mean(word, codes_and_names(), "write a code that lint prints, such as TF401")
+            found.append(finding("TF017", f"unknown code {word} under rules", at, help=advice))
         elif not can_be_allowed(code):
-            found.append(finding("TF017", f"rules: {code} {CATALOGUE[code].name} cannot be set", at, help="remove it"))
+            found.append(
+                finding("TF017", f"{code} {CATALOGUE[code].name} cannot be set under rules", at, help="remove it")
+            )
     return found
 
 
@@ -79,23 +81,23 @@ def _covers(allow: Allow, found: Finding) -> bool:
 
 
 def unused_allows(allows: Sequence[Allow], used: Used) -> list[Finding]:
-    """Return a finding for each comment that allows nothing, cannot allow what it names, or does not say why."""
+    """Return a finding for each comment that allows nothing, cannot allow what it names, or gives no reason."""
     found = []
     for allow in allows:
         if not allow.codes:
-            found.append(finding("TF012", "allow names no code", allow.at, help="allow TF401 because …"))
+            found.append(finding("TF012", "allow without a code", allow.at, help="write allow TF401 because …"))
         for code in allow.codes:
             message = ""
             if code not in CATALOGUE:
-                message = f"allow {code}: there is no such code"
+                message = f"allow {code}: unknown code"
             elif not can_be_allowed(code):
                 message = f"allow {code}: {CATALOGUE[code].name} cannot be allowed"
             elif (allow, code) not in used:
-                message = f"allow {code}: there is no {CATALOGUE[code].name} here"
+                message = f"unused allow {code}: there is no {CATALOGUE[code].name} here"
             if message:
                 advice = did_you_mean(code, CATALOGUE, "remove it") if code not in CATALOGUE else "remove it"
                 found.append(finding("TF012", message, allow.at, help=advice))
         if allow.codes and not allow.reason:
-            message = f"allow {', '.join(allow.codes)} does not say why"
-            found.append(finding("TF013", message, allow.at, help="add: because …"))
+            message = f"allow {', '.join(allow.codes)} without a reason"
+            found.append(finding("TF013", message, allow.at, help="add because … after it"))
     return found

@@ -45,8 +45,10 @@ def check(robot: Robot, rules: Iterable[Rule] = RULES.values()) -> list[Finding]
         try:
             found += [_of_part(one, robot) for one in rule.find(robot) if not _is_left_out(one, rule, robot)]
         except Exception as error:  # noqa: BLE001 (a rule's fault must not hide the others' findings)
-            message = f"the rule {rule.code.code} {rule.code.name} crashed: {type(error).__name__}: {error}"
-            found.append(finding("TF903", message, Span(robot.file), help="this is a fault of tfcompose: report it"))
+            message = f"rule {rule.code.code} {rule.code.name} crashed: {type(error).__name__}: {error}"
+            found.append(
+                finding("TF903", message, Span(robot.file), help="this is a bug in tfcompose: please report it")
+            )
     return found
 
 

@@ -27,14 +27,13 @@ _NODE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 @rule("TF501", of_urdf=True)
 def bad_frame_name(robot: Robot) -> Iterator[Finding]:
-    """A frame, joint, process or node has a name that tf2, URDF, ROS or a file system takes differently.
+    """The name of a frame, joint, process or node is not valid for tf2, URDF, ROS or the file system.
 
-    tf2 strips a leading slash, a process's name is also that of its parameter file, and spaces, quotes and ``&`` break
-    somewhere on the way. Use letters, digits and ``_``; a slash stands between a prefix and a name only. The parts of
-    a node's name do not begin with a digit. Hyphens, dots, colons and letters beyond ASCII, as in
-    ``base_link-base_fixed_joint``, are warnings: URDF and TF take them, but a parameter or a topic that is named after
-    the frame or joint cannot have them. In a URDF that somebody else wrote everything is a warning that can be looked
-    up at all.
+    tf2 strips a leading slash, the parameter file of a process is named after it, and spaces, quotes and ``&`` break
+    something sooner or later. Use letters, digits and ``_``, and a slash only between a prefix and a name. No part of a
+    node's name begins with a digit. Hyphens, dots, colons and non-ASCII letters, as in ``base_link-base_fixed_joint``,
+    are warnings: URDF and TF accept them, but parameters and topics that are named after the frame or joint cannot
+    have them. In a URDF that somebody else wrote, every name that can be looked up is only a warning.
     """
     names: dict[str, Span] = dict(robot.frames)
     for edge in robot.edges:
@@ -43,38 +42,37 @@ def bad_frame_name(robot: Robot) -> Iterator[Finding]:
             names.setdefault(edge.joint_name, edge.joint_at or edge.at)
     for name, at in names.items():
         if not _GOOD.fullmatch(name):
-            taken = re.fullmatch(_TAKEN, name) or (at.file in robot.foreign and not re.fullmatch(_LOST, name))
+            taken = re.fullmatch(_TAKEN, name) or (robot.is_foreign(at) and not re.fullmatch(_LOST, name))
             yield _invalid(name, at, "name", "warning" if taken else "error")
     for process in robot.processes:
         if not _PROCESS.fullmatch(process.name):
-            yield _invalid(process.name, process.at, "name for a process")
+            yield _invalid(process.name, process.at, "process name")
         elif process.name == _LAUNCHER:
-            message = f"{_LAUNCHER} is the launcher's own name, in logs and findings"
+            message = f"a process cannot be called {_LAUNCHER}: that is the launcher in logs and findings"
             yield finding("TF501", message, process.at, help="give the process another name")
         elif (process.package or process.kind != "run" or process.params) and not _NODE.fullmatch(process.node):
-            yield _invalid(process.node, process.at, "name for a node")
+            yield _invalid(process.node, process.at, "node name")
 
 
 def _invalid(name: str, at: Span, what: str, severity: Severity = "error") -> Finding:
     bare = name.lstrip("/")
     if what == "name" and bare != name and _GOOD.fullmatch(bare):
-        return finding("TF501", f"{name!r} is no good {what}", at, help=f"tf2 drops a leading slash: write {bare}")
+        return finding("TF501", f"invalid {what} {name!r}", at, help=f"write {bare}: tf2 drops a leading slash")
     better = re.sub(r"[^A-Za-z0-9_/]+|//+", "_", name).strip("/")
     advice = f"for example {better}" if _GOOD.fullmatch(better) and better != name.strip("/") else _LETTERS
-    return finding("TF501", f"{name!r} is no good {what}", at, help=advice, severity=severity)
+    return finding("TF501", f"invalid {what} {name!r}", at, help=advice, severity=severity)
 
 
-_LETTERS = "letters, digits and _; a node's name does not begin with a digit"
+_LETTERS = "use letters, digits and _; a node's name does not begin with a digit"
 
 
 @rule("TF503", of_urdf=True)
 def upper_case_name(robot: Robot) -> Iterator[Finding]:
     """A frame's name has upper case letters.
 
-    tf2 tells ``Base_link`` from ``base_link``, people do not: a lookup fails, and the two names look the same. ROS
-    names are lower case with underscores, ``left_wheel_link``. Only frames that the file names are judged, not those
-    of presets, and all together are one finding; a robot whose vendor's names are upper case says
-    ``rules: {TF503: off}``.
+    ``Base_link`` and ``base_link`` are two frames for tf2 but look alike to people: a lookup fails, and nobody sees
+    why. ROS names are lower case with underscores, ``left_wheel_link``. Frames of presets are exempt, and all frames of
+    a robot are one finding; if the vendor's names are upper case, write ``rules: {TF503: off}``.
     """
     presets = [sensor for sensor in robot.sensors if sensor.name == sensor.name.lower()]
     inside = {frame for sensor in presets for frame in (sensor.mount, *sensor.frames)}
@@ -83,11 +81,13 @@ def upper_case_name(robot: Robot) -> Iterator[Finding]:
         first, *others = bad
         known = {name.lower(): name for name in robot.frames if name == name.lower()}
         more = f" and {len(others)} more" if others else ""
-        message = f"upper case in the frame name {first}{more}"
+        message = f"upper case letters in frame name {first}{more}"
         notes = [
-            Note(f"{known[name.lower()]} is another frame", at) for name, at in bad.items() if name.lower() in known
+            Note(f"{name} and {lower} are two frames", at)
+            for name, at in bad.items()
+            if (lower := known.get(name.lower()))
         ]
-        notes += [Note(f"{name} is one too", bad[name]) for name in others[:_MOST_LISTED]]
+        notes += [Note(f"also in {name}", bad[name]) for name in others[:_MOST_LISTED]]
         yield finding("TF503", message, bad[first], help=_lower_case(first), notes=notes)
 
 
@@ -101,12 +101,11 @@ def _lower_case(name: str) -> str:
 
 @rule("TF504", idle=True)
 def unused_variable(robot: Robot) -> Iterator[Finding]:
-    """Nothing uses a variable.
+    """A variable is not used.
 
-    Probably the number still stands where the variable was meant to go, and changing the variable changes nothing. Use
-    it, ``"${mast}"``, or remove it. Variables that only a profile uses, or that an included file brings, are left
-    alone.
+    Probably its value is still written where the variable was meant to be, and changing the variable has no effect. Use
+    it, ``"${mast}"``, or remove it. Variables that only a profile uses, or that come from an included file, are exempt.
     """
     for name, at in robot.unused.items():
         if at.file == robot.file and ("vars", name) not in robot.broken:
-            yield finding("TF504", f"nothing uses the variable {name}", at, help="remove it")
+            yield finding("TF504", f"unused variable {name}", at, help=f'use it, "${{{name}}}", or remove it')

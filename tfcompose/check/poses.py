@@ -22,11 +22,11 @@ _OPTICAL_TOLERANCE_RAD = 2e-3
 
 @rule("TF401", of_urdf=True, follows="pose")
 def optical_frame_not_rotated(robot: Robot) -> Iterator[Finding]:
-    """An optical frame is not turned into the viewing direction.
+    """A frame is named like an optical frame but not rotated like one.
 
     By REP-103 an optical frame has z forward, x right and y down, and its body frame x forward, y left and z up. The
-    rotation between the two is rpy [-90 deg, 0, -90 deg]. Without it, point clouds stand upright on their side. Rounded
-    constants (−1.57) are let through: they are off by 0.0011 rad each. So are frames of a preset whose vendor has other
+    rotation from body to optical frame is rpy [-90 deg, 0, -90 deg]; without it point clouds are turned on their side.
+    Rounded constants (−1.57) pass: they are off by 0.0011 rad each. So do frames of presets whose vendor uses other
     axes (RealSense T265).
     """
     for edge in robot.edges:
@@ -34,27 +34,33 @@ def optical_frame_not_rotated(robot: Robot) -> Iterator[Finding]:
             continue
         off = angle_between(edge.pose.quat_xyzw, OPTICAL_XYZW)
         is_body = _stem(edge.child).startswith(_stem(edge.parent))
-        unturned = angle_between(edge.pose.quat_xyzw, IDENTITY_XYZW) <= _OPTICAL_TOLERANCE_RAD
-        if off > _OPTICAL_TOLERANCE_RAD and (is_body or unturned):
-            message = f"{edge.child} is no optical frame: it is {math.degrees(off):.2f} deg off the optical rotation"
-            advice = f"in {edge.parent} an optical frame has rpy: [-90 deg, 0, -90 deg]"
+        unrotated = angle_between(edge.pose.quat_xyzw, IDENTITY_XYZW) <= _OPTICAL_TOLERANCE_RAD
+        if off > _OPTICAL_TOLERANCE_RAD and (is_body or unrotated):
+            message = (
+                f"{edge.child} is named like an optical frame but not rotated like one: "
+                f"it is {math.degrees(off):.2f} deg off"
+            )
+            advice = "rpy: [-90 deg, 0, -90 deg]"
+            if robot.is_foreign(edge.at):
+                advice = '<origin rpy="-1.5707963267948966 0 -1.5707963267948966"/>'
+            advice = f"an optical frame has {advice} in {edge.parent}"
             yield finding("TF401", message, edge.at, help=advice, edits=edge.optical_edits())
 
 
 def _stem(frame: str) -> str:
-    """Return what a frame and its optical twin have in common: camera_link, camera_optical_frame → camera."""
+    """Return what a frame and its optical frame have in common: camera_link, camera_optical_frame → camera."""
     for ending in (*OPTICAL_ENDINGS, "_link", "_frame"):
         if frame.endswith(ending):
             return frame.removesuffix(ending)
     return frame
 
 
-#: Degrees that people write. All but 5 are more than a full turn when read as radians; so many radians nobody means.
+#: Degrees that people write. Read as radians, all but 5 are more than a full turn, which nobody means.
 _ROUND_DEG = frozenset(
     {5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 45.0, 50.0, 60.0, 70.0, 75.0, 80.0, 90.0, 100.0, 120.0, 135.0}
 )
 _ROUND_LIMITS_DEG = _ROUND_DEG | {150.0, 165.0, 170.0, 175.0, 180.0, 185.0, 190.0, 270.0, 350.0, 360.0, 720.0}
-#: A full turn, and a little for its rounding.
+#: A full turn, with a margin for rounding.
 _FULL_TURN_RAD = 6.29
 
 
@@ -62,14 +68,14 @@ _FULL_TURN_RAD = 6.29
 def degrees_as_radians(robot: Robot) -> Iterator[Finding]:
     """An angle without a unit is probably meant in degrees.
 
-    A bare number is in radians: 90 is fourteen turns and a bit. The frame ends up turned somehow, and nothing else
-    complains. Write the unit, ``90 deg``; an angle that is really meant in radians may carry ``rad``. Limits of turning
-    joints may be more than a turn: of these only values that people write in degrees are named.
+    A bare number is in radians: 90 is more than fourteen turns. The frame ends up in some orientation, and nothing else
+    complains. Write the unit, ``90 deg``; an angle in radians may have the unit ``rad``. Limits of revolute joints may
+    exceed a turn: of these only values that people write in degrees are reported.
     """
-    turning = {edge.joint.name for edge in robot.edges if edge.joint and edge.joint.type == "revolute"}
+    revolute = {edge.joint.name for edge in robot.edges if edge.joint and edge.joint.type == "revolute"}
     for value in robot.as_written:
         is_limit = value.key == "limit"
-        if value.key not in {"rpy", "look", "axis_angle", "limit"} or (is_limit and value.entry not in turning):
+        if value.key not in {"rpy", "look", "axis_angle", "limit"} or (is_limit and value.entry not in revolute):
             continue
         for index, (number, with_unit) in enumerate(zip(value.numbers, value.with_unit, strict=True)):
             size = abs(number)
@@ -77,10 +83,10 @@ def degrees_as_radians(robot: Robot) -> Iterator[Finding]:
                 size in _ROUND_LIMITS_DEG if is_limit else size in _ROUND_DEG or size > _FULL_TURN_RAD
             ):
                 message = f"{value.entry}: {value.key} is {number:g} rad, {number / math.tau:.3g} turns"
-                yield finding("TF410", message, value.place(index), help=f"in degrees: {number:g} deg")
+                yield finding("TF410", message, value.place(index), help=f"if degrees are meant, write {number:g} deg")
 
 
-#: 1.5708 is good enough: 0.0002 degrees off, less than any mount is true to.
+#: 1.5708 is good enough: it is 0.0002 degrees off, and no mount is that accurate.
 _EXACT_RAD, _ROUNDED_RAD, _NOISE = 5e-6, 2e-3, 2e-9
 _QUARTERS = {1: "pi/2", 2: "pi", 3: "3*pi/2", 4: "2*pi"}
 _MOST_DECIMALS = 6
@@ -90,9 +96,9 @@ _MOST_DECIMALS = 6
 def rounded_right_angle(robot: Robot) -> Iterator[Finding]:
     """An angle is π/2 or π with too few digits.
 
-    −1.57 misses the right angle by 0.05 degrees: 0.8 mm at one metre. Two such frames no longer cancel out, and every
-    point cloud is tilted a little. Write ``-90 deg``, or ``"${-pi/2}"``. Only roundings of the right angle are named: a
-    measured 1.5689 can stand.
+    −1.57 is 0.05 degrees off a right angle: 0.8 mm at one metre. Two such frames do not cancel out, and every point
+    cloud is slightly tilted. Write ``-90 deg``, or ``"${-pi/2}"``. Only roundings of right angles are reported: a
+    measured 1.5689 is not.
     """
     for value in robot.as_written:
         if value.key not in {"rpy", "look", "axis_angle"}:
@@ -103,8 +109,8 @@ def rounded_right_angle(robot: Robot) -> Iterator[Finding]:
             quarters = round(number / (math.pi / 2))
             sign = "-" if number < 0 else ""
             off = math.degrees(abs(number - quarters * math.pi / 2))
-            said = ", ".join(dict.fromkeys(f"{n:g}" for n, _ in rounded))
-            message = f"{value.entry}: {value.key} has {said}, {off:.2g} deg off {quarters * 90} deg"
+            listed = ", ".join(dict.fromkeys(f"{n:g}" for n, _ in rounded))
+            message = f"{value.entry}: {value.key} has {listed}, {off:.2g} deg off {quarters * 90} deg"
             advice = f'write {quarters * 90} deg, or "${{{sign}{_QUARTERS[abs(quarters)]}}}"'
             yield finding("TF411", message, value.place(first), help=advice)
 
@@ -116,24 +122,24 @@ def _is_rounded(number: float) -> bool:
     if abs(quarters) not in _QUARTERS or not _EXACT_RAD < abs(number - exact) / max(1, abs(quarters)) < _ROUNDED_RAD:
         return False
     return any(
-        abs(number * 10**decimals - whole(exact * 10**decimals)) < _NOISE
+        abs(number * 10**decimals - rounding(exact * 10**decimals)) < _NOISE
         for decimals in range(2, _MOST_DECIMALS)
-        for whole in (math.floor, math.ceil)
+        for rounding in (math.floor, math.ceil)
     )
 
 
-#: A w of this and more is a turn of less than 64 degrees.
+#: A rotation with this w or more is smaller than 64 degrees.
 _SMALL_TURN_W = 0.85
 
 
 @rule("TF412")
 def quaternion_w_first(robot: Robot) -> Iterator[Finding]:
-    """A quaternion looks as if it had w in front; the order is x, y, z, w.
+    """A quaternion probably has w first; the order is x, y, z, w.
 
-    Eigen's constructor, MATLAB and many papers put w first. [1, 0, 0, 0] is no turn there, and a half turn about x
-    here: the sensor hangs upside down. Move the first number to the end. If the half turn is meant, write
-    ``rpy: [180 deg, 0, 0]``. Named are [1, 0, 0, 0] itself, and quaternions that are a plain small pitch or yaw when
-    read with w first and an odd large turn otherwise.
+    Eigen's constructor, MATLAB and many papers put w first. [1, 0, 0, 0] is the identity there and a half turn about x
+    here: the sensor is upside down. Move the first number to the end. If the half turn is meant, write
+    ``rpy: [180 deg, 0, 0]``. Reported are [1, 0, 0, 0] itself, and quaternions that are a small pitch or yaw with w
+    first and a large rotation about an odd axis otherwise.
     """
     for value in robot.as_written:
         if value.key != "quat_xyzw" or len(value.numbers) != 4:  # noqa: PLR2004 (x, y, z, w)
@@ -142,9 +148,9 @@ def quaternion_w_first(robot: Robot) -> Iterator[Finding]:
         identity = abs(first) == 1 and not (second or third or fourth)
         small = _SMALL_TURN_W < abs(first) < 1 and second == 0 and (third == 0) != (fourth == 0)
         if identity or small:
-            ways = f"a turn of {_degrees(fourth)} deg, and with w first one of {_degrees(first)} deg"
-            message = f"{value.entry}: quat_xyzw {_shown(value.numbers)} is {ways}"
-            advice = f"x, y, z, w: {_shown((second, third, fourth, first))}"
+            turns = f"turns by {_degrees(fourth)} deg, and by {_degrees(first)} deg if w is first"
+            message = f"{value.entry}: quat_xyzw {_listed(value.numbers)} {turns}"
+            advice = f"if w is first, write {_listed((second, third, fourth, first))}"
             if identity:
                 advice += "; if the half turn is meant, rpy: [180 deg, 0, 0]"
             yield finding("TF412", message, value.place(0), help=advice)
@@ -154,12 +160,12 @@ def _degrees(w: float) -> str:
     return f"{math.degrees(2 * math.acos(min(1.0, abs(w)))):.0f}"
 
 
-def _shown(numbers: tuple[float, ...]) -> str:
+def _listed(numbers: tuple[float, ...]) -> str:
     return f"[{', '.join(f'{number:g}' for number in numbers)}]"
 
 
-#: Words in a name, the sign of z that they promise, and how far (sine) the view may be on the other side. "up" and
-#: "down" may also mean the upper and the lower camera, and so must be clearly contradicted.
+#: Words in a name, the sign of z that they imply, and by how much (sine) the view may contradict it. "up" and "down"
+#: may also mean the upper and the lower camera, so the contradiction must be clear.
 _VIEWS = {
     "floor": (-1, 0.1),
     "ground": (-1, 0.1),
@@ -171,56 +177,57 @@ _VIEWS = {
     "upwards": (1, 0.1),
     "up": (1, 0.5),
 }
-#: Above this a camera named after the ceiling probably hangs there.
+#: Above this a camera named after the ceiling is probably mounted there.
 _OVERHEAD_M = 1.5
 
 
 @rule("TF413", follows="pose")
 def camera_looks_away(robot: Robot) -> Iterator[Finding]:
-    """A camera looks up and its name says floor, or looks down and its name says ceiling.
+    """A camera looks up although its name says floor, or down although its name says ceiling.
 
-    By REP-103 looking down is *positive* pitch, which many get wrong once. Write what is meant:
-    ``look: {down: 30 deg}``. Judged is the optical axis in the robot's base, for cameras that are fixed to it.
+    By REP-103 looking down is *positive* pitch, a common mistake. Write what is meant: ``look: {down: 30 deg}``. What
+    counts is the optical axis in the robot's base, for cameras that are fixed to it.
     """
     base = (robot.base or "").rpartition("/")[2]
     poses = placed(robot) if base.startswith("base") and robot.sensors else {}
     for sensor in robot.sensors:
-        said = next((_VIEWS[word] for word in reversed(sensor.name.split("_")) if word in _VIEWS), None)
-        if said is None or sensor.kind not in CAMERAS or sensor.mount not in poses:
+        view = next((_VIEWS[word] for word in reversed(sensor.name.split("_")) if word in _VIEWS), None)
+        if view is None or sensor.kind not in CAMERAS or sensor.mount not in poses:
             continue
         optical = next((frame for frame in sensor.frames if is_optical(frame) and frame in poses), None)
         pose = poses[optical or sensor.mount]
         axis = rotate(pose.quat_xyzw, (0.0, 0.0, 1.0) if optical else (1.0, 0.0, 0.0))
-        sign, tolerance = said
-        hangs = "ceiling" in sensor.name and pose.xyz[2] > _OVERHEAD_M
-        if axis[2] * sign < -tolerance and not hangs:
+        sign, tolerance = view
+        overhead = "ceiling" in sensor.name and pose.xyz[2] > _OVERHEAD_M
+        if axis[2] * sign < -tolerance and not overhead:
             angle = math.degrees(math.asin(min(1.0, abs(axis[2]))))
-            message = f"{sensor.name} looks {angle:.0f} deg {'up' if axis[2] > 0 else 'down'}"
-            advice = f"look: {{{'down' if sign < 0 else 'up'}: {angle:.0f} deg}}; looking down is positive pitch"
+            up, named = ("up", "down") if axis[2] > 0 else ("down", "up")
+            message = f"{sensor.name} looks {up} by {angle:.0f} deg, but its name says {named}"
+            advice = f"write look: {{{named}: {angle:.0f} deg}}; looking down is positive pitch"
             yield finding("TF413", message, sensor.at, help=advice)
 
 
-#: No part of a usual robot is farther from what it is mounted on; larger ones are known by their bodies and mounts.
+#: No part of an ordinary robot is farther from its mount; larger robots are known by their bodies and mounts.
 _USUAL_M = 5.0
-#: No robot is larger, unless a body says so.
+#: No robot is larger, unless it has a larger body.
 _LARGEST_M = 100.0
 _TIMES = 3
 
 
 @rule("TF414", follows="pose")
 def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
-    """A mount or a body is far larger than the robot; it is probably written in millimetres.
+    """A position or a body is far larger than the robot, and probably in millimetres.
 
-    A bare number is in metres. Drawings are in millimetres, and 250 becomes a sensor that floats a quarter of a
-    kilometre away. Write the unit: ``250 mm``. The limit is three times the robot's bodies or usual mounts, and at
-    least 5 m. A value with a unit is believed.
+    A bare number is in metres. Drawings are in millimetres, and 250 puts a sensor a quarter of a kilometre away. Write
+    the unit: ``250 mm``. The limit is three times the size of the robot's bodies or typical mounts, and at least 5 m.
+    Values with a unit are not reported.
     """
     sizes = [max(shape.size) for link in robot.links.values() for shape in (*link.visuals, *link.collisions)]
     for link in robot.links.values():
         largest = max((max(shape.size) for shape in (*link.visuals, *link.collisions)), default=0.0)
         if largest > _LARGEST_M:
             message = f"the body of {link.name} is {largest:g} m long"
-            yield finding("TF414", message, link.at, help=f"in millimetres: {largest:g} mm")
+            yield finding("TF414", message, link.at, help=f"if millimetres are meant, write {largest:g} mm")
     body = max((size for size in sizes if size <= _LARGEST_M), default=0.0)
     below = placed(robot, moving=True)
     mounts = [norm(edge.pose.xyz) for edge in robot.edges if edge.given and edge.child in below and any(edge.pose.xyz)]
@@ -239,5 +246,5 @@ def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
         if child in below and distance > limit:
             message = f"{value.entry} is {distance:g} m away; the rest of the robot is within {limit:.3g} m"
             farthest = max(range(len(value.numbers)), key=lambda index: abs(value.numbers[index]))
-            advice = f"a bare number is in metres; in millimetres: {value.numbers[farthest]:g} mm"
+            advice = f"a bare number is in metres; if millimetres are meant, write {value.numbers[farthest]:g} mm"
             yield finding("TF414", message, value.place(farthest), help=advice)

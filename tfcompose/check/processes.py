@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def start_order_loop(robot: Robot) -> Iterator[Finding]:
     """Processes wait for each other.
 
-    None of them would ever be started.
+    None of them would ever start. Remove one of the entries under ``after``.
     """
     waiting = {process.name: process for process in robot.processes}
     while free := [name for name, p in waiting.items() if not any(other in waiting for other in p.after)]:
@@ -25,18 +25,18 @@ def start_order_loop(robot: Robot) -> Iterator[Finding]:
             del waiting[name]
     names = list(waiting)
     if names:
-        notes = [Note(f"{name} is one of them", waiting[name].at) for name in names[1:]]
+        notes = [Note(f"{name} is defined here", waiting[name].at) for name in names[1:]]
         message = f"processes wait for each other: {', '.join(names)}"
-        yield finding("TF812", message, waiting[names[0]].at, notes=notes, help="remove one after")
+        yield finding("TF812", message, waiting[names[0]].at, notes=notes, help="remove one of their after entries")
 
 
 @rule("TF815", idle=True)
 def process_without_role(robot: Robot) -> Iterator[Finding]:
-    """A process that somebody else starts, or a stand-in, has nothing to do with the robot.
+    """An external or simulated process is not used.
 
-    It owns no edge, no sensor is driven by it and nothing waits for it: probably an ``owner`` was meant to name it.
-    Give it its edge, or remove it. Programs that tfcompose starts may do what they like, and a process that somebody
-    else starts may send the joint states where no stand-in does.
+    It owns no edge, is no sensor's driver, and nothing waits for it: probably an ``owner`` was meant to name it. Make
+    it the owner of its edge, or remove it. Processes that tfcompose starts are exempt, as is an external process that
+    may send the joint states because no simulated one does.
     """
     owners = {edge.owner for edge in robot.edges}
     drivers = {sensor.driver for sensor in robot.sensors}
@@ -45,7 +45,7 @@ def process_without_role(robot: Robot) -> Iterator[Finding]:
     busy = owners | drivers | awaited | {process.name for process in robot.processes if process.node in publishers}
     names = {process.name for process in robot.processes}
     if (owners | drivers) - names - {""}:
-        return  # a name is misspelt, and that has been said
+        return  # a name is misspelt, which TF302 reports
     moving = any(edge.joint for edge in robot.edges)
     states = any(process.simulate and process.simulate.kind == "joints" for process in robot.processes)
     for process in robot.processes:
@@ -55,20 +55,18 @@ def process_without_role(robot: Robot) -> Iterator[Finding]:
             continue
         if process.simulate and process.simulate.kind == "joints" and moving:
             continue
-        what = "no joint moves" if process.simulate and process.simulate.kind == "joints" else "it owns no edge"
-        advice = "remove it"
-        if "edge" in what:
-            advice = f"owner: {process.name} at the edge that it publishes, or remove it"
-        message = f"{process.name} has nothing to do here: {what}"
-        yield finding("TF815", message, process.at, help=advice)
+        reason, advice = "it owns no edge", f"write owner: {process.name} on the edge that it publishes, or remove it"
+        if process.simulate and process.simulate.kind == "joints":
+            reason, advice = "no joint moves", "remove it"
+        yield finding("TF815", f"unused process {process.name}: {reason}", process.at, help=advice)
 
 
 @rule("TF818")
 def required_without_role(robot: Robot) -> Iterator[Finding]:
-    """A process is required, owns no edge, and nothing waits for it.
+    """A required process owns no edge, and nothing waits for it.
 
-    When it ends, the whole robot is stopped; yet nothing here needs it. Leave ``required`` out, or say who needs it:
-    ``after: {NAME: ready}`` at the process that does.
+    When it ends, the whole robot stops, although nothing needs it. Remove ``required``, or declare who needs it:
+    ``after: {NAME: ready}`` on that process.
     """
     owners = {edge.owner for edge in robot.edges}
     drivers = {sensor.driver for sensor in robot.sensors}
@@ -77,8 +75,8 @@ def required_without_role(robot: Robot) -> Iterator[Finding]:
     for process in robot.processes:
         needed = process.name in owners | drivers | awaited or any(node.name in publishers for node in process.nodes)
         if process.required and not needed and not robot.excuses(process.name):
-            message = f"{process.name} is required, owns no edge, and nothing waits for it"
-            advice = f"leave required out, or after: {{{process.name}: ready}} at what needs it"
+            message = f"{process.name} is required, but owns no edge, and nothing waits for it"
+            advice = f"remove required, or write after: {{{process.name}: ready}} on the process that needs it"
             yield finding("TF818", message, process.at, help=advice)
 
 
@@ -86,8 +84,8 @@ def required_without_role(robot: Robot) -> Iterator[Finding]:
 def needed_but_optional(robot: Robot) -> Iterator[Finding]:
     """A process that the robot needs waits for one with ``required: false``.
 
-    When the optional one fails, the other is never started, and that ends everything: then it is not optional at all.
-    Say ``required: false`` at both, or at neither.
+    If the optional process fails, the other one never starts, and the whole robot stops: the process is not optional
+    after all. Write ``required: false`` on both, or on neither.
     """
     optional = {process.name: process for process in robot.processes if process.required is False}
     for process in robot.processes:
@@ -95,27 +93,25 @@ def needed_but_optional(robot: Robot) -> Iterator[Finding]:
             continue
         for name, what in process.after.items():
             if name in optional:
-                message = f"{process.name} waits until {name} is {what}, and {name} is optional"
-                advice = f"required: false at {process.name} too, or leave it out at {name}"
-                notes = [Note(f"{name} is not required here", optional[name].at)]
+                message = f"{process.name} waits until {name} is {what}, but {name} is optional"
+                advice = f"write required: false on {process.name} too, or remove it from {name}"
+                notes = [Note(f"{name} is defined here", optional[name].at)]
                 yield finding("TF847", message, process.at, notes=notes, help=advice)
 
 
 @rule("TF848")
 def gate_never_opens(robot: Robot) -> Iterator[Finding]:
-    """A process is ready by what cannot come: the edges of one that owns none, or the end of one that always runs.
+    """A process waits for something that cannot happen before it is ready.
 
-    It stays not ready, and so does what waits for it. Say by what it is ready, leave ``ready`` out, or take
-    ``restart: always`` away.
+    It owns no edges and waits for them to be live, or it waits for its own exit and always restarts. It never becomes
+    ready, and what waits for it never starts. Choose another ``ready``, remove it, or remove ``restart: always``.
     """
     owners = {edge.owner for edge in robot.edges}
     for process in robot.processes:
         kind = process.ready.kind if process.ready else ""
         if kind == "edges" and process.name not in owners:
-            message = f"{process.name} is ready when its edges are live, and it owns none"
-            yield finding(
-                "TF848", message, process.at, help="leave ready out, or say what else shows it: a topic, a line"
-            )
+            message = f"{process.name} is ready when its edges are live, but it owns none"
+            yield finding("TF848", message, process.at, help="remove ready, or wait for a topic or a line of output")
         elif kind == "exit" and process.restart == "always":
-            message = f"{process.name} is ready when it has ended, and restart: always starts it again"
-            yield finding("TF848", message, process.at, help="restart: on-failure, or leave it out")
+            message = f"{process.name} is ready when it has ended, but restart: always starts it again"
+            yield finding("TF848", message, process.at, help="write restart: on-failure, or remove restart")

@@ -37,10 +37,10 @@ def _notes(found: Finding, known: set[Span | None], source: Source) -> list[Note
         if now is None or found.span is None or old in known:
             continue
         if now.holds(found.span) or found.span == source.at_key(path):
-            exact.append(Note("it replaces the value here", old))
+            exact.append(Note("it replaces this value", old))
         elif len(path) > _OF_AN_ENTRY and found.span in _places_of_entry(path[:_OF_AN_ENTRY], source):
             name = ".".join(map(str, path[_OF_AN_ENTRY:]))
-            around.append(Note(f"{name} is given at {now}, and replaces the value here", old))
+            around.append(Note(f"{name} at {now} replaces this value", old))
     return exact or around
 
 

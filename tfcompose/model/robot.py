@@ -139,6 +139,10 @@ class Robot:
             for section, entry in self.broken
         )
 
+    def is_foreign(self, at: Span | None) -> bool:
+        """Return whether the place is in a file that somebody else wrote, a URDF: advice speaks of XML there."""
+        return at is not None and at.file in self.foreign
+
     def parent_edge(self, child: str) -> Edge | None:
         """Return the first edge whose child is the frame, or None for a root."""
         return next((edge for edge in self.edges if edge.child == child), None)

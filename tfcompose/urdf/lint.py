@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tfcompose.check import RULES, apply, check, unused_allows
@@ -22,22 +21,6 @@ if TYPE_CHECKING:
     from tfcompose.urdf.read import Element
 
 _RULES = tuple(rule for rule in RULES.values() if rule.of_urdf)
-
-#: How a rule says that a frame is missing.
-_DECLARE = re.compile(r"declare it: (?:frames|links): \{(.+): \{\}\}", re.DOTALL)
-
-#: What to do, in URDF's words, where a rule speaks of YAML. Advice that names a near word is kept.
-_HELP = {
-    "TF204": "join the trees with a fixed joint",
-    "TF206": 'add <link name="base_link"/>',
-    "TF209": "remove it, or give it a joint",
-    "TF401": 'an optical frame has <origin rpy="-1.5707963267948966 0 -1.5707963267948966"/> in its camera\'s frame',
-    "TF704": '<limit lower="-1.57" upper="1.57" effort="10" velocity="1"/>; without an end it is continuous',
-    "TF709": 'add <inertial> with <mass value="…"/> and <inertia …/>',
-    "TF710": "take the tensor from CAD: in kg m², about the centre of mass",
-    "TF711": "give it in kg m², about the centre of mass",
-    "TF713": "another name for one of them",
-}
 
 
 def lint_urdf(file: str, packages: Packages, disk: Disk) -> list[Finding]:
@@ -62,8 +45,8 @@ class Document:
     def findings(self) -> list[Finding]:
         """Return what is wrong with it, by place, but for what its comments allow."""
         allows = allows_in_xml(self.text, self.name)
-        ruled = (_in_words_of_urdf(one) for one in check(with_hardware(self.robot), _RULES))
-        kept, used = apply(dict.fromkeys([*self.found, *ruled]), allows)
+        found = dict.fromkeys([*self.found, *check(with_hardware(self.robot), _RULES)])
+        kept, used = apply(found, allows)
         return sorted([*kept, *unused_allows(allows, used)], key=lambda one: one.sort_key)
 
 
@@ -87,12 +70,3 @@ def read_urdf(file: str, packages: Packages, disk: Disk, arguments: Mapping[str,
         message = f"{file} defines macros, and no links: {', '.join(macros)}"
         raise RejectedError([finding("TF206", message, Span(file), help=advice)])
     return Document(name, text, root, robot, found)
-
-
-def _in_words_of_urdf(found: Finding) -> Finding:
-    """Return the finding with its advice in URDF's words."""
-    if found.help.startswith("did you mean"):
-        return found
-    declared = _DECLARE.fullmatch(found.help)
-    advice = f'add <link name="{declared[1]}"/>' if declared else _HELP.get(found.code, found.help)
-    return replace(found, help=advice)

@@ -19,6 +19,7 @@ from hypothesis import HealthCheck, settings
 
 from tests.domains import reserved_domain
 from tests.support import processes
+from tests.support.skips import unexpected
 from tests.waiting import TIMEOUT_S, until
 from tfcompose.geometry import Pose
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
@@ -47,11 +48,32 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("filterwarnings", "ignore:private variables, such as:DeprecationWarning")
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--fail-on-skips", action="store_true", help="fail where a test is skipped that need not be")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    reporter: Any = session.config.pluginmanager.get_plugin("terminalreporter")
+    if reporter and session.config.getoption("fail_on_skips"):
+        for skip in unexpected(reporter.stats.get("skipped", [])):
+            reporter.write_line(f"skipped, and may not be: {skip}", red=True)
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
 def pytest_report_header() -> str:
     return f"ROS: none, so test_*_ros.py are left out ({NO_ROS})" if NO_ROS else "ROS: found"
 
 
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """Two workers a core, since tests wait more than they work; none where single files or tests are named."""
+    if any(".py" in argument for argument in config.args):
+        return 0
+    return min(2 * len(os.sched_getaffinity(0)), 16)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: item.get_closest_marker("ros") is None)  # those that wait come first, and end with all
     with_ros = [item for item in items if item.get_closest_marker("ros")]
     if NO_ROS:
         for item in with_ros:

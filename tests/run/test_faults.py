@@ -152,6 +152,7 @@ def program(name: str, code: str, **more: Any) -> PlanProcess:
     return PlanProcess(name, "run", argv=(*PYTHON, code), cwd=".", **more)
 
 
+@pytest.mark.slow
 def test_a_flood_blocks_neither_its_writer_nor_anybody_else_and_takes_little_memory_and_disk(
     launch: Callable[..., Run], tmp_path: Path
 ) -> None:
@@ -289,6 +290,7 @@ def test_leftovers_are_recognised_by_the_runs_id_and_ended_on_request_only(
     assert gone(pid)
 
 
+@pytest.mark.slow
 def test_200_processes_are_started_listed_and_stopped_and_all_are_gone(launch: Callable[..., Run]) -> None:
     run = launch(*(PlanProcess(f"p{number}", "run", argv=("sleep", "180")) for number in range(200)))
     assert until(run.is_up)
@@ -298,6 +300,7 @@ def test_200_processes_are_started_listed_and_stopped_and_all_are_gone(launch: C
     assert all(map(gone, pids))
 
 
+@pytest.mark.slow
 def test_500_stops_and_starts_leave_no_process_no_descriptor_and_no_memory(launch: Callable[..., Run]) -> None:
     run = launch(PlanProcess("a", "run", argv=("sleep", "180")), PlanProcess("b", "run", argv=("sleep", "180")))
     assert until(run.is_up)

@@ -377,6 +377,7 @@ with open_node("foreign", "/") as node:
 GUARDS = ["mode: watch", "mode: strict, fence: partition", "mode: strict, fence: remap"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("guard", GUARDS)
 def test_a_rogue_at_1_khz_is_named_once_and_costs_the_guard_little_beside_a_plain_listener(
     up: Callable[[str], Running], guard: str
@@ -406,6 +407,7 @@ def test_a_rogue_at_1_khz_is_named_once_and_costs_the_guard_little_beside_a_plai
     robot.says("over", "map → odom is no longer published by /rogue")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("guard", GUARDS)
 def test_of_more_static_publishers_than_a_listener_keeps_every_one_is_seen(
     up: Callable[[str], Running], guard: str

@@ -23,7 +23,7 @@ from tfcompose.ros.tf_codec import decode
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.ros, pytest.mark.xdist_group("one robot for all of these")]
 
 ROBOT = Path(__file__).parents[2] / "robots" / "autonomous_robot.yaml"
 #: A stranger with stock settings: node name, topic's kind, rate, seconds, edges. It sends when there is somebody who

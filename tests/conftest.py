@@ -6,28 +6,25 @@ Files named ``test_…_ros.py`` import ROS, and are left out where there is none
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
-import threading
-from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import HealthCheck, settings
 
-from tests.domains import reserved_domain
 from tests.support import processes
+from tests.support.domains import Domain, reserved_domain
+from tests.support.processes import Started
 from tests.support.skips import unexpected
-from tests.waiting import TIMEOUT_S, until
+from tests.support.waiting import TIMEOUT_S
 from tfcompose.geometry import Pose
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.plan.file import write_plan
 from tfcompose.ros.environment import missing_ros
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     from tfcompose.plan import Clock, Joint
@@ -79,7 +76,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for item in with_ros:
             item.add_marker(pytest.mark.skip(reason=NO_ROS))
     elif with_ros:  # a node of a test's that leaves slowly on a busy machine does not end all tests
-        node: Any = import_module("tfcompose.ros.node")
+        from tfcompose.ros import node  # noqa: PLC0415 (ROS, which is there)
+
         node.LEAVE_S = 2 * TIMEOUT_S
 
 
@@ -96,14 +94,6 @@ def _all_processes() -> Iterator[None]:
         yield
 
 
-@dataclass(frozen=True)
-class Domain:
-    """A ROS domain that nobody else on this machine uses during the test; ``environment`` is a process's."""
-
-    id: int
-    environment: Mapping[str, str]
-
-
 @pytest.fixture
 def domain(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Domain]:
     """A domain of the test's own, on the loopback interface, in this process's environment too.
@@ -118,51 +108,6 @@ def domain(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFac
         monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
         monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         yield Domain(number, dict(os.environ))
-
-
-@dataclass
-class Started:
-    """A process under test, its standard output and error read line by line."""
-
-    process: subprocess.Popen[str]
-    lines: list[str] = field(default_factory=list)
-    errors: list[str] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        pairs = ((self.process.stdout, self.lines), (self.process.stderr, self.errors))
-        self._readers = [threading.Thread(target=lines.extend, args=(stream,)) for stream, lines in pairs if stream]
-        for reader in self._readers:
-            reader.start()
-
-    @property
-    def output(self) -> str:
-        return "".join(self.lines)
-
-    def until_says(self, text: str) -> None:
-        """Wait until a line holds ``text``."""
-        until(lambda: text in self.output or self.process.poll() is not None)
-        if self.process.poll() is not None:
-            self._join()  # its last lines may not have been read yet
-        assert text in self.output, self.lines + self.errors
-
-    def end(self, number: int = signal.SIGINT) -> int:
-        """Send the signal; return the exit code."""
-        self.process.send_signal(number)
-        return self.process.wait(TIMEOUT_S)
-
-    def close(self) -> None:
-        """End the process, whatever it does, and its readers."""
-        if self.process.poll() is None:
-            self.process.kill()
-        self.process.wait(TIMEOUT_S)
-        self._join()
-        for stream in (self.process.stdout, self.process.stderr):
-            if stream:
-                stream.close()
-
-    def _join(self) -> None:
-        for reader in self._readers:
-            reader.join(TIMEOUT_S)
 
 
 @pytest.fixture
@@ -191,11 +136,6 @@ def python() -> Callable[[str], str]:
         return processes.run(command, check=True, timeout_s=TIMEOUT_S).stdout
 
     return run
-
-
-@pytest.fixture(name="until")
-def _until() -> Callable[..., bool]:
-    return until
 
 
 @pytest.fixture

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 import psutil
 import pytest
 
-from tests.rover import EXTERNAL, ROVER
 from tests.support import processes
-from tests.waiting import gone, until
-from tests.witness import Witness
+from tests.support.edge_listener import EdgeListener
+from tests.support.robots import EXTERNAL, ROVER
+from tests.support.waiting import gone, until
 from tfcompose.run.launcher.control import ANSWER_S
 
 if TYPE_CHECKING:
@@ -156,7 +156,7 @@ def test_up_on_a_running_robot_restarts_what_changed_and_says_what_listeners_kee
 ) -> None:
     assert tfc("up", "--wait").returncode == 0
     before = ps(tfc)
-    with Witness("base_link") as drive:
+    with EdgeListener("base_link") as drive:
         _change(tfc, tmp_path)
         after = ps(tfc)
         assert after["drive"]["pid"] == before["drive"]["pid"]

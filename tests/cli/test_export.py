@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from tests.emit.test_exports import DRIVEN
-from tests.run.test_hosts import TWO
+from tests.support.robots import ON_TWO_HOSTS
 from tfcompose.cli import main
 
 
@@ -16,7 +16,7 @@ from tfcompose.cli import main
 def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "robot.yaml").write_text(DRIVEN, "utf-8")
-    (tmp_path / "two.yaml").write_text(TWO, "utf-8")
+    (tmp_path / "two.yaml").write_text(ON_TWO_HOSTS, "utf-8")
     return tmp_path
 
 

@@ -12,7 +12,7 @@ import pytest
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tests.conftest import Started
+    from tests.support.processes import Started
 
 pytestmark = pytest.mark.ros
 ROOT = Path(__file__).parents[2]

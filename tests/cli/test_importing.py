@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from tests.cli.same_urdf import same
-from tests.readers.family import spec as family
+from tests.support.random_robot import spec as family
+from tests.support.same_urdf import same
 from tfcompose.cli import main
 from tfcompose.cli.commands import importing
 from tfcompose.cli.disk import disk

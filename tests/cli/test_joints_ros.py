@@ -13,7 +13,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from tests.support import processes
-from tests.waiting import until
+from tests.support.waiting import until
 from tfcompose.ros.node import JOINT_STATES, LATCHED, Subscription, open_node
 from tfcompose.tf2 import Buffer, TransformListener
 

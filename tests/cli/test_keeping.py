@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from tests.planned import compiled_plan
-from tests.rover import ROVER
+from tests.support.plans import compiled_plan
+from tests.support.robots import ROVER
 from tfcompose.cli.keeping import kept
 from tfcompose.run.place import Place, place_of
 

@@ -18,7 +18,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.waiting import TIMEOUT_S, until
+from tests.support.waiting import TIMEOUT_S, until
 from tfcompose.cli.console import Console
 from tfcompose.cli.printable import coloured_only, plain
 from tfcompose.cli.status import Status

@@ -13,14 +13,14 @@ import pytest
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
-from tests.waiting import until
+from tests.support.waiting import until
 from tfcompose.ros.graph import UNKNOWN_NODE, writers
 from tfcompose.ros.node import LATCHED, Subscription, open_node
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tests.conftest import Started
+    from tests.support.processes import Started
 
 pytestmark = pytest.mark.ros
 

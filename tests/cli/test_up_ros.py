@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import psutil
 import pytest
 
-from tests.rover import EXTERNAL, ROVER
 from tests.support import processes
-from tests.waiting import TIMEOUT_S, gone, until
+from tests.support.robots import EXTERNAL, ROVER
+from tests.support.waiting import TIMEOUT_S, gone, until
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

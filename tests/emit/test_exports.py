@@ -15,8 +15,8 @@ from xml.etree import ElementTree as ET
 import pytest
 import yaml
 
-from tests.planned import built, compiled_plan
 from tests.support import processes
+from tests.support.plans import built, compiled_plan
 from tfcompose.emit.compose import compose
 from tfcompose.emit.launch import launch
 from tfcompose.emit.supervised import Machine

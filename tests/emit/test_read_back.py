@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.emit.test_xacro import EVERYTHING
-from tests.readers.family import spec
+from tests.support.random_robot import spec
 from tfcompose.cli import main
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot

@@ -12,7 +12,7 @@ import pytest
 import xacro
 from scipy.spatial.transform import Rotation
 
-from tests.readers.family import spec
+from tests.support.random_robot import spec
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit

@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.golden.mutations import mutated
 from tests.support.bad_input import BAD
+from tests.support.mutations import mutated
 from tfcompose.check import unused_allows
 from tfcompose.cli.disk import disk
 from tfcompose.cli.shelves import PRESETS, library

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -14,10 +13,12 @@ if TYPE_CHECKING:
 
 
 @pytest.fixture
-def stage(domain: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    """A stage for real nodes, in the test's domain; they announce themselves as tfcompose's own do."""
+def nodes(domain: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    """Real nodes that do what a test wants, in the test's domain; they announce themselves as tfcompose's own do."""
     assert domain.id
     monkeypatch.setenv("FASTRTPS_DEFAULT_PROFILES_FILE", str(FASTDDS_PROFILE))
-    stage = import_module("tests.observe.stage").Stage()  # ROS, which may not be there
-    yield stage
-    stage.close()
+    from tests.support.fake_nodes import FakeNodes  # noqa: PLC0415 (ROS, which may not be there)
+
+    nodes = FakeNodes()
+    yield nodes
+    nodes.close()

@@ -10,36 +10,15 @@ import pytest
 from rosbags.rosbag2 import CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from tests.observe.bags import START_S, STORE, write_bag
 from tests.support import processes
+from tests.support.bags import START_S, STORE, UP, drive, tfcompose_without_ros, write_bag
 from tfcompose.cli import main
 
 if TYPE_CHECKING:
     import subprocess
     from pathlib import Path
 
-    from tests.observe.bags import Sent
-
-UP = (0.0, 0.0, 0.0, 1.0)
-
-
-def tfcompose(*words: str, code: int = 0) -> subprocess.CompletedProcess[str]:
-    """Run the command line where rclpy cannot be imported."""
-    program = "import sys; sys.modules['rclpy'] = None; from tfcompose.cli import main; sys.exit(main())"
-    command = [sys.executable, "-c", program, *words]
-    done = processes.run(command)
-    assert "Traceback" not in done.stderr, done.stderr
-    assert done.returncode == code, done.stdout + done.stderr
-    return done
-
-
-def drive(seconds: float = 4.0, rate: float = 50.0, topic: str = "/tf", late_s: float = 0.004) -> list[Sent]:
-    """A base that moves along x at 1 m/s, and comes a little late."""
-    count = round(seconds * rate)
-    return [
-        (topic, at / rate + late_s, "odom", "base_link", at / rate, (at / rate, 0.0, 0.0), UP) for at in range(count)
-    ]
-
+    from tests.support.bags import Sent
 
 FIXED: list[Sent] = [("/tf_static", 0.0, "base_link", "laser_link", 0.0, (0.0, 0.0, 0.3), UP)]
 
@@ -51,7 +30,7 @@ def edges(done: subprocess.CompletedProcess[str]) -> dict[str, Any]:
 @pytest.mark.parametrize("mcap", [True, False], ids=["mcap", "sqlite"])
 def test_monitor_tells_rates_and_delays_of_a_bag(tmp_path: Path, *, mcap: bool) -> None:
     bag = write_bag(tmp_path / "bag", [*FIXED, *drive()], mcap=mcap)
-    seen = edges(tfcompose("monitor", "--bag", str(bag), "--format", "json"))
+    seen = edges(tfcompose_without_ros("monitor", "--bag", str(bag), "--format", "json"))
     base, laser = seen["base_link"], seen["laser_link"]
     assert (base["kind"], base["count"], base["publisher"]) == ("dynamic", 200, None)
     assert base["rate"] == pytest.approx(50, rel=1e-3)
@@ -66,12 +45,15 @@ def test_a_single_file_and_a_folder_without_metadata_are_read_too(tmp_path: Path
     (bag / "metadata.yaml").unlink()
     [file] = bag.iterdir()
     for path in (bag, file):
-        assert set(edges(tfcompose("monitor", "--bag", str(path), "--format", "json"))) == {"base_link", "laser_link"}
+        assert set(edges(tfcompose_without_ros("monitor", "--bag", str(path), "--format", "json"))) == {
+            "base_link",
+            "laser_link",
+        }
 
 
 def test_the_table_has_a_line_for_each_edge(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / "bag", [*FIXED, *drive()])
-    lines = tfcompose("monitor", "--bag", str(bag)).stdout.splitlines()
+    lines = tfcompose_without_ros("monitor", "--bag", str(bag)).stdout.splitlines()
     assert lines[0] == "2 edges, 201 messages in 4.0 s, delays are from stamp to recording"
     assert lines[1].split() == ["edge", "publisher", "kind", "rate", "jitter", "gap", "age", "delay"]
     assert lines[3].split() == ["base_link", "→", "laser_link", "–", "static"]
@@ -81,11 +63,11 @@ def test_the_table_has_a_line_for_each_edge(tmp_path: Path) -> None:
 def test_the_table_says_how_many_were_refused(tmp_path: Path) -> None:
     nan = (float("nan"), 0.0, 0.0)
     some = [(*sent[:5], nan if index % 10 == 0 else sent[5], UP) for index, sent in enumerate(drive())]
-    lines = tfcompose("monitor", "--bag", str(write_bag(tmp_path / "bag", some))).stdout.splitlines()
+    lines = tfcompose_without_ros("monitor", "--bag", str(write_bag(tmp_path / "bag", some))).stdout.splitlines()
     assert lines[2].endswith("  20 of 200 refused: a value is not a finite number")
     bag = write_bag(tmp_path / "all", [(*sent[:5], nan, UP) for sent in drive()])
     assert (
-        tfcompose("monitor", "--bag", str(bag))
+        tfcompose_without_ros("monitor", "--bag", str(bag))
         .stdout.splitlines()[2]
         .endswith("  refused: a value is not a finite number")
     )
@@ -93,8 +75,8 @@ def test_the_table_says_how_many_were_refused(tmp_path: Path) -> None:
 
 def test_a_namespace_is_looked_at_alone_and_where_tf_is_instead_is_said(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / "bag", drive(topic="/robot1/tf"))
-    assert edges(tfcompose("monitor", "--bag", str(bag), "--namespace", "robot1", "--format", "json"))
-    errors = tfcompose("monitor", "--bag", str(bag), code=2).stderr
+    assert edges(tfcompose_without_ros("monitor", "--bag", str(bag), "--namespace", "robot1", "--format", "json"))
+    errors = tfcompose_without_ros("monitor", "--bag", str(bag), code=2).stderr
     assert "has neither /tf nor /tf_static" in errors
     assert "TF is on /robot1/tf: --namespace /robot1" in errors
 
@@ -121,7 +103,7 @@ def test_what_is_no_bag_is_said_in_one_sentence(tmp_path: Path) -> None:
         ("cut.mcap", "help: mcap recover"),
         ("whole.zstd", "compressed as a whole"),
     ]:
-        done = tfcompose("monitor", "--bag", str(tmp_path / name), code=2)
+        done = tfcompose_without_ros("monitor", "--bag", str(tmp_path / name), code=2)
         assert "error[TF907]" in done.stderr
         assert why in done.stderr
         assert done.stdout == ""
@@ -139,7 +121,7 @@ def test_without_the_library_it_says_what_to_install(monkeypatch: pytest.MonkeyP
 
 def poses(*words: str) -> list[Any]:
     """Return x in metres and the time in seconds of the recording of what is echoed."""
-    rows = [json.loads(line) for line in tfcompose("echo", *words, "--format", "json").stdout.splitlines()]
+    rows = [json.loads(line) for line in tfcompose_without_ros("echo", *words, "--format", "json").stdout.splitlines()]
     return [(row["xyz"][0], row["stamp_ns"] and row["stamp_ns"] / 1e9 - START_S) for row in rows]
 
 
@@ -168,10 +150,10 @@ def test_where_echo_finds_no_pose_in_a_bag_it_says_why(tmp_path: Path) -> None:
         (("odom", "base_link", "--at", f"{START_S - 1}"), "its oldest sample is 1000 ms"),
         (("odom", "base_link", "--at", f"{START_S + 31}"), "its newest sample is 1020 ms"),
     ]:
-        errors = tfcompose("echo", *words, "--bag", bag, code=1).stderr
+        errors = tfcompose_without_ros("echo", *words, "--bag", bag, code=1).stderr
         assert "error[TF814]" in errors
         assert why in errors
-    assert "there is no bag" in tfcompose("echo", "a", "b", "--bag", "none", code=2).stderr
+    assert "there is no bag" in tfcompose_without_ros("echo", "a", "b", "--bag", "none", code=2).stderr
 
 
 @pytest.mark.parametrize(
@@ -186,7 +168,7 @@ def test_where_echo_finds_no_pose_in_a_bag_it_says_why(tmp_path: Path) -> None:
 )
 def test_compressed_bags_are_read(tmp_path: Path, compressed: CompressionMode, *, mcap: bool) -> None:
     bag = write_bag(tmp_path / "bag", [*FIXED, *drive()], mcap=mcap, compressed=compressed)
-    seen = edges(tfcompose("monitor", "--bag", str(bag), "--format", "json"))
+    seen = edges(tfcompose_without_ros("monitor", "--bag", str(bag), "--format", "json"))
     assert (seen["base_link"]["count"], seen["laser_link"]["count"]) == (200, 1)
 
 
@@ -199,7 +181,7 @@ def test_a_bag_that_was_split_is_read_in_order_without_its_metadata_too(tmp_path
         sent = [one for one in drive(11.0) if part <= one[1] < part + 1]
         [file] = [f for f in write_bag(tmp_path / f"part_{part}", sent, mcap=mcap).iterdir() if f.suffix != ".yaml"]
         file.rename(folder / f"run_{part}{file.suffix}")
-    base = edges(tfcompose("monitor", "--bag", str(folder), "--format", "json"))["base_link"]
+    base = edges(tfcompose_without_ros("monitor", "--bag", str(folder), "--format", "json"))["base_link"]
     assert (base["count"], base["stamps_back"]) == (550, 0)
     assert base["longest_gap_s"] == pytest.approx(0.02, abs=1e-5)
     stamps = [at for _, at in poses("odom", "base_link", "--bag", str(folder))]
@@ -208,13 +190,13 @@ def test_a_bag_that_was_split_is_read_in_order_without_its_metadata_too(tmp_path
 
 def test_a_bag_without_messages_and_one_of_another_type_are_told_apart(tmp_path: Path) -> None:
     text = ("/tf", 0.0, "std_msgs/msg/String", STORE.types["std_msgs/msg/String"]("a"))
-    strange = write_bag(tmp_path / "strange", [], beside=[text])
-    errors = tfcompose("monitor", "--bag", str(strange), code=2).stderr
+    strange = write_bag(tmp_path / "strange", [], others=[text])
+    errors = tfcompose_without_ros("monitor", "--bag", str(strange), code=2).stderr
     assert f"/tf in {strange} is std_msgs/msg/String, not tf2_msgs/msg/TFMessage" in errors
     silent = tmp_path / "silent"
     with Writer(silent, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         writer.add_connection("/tf", "tf2_msgs/msg/TFMessage", typestore=STORE)
-    errors = tfcompose("monitor", "--bag", str(silent), code=1).stderr
+    errors = tfcompose_without_ros("monitor", "--bag", str(silent), code=1).stderr
     assert "error[TF811] no message was recorded on /tf and /tf_static" in errors
 
 
@@ -230,7 +212,7 @@ def test_a_bag_with_another_definition_of_the_message_is_not_misread(tmp_path: P
         connection = writer.add_connection("/tf", "tf2_msgs/msg/TFMessage", typestore=other)
         message = other.types["tf2_msgs/msg/TFMessage"]([], 7)
         writer.write(connection, 1, other.serialize_cdr(message, "tf2_msgs/msg/TFMessage"))
-    errors = tfcompose("monitor", "--bag", str(bag), code=2).stderr
+    errors = tfcompose_without_ros("monitor", "--bag", str(bag), code=2).stderr
     assert "error[TF907] /tf was recorded with another definition of tf2_msgs/msg/TFMessage than ROS 2 has" in errors
 
 
@@ -240,7 +222,7 @@ def test_messages_that_cannot_be_read_are_counted(tmp_path: Path) -> None:
         connection = writer.add_connection("/tf", "tf2_msgs/msg/TFMessage", typestore=STORE)
         for at in range(3):
             writer.write(connection, at, b"\x00\x01\x00\x00\xff\xff\xff\x7f none")
-    output = tfcompose("monitor", "--bag", str(bag)).stdout
+    output = tfcompose_without_ros("monitor", "--bag", str(bag)).stdout
     assert output.startswith("0 edges, 0 messages in 0.0 s, 3 not readable")
 
 
@@ -251,11 +233,11 @@ def test_stamps_of_a_simulation_are_compared_with_the_clock_that_was_recorded(tm
         return "/clock", at_s, "rosgraph_msgs/msg/Clock", STORE.types["rosgraph_msgs/msg/Clock"](time)
 
     sent: list[Sent] = [(topic, at, a, b, stamp - START_S, xyz, q) for topic, at, a, b, stamp, xyz, q in drive()]
-    with_clock = write_bag(tmp_path / "sim", sent, beside=[clock(at / 100) for at in range(400)])
+    with_clock = write_bag(tmp_path / "sim", sent, others=[clock(at / 100) for at in range(400)])
     without = write_bag(tmp_path / "lost", sent)
-    base = edges(tfcompose("monitor", "--bag", str(with_clock), "--format", "json"))["base_link"]
+    base = edges(tfcompose_without_ros("monitor", "--bag", str(with_clock), "--format", "json"))["base_link"]
     assert base["delay_s"] == pytest.approx(0.0, abs=0.011)
-    assert "other clock" in tfcompose("monitor", "--bag", str(without)).stdout
+    assert "other clock" in tfcompose_without_ros("monitor", "--bag", str(without)).stdout
 
 
 def test_what_ended_before_the_recording_did_is_silent(tmp_path: Path) -> None:
@@ -266,8 +248,8 @@ def test_what_ended_before_the_recording_did_is_silent(tmp_path: Path) -> None:
     )
     text = STORE.types["std_msgs/msg/String"]("a")
     chatter = [("/chatter", float(at), "std_msgs/msg/String", text) for at in range(20)]
-    bag = write_bag(tmp_path / "bag", drive(4.0), beside=chatter)
-    output = tfcompose("verify", str(robot), "--bag", str(bag), code=1).stdout
+    bag = write_bag(tmp_path / "bag", drive(4.0), others=chatter)
+    output = tfcompose_without_ros("verify", str(robot), "--bag", str(bag), code=1).stdout
     assert "error[TF804] drive (/diff_drive) fell silent: nothing on odom → base_link for 15 s" in output
 
 

@@ -21,27 +21,18 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState, LaserScan
 from std_msgs.msg import String
 
-from tests.observe.stage import at_last, doctor, doctor_finds, finds_nothing, message, said
 from tests.support import processes
-from tests.waiting import until
+from tests.support.doctor import at_last, doctor, doctor_finds, finds_nothing, said
+from tests.support.fake_nodes import message
+from tests.support.waiting import until
 from tfcompose.ros.node import LATCHED, TFPublisher, open_node, qos
 from tfcompose.ros.typesupport import tf_message_type
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from typing import Protocol
 
-    from tests.observe.stage import Stage
-
-    class Started(Protocol):
-        """A process under test, as conftest starts it."""
-
-        output: str
-        errors: list[str]
-
-        def until_says(self, text: str) -> None: ...
-        def end(self, number: int = ...) -> int: ...
-        def close(self) -> None: ...
+    from tests.support.fake_nodes import FakeNodes
+    from tests.support.processes import Started
 
 
 pytestmark = pytest.mark.ros
@@ -57,11 +48,11 @@ ARM = """<robot name="arm"><link name="base_link"/><link name="upper_arm"/><link
 <joint name="wrist" type="fixed"><parent link="upper_arm"/><child link="hand"/></joint></robot>"""
 
 
-def sound(stage: Stage) -> Any:
+def sound(nodes: FakeNodes) -> Any:
     """A robot with nothing wrong."""
-    node = stage.node("drive")
-    stage.moving(node, "odom base_link")
-    stage.fixed(node, "base_link laser")
+    node = nodes.node("drive")
+    nodes.moving(node, "odom base_link")
+    nodes.fixed(node, "base_link laser")
     return node
 
 
@@ -75,141 +66,141 @@ def scan(frame: str, late_s: float = 0.0) -> Callable[[int], LaserScan]:
     return make
 
 
-def two_trees(stage: Stage) -> None:
-    sound(stage)
-    stage.fixed(stage.node("cam"), "base_lnk camera")
+def two_trees(nodes: FakeNodes) -> None:
+    sound(nodes)
+    nodes.fixed(nodes.node("cam"), "base_lnk camera")
 
 
-def future_stamps(stage: Stage) -> None:
+def future_stamps(nodes: FakeNodes) -> None:
     """The scan is stamped as it is measured, and odometry a second late."""
-    node = stage.node("drive")
-    stage.moving(node, "odom base_link", stamp=lambda now: now - SECOND_NS)
-    stage.fixed(node, "base_link laser")
-    stage.typed(stage.node("lidar"), LaserScan, "/scan", scan("laser"))
+    node = nodes.node("drive")
+    nodes.moving(node, "odom base_link", stamp=lambda now: now - SECOND_NS)
+    nodes.fixed(node, "base_link laser")
+    nodes.typed(nodes.node("lidar"), LaserScan, "/scan", scan("laser"))
 
 
-def past_stamps(stage: Stage) -> None:
-    sound(stage)
-    stage.typed(stage.node("lidar"), LaserScan, "/scan", scan("laser", 12.0))
+def past_stamps(nodes: FakeNodes) -> None:
+    sound(nodes)
+    nodes.typed(nodes.node("lidar"), LaserScan, "/scan", scan("laser", 12.0))
 
 
-def late(stage: Stage) -> None:
-    stage.moving(stage.node("drive"), "odom base_link", stamp=lambda now: now - 2 * SECOND_NS)
+def late(nodes: FakeNodes) -> None:
+    nodes.moving(nodes.node("drive"), "odom base_link", stamp=lambda now: now - 2 * SECOND_NS)
 
 
-def loop(stage: Stage) -> None:
-    sound(stage)
-    stage.moving(stage.node("wrong"), "base_link odom")
+def loop(nodes: FakeNodes) -> None:
+    sound(nodes)
+    nodes.moving(nodes.node("wrong"), "base_link odom")
 
 
-def two_writers(stage: Stage) -> None:
-    sound(stage)
-    stage.moving(stage.node("ekf"), "odom base_link")
+def two_writers(nodes: FakeNodes) -> None:
+    sound(nodes)
+    nodes.moving(nodes.node("ekf"), "odom base_link")
 
 
-def second_parent(stage: Stage) -> None:
-    sound(stage)
-    stage.moving(stage.node("slam"), "map base_link")
+def second_parent(nodes: FakeNodes) -> None:
+    sound(nodes)
+    nodes.moving(nodes.node("slam"), "map base_link")
 
 
-def low_rate(stage: Stage) -> None:
-    node = stage.node("drive")
-    stage.moving(node, "odom base_link", hz=4)
-    stage.fixed(node, "base_link laser")
+def low_rate(nodes: FakeNodes) -> None:
+    node = nodes.node("drive")
+    nodes.moving(node, "odom base_link", hz=4)
+    nodes.fixed(node, "base_link laser")
 
 
-def slashed(stage: Stage) -> None:
-    sound(stage)
-    stage.moving(stage.node("old"), "/odom /gps")
+def slashed(nodes: FakeNodes) -> None:
+    sound(nodes)
+    nodes.moving(nodes.node("old"), "/odom /gps")
 
 
-def repeated(stage: Stage) -> None:
+def repeated(nodes: FakeNodes) -> None:
     began = time.time_ns()
-    node = stage.node("drive")
-    stage.moving(node, "odom base_link", stamp=lambda _: began)
+    node = nodes.node("drive")
+    nodes.moving(node, "odom base_link", stamp=lambda _: began)
 
 
-def back(stage: Stage) -> None:
+def back(nodes: FakeNodes) -> None:
     turns = iter(range(1_000_000))
-    stage.moving(stage.node("drive"), "odom base_link", stamp=lambda now: now - next(turns) % 2 * SECOND_NS // 4)
+    nodes.moving(nodes.node("drive"), "odom base_link", stamp=lambda now: now - next(turns) % 2 * SECOND_NS // 4)
 
 
-def without_stamp(stage: Stage) -> None:
-    stage.moving(stage.node("drive"), "odom base_link", stamp=lambda _: 0)
+def without_stamp(nodes: FakeNodes) -> None:
+    nodes.moving(nodes.node("drive"), "odom base_link", stamp=lambda _: 0)
 
 
-def other_clock(stage: Stage) -> None:
+def other_clock(nodes: FakeNodes) -> None:
     """One node stamps with simulated time, the other with the system's."""
-    sound(stage)
+    sound(nodes)
     began = time.time_ns()
-    stage.moving(stage.node("gazebo"), "base_link wheel", stamp=lambda now: now - began)
+    nodes.moving(nodes.node("gazebo"), "base_link wheel", stamp=lambda now: now - began)
 
 
-def ahead(stage: Stage) -> None:
-    stage.moving(stage.node("amcl"), "map odom", stamp=lambda now: now + 3 * SECOND_NS)
+def ahead(nodes: FakeNodes) -> None:
+    nodes.moving(nodes.node("amcl"), "map odom", stamp=lambda now: now + 3 * SECOND_NS)
 
 
-def volatile(stage: Stage) -> None:
-    sound(stage)
-    stage.odd(stage.node("cam"), "base_link camera", topic="/tf_static", profile=qos(1, VOLATILE, RELIABLE))
+def volatile(nodes: FakeNodes) -> None:
+    sound(nodes)
+    nodes.odd(nodes.node("cam"), "base_link camera", topic="/tf_static", profile=qos(1, VOLATILE, RELIABLE))
 
 
-def best_effort(stage: Stage) -> None:
-    stage.fixed(stage.node("static"), "base_link laser")
-    stage.odd(stage.node("drive"), "odom base_link", topic="/tf", profile=qos(10, VOLATILE, BEST_EFFORT))
+def best_effort(nodes: FakeNodes) -> None:
+    nodes.fixed(nodes.node("static"), "base_link laser")
+    nodes.odd(nodes.node("drive"), "odom base_link", topic="/tf", profile=qos(10, VOLATILE, BEST_EFFORT))
 
 
-def volatile_listener(stage: Stage) -> None:
-    sound(stage)
-    stage.keep(stage.node("viewer").create_subscription(tf_message_type(), "/tf_static", lambda _: None, 10, raw=True))
+def volatile_listener(nodes: FakeNodes) -> None:
+    sound(nodes)
+    nodes.keep(nodes.node("viewer").create_subscription(tf_message_type(), "/tf_static", lambda _: None, 10, raw=True))
 
 
-def wrong_type(stage: Stage) -> None:
-    sound(stage)
-    stage.typed(stage.node("old"), String, "/tf", lambda _: String(data="a b"))
+def wrong_type(nodes: FakeNodes) -> None:
+    sound(nodes)
+    nodes.typed(nodes.node("old"), String, "/tf", lambda _: String(data="a b"))
 
 
-def unreadable(stage: Stage) -> None:
-    sound(stage)
-    publisher = stage.keep(TFPublisher(stage.node("bridge"), static=False))
-    stage.every(10, lambda _: publisher.publish(b"\x00\x01\x00\x00\xff\xff\xff\x7f no transforms"))
+def unreadable(nodes: FakeNodes) -> None:
+    sound(nodes)
+    publisher = nodes.keep(TFPublisher(nodes.node("bridge"), static=False))
+    nodes.every(10, lambda _: publisher.publish(b"\x00\x01\x00\x00\xff\xff\xff\x7f no transforms"))
 
 
-def both_topics(stage: Stage) -> None:
-    sound(stage)
-    stage.fixed(stage.node("old"), "odom base_link")
+def both_topics(nodes: FakeNodes) -> None:
+    sound(nodes)
+    nodes.fixed(nodes.node("old"), "odom base_link")
 
 
-def leak(stage: Stage) -> None:
-    stage.moving(stage.node("drive", "robot1"), "odom base_link", topic="/robot1/tf")
-    stage.moving(stage.node("ekf", "robot1"), "map odom")
+def leak(nodes: FakeNodes) -> None:
+    nodes.moving(nodes.node("drive", "robot1"), "odom base_link", topic="/robot1/tf")
+    nodes.moving(nodes.node("ekf", "robot1"), "map odom")
 
 
-def refused(stage: Stage) -> None:
-    sound(stage)
-    stage.moving(stage.node("arm"), "base_link arm", quat=(0.0, 0.0, 0.0, 0.9))
+def refused(nodes: FakeNodes) -> None:
+    sound(nodes)
+    nodes.moving(nodes.node("arm"), "base_link arm", quat=(0.0, 0.0, 0.0, 0.9))
 
 
-def in_itself(stage: Stage) -> None:
-    sound(stage)
-    stage.moving(stage.node("arm"), "base_link base_link")
+def in_itself(nodes: FakeNodes) -> None:
+    sound(nodes)
+    nodes.moving(nodes.node("arm"), "base_link base_link")
 
 
-def no_clock(stage: Stage) -> None:
-    sound(stage)
-    node = stage.node("nav")
-    stage.keep(node.create_subscription(Clock, "/clock", lambda _: None, 1))
+def no_clock(nodes: FakeNodes) -> None:
+    sound(nodes)
+    node = nodes.node("nav")
+    nodes.keep(node.create_subscription(Clock, "/clock", lambda _: None, 1))
 
 
-def clock_stands(stage: Stage) -> None:
-    no_clock(stage)
-    stage.typed(stage.node("sim"), Clock, "/clock", lambda _: Clock())
+def clock_stands(nodes: FakeNodes) -> None:
+    no_clock(nodes)
+    nodes.typed(nodes.node("sim"), Clock, "/clock", lambda _: Clock())
 
 
-def clocks(stage: Stage) -> None:
-    sound(stage)
+def clocks(nodes: FakeNodes) -> None:
+    sound(nodes)
     for name in ("sim", "bag"):
-        stage.typed(stage.node(name), Clock, "/clock", clock)
+        nodes.typed(nodes.node(name), Clock, "/clock", clock)
 
 
 def clock(now: int) -> Clock:
@@ -218,57 +209,57 @@ def clock(now: int) -> Clock:
     return made
 
 
-def unknown_frame(stage: Stage) -> None:
-    sound(stage)
-    stage.typed(stage.node("lidar"), LaserScan, "/scan", scan("lasr"))
+def unknown_frame(nodes: FakeNodes) -> None:
+    sound(nodes)
+    nodes.typed(nodes.node("lidar"), LaserScan, "/scan", scan("lasr"))
 
 
-def slash(stage: Stage) -> None:
-    sound(stage)
-    stage.typed(stage.node("lidar"), LaserScan, "/scan", scan("/laser"))
+def slash(nodes: FakeNodes) -> None:
+    sound(nodes)
+    nodes.typed(nodes.node("lidar"), LaserScan, "/scan", scan("/laser"))
 
 
-def states_unheard(stage: Stage) -> None:
-    sound(stage)
-    stage.typed(
-        stage.node("broadcaster"), JointState, "/joint_states", lambda _: JointState(name=["a"], position=[0.0])
+def states_unheard(nodes: FakeNodes) -> None:
+    sound(nodes)
+    nodes.typed(
+        nodes.node("broadcaster"), JointState, "/joint_states", lambda _: JointState(name=["a"], position=[0.0])
     )
 
 
-def publisher_of_states(stage: Stage) -> Any:
+def publisher_of_states(nodes: FakeNodes) -> Any:
     """A robot state publisher, as it is seen from outside."""
-    node = sound(stage)
-    stage.keep(node.create_publisher(String, "/robot_description", LATCHED)).publish(String(data=ARM))
-    stage.keep(node.create_subscription(JointState, "/joint_states", lambda _: None, 1))
+    node = sound(nodes)
+    nodes.keep(node.create_publisher(String, "/robot_description", LATCHED)).publish(String(data=ARM))
+    nodes.keep(node.create_subscription(JointState, "/joint_states", lambda _: None, 1))
     return node
 
 
-def misspelt_joint(stage: Stage) -> None:
-    publisher_of_states(stage)
-    stage.typed(
-        stage.node("broadcaster"), JointState, "/joint_states", lambda _: JointState(name=["sholder"], position=[0.0])
+def misspelt_joint(nodes: FakeNodes) -> None:
+    publisher_of_states(nodes)
+    nodes.typed(
+        nodes.node("broadcaster"), JointState, "/joint_states", lambda _: JointState(name=["sholder"], position=[0.0])
     )
 
 
-def many_static(stage: Stage) -> None:
-    node = stage.node("many")
+def many_static(nodes: FakeNodes) -> None:
+    node = nodes.node("many")
     for number in range(101):
-        stage.fixed(node, f"base_link part_{number}")
+        nodes.fixed(node, f"base_link part_{number}")
 
 
-def gaps(stage: Stage) -> None:
-    node = stage.node("drive")
-    publisher = stage.keep(TFPublisher(node, static=False))
+def gaps(nodes: FakeNodes) -> None:
+    node = nodes.node("drive")
+    publisher = nodes.keep(TFPublisher(node, static=False))
     ticks = iter(range(1_000_000))
 
     def tick(now: int) -> None:
         if next(ticks) % 100 < 50:
             publisher.publish(message(now, ("odom base_link",)))
 
-    stage.every(40, tick)
+    nodes.every(40, tick)
 
 
-SCENES: dict[Callable[[Stage], Any], tuple[str, list[str]]] = {
+SCENES: dict[Callable[[FakeNodes], Any], tuple[str, list[str]]] = {
     two_trees: ("TF830", ["base_lnk", "camera", "/cam", "base_link?"]),
     future_stamps: ("TF841", ["/scan from /lidar is stamped", "odom → base_link from /drive", "into the future"]),
     past_stamps: ("TF841", ["/scan from /lidar is stamped 12 s before odom → base_link", "into the past"]),
@@ -310,8 +301,10 @@ LATE = {"TF805", "TF833", "TF838", "TF839"}
 
 
 @pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.__name__)
-def test_what_is_wrong_is_found_with_the_node_and_the_numbers(stage: Stage, scene: Callable[[Stage], Any]) -> None:
-    scene(stage)
+def test_what_is_wrong_is_found_with_the_node_and_the_numbers(
+    nodes: FakeNodes, scene: Callable[[FakeNodes], Any]
+) -> None:
+    scene(nodes)
     expected, words = SCENES[scene]
     others = {*LATE, *ALSO.get(scene, set())}
     found = doctor_finds(expected, words, others)
@@ -322,16 +315,16 @@ def test_what_is_wrong_is_found_with_the_node_and_the_numbers(stage: Stage, scen
 
 
 #: What else is found there, since it follows.
-ALSO: dict[Callable[[Stage], Any], set[str]] = {
+ALSO: dict[Callable[[FakeNodes], Any], set[str]] = {
     clocks: {"TF825"},
     two_writers: {"TF824"},
 }
 
 
-def test_a_sound_robot_gives_no_finding_and_exit_code_0(stage: Stage) -> None:
-    sound(stage)
-    stage.typed(stage.node("lidar"), LaserScan, "/scan", scan("laser", 0.05))
-    stage.typed(stage.node("wheels"), Odometry, "/odometry", odometry)
+def test_a_sound_robot_gives_no_finding_and_exit_code_0(nodes: FakeNodes) -> None:
+    sound(nodes)
+    nodes.typed(nodes.node("lidar"), LaserScan, "/scan", scan("laser", 0.05))
+    nodes.typed(nodes.node("wheels"), Odometry, "/odometry", odometry)
     assert finds_nothing()
 
 
@@ -358,8 +351,8 @@ def missed(name: str, *, static: bool, seconds: float) -> str:
     return said(json.loads(output), "TF804")
 
 
-def test_one_that_leaves_is_missed(stage: Stage) -> None:
-    sound(stage)
+def test_one_that_leaves_is_missed(nodes: FakeNodes) -> None:
+    sound(nodes)
 
     def is_missed(seconds: float) -> None:
         text = missed("arm", static=False, seconds=seconds)
@@ -369,8 +362,8 @@ def test_one_that_leaves_is_missed(stage: Stage) -> None:
     at_last(is_missed)
 
 
-def test_fixed_frames_whose_publisher_leaves_are_missed(stage: Stage) -> None:
-    sound(stage)
+def test_fixed_frames_whose_publisher_leaves_are_missed(nodes: FakeNodes) -> None:
+    sound(nodes)
 
     def is_missed(seconds: float) -> None:
         text = missed("camera", static=True, seconds=seconds)
@@ -379,7 +372,7 @@ def test_fixed_frames_whose_publisher_leaves_are_missed(stage: Stage) -> None:
     at_last(is_missed)
 
 
-@pytest.mark.usefixtures("stage")
+@pytest.mark.usefixtures("nodes")
 def test_where_nothing_runs_it_says_with_which_settings_it_looked(domain: Any) -> None:
     code, found = doctor(seconds=1.0)
     text = said(found, "TF845")
@@ -388,10 +381,10 @@ def test_where_nothing_runs_it_says_with_which_settings_it_looked(domain: Any) -
     assert f"ROS_DOMAIN_ID={domain.id}, ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST" in text
 
 
-def test_a_robot_below_a_namespace_is_pointed_at_and_then_looked_at(stage: Stage) -> None:
-    node = stage.node("drive", "robot1")
-    stage.moving(node, "odom base_link", topic="/robot1/tf")
-    stage.fixed(node, "base_link laser", topic="/robot1/tf_static")
+def test_a_robot_below_a_namespace_is_pointed_at_and_then_looked_at(nodes: FakeNodes) -> None:
+    node = nodes.node("drive", "robot1")
+    nodes.moving(node, "odom base_link", topic="/robot1/tf")
+    nodes.fixed(node, "base_link laser", topic="/robot1/tf_static")
     words = "tfcompose doctor --namespace /robot1"
 
     def is_pointed_at(seconds: float) -> None:
@@ -429,8 +422,8 @@ def test_a_robot_in_another_domain_is_seen_by_its_process(domain: Any) -> None:
     at_last(is_seen)  # what others run here at the same time may have been started later, and is named first
 
 
-def test_discovery_that_is_switched_off_is_named(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    sound(stage)
+def test_discovery_that_is_switched_off_is_named(nodes: FakeNodes, monkeypatch: pytest.MonkeyPatch) -> None:
+    sound(nodes)
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
     _, found = doctor(seconds=1.0)
     assert "ROS_AUTOMATIC_DISCOVERY_RANGE=OFF" in said(found, "TF909")
@@ -463,7 +456,7 @@ with open_node("far", "") as node:
 
 
 @pytest.mark.skipif(not GCC, reason="the clock of a process is set by a library that gcc makes")
-@pytest.mark.usefixtures("stage")
+@pytest.mark.usefixtures("nodes")
 def test_the_clock_of_another_machine_is_named_with_how_far_it_is_off(tmp_path: Path) -> None:
     (tmp_path / "shim.c").write_text(SHIM, encoding="utf-8")
     library = str(tmp_path / "shim.so")
@@ -483,14 +476,14 @@ def test_the_clock_of_another_machine_is_named_with_how_far_it_is_off(tmp_path: 
 
 
 def test_a_robot_that_runs_as_planned_gives_no_finding_and_one_beside_its_plan_is_told_what_differs(
-    start: Callable[..., Started], stage: Stage
+    start: Callable[..., Started], nodes: FakeNodes
 ) -> None:
     """The example's stand-ins; without the profile the plan expects a camera's driver."""
     up = start("tfcompose", "up", ROBOT, "--profile", "demo")
     up.until_says("all ready")
     assert finds_nothing(ROBOT, "--profile", "demo")
     assert finds_nothing()
-    stage.fixed(stage.node("rogue"), "base_link laser_link", x=0.1)
+    nodes.fixed(nodes.node("rogue"), "base_link laser_link", x=0.1)
 
     def is_told(seconds: float) -> None:
         text = said(doctor(ROBOT, seconds=seconds)[1], "TF801")
@@ -501,8 +494,8 @@ def test_a_robot_that_runs_as_planned_gives_no_finding_and_one_beside_its_plan_i
     up.end()
 
 
-def test_ctrl_c_ends_the_look_and_says_what_was_found(stage: Stage, start: Callable[..., Started]) -> None:
-    stage.moving(node := stage.node("drive"), "odom base_link", stamp=lambda _: 0)
+def test_ctrl_c_ends_the_look_and_says_what_was_found(nodes: FakeNodes, start: Callable[..., Started]) -> None:
+    nodes.moving(node := nodes.node("drive"), "odom base_link", stamp=lambda _: 0)
 
     def is_said(seconds: float) -> None:
         process = start("tfcompose", "doctor", "--for", "600")
@@ -520,12 +513,12 @@ def test_ctrl_c_ends_the_look_and_says_what_was_found(stage: Stage, start: Calla
     "words", [["monitor"], ["echo", "b", "c"], ["verify"], ["tree", "--live"], ["graph", "--live"]]
 )
 def test_ctrl_c_before_anything_came_is_no_finding(
-    stage: Stage, start: Callable[..., Started], tmp_path: Path, words: list[str]
+    nodes: FakeNodes, start: Callable[..., Started], tmp_path: Path, words: list[str]
 ) -> None:
     robot = tmp_path / "robot.yaml"
     robot.write_text("{tfcompose: 1, robot: a, frames: {b: {}, c: {parent: b}}}")
     more = {"verify": [robot, "--for", "600"], "graph": ["-o", tmp_path / "tree.svg", "--for", "600"]}
-    node = stage.node("waits")
+    node = nodes.node("waits")
 
     def is_none(_: float) -> None:
         assert until(lambda: not node.count_subscribers("/tf"))
@@ -554,9 +547,9 @@ def test_a_node_that_asks_a_discovery_server_is_named(domain: Any) -> None:
     assert "ROS_DISCOVERY_SERVER=127.0.0.1:11811, and here ROS_DISCOVERY_SERVER is unset" in said(found, "TF908")
 
 
-def test_where_other_robots_are_beside_is_said(stage: Stage) -> None:
-    sound(stage)
-    stage.moving(stage.node("drive", "robot2"), "odom base_link", topic="/robot2/tf")
+def test_where_other_robots_are_beside_is_said(nodes: FakeNodes) -> None:
+    sound(nodes)
+    nodes.moving(nodes.node("drive", "robot2"), "odom base_link", topic="/robot2/tf")
     command = [sys.executable, "-m", "tfcompose", "doctor", "--for"]
 
     def is_said(seconds: float) -> None:

@@ -16,7 +16,7 @@ from builtin_interfaces.msg import Time
 from rosgraph_msgs.msg import Clock
 
 from tests.support import processes
-from tests.waiting import until
+from tests.support.waiting import until
 from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.observe.asked import Asked
 from tfcompose.observe.echo import echo as run_echo
@@ -29,15 +29,9 @@ from tfcompose.ros.tf_codec import Transform, encode
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
-    from typing import Protocol
 
+    from tests.support.processes import Started
     from tfcompose.plan import PlanEdge
-
-    class Started(Protocol):
-        """A process under test, as conftest starts it."""
-
-        def until_says(self, text: str) -> None: ...
-        def end(self) -> int: ...
 
 
 pytestmark = pytest.mark.ros

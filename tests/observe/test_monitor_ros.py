@@ -6,24 +6,15 @@ import json
 import signal
 import subprocess
 import sys
-import threading
-import time
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
-from tests.observe.stage import LOOKS_S, at_last
 from tests.support import processes
-from tfcompose.ros.node import TFPublisher, open_node
-from tfcompose.ros.tf_codec import Transform, encode
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+from tests.support.doctor import LOOKS_S, at_last
+from tests.support.fake_nodes import sending
 
 pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
-
-UP = (0.0, 0.0, 0.0, 1.0)
 
 
 def monitor(*words: str, code: int = 0) -> subprocess.CompletedProcess[str]:
@@ -31,38 +22,6 @@ def monitor(*words: str, code: int = 0) -> subprocess.CompletedProcess[str]:
     done = processes.run(command)
     assert done.returncode == code, done.stdout + done.stderr
     return done
-
-
-@contextmanager
-def sending(  # noqa: PLR0913 (all but three are named)
-    name: str, parent: str, child: str, *, rate: float, late_s: float = 0.0, topic: str = "/tf", bad: bytes = b""
-) -> Iterator[Callable[[], float]]:
-    """Send an edge from a node of this name, stamped ``late_s`` ago, and from time to time the ``bad`` message.
-
-    Gives a function that returns the rate at which it was really sent so far.
-    """
-    over, sent = threading.Event(), 0
-
-    def send() -> None:
-        nonlocal sent
-        due = begun
-        while not over.wait(max(0.0, due - time.monotonic())):
-            due += 1 / rate
-            sent += 1
-            stamp_ns = time.time_ns() - int(late_s * 1e9)
-            publisher.publish(encode([Transform(stamp_ns, parent, child, (1.0, 0.0, 0.0), UP)]))
-            if bad:
-                publisher.publish(bad)
-
-    with open_node(name, "") as node:
-        publisher = TFPublisher(node, static=False, topic=topic)
-        thread, begun = threading.Thread(target=send), time.monotonic()
-        thread.start()
-        try:
-            yield lambda: sent / (time.monotonic() - begun)
-        finally:
-            over.set()
-            thread.join()
 
 
 def rows(done: subprocess.CompletedProcess[str]) -> list[dict[str, Any]]:

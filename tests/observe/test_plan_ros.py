@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.observe.stage import LOOKS_S, doctor, finds_nothing, message, said, says
 from tests.support import processes
+from tests.support.doctor import LOOKS_S, doctor, finds_nothing, said, says
+from tests.support.fake_nodes import message
 from tfcompose.geometry import OPTICAL_XYZW
 from tfcompose.ros.node import TFPublisher
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from tests.observe.stage import Stage
+    from tests.support.fake_nodes import FakeNodes
 
 pytestmark = pytest.mark.ros
 
@@ -42,8 +43,8 @@ LATE = {"TF804", "TF805", "TF833", "TF838", "TF839"}
 class Rover:
     """The robot as it is meant, part by part."""
 
-    def __init__(self, stage: Stage) -> None:
-        self.stage = stage
+    def __init__(self, nodes: FakeNodes) -> None:
+        self.nodes = nodes
 
     def all_but(self, *parts: str) -> Rover:
         for name in ("drive", "mount", "static", "driver"):
@@ -52,25 +53,25 @@ class Rover:
         return self
 
     def drive(self, hz: float = 25.0, name: str = "drive") -> None:
-        self.stage.moving(self.stage.node(name), "odom base_link", hz=hz)
+        self.nodes.moving(self.nodes.node(name), "odom base_link", hz=hz)
 
     def mount(self, x: float = 0.3) -> None:
-        self.stage.fixed(self.stage.node("mount"), "base_link mast", x=x)
+        self.nodes.fixed(self.nodes.node("mount"), "base_link mast", x=x)
 
     def static(self) -> None:
-        node, quat = self.stage.node("tfcompose_static"), (0.0, 0.0, 0.0, 1.0)
+        node, quat = self.nodes.node("tfcompose_static"), (0.0, 0.0, 0.0, 1.0)
         screw = [
             ("mast", "front_bottom_screw_frame", (-0.0106, -0.0175, -0.0125), quat),
             ("front_bottom_screw_frame", "front_link", (0.0106, 0.0175, 0.0125), quat),
         ]
-        self.stage.latched(node, *screw)
+        self.nodes.latched(node, *screw)
 
     def driver(self, x: float = 0.0) -> None:
         inside = [
             ("front_link", "front_depth_frame", (x, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),
             ("front_depth_frame", "front_depth_optical_frame", (0.0, 0.0, 0.0), OPTICAL_XYZW),
         ]
-        self.stage.latched(self.stage.node("front", "front"), *inside)
+        self.nodes.latched(self.nodes.node("front", "front"), *inside)
 
 
 def nobody_drives(rover: Rover) -> None:
@@ -91,23 +92,23 @@ def twice(rover: Rover) -> None:
 
 def second_parent(rover: Rover) -> None:
     rover.all_but()
-    rover.stage.moving(rover.stage.node("slam"), "map base_link")
+    rover.nodes.moving(rover.nodes.node("slam"), "map base_link")
 
 
 def other_parent(rover: Rover) -> None:
     rover.all_but("mount")
-    rover.stage.fixed(rover.stage.node("mount"), "odom mast", x=0.3)
+    rover.nodes.fixed(rover.nodes.node("mount"), "odom mast", x=0.3)
 
 
 def stranger(rover: Rover) -> None:
     rover.all_but()
-    rover.stage.moving(rover.stage.node("tags"), "mast tag_1", "mast tag_2")
+    rover.nodes.moving(rover.nodes.node("tags"), "mast tag_1", "mast tag_2")
 
 
 def falls_silent(rover: Rover) -> None:
     """It is heard for a second, and stays."""
     rover.all_but("drive")
-    publisher = rover.stage.keep(TFPublisher(rover.stage.node("drive"), static=False))
+    publisher = rover.nodes.keep(TFPublisher(rover.nodes.node("drive"), static=False))
     heard_since: list[float] = []
 
     def tick(now: int) -> None:
@@ -118,7 +119,7 @@ def falls_silent(rover: Rover) -> None:
         if time.monotonic() - heard_since[0] < 1.0:
             publisher.publish(message(now, ("odom base_link",)))
 
-    rover.stage.every(25.0, tick)
+    rover.nodes.every(25.0, tick)
 
 
 def slow(rover: Rover) -> None:
@@ -127,8 +128,8 @@ def slow(rover: Rover) -> None:
 
 def moving_though_fixed(rover: Rover) -> None:
     rover.all_but("mount")
-    publisher = rover.stage.keep(TFPublisher(rover.stage.node("mount"), static=False))
-    rover.stage.every(10.0, lambda now: publisher.publish(message(now, ("base_link mast",), 0.3)))
+    publisher = rover.nodes.keep(TFPublisher(rover.nodes.node("mount"), static=False))
+    rover.nodes.every(10.0, lambda now: publisher.publish(message(now, ("base_link mast",), 0.3)))
 
 
 def elsewhere(rover: Rover) -> None:
@@ -192,9 +193,9 @@ def both(
 
 @pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.__name__)
 def test_what_differs_from_the_plan_is_found_by_both_in_the_same_words(
-    stage: Stage, robot: str, scene: Callable[[Rover], Any]
+    nodes: FakeNodes, robot: str, scene: Callable[[Rover], Any]
 ) -> None:
-    scene(Rover(stage))
+    scene(Rover(nodes))
     code, words = SCENES[scene]
     others = {*LATE, *ALSO.get(scene, set())}
     by_doctor, by_verify = both(robot, code, words, others)
@@ -215,7 +216,7 @@ ALSO: dict[Callable[[Rover], Any], set[str]] = {
 }
 
 
-def test_a_robot_as_planned_has_no_findings(stage: Stage, robot: str) -> None:
-    Rover(stage).all_but()
+def test_a_robot_as_planned_has_no_findings(nodes: FakeNodes, robot: str) -> None:
+    Rover(nodes).all_but()
     assert finds_nothing(robot)
     assert any(verify(robot, seconds) == [] for seconds in LOOKS_S)

@@ -9,14 +9,13 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from tests.observe.bags import write_bag
-from tests.observe.test_bag import UP, drive, tfcompose
+from tests.support.bags import UP, drive, tfcompose_without_ros, write_bag
 from tfcompose.geometry import quat_from_rpy
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from tests.observe.bags import Sent
+    from tests.support.bags import Sent
 
 ROBOT = """\
 tfcompose: 1
@@ -47,21 +46,24 @@ def robot(tmp_path: Path) -> str:
 
 def test_a_right_bag_is_as_expected(tmp_path: Path, robot: str) -> None:
     bag = write_bag(tmp_path / "bag", RIGHT)
-    assert tfcompose("verify", robot, "--bag", str(bag)).stdout == f"rover: 3 of 3 edges as expected, in {bag}\n"
+    assert (
+        tfcompose_without_ros("verify", robot, "--bag", str(bag)).stdout
+        == f"rover: 3 of 3 edges as expected, in {bag}\n"
+    )
 
 
 def test_a_built_plan_or_its_folder_does_as_well(tmp_path: Path, robot: str) -> None:
     bag = write_bag(tmp_path / "bag", [*RIGHT[1:], fixed("laser_link", 0.4)])
-    tfcompose("build", robot, "-o", str(tmp_path / "out"))
+    tfcompose_without_ros("build", robot, "-o", str(tmp_path / "out"))
     for plan in (tmp_path / "out", tmp_path / "out" / "plan.json"):
-        output = tfcompose("verify", str(plan), "--bag", str(bag), code=1).stdout
+        output = tfcompose_without_ros("verify", str(plan), "--bag", str(bag), code=1).stdout
         assert "error[TF846] the pose of laser_link in base_link is off by 100 mm" in output
         assert "note: base_link → laser_link is declared in rover.yaml:6" in output
 
 
 def test_what_is_wrong_is_told_with_the_place_in_the_file(tmp_path: Path, robot: str) -> None:
     bag = write_bag(tmp_path / "bag", [fixed("laser_link", 0.3, math.radians(2)), fixed("mast", 0.5), *drive(rate=20)])
-    output = tfcompose("verify", robot, "--bag", str(bag), code=1).stdout
+    output = tfcompose_without_ros("verify", robot, "--bag", str(bag), code=1).stdout
     assert f"{robot}:6:" in output
     assert "the pose of laser_link in base_link is off by 2 deg" in output
     assert "error[TF811] base_link → mast_link was never seen" in output
@@ -74,26 +76,29 @@ def test_what_is_wrong_is_told_with_the_place_in_the_file(tmp_path: Path, robot:
 def test_the_tolerance_is_what_is_asked_for(tmp_path: Path, robot: str) -> None:
     bag = write_bag(tmp_path / "bag", [fixed("laser_link", 0.304, math.radians(2)), fixed("mast_link"), *drive()])
     for words, code in (("5mm,3deg", 0), ("5 mm", 1), ("3deg", 1), ("0.5cm,0.1rad", 0)):
-        tfcompose("verify", robot, "--bag", str(bag), "--tolerance", words, code=code)
+        tfcompose_without_ros("verify", robot, "--bag", str(bag), "--tolerance", words, code=code)
     for words in ("5", "5mm,3mm", "five", "5 ft", "-1mm"):
-        assert "--tolerance" in tfcompose("verify", robot, "--bag", str(bag), f"--tolerance={words}", code=2).stderr
+        assert (
+            "--tolerance"
+            in tfcompose_without_ros("verify", robot, "--bag", str(bag), f"--tolerance={words}", code=2).stderr
+        )
 
 
 def test_warnings_alone_fail_only_where_they_are_to(tmp_path: Path, robot: str) -> None:
     bag = write_bag(tmp_path / "bag", [*RIGHT, fixed("table")])
-    tfcompose("verify", robot, "--bag", str(bag))
-    tfcompose("verify", robot, "--bag", str(bag), "--fail-on", "warning", code=1)
+    tfcompose_without_ros("verify", robot, "--bag", str(bag))
+    tfcompose_without_ros("verify", robot, "--bag", str(bag), "--fail-on", "warning", code=1)
 
 
 def test_json_is_a_list_of_findings_as_lints(tmp_path: Path, robot: str) -> None:
     bag = write_bag(tmp_path / "bag", RIGHT[1:])
-    [found] = json.loads(tfcompose("verify", robot, "--bag", str(bag), "--format", "json", code=1).stdout)
+    [found] = json.loads(tfcompose_without_ros("verify", robot, "--bag", str(bag), "--format", "json", code=1).stdout)
     assert (found["code"], found["name"], found["line"]) == ("TF811", "edge_never_seen", 6)
 
 
 def test_junit_has_a_case_for_each_edge(tmp_path: Path, robot: str) -> None:
     bag = write_bag(tmp_path / "bag", [*RIGHT[1:], fixed('t<a>&"\x01ble')])
-    root = ET.fromstring(tfcompose("verify", robot, "--bag", str(bag), "--format", "junit", code=1).stdout)  # noqa: S314
+    root = ET.fromstring(tfcompose_without_ros("verify", robot, "--bag", str(bag), "--format", "junit", code=1).stdout)  # noqa: S314
     [suite] = root
     assert (suite.get("tests"), suite.get("failures")) == ("4", "1")
     cases = {(case.get("classname"), case.get("name")): case for case in suite}
@@ -139,18 +144,18 @@ def test_each_difference_is_told_of_a_bag_without_a_publisher(
     tmp_path: Path, robot: str, sent: list[Sent], code: str, message: str
 ) -> None:
     bag = write_bag(tmp_path / "bag", sent)
-    [found] = json.loads(tfcompose("verify", robot, "--bag", str(bag), "--format", "json", code=1).stdout)
+    [found] = json.loads(tfcompose_without_ros("verify", robot, "--bag", str(bag), "--format", "json", code=1).stdout)
     assert (found["code"], found["message"]) == (code, message)
 
 
 def test_wrong_use_and_what_cannot_be_read_is_exit_code_2(tmp_path: Path, robot: str) -> None:
     bag = write_bag(tmp_path / "bag", RIGHT)
-    tfcompose("verify", robot, "--bag", str(bag), "--live", code=2)
-    tfcompose("tree", "--bag", str(bag), "--live", code=2)
-    tfcompose("monitor", "--bag", str(bag), "--for", "3", code=2)
-    tfcompose("verify", str(tmp_path / "none.yaml"), "--bag", str(bag), code=2)
-    tfcompose("verify", robot, "--bag", str(tmp_path / "none"), code=2)
-    tfcompose("verify", str(tmp_path / "bag"), "--bag", str(bag), code=2)
+    tfcompose_without_ros("verify", robot, "--bag", str(bag), "--live", code=2)
+    tfcompose_without_ros("tree", "--bag", str(bag), "--live", code=2)
+    tfcompose_without_ros("monitor", "--bag", str(bag), "--for", "3", code=2)
+    tfcompose_without_ros("verify", str(tmp_path / "none.yaml"), "--bag", str(bag), code=2)
+    tfcompose_without_ros("verify", robot, "--bag", str(tmp_path / "none"), code=2)
+    tfcompose_without_ros("verify", str(tmp_path / "bag"), "--bag", str(bag), code=2)
 
 
 def test_without_ros_the_running_tree_is_no_traceback(robot: str) -> None:
@@ -163,7 +168,7 @@ def test_without_ros_the_running_tree_is_no_traceback(robot: str) -> None:
         ("doctor", robot),
     )
     for words in (("verify", robot), *looking):
-        done = tfcompose(*words, code=1)
+        done = tfcompose_without_ros(*words, code=1)
         first, advice = (done.stdout + done.stderr).splitlines()
         assert first == "error[TF901] rclpy cannot be imported"
         assert "pip install 'tfcompose[ros]'" in advice
@@ -171,7 +176,7 @@ def test_without_ros_the_running_tree_is_no_traceback(robot: str) -> None:
 
 def test_the_tree_of_a_bag_says_what_is_expected_unexpected_and_missing(tmp_path: Path, robot: str) -> None:
     bag = write_bag(tmp_path / "bag", [fixed("laser_link", 0.3), fixed("table"), *drive()])
-    rows = tfcompose("tree", robot, "--bag", str(bag)).stdout.splitlines()
+    rows = tfcompose_without_ros("tree", robot, "--bag", str(bag)).stdout.splitlines()
     assert rows[0] == "odom"
     assert [row.replace("├── ", "").replace("└── ", "").split()[0] for row in rows[1:]] == [
         "base_link", "laser_link", "mast_link", "table",
@@ -184,8 +189,8 @@ def test_the_tree_of_a_bag_says_what_is_expected_unexpected_and_missing(tmp_path
 
 def test_the_tree_of_a_file_for_programs_has_the_shape_of_the_published_one(tmp_path: Path, robot: str) -> None:
     bag = write_bag(tmp_path / "bag", RIGHT)
-    planned = json.loads(tfcompose("tree", robot, "--format", "json").stdout)
-    published = json.loads(tfcompose("tree", robot, "--bag", str(bag), "--format", "json").stdout)
+    planned = json.loads(tfcompose_without_ros("tree", robot, "--format", "json").stdout)
+    published = json.loads(tfcompose_without_ros("tree", robot, "--bag", str(bag), "--format", "json").stdout)
     [of_file], [of_bag] = planned["trees"], published["trees"]
     assert of_file["root"] == of_bag["root"] == "odom"
     names = [[(edge["parent"], edge["child"]) for edge in tree["edges"]] for tree in (of_file, of_bag)]
@@ -199,11 +204,11 @@ def test_trees_that_do_not_hang_together_and_loops_are_shown_as_such(tmp_path: P
         ("/tf", 0.0, a, b, 0.0, (0.0, 0.0, 0.0), UP) for a, b in (("x", "y"), ("y", "z"), ("z", "x"), ("z", "leaf"))
     ]
     bag = write_bag(tmp_path / "bag", [*RIGHT, ("/tf", 0.0, "world", "table", 0.0, (0.0, 0.0, 0.0), UP), *loop])
-    output = tfcompose("tree", "--bag", str(bag)).stdout
+    output = tfcompose_without_ros("tree", "--bag", str(bag)).stdout
     assert output.startswith("3 trees that do not hang together:\n\nodom\n└── base_link")
     assert "\n\nworld\n└── table" in output
     assert "\n\na loop, in which tf2 finds no way: x → y → z → x\n" in output
     assert "\nleaf " in output
-    trees = json.loads(tfcompose("tree", "--bag", str(bag), "--format", "json").stdout)["trees"]
+    trees = json.loads(tfcompose_without_ros("tree", "--bag", str(bag), "--format", "json").stdout)["trees"]
     assert [(tree["root"], len(tree["edges"])) for tree in trees] == [("odom", 3), ("world", 1), (None, 4)]
     assert trees[2]["loop"] == ["x", "y", "z", "x"]

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.observe.stage import at_last
-from tests.observe.test_monitor_ros import sending
 from tests.support import processes
+from tests.support.doctor import at_last
+from tests.support.fake_nodes import sending
 from tfcompose.geometry import Pose
 from tfcompose.plan import PlanProcess, Simulation
 from tfcompose.plan.file import read_plan, write_plan
@@ -19,14 +19,9 @@ from tfcompose.plan.file import read_plan, write_plan
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
-    from typing import Protocol
 
+    from tests.support.processes import Started
     from tfcompose.plan import PlanEdge
-
-    class Started(Protocol):
-        """A process under test, as conftest starts it."""
-
-        def until_says(self, text: str) -> None: ...
 
 
 pytestmark = pytest.mark.ros

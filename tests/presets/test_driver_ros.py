@@ -14,7 +14,7 @@ import psutil
 import pytest
 
 from tests.support import processes
-from tests.waiting import TIMEOUT_S, until
+from tests.support.waiting import TIMEOUT_S, until
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 
+from tests.support.waiting import until
 from tfcompose.ros.clock import SimClock, read_clock
 from tfcompose.ros.node import open_node
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 pytestmark = pytest.mark.ros
 
@@ -36,7 +32,7 @@ def test_any_bytes_are_a_time_or_none(data: bytes) -> None:
 
 
 @pytest.mark.usefixtures("domain")
-def test_a_clock_goes_on_after_bytes_that_are_no_time(until: Callable[..., bool]) -> None:
+def test_a_clock_goes_on_after_bytes_that_are_no_time() -> None:
     with open_node("simulator", "") as node:
         publisher, clock = node.create_publisher(Clock, "/clock", 1), SimClock(node)
 

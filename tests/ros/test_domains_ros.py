@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests import domains
+from tests.support import domains
 from tfcompose.ros.node import open_node
 
 if TYPE_CHECKING:
-    from tests.conftest import Domain
+    from tests.support.domains import Domain
 
 pytestmark = pytest.mark.ros
 

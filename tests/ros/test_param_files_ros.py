@@ -13,7 +13,7 @@ from tests.support import processes
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from tests.conftest import Domain
+    from tests.support.domains import Domain
 
 pytestmark = pytest.mark.ros
 

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from tests.waiting import none_but
+from tests.support.waiting import none_but
 from tfcompose.ros.stop import Stop
 
 

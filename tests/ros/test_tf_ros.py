@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from sensor_msgs.msg import JointState
 
-from tests.waiting import none_but
+from tests.support.waiting import none_but, until
 from tfcompose.ros.environment import RosError
 from tfcompose.ros.graph import writers
 from tfcompose.ros.node import JOINT_STATES, Subscription, TFPublisher, TFSubscription, open_node, wait
@@ -17,7 +17,7 @@ from tfcompose.ros.stop import Stop
 from tfcompose.ros.tf_codec import Transform, decode, encode
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
 pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
 
@@ -32,7 +32,7 @@ def node(domain: object) -> Iterator[Any]:
         yield opened
 
 
-def test_a_message_and_the_graph_name_the_same_publisher(node: Any, until: Callable[..., bool]) -> None:
+def test_a_message_and_the_graph_name_the_same_publisher(node: Any) -> None:
     with open_node("one", "/rover") as first, open_node("two", "/rover") as second:
         subscription = TFSubscription(node, static=True)
         publishers = [TFPublisher(each, static=True) for each in (first, second)]
@@ -49,7 +49,7 @@ def test_a_message_and_the_graph_name_the_same_publisher(node: Any, until: Calla
     assert {writer.type for writer in named.values()} == {"tf2_msgs/msg/TFMessage"}
 
 
-def test_take_returns_everything_in_order_and_then_nothing(node: Any, until: Callable[..., bool]) -> None:
+def test_take_returns_everything_in_order_and_then_nothing(node: Any) -> None:
     publisher, subscription = TFPublisher(node, static=False), TFSubscription(node, static=False)
     assert until(lambda: publisher.publisher.get_subscription_count() == 1)
     assert subscription.take() == []
@@ -63,7 +63,7 @@ def test_take_returns_everything_in_order_and_then_nothing(node: Any, until: Cal
     assert subscription.take() == []
 
 
-def test_other_types_are_taken_as_bytes_too(node: Any, until: Callable[..., bool]) -> None:
+def test_other_types_are_taken_as_bytes_too(node: Any) -> None:
     subscription = Subscription(node, JointState, "joint_states", JOINT_STATES)
     publisher = node.create_publisher(JointState, "/test/joint_states", 10)
     assert until(lambda: publisher.get_subscription_count() == 1)

@@ -24,7 +24,7 @@ import pytest
 import yaml
 
 from tests.support import processes
-from tests.waiting import TIMEOUT_S, offences, until
+from tests.support.waiting import TIMEOUT_S, offences, until
 
 if TYPE_CHECKING:
     import subprocess

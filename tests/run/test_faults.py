@@ -16,7 +16,7 @@ import psutil
 import pytest
 
 from tests.support import processes
-from tests.waiting import TIMEOUT_S, gone, until
+from tests.support.waiting import TIMEOUT_S, gone, until
 from tfcompose.plan import Plan, PlanProcess, RosSettings
 from tfcompose.plan.file import write_plan
 from tfcompose.run.launcher.control import ask, connect

@@ -15,9 +15,9 @@ import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-from tests.run.nameless import nameless_guard
 from tests.support import processes
-from tests.waiting import TIMEOUT_S, in_one_of_a_few, until, whole_lines
+from tests.support.guard_without_ids import guard_without_ids
+from tests.support.waiting import TIMEOUT_S, in_one_of_a_few, until, whole_lines
 from tfcompose.plan import SILENT_PERIODS
 from tfcompose.run.guard.judge import FINDING_S
 
@@ -287,7 +287,7 @@ def test_a_guard_that_is_killed_is_back_with_what_it_knew_and_tells_nothing_twic
 def test_where_ids_do_not_say_whose_they_are_two_on_an_edge_are_named_as_one_of_all_on_the_topic(
     up: Callable[[str], Running], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name, value in nameless_guard(tmp_path).items():
+    for name, value in guard_without_ids(tmp_path).items():
         monkeypatch.setenv(name, value)
     robot = up(ROBOT)
     robot.joins("/drive", "odom base_link")

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import psutil
 import pytest
 
-from tests.domains import reserved_domain
 from tests.support import processes
-from tests.waiting import TIMEOUT_S, in_one_of_a_few, offences, until, whole_lines
+from tests.support.domains import reserved_domain
+from tests.support.waiting import TIMEOUT_S, in_one_of_a_few, offences, until, whole_lines
 from tfcompose.ros.node import TFSubscription, open_node, wait
 from tfcompose.ros.stop import Stop
 from tfcompose.ros.tf_codec import decode

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import psutil
 import pytest
 
-from tests.run.test_supervisor import LISTEN, SLEEPER, launch, plan_of, program
-from tests.waiting import TIMEOUT_S, gone, until
+from tests.support.launcher import LISTEN, SLEEPER, plan_of, program
+from tests.support.waiting import TIMEOUT_S, gone, until
 from tfcompose.ros.stop import Stop
 from tfcompose.run.events import Clear, to_line
 from tfcompose.run.hold import GO, HOLD_FD, wait_for_go
@@ -22,10 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from tests.run.test_supervisor import Launcher
+    from tests.support.launcher import Launcher
     from tfcompose.plan import PlanProcess
-
-__all__ = ["launch"]
 
 #: Says what it has loaded before it is let go, as an own process would.
 HELD = f"""

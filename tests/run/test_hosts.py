@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.planned import compiled_plan
+from tests.support.plans import compiled_plan
+from tests.support.robots import ON_TWO_HOSTS
 from tfcompose.findings import Finding
 from tfcompose.plan import Plan, Ready
 from tfcompose.plan.file import read_plan, write_plan
@@ -20,19 +21,7 @@ from tfcompose.verdict.offence import relays_of
 if TYPE_CHECKING:
     from pathlib import Path
 
-TWO = """
-tfcompose: 1
-robot: rover
-frames:
-  odom: {}
-  base_link: {parent: odom, owner: drive, rate: 20 Hz}
-  arm: {parent: base_link, owner: arm_drive, rate: 20 Hz}
-  lidar: {parent: base_link, xyz: [0, 0, 0.3]}
-processes:
-  drive: {simulate: {fixed: {xyz: [0, 0, 0]}, rate: 20 Hz}}
-  arm_drive: {simulate: {fixed: {xyz: [0, 0, 1]}, rate: 20 Hz}, host: jetson, after: {drive: ready}}
-"""
-NAMED = TWO + "  static: {host: main}\n"
+NAMED = ON_TWO_HOSTS + "  static: {host: main}\n"
 
 
 def started(plan: Plan | Finding) -> set[str]:
@@ -43,7 +32,7 @@ def started(plan: Plan | Finding) -> set[str]:
 @pytest.mark.parametrize(
     ("text", "machines"),
     [
-        (TWO, [("jetson", "x"), (None, "x")]),
+        (ON_TWO_HOSTS, [("jetson", "x"), (None, "x")]),
         (NAMED, [("jetson", "x"), ("main", "x")]),
         (NAMED, [(None, "jetson.lan"), (None, "main")]),
     ],
@@ -67,7 +56,7 @@ def test_what_names_no_host_runs_where_static_does() -> None:
 
 
 def test_each_machine_sees_all_edges_with_their_owners() -> None:
-    plan = compiled_plan(TWO)
+    plan = compiled_plan(ON_TWO_HOSTS)
     for asked in ("jetson", None):
         share = share_of(plan, asked, "elsewhere")
         assert isinstance(share, Plan)
@@ -76,7 +65,7 @@ def test_each_machine_sees_all_edges_with_their_owners() -> None:
 
 
 def test_a_plan_without_hosts_is_whole_on_every_machine() -> None:
-    plan = compiled_plan(TWO.replace(", host: jetson", ""))
+    plan = compiled_plan(ON_TWO_HOSTS.replace(", host: jetson", ""))
     assert share_of(plan, None, "jetson") is plan
     assert told(plan) == ()
 
@@ -84,7 +73,7 @@ def test_a_plan_without_hosts_is_whole_on_every_machine() -> None:
 @pytest.mark.parametrize(
     ("text", "asked", "message", "advice"),
     [
-        (TWO, "jetsn", "no process of rover runs on a host jetsn", "did you mean jetson?"),
+        (ON_TWO_HOSTS, "jetsn", "no process of rover runs on a host jetsn", "did you mean jetson?"),
         (NAMED, "zzz", "no process of rover runs on a host zzz", "the plan names main, jetson"),
         (
             NAMED,
@@ -92,7 +81,7 @@ def test_a_plan_without_hosts_is_whole_on_every_machine() -> None:
             "this machine is desk, and every process of rover runs on another: main, jetson",
             "--host main or --host jetson",
         ),
-        (TWO.replace(", host: jetson", ""), "a", "no process of rover runs on a host a", "leave out --host"),
+        (ON_TWO_HOSTS.replace(", host: jetson", ""), "a", "no process of rover runs on a host a", "leave out --host"),
     ],
 )  # fmt: skip
 def test_a_host_that_the_plan_does_not_know_is_a_finding(
@@ -108,7 +97,7 @@ STRICT = "guard: {mode: strict}\n"
 
 
 def test_behind_a_strict_guard_each_machine_hears_the_others_guard_and_has_a_fence_of_its_own() -> None:
-    plan = compiled_plan(TWO + STRICT)
+    plan = compiled_plan(ON_TWO_HOSTS + STRICT)
     shares = [share for asked in ("jetson", None) if isinstance(share := share_of(plan, asked, "x"), Plan)]
     assert [{edge.child: edge.node for edge in share.edges} for share in shares] == [
         {"base_link": "/tfcompose_guard", "lidar": "/tfcompose_guard", "arm": "/arm_drive"},
@@ -120,7 +109,7 @@ def test_behind_a_strict_guard_each_machine_hears_the_others_guard_and_has_a_fen
 
 
 def test_a_strict_guard_on_one_of_several_machines_passes_nothing_on_of_the_others() -> None:
-    found = share_of(compiled_plan(TWO + "  guard: {host: jetson}\n" + STRICT), "jetson", "x")
+    found = share_of(compiled_plan(ON_TWO_HOSTS + "  guard: {host: jetson}\n" + STRICT), "jetson", "x")
     assert isinstance(found, Finding)
     assert (found.code, found.help) == ("TF819", "remove the guard's host, or watch: guard: {mode: watch}")
 
@@ -128,7 +117,7 @@ def test_a_strict_guard_on_one_of_several_machines_passes_nothing_on_of_the_othe
 def test_a_share_is_written_and_read_and_has_a_place_of_its_own(tmp_path: Path) -> None:
     tmp_path.chmod(0o700)
     env = {"XDG_RUNTIME_DIR": str(tmp_path), "ROS_DOMAIN_ID": "7"}
-    plan = compiled_plan(TWO)
+    plan = compiled_plan(ON_TWO_HOSTS)
     jetson, main = share_of(plan, "jetson", "x"), share_of(plan, None, "x")
     assert isinstance(jetson, Plan)
     assert isinstance(main, Plan)
@@ -138,7 +127,7 @@ def test_a_share_is_written_and_read_and_has_a_place_of_its_own(tmp_path: Path) 
 
 
 def test_two_guards_have_two_names() -> None:
-    plan = compiled_plan(TWO)
+    plan = compiled_plan(ON_TWO_HOSTS)
     nodes = [
         share.process("guard").nodes
         for asked in ("jetson", None)
@@ -148,14 +137,14 @@ def test_two_guards_have_two_names() -> None:
 
 
 def test_a_guard_with_a_host_judges_there_only() -> None:
-    plan = compiled_plan(TWO + "  guard: {host: jetson}\n")
+    plan = compiled_plan(ON_TWO_HOSTS + "  guard: {host: jetson}\n")
     modes = [share.guard.mode for asked in ("jetson", None) if isinstance(share := share_of(plan, asked, "x"), Plan)]
     assert modes == ["watch", "off"]
 
 
 def test_what_only_the_own_launcher_sees_is_not_waited_for_from_elsewhere() -> None:
     """A line of output and a code are not seen from another machine; a lifecycle state is, and is driven there."""
-    plan = compiled_plan(TWO)
+    plan = compiled_plan(ON_TWO_HOSTS)
     cases: list[tuple[dict[str, Any], Ready | None]] = [
         ({"ready": Ready("log", "up")}, None),
         ({"ready": Ready("topic", "/scan")}, Ready("topic", "/scan")),

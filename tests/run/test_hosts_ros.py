@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.run.test_hosts import TWO
 from tests.support import processes
-from tests.waiting import offences, until
+from tests.support.robots import ON_TWO_HOSTS
+from tests.support.waiting import offences, until
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from tests.conftest import Started
+    from tests.support.processes import Started
 
 pytestmark = pytest.mark.ros
 
@@ -34,7 +34,7 @@ def test_two_hosts_start_their_shares_and_each_sees_the_whole_tree(
     start: Callable[..., Started], tmp_path: Path
 ) -> None:
     file = tmp_path / "rover.yaml"
-    file.write_text(TWO.replace("robot: rover", "robot: rover\nros: {discovery: localhost}"), "utf-8")
+    file.write_text(ON_TWO_HOSTS.replace("robot: rover", "robot: rover\nros: {discovery: localhost}"), "utf-8")
     main = start("tfcompose", "up", file, "-o", tmp_path / "a")
     main.until_says("expecting arm_drive (/arm_drive): host jetson starts it")
     main.until_says("live  drive")
@@ -76,7 +76,9 @@ def test_each_of_two_strict_guards_holds_back_on_its_machine_and_passes_on_to_al
     (tmp_path / "liar.py").write_text(LIAR, "utf-8")
     file = tmp_path / "rover.yaml"
     run = f"run: [{sys.executable}, {tmp_path / 'liar.py'}]"
-    text = TWO.replace("simulate: {fixed: {xyz: [0, 0, 1]}, rate: 20 Hz}, host", f"{run}, node: arm_drive, host")
+    text = ON_TWO_HOSTS.replace(
+        "simulate: {fixed: {xyz: [0, 0, 1]}, rate: 20 Hz}, host", f"{run}, node: arm_drive, host"
+    )
     text = text.replace("robot: rover", "robot: rover\nros: {discovery: localhost}")
     file.write_text(f"{text}guard: {{mode: strict, fence: {fence}}}\n", "utf-8")
     main = start("tfcompose", "up", file, "-o", tmp_path / "a")
@@ -101,7 +103,7 @@ def test_each_of_two_strict_guards_holds_back_on_its_machine_and_passes_on_to_al
 def test_a_share_that_is_live_on_another_machine_is_refused(start: Callable[..., Started], tmp_path: Path) -> None:
     """Started by another supervisor, as nothing of another machine's launcher is seen here but its nodes."""
     file = tmp_path / "rover.yaml"
-    file.write_text(TWO.replace("robot: rover", "robot: rover\nros: {discovery: localhost}"), "utf-8")
+    file.write_text(ON_TWO_HOSTS.replace("robot: rover", "robot: rover\nros: {discovery: localhost}"), "utf-8")
     assert start("tfcompose", "build", file, "-o", tmp_path / "a").process.wait(60) == 0
     elsewhere = start("tfcompose.run.process", tmp_path / "a" / "plan.json", "drive")
     elsewhere.until_says("simulated at")

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.run.watched import FIXED, LOOK_S, SETTLE_S, History, Publisher
+from tests.support.guard_history import FIXED, LOOK_S, SETTLE_S, History, Publisher
 from tfcompose.plan import EdgePattern, GuardPolicy
 from tfcompose.run.events import Clear, Complete, Found, Live, OwnerReady, Recovered
 

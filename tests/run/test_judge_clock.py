@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.run.watched import FIXED, History, Publisher, edge, wall
+from tests.support.guard_history import FIXED, History, Publisher, edge, wall
 from tfcompose.run.events import Recovered
 
 

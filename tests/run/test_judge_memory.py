@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.run.watched import EDGES, FIXED, History, edge, wall
+from tests.support.guard_history import EDGES, FIXED, History, edge, wall
 from tfcompose.geometry import Pose
 from tfcompose.plan import Claim, EdgePattern, GuardPolicy, PlanEdge, PlanProcess, SourceLine
 from tfcompose.run.events import Clear, Found, Live, Recovered

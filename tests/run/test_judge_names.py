@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from tests.run.watched import EDGES, FIXED, LOOK_S, PROCESSES, SETTLE_S, History
+from tests.support.guard_history import EDGES, FIXED, LOOK_S, PROCESSES, SETTLE_S, History
 from tfcompose.plan import Plan, RosSettings
 from tfcompose.run.events import Live, Recovered, Taken
 from tfcompose.run.guard.judge import Judge

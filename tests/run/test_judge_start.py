@@ -6,7 +6,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from tests.run.watched import History
+from tests.support.guard_history import History
 from tfcompose.run.events import Clear, Found, Taken
 
 

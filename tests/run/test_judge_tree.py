@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from tests.run.watched import EDGES, PROCESSES, SETTLE_S, TOOL, History
+from tests.support.guard_history import EDGES, PROCESSES, SETTLE_S, TOOL, History
 from tfcompose.plan import EdgePattern, GuardPolicy, Plan, RosSettings
 from tfcompose.run.events import Found, Recovered, Taken
 from tfcompose.run.guard.judge import Judge, Writer

@@ -12,13 +12,13 @@ import psutil
 import pytest
 
 from tests.support import processes
-from tests.waiting import gone, until
+from tests.support.waiting import gone, until
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from tests.conftest import Started
+    from tests.support.processes import Started
 
 
 def _can_launch() -> bool:

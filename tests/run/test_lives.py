@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.run.history import GUARD, SLAM, STATIC, begin, plan_of, run_process
+from tests.support.machine_history import GUARD, SLAM, STATIC, begin, plan_of, run_process
 from tfcompose.plan import GuardPolicy, Plan, PlanProcess, Ready, RestartPolicy, StopRule
 from tfcompose.run.events import Alive, Clear, Complete, GateOpen, GateShut, Live, OwnerReady, Remember, Silent
 from tfcompose.run.launcher.answers import status

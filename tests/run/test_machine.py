@@ -8,7 +8,7 @@ from typing import Literal
 
 import pytest
 
-from tests.run.history import GUARD, SLAM, STATIC, begin, plan_of, run_process
+from tests.support.machine_history import GUARD, SLAM, STATIC, begin, plan_of, run_process
 from tfcompose.findings import finding
 from tfcompose.plan import GuardPolicy, PlanProcess
 from tfcompose.run.events import SETTLE, Clear, Complete, Found, Live, OwnerReady, Recovered, Taken

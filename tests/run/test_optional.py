@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.run.history import GUARD, SLAM, STATIC, History, begin, run_process
+from tests.support.machine_history import GUARD, SLAM, STATIC, History, begin, run_process
 from tfcompose.plan import PlanProcess, Ready, RestartPolicy
 from tfcompose.run.events import Clear, Live, OwnerReady
 from tfcompose.run.launcher.answers import status

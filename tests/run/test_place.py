@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.support import processes
+from tests.support.waiting import until
 from tfcompose.plan import Plan, RosSettings
 from tfcompose.run import place as place_module
 from tfcompose.run.place import Lock, PlaceError, place_of, places
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
 
 ROVER = Plan("rover", "", None, RosSettings(domain_id=7), (), ())
@@ -123,7 +123,7 @@ def test_who_only_looks_is_in_nobodys_way_and_is_taken_for_nobodys_run(env: dict
     lock.close()
 
 
-def test_a_child_that_is_started_does_not_hold_the_lock_on(env: dict[str, str], until: Callable[..., bool]) -> None:
+def test_a_child_that_is_started_does_not_hold_the_lock_on(env: dict[str, str]) -> None:
     place = place_of(ROVER, env)
     lock = Lock(place)
     with processes.start(["/bin/sleep", "60"], close_fds=False) as child:

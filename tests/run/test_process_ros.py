@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.rover import ROVER
 from tests.support import processes
-from tests.waiting import until
+from tests.support.robots import ROVER
+from tests.support.waiting import until
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tests.conftest import Started
+    from tests.support.processes import Started
 
 pytestmark = pytest.mark.ros
 

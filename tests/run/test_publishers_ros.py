@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from tests.support.waiting import until
 from tfcompose.geometry import Pose, angle_between, normalised, quat_from_rpy
 from tfcompose.plan import Joint, PlanProcess, Simulation, Sweep
 from tfcompose.ros.graph import writers
@@ -80,7 +81,6 @@ def test_a_late_joiner_gets_all_fixed_edges_in_one_message(
     ears: Ears,
     edge: Callable[..., Any],
     write: Callable[..., Any],
-    until: Callable[..., bool],
 ) -> None:
     edges = [edge(f"base_link frame_{n}", "static", Pose((n, 0.0, 0.0))) for n in range(150)]
     other = [edge("odom base_link", "wheels")]
@@ -146,7 +146,7 @@ def test_joint_states_that_cannot_be_believed_are_dropped_with_one_line(
 
 
 def test_drivers_that_send_their_own_joints_each_move_them_all(
-    start: Callable[..., Any], ears: Ears, rover: Any, until: Callable[..., bool]
+    start: Callable[..., Any], ears: Ears, rover: Any
 ) -> None:
     start("tfcompose.run.joints", rover, "joints").until_says("edges")
     subscription = TFSubscription(ears.node, static=False)
@@ -165,7 +165,7 @@ def test_drivers_that_send_their_own_joints_each_move_them_all(
 
 
 def test_joints_that_no_joint_state_speaks_of_are_named_once_with_who_sends_the_others(
-    start: Callable[..., Any], ears: Ears, rover: Any, until: Callable[..., bool]
+    start: Callable[..., Any], ears: Ears, rover: Any
 ) -> None:
     right = JointState(name=["right"], position=[1.0])
     publisher = ears.node.create_publisher(JointState, "/rover/joint_states", 10)
@@ -186,7 +186,7 @@ def test_without_any_joint_state_it_says_that_nobody_publishes_them(start: Calla
 
 
 def test_publish_frequency_is_said_and_leaves_nothing_out_in_silence(
-    start: Callable[..., Any], ears: Ears, rover: Any, until: Callable[..., bool]
+    start: Callable[..., Any], ears: Ears, rover: Any
 ) -> None:
     process = start("tfcompose.run.joints", rover, "joints", "--ros-args", "-p", "publish_frequency:=10.0")
     process.until_says("4 edges on /tf, from /rover/joint_states, at most 10 Hz")
@@ -402,7 +402,6 @@ def test_a_node_is_called_as_the_plan_says_and_its_topics_move_with_it(
     ears: Ears,
     edge: Callable[..., Any],
     write: Callable[..., Any],
-    until: Callable[..., bool],
 ) -> None:
     process = PlanProcess("static", "static", nodes=("/fleet/r1/frames",), remap={"/tf_static": "tf_static"})
     start("tfcompose.run.static", write([edge("a b")], process), "static", "--ros-args", "-r", "__node:=frames2")

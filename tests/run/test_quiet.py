@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tests.run.watched import FIXED, History, edge
+from tests.support.guard_history import FIXED, History, edge
 from tfcompose.run.events import Silent
 from tfcompose.run.guard.quiet import Quiet
 

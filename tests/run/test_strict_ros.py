@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import psutil
 import pytest
 
-from tests.run.nameless import nameless_guard
 from tests.support import processes
-from tests.waiting import TIMEOUT_S, gone, until, whole_lines
+from tests.support.guard_without_ids import guard_without_ids
+from tests.support.waiting import TIMEOUT_S, gone, until, whole_lines
 from tfcompose.ros.graph import writers
 from tfcompose.ros.node import TFPublisher, TFSubscription, open_node, wait
 from tfcompose.ros.stop import Stop
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
-    from tests.conftest import Started
+    from tests.support.processes import Started
     from tfcompose.ros.node import Received
 
 pytestmark = pytest.mark.ros
@@ -136,7 +136,7 @@ class Fenced:
 def robot(request: pytest.FixtureRequest, domain: object, tmp_path: Path) -> Iterator[Fenced]:
     assert domain
     fence, _, nameless = request.param.partition(" ")
-    running = Fenced(tmp_path, fence, nameless_guard(tmp_path) if nameless else {})
+    running = Fenced(tmp_path, fence, guard_without_ids(tmp_path) if nameless else {})
     try:
         running.says("tree complete")
         yield running

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
-import sys
 import tracemalloc
-from dataclasses import dataclass
 from pathlib import Path
 from signal import SIGHUP, SIGINT, SIGKILL, SIGTERM
 from typing import TYPE_CHECKING, Any
@@ -15,10 +12,9 @@ from typing import TYPE_CHECKING, Any
 import psutil
 import pytest
 
-from tests.support import processes
-from tests.waiting import TIMEOUT_S, gone, until, whole_lines
-from tfcompose.plan import GuardPolicy, Plan, PlanProcess, RosSettings
-from tfcompose.plan.file import write_plan
+from tests.support.launcher import SLEEPER, Launcher, guard, plan_of, program
+from tests.support.waiting import TIMEOUT_S, gone, until
+from tfcompose.plan import Plan, PlanProcess, RosSettings
 from tfcompose.run.events import Clear, Complete, Live, OwnerReady, Remember, to_line
 from tfcompose.run.launcher.child import READ_SIZE
 from tfcompose.run.launcher.notice import Ended, FindingShown, LogLine, Notice, ProcessState, Stopping
@@ -26,13 +22,8 @@ from tfcompose.run.launcher.state import Times
 from tfcompose.run.launcher.supervisor import supervise
 
 if TYPE_CHECKING:
-    import subprocess
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
-PYTHON = ("${python}", "-I", "-S", "-c")
-SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); time.sleep(180)"
-#: What tfcompose's own processes do once they handle signals: until then these are blocked.
-LISTEN = "import signal; signal.pthread_sigmask(signal.SIG_UNBLOCK, signal.valid_signals())"
 #: Starts a child of its own that heeds no signal but SIGKILL, and says both process numbers.
 PARENT = """
 import os, signal, subprocess, sys, time
@@ -50,68 +41,6 @@ signal.signal(signal.SIGTERM, signal.SIG_IGN)
 print("pids", os.getpid(), flush=True)
 time.sleep(180)
 """
-#: Runs a plan file as a process of its own, and prints the notices.
-LAUNCHER = """
-import signal, sys
-from pathlib import Path
-from tfcompose.plan.file import read_plan
-from tfcompose.run.launcher.supervisor import supervise
-file = Path(sys.argv[1])
-plan = read_plan(file.read_text(), str(file))
-sys.exit(supervise(plan, file, report=lambda notice: print(notice, flush=True)))
-"""
-
-
-def program(name: str, code: str, *words: str, **more: Any) -> PlanProcess:
-    return PlanProcess(name, more.pop("kind", "run"), argv=(*PYTHON, code, *words), **more)
-
-
-def guard(*events: Any, end: str = SLEEPER) -> PlanProcess:
-    """Return a guard that says these events, or lines, and then sleeps."""
-    lines = "".join(event if isinstance(event, str) else to_line(event) for event in events)
-    say = f"{LISTEN}; import os; os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']), {lines.encode()!r}); {end}"
-    return program("guard", say, kind="guard")
-
-
-def plan_of(*processes: PlanProcess) -> Plan:
-    return Plan("rover", "", None, RosSettings(), (), processes, GuardPolicy())
-
-
-@dataclass
-class Launcher:
-    """A launcher that runs as a process of its own."""
-
-    popen: subprocess.Popen[str]
-    output: Path
-
-    def pids(self) -> list[int]:
-        """Return the process numbers that the children have said so far."""
-        said = [line.split("pids ")[1] for line in whole_lines(self.output) if "pids " in line]
-        return [int(word) for words in said for word in words.rstrip("')").split()]
-
-    def below(self, *, recursive: bool = True) -> list[int]:
-        return [child.pid for child in psutil.Process(self.popen.pid).children(recursive=recursive)]
-
-
-@pytest.fixture
-def launch(tmp_path: Path) -> Iterator[Callable[..., Launcher]]:
-    launchers: list[Launcher] = []
-
-    def start(*planned: PlanProcess) -> Launcher:
-        file, output = tmp_path / "plan.json", tmp_path / "output.txt"
-        file.write_text(write_plan(plan_of(*planned)))
-        with output.open("wb") as out:
-            popen = processes.start([sys.executable, "-c", LAUNCHER, str(file)], stdout=out, stderr=out)
-        launchers.append(Launcher(popen, output))
-        return launchers[-1]
-
-    yield start
-    for launcher in launchers:
-        if launcher.popen.poll() is None:
-            for pid in (*launcher.below(), launcher.popen.pid):
-                with contextlib.suppress(ProcessLookupError):
-                    os.kill(pid, SIGKILL)
-        launcher.popen.wait()
 
 
 def run(tmp_path: Path, *processes: PlanProcess, **more: Any) -> tuple[int, list[Notice]]:

@@ -6,9 +6,11 @@ import contextlib
 import os
 import signal
 import subprocess
+import threading
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tests.waiting import TIMEOUT_S
+from tests.support.waiting import TIMEOUT_S, until
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -73,6 +75,51 @@ def end(process: subprocess.Popen[str]) -> None:
                 stream.close()
     if process in _started:
         _started.remove(process)
+
+
+@dataclass
+class Started:
+    """A process under test, its standard output and error read line by line."""
+
+    process: subprocess.Popen[str]
+    lines: list[str] = field(default_factory=list)
+    errors: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        pairs = ((self.process.stdout, self.lines), (self.process.stderr, self.errors))
+        self._readers = [threading.Thread(target=lines.extend, args=(stream,)) for stream, lines in pairs if stream]
+        for reader in self._readers:
+            reader.start()
+
+    @property
+    def output(self) -> str:
+        return "".join(self.lines)
+
+    def until_says(self, text: str) -> None:
+        """Wait until a line holds ``text``."""
+        until(lambda: text in self.output or self.process.poll() is not None)
+        if self.process.poll() is not None:
+            self._join()  # its last lines may not have been read yet
+        assert text in self.output, self.lines + self.errors
+
+    def end(self, number: int = signal.SIGINT) -> int:
+        """Send the signal; return the exit code."""
+        self.process.send_signal(number)
+        return self.process.wait(TIMEOUT_S)
+
+    def close(self) -> None:
+        """End the process, whatever it does, and its readers."""
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait(TIMEOUT_S)
+        self._join()
+        for stream in (self.process.stdout, self.process.stderr):
+            if stream:
+                stream.close()
+
+    def _join(self) -> None:
+        for reader in self._readers:
+            reader.join(TIMEOUT_S)
 
 
 @contextlib.contextmanager

@@ -14,14 +14,14 @@ from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
 from tests.support import processes
-from tests.waiting import none_but
+from tests.support.waiting import none_but, until
 from tfcompose.geometry import Pose
 from tfcompose.ros.node import TFPublisher, open_node
 from tfcompose.ros.tf_codec import Transform, encode
 from tfcompose.tf2 import Buffer, TransformListener
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
 pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
 
@@ -47,7 +47,7 @@ def one(x: float, stamp_ns: int, parent: str = "odom", child: str = "base_link")
     return encode([Transform(stamp_ns, parent, child, (x, 0.0, 0.0), UNIT)])
 
 
-def test_an_executor_spins_until_the_transform_is_there(node: Any, other: Any, until: Callable[..., bool]) -> None:
+def test_an_executor_spins_until_the_transform_is_there(node: Any, other: Any) -> None:
     buffer = Buffer()
     listener = TransformListener(buffer, node)
     executor = SingleThreadedExecutor(context=node.context)
@@ -65,9 +65,7 @@ def test_an_executor_spins_until_the_transform_is_there(node: Any, other: Any, u
     executor.shutdown()
 
 
-def test_a_callback_that_awaits_lets_the_executor_hear_what_it_waits_for(
-    node: Any, other: Any, until: Callable[..., bool]
-) -> None:
+def test_a_callback_that_awaits_lets_the_executor_hear_what_it_waits_for(node: Any, other: Any) -> None:
     buffer = Buffer()
     listener = TransformListener(buffer, node)
     executor = SingleThreadedExecutor(context=node.context)
@@ -102,7 +100,7 @@ def test_a_callback_that_awaits_lets_the_executor_hear_what_it_waits_for(
 
 
 def test_a_listener_of_its_own_follows_the_simulated_clock_and_says_when_it_goes_back(
-    other: Any, until: Callable[..., bool], capfd: pytest.CaptureFixture[str]
+    other: Any, capfd: pytest.CaptureFixture[str]
 ) -> None:
     buffer = Buffer()
     clock = other.create_publisher(Clock, "/clock", 1)
@@ -205,9 +203,7 @@ def test_profiles_and_depths_are_those_that_were_asked_for(node: Any, *, handed_
     assert (fixed.reliability.name, fixed.durability.name) == ("RELIABLE", "TRANSIENT_LOCAL"), "still latched"
 
 
-def test_a_thread_of_the_listeners_spins_the_whole_node_and_ends_with_it(
-    node: Any, other: Any, until: Callable[..., bool]
-) -> None:
+def test_a_thread_of_the_listeners_spins_the_whole_node_and_ends_with_it(node: Any, other: Any) -> None:
     before, ticks = threading.enumerate(), []
     node.create_timer(0.01, lambda: ticks.append(1))
     buffer = Buffer()
@@ -221,7 +217,7 @@ def test_a_thread_of_the_listeners_spins_the_whole_node_and_ends_with_it(
 
 
 def test_a_wait_of_half_a_second_ends_after_half_a_second_and_callbacks_of_tf_are_heard_meanwhile(
-    node: Any, other: Any, until: Callable[..., bool]
+    node: Any, other: Any
 ) -> None:
     """The thread that waits is the only one, and nobody spins."""
     buffer = Buffer()

@@ -18,7 +18,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.time import Time
 
 from tests.support import processes
-from tests.waiting import none_but
+from tests.support.waiting import none_but, until
 from tfcompose.geometry import Pose
 from tfcompose.plan import PlanProcess, Simulation
 from tfcompose.ros.graph import writers
@@ -118,9 +118,7 @@ def one(x: float, stamp_ns: int, parent: str = "odom", child: str = "base_link")
     return encode([Transform(stamp_ns, parent, child, (x, 0.0, 0.0), UNIT)])
 
 
-def test_a_node_that_is_handed_over_is_fed_by_its_executor(
-    node: Any, executor: Callable[[float], None], until: Callable[..., bool]
-) -> None:
+def test_a_node_that_is_handed_over_is_fed_by_its_executor(node: Any, executor: Callable[[float], None]) -> None:
     buffer = Buffer()
     listener = TransformListener(buffer, node)
     with open_node("talks", "/test") as other:
@@ -176,7 +174,7 @@ def test_a_wait_ends_when_the_transform_comes_or_when_the_time_is_over_and_not_m
 
 
 def test_bytes_that_are_no_message_and_transforms_that_tf2_refuses_are_said_once_and_the_listener_lives_on(
-    node: Any, until: Callable[..., bool], capfd: pytest.CaptureFixture[str]
+    node: Any, capfd: pytest.CaptureFixture[str]
 ) -> None:
     buffer = Buffer()
     listener = TransformListener(buffer, node)

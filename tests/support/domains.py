@@ -6,16 +6,25 @@ import fcntl
 import os
 import tempfile
 from contextlib import contextmanager
+from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
 #: The domains that tests may have; CI's own run of a robot has 101.
 DOMAINS = range(1, 101)
 _TURN = count(os.getpid())
+
+
+@dataclass(frozen=True)
+class Domain:
+    """A ROS domain that nobody else on this machine uses during the test; ``environment`` is a process's."""
+
+    id: int
+    environment: Mapping[str, str]
 
 
 def own_domains() -> range:

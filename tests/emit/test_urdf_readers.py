@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.readers.family import TYPES, spec
-from tests.readers.readers import Body, Drake, MuJoCo, Pinocchio, Reader, Yourdfpy, together
+from tests.support.random_robot import TYPES, spec
+from tests.support.urdf_readers import Body, Drake, MuJoCo, Pinocchio, Reader, Yourdfpy, together
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit

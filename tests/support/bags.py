@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, Any
 
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
+from tests.support import processes
+
 if TYPE_CHECKING:
+    import subprocess
     from collections.abc import Iterable
     from pathlib import Path
 
@@ -16,6 +20,7 @@ Sent = tuple[str, float, str, str, float, tuple[float, float, float], tuple[floa
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 START_S = 1_700_000_000
+UP = (0.0, 0.0, 0.0, 1.0)
 
 
 def write_bag(
@@ -24,11 +29,11 @@ def write_bag(
     *,
     mcap: bool = True,
     compressed: CompressionMode = CompressionMode.NONE,
-    beside: Iterable[tuple[str, float, str, Any]] = (),
+    others: Iterable[tuple[str, float, str, Any]] = (),
 ) -> Path:
     """Write a bag with one message for each transform; times count from START_S.
 
-    ``beside`` are other messages: topic, seconds of the recording, type and message.
+    ``others`` are other messages: topic, seconds of the recording, type and message.
     """
     types = STORE.types
     kind = "tf2_msgs/msg/TFMessage"
@@ -36,12 +41,11 @@ def write_bag(
     if compressed is not CompressionMode.NONE:
         bag.set_compression(compressed, CompressionFormat.ZSTD)
     with bag as writer:
-        others = {}
-        for topic, at_s, other, message in beside:
-            if topic not in others:
-                others[topic] = writer.add_connection(topic, other, typestore=STORE)
-            writer.write(others[topic], round((START_S + at_s) * 1e9), STORE.serialize_cdr(message, other))
-        connections = {}
+        connections: dict[str, Any] = {}
+        for topic, at_s, other_kind, message in others:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, other_kind, typestore=STORE)
+            writer.write(connections[topic], round((START_S + at_s) * 1e9), STORE.serialize_cdr(message, other_kind))
         for topic, at_s, parent, child, stamp_s, xyz, quat_xyzw in sent:
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=STORE)
@@ -56,3 +60,21 @@ def write_bag(
             data = STORE.serialize_cdr(types[kind]([transform]), kind)
             writer.write(connections[topic], round((START_S + at_s) * 1e9), data)
     return folder
+
+
+def tfcompose_without_ros(*words: str, code: int = 0) -> subprocess.CompletedProcess[str]:
+    """Run the command line where rclpy cannot be imported."""
+    program = "import sys; sys.modules['rclpy'] = None; from tfcompose.cli import main; sys.exit(main())"
+    command = [sys.executable, "-c", program, *words]
+    done = processes.run(command)
+    assert "Traceback" not in done.stderr, done.stderr
+    assert done.returncode == code, done.stdout + done.stderr
+    return done
+
+
+def drive(seconds: float = 4.0, rate: float = 50.0, topic: str = "/tf", late_s: float = 0.004) -> list[Sent]:
+    """A base that moves along x at 1 m/s, and comes a little late."""
+    count = round(seconds * rate)
+    return [
+        (topic, at / rate + late_s, "odom", "base_link", at / rate, (at / rate, 0.0, 0.0), UP) for at in range(count)
+    ]

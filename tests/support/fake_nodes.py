@@ -1,34 +1,27 @@
-"""Real nodes on a stage, and the doctor who looks at them."""
+"""Real nodes that publish what a test wants."""
 
 from __future__ import annotations
 
-import contextlib
-import json
-import sys
 import threading
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
-from tests.support import processes
 from tfcompose.ros.node import TFPublisher, open_node
 from tfcompose.ros.tf_codec import Transform, encode
 from tfcompose.ros.typesupport import tf_message_type
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator
 
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
-#: So long it is looked, again and again: where much else runs, publishers are found late, and late in truth.
-LOOKS_S = (3.0, 3.0, 3.0, 6.0, 12.0)
 
 
-class Stage:
+class FakeNodes:
     """Nodes that publish, until the test is over."""
 
     def __init__(self) -> None:
         self._stack = ExitStack()
-        self._jobs: list[tuple[float, Callable[[int], None]]] = []
         self._over = threading.Event()
         self._threads: list[threading.Thread] = []
 
@@ -88,47 +81,33 @@ def message(stamp_ns: int, edges: tuple[str, ...], x: float = 0.0, quat: Any = I
     return encode([Transform(stamp_ns, parent, child, (x, 0.0, 0.0), quat) for parent, child in pairs])
 
 
-def doctor(*words: str, seconds: float = 3.0) -> tuple[int, list[dict[str, Any]]]:
-    """Run it, and return the exit code and the findings."""
-    command = [sys.executable, "-m", "tfcompose", "doctor", "--for", str(seconds), "--format", "json", *words]
-    done = processes.run(command)
-    assert "Traceback" not in done.stderr, done.stderr
-    return done.returncode, json.loads(done.stdout)
+@contextmanager
+def sending(  # noqa: PLR0913 (all but three are named)
+    name: str, parent: str, child: str, *, rate: float, late_s: float = 0.0, topic: str = "/tf", bad: bytes = b""
+) -> Iterator[Callable[[], float]]:
+    """Send an edge from a node of this name, stamped ``late_s`` ago, and from time to time the ``bad`` message.
 
+    Gives a function that returns the rate at which it was really sent so far.
+    """
+    over, sent = threading.Event(), 0
 
-def doctor_finds(code: str, words: Sequence[str], others: set[str], *arguments: str) -> list[dict[str, Any]]:
-    """Run it until it finds that code in those words, and no codes but the others; a few times: names may come late."""
-    for seconds in LOOKS_S:
-        exit_code, found = doctor(*arguments, seconds=seconds)
-        if says(found, code, words, others):
-            break
-    assert exit_code == 1
-    return found
+    def send() -> None:
+        nonlocal sent
+        due = begun
+        while not over.wait(max(0.0, due - time.monotonic())):
+            due += 1 / rate
+            sent += 1
+            stamp_ns = time.time_ns() - int(late_s * 1e9)
+            publisher.publish(encode([Transform(stamp_ns, parent, child, (1.0, 0.0, 0.0), IDENTITY)]))
+            if bad:
+                publisher.publish(bad)
 
-
-def finds_nothing(*words: str) -> bool:
-    """Look until nothing is found, a few times."""
-    return any(doctor(*words, seconds=seconds) == (0, []) for seconds in LOOKS_S)
-
-
-def at_last(claim: Callable[[float], None]) -> None:
-    """Let the claim about what is seen in so many seconds hold once, of a few times that are longer and longer."""
-    for seconds in LOOKS_S[:-1]:
-        with contextlib.suppress(AssertionError):
-            return claim(seconds)
-    return claim(LOOKS_S[-1])
-
-
-def says(found: list[dict[str, Any]], code: str, words: Sequence[str], others: set[str]) -> bool:
-    """Return whether that code was found, said in all these words, and no codes but the others."""
-    codes = {one["code"] for one in found}
-    return code in codes and codes <= {code, *others} and all(word in said(found, code) for word in words)
-
-
-def said(found: list[dict[str, Any]], code: str) -> str:
-    """Return all that was said of that code."""
-    assert code in {one["code"] for one in found}, found
-    parts = [one for one in found if one["code"] == code]
-    return "\n".join(
-        "\n".join([one["message"], *(note["message"] for note in one["notes"]), one["help"]]) for one in parts
-    )
+    with open_node(name, "") as node:
+        publisher = TFPublisher(node, static=False, topic=topic)
+        thread, begun = threading.Thread(target=send), time.monotonic()
+        thread.start()
+        try:
+            yield lambda: sent / (time.monotonic() - begun)
+        finally:
+            over.set()
+            thread.join()

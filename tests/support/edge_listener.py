@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 
-class Witness:
+class EdgeListener:
     """Hears a moving edge in a thread of its own, and when each of its messages was sent."""
 
     def __init__(self, child: str) -> None:

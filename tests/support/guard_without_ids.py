@@ -27,7 +27,7 @@ if "tfcompose.run.guard" in sys.orig_argv:
 """
 
 
-def nameless_guard(folder: Path) -> dict[str, str]:
+def guard_without_ids(folder: Path) -> dict[str, str]:
     """Return what makes guards nameless that are started with it in their environment."""
     site = folder / "site"
     site.mkdir()

@@ -1,0 +1,62 @@
+"""``tfcompose doctor``, run until it sees what is to be seen."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import sys
+from typing import TYPE_CHECKING, Any
+
+from tests.support import processes
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+#: So long it is looked, again and again: where much else runs, publishers are found late, and late in truth.
+LOOKS_S = (3.0, 3.0, 3.0, 6.0, 12.0)
+
+
+def doctor(*words: str, seconds: float = 3.0) -> tuple[int, list[dict[str, Any]]]:
+    """Run it, and return the exit code and the findings."""
+    command = [sys.executable, "-m", "tfcompose", "doctor", "--for", str(seconds), "--format", "json", *words]
+    done = processes.run(command)
+    assert "Traceback" not in done.stderr, done.stderr
+    return done.returncode, json.loads(done.stdout)
+
+
+def doctor_finds(code: str, words: Sequence[str], others: set[str], *arguments: str) -> list[dict[str, Any]]:
+    """Run it until it finds that code in those words, and no codes but the others; a few times: names may come late."""
+    for seconds in LOOKS_S:
+        exit_code, found = doctor(*arguments, seconds=seconds)
+        if says(found, code, words, others):
+            break
+    assert exit_code == 1
+    return found
+
+
+def finds_nothing(*words: str) -> bool:
+    """Look until nothing is found, a few times."""
+    return any(doctor(*words, seconds=seconds) == (0, []) for seconds in LOOKS_S)
+
+
+def at_last(claim: Callable[[float], None]) -> None:
+    """Let the claim about what is seen in so many seconds hold once, of a few times that are longer and longer."""
+    for seconds in LOOKS_S[:-1]:
+        with contextlib.suppress(AssertionError):
+            return claim(seconds)
+    return claim(LOOKS_S[-1])
+
+
+def says(found: list[dict[str, Any]], code: str, words: Sequence[str], others: set[str]) -> bool:
+    """Return whether that code was found, said in all these words, and no codes but the others."""
+    codes = {one["code"] for one in found}
+    return code in codes and codes <= {code, *others} and all(word in said(found, code) for word in words)
+
+
+def said(found: list[dict[str, Any]], code: str) -> str:
+    """Return all that was said of that code."""
+    assert code in {one["code"] for one in found}, found
+    parts = [one for one in found if one["code"] == code]
+    return "\n".join(
+        "\n".join([one["message"], *(note["message"] for note in one["notes"]), one["help"]]) for one in parts
+    )

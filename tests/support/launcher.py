@@ -1,0 +1,85 @@
+"""The launcher as a process of its own, for plans of plain Python processes."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from dataclasses import dataclass
+from signal import SIGKILL
+from typing import TYPE_CHECKING, Any
+
+import psutil
+
+from tests.support import processes
+from tests.support.waiting import TIMEOUT_S, whole_lines
+from tfcompose.plan import GuardPolicy, Plan, PlanProcess, RosSettings
+from tfcompose.plan.file import write_plan
+from tfcompose.run.events import to_line
+
+if TYPE_CHECKING:
+    import subprocess
+    from pathlib import Path
+
+PYTHON = ("${python}", "-I", "-S", "-c")
+SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); time.sleep(180)"
+#: What tfcompose's own processes do once they handle signals: until then these are blocked.
+LISTEN = "import signal; signal.pthread_sigmask(signal.SIG_UNBLOCK, signal.valid_signals())"
+#: Runs a plan file as a process of its own, and prints the notices.
+LAUNCHER = """
+import signal, sys
+from pathlib import Path
+from tfcompose.plan.file import read_plan
+from tfcompose.run.launcher.supervisor import supervise
+file = Path(sys.argv[1])
+plan = read_plan(file.read_text(), str(file))
+sys.exit(supervise(plan, file, report=lambda notice: print(notice, flush=True)))
+"""
+
+
+def program(name: str, code: str, *words: str, **more: Any) -> PlanProcess:
+    return PlanProcess(name, more.pop("kind", "run"), argv=(*PYTHON, code, *words), **more)
+
+
+def guard(*events: Any, end: str = SLEEPER) -> PlanProcess:
+    """Return a guard that says these events, or lines, and then sleeps."""
+    lines = "".join(event if isinstance(event, str) else to_line(event) for event in events)
+    say = f"{LISTEN}; import os; os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']), {lines.encode()!r}); {end}"
+    return program("guard", say, kind="guard")
+
+
+def plan_of(*processes: PlanProcess) -> Plan:
+    return Plan("rover", "", None, RosSettings(), (), processes, GuardPolicy())
+
+
+@dataclass
+class Launcher:
+    """A launcher that runs as a process of its own."""
+
+    popen: subprocess.Popen[str]
+    output: Path
+
+    def pids(self) -> list[int]:
+        """Return the process numbers that the children have said so far."""
+        said = [line.split("pids ")[1] for line in whole_lines(self.output) if "pids " in line]
+        return [int(word) for words in said for word in words.rstrip("')").split()]
+
+    def below(self, *, recursive: bool = True) -> list[int]:
+        return [child.pid for child in psutil.Process(self.popen.pid).children(recursive=recursive)]
+
+    def kill(self) -> None:
+        """End it with all that it has started."""
+        if self.popen.poll() is None:
+            for pid in (*self.below(), self.popen.pid):
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, SIGKILL)
+        self.popen.wait(TIMEOUT_S)
+
+
+def launched(folder: Path, *planned: PlanProcess) -> Launcher:
+    """Start a launcher of these processes, whose files and output are in the folder."""
+    file, output = folder / "plan.json", folder / "output.txt"
+    file.write_text(write_plan(plan_of(*planned)))
+    with output.open("wb") as out:
+        popen = processes.start([sys.executable, "-c", LAUNCHER, str(file)], stdout=out, stderr=out)
+    return Launcher(popen, output)

@@ -58,6 +58,7 @@ ONLY_IN: dict[str, set[str]] = {
     "numpy": {"ros", "run", "tf2", "urdf"},  # urdf: what trimesh gives are its arrays
     "xacro": {"urdf"},
     "trimesh": {"urdf"},
+    "yourdfpy": {"urdf"},
     "pypdfium2": {"draw"},
     "rclpy": {"ros"},
     "rosbags": {"observe"},

@@ -448,8 +448,8 @@ that requests another. ROS_LOCALHOST_ONLY=1 overrides ROS_AUTOMATIC_DISCOVERY_RA
 discovers nobody, not even on the same machine.""",
     "TF910": """A URDF that was to be written does not read back as the same robot.
 
-build --read-back reads each description with another parser and compares links, joints, poses, limits, masses and
-shapes. Nothing is written then. This is a bug in tfcompose; please report it with the robot file.""",
+build --read-back has yourdfpy read each description and compares links, joints, poses, limits, masses, shapes and
+materials. Nothing is written then. This is a bug in tfcompose; please report it with the robot file.""",
 }
 
 

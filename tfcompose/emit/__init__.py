@@ -1,5 +1,5 @@
 """Stage ``emit``: a Robot becomes files, as text."""
 
-from tfcompose.emit.emit import emit
+from tfcompose.emit.emit import described, emit
 
-__all__ = ["emit"]
+__all__ = ["described", "emit"]

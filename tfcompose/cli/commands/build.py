@@ -27,7 +27,8 @@ def arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--read-back", action="store_true",
-        help="read the URDF again with another parser, and write only what is the robot, value by value",
+        help="read the URDF again with yourdfpy, and write it only if links, joints, poses, limits, masses, shapes and "
+        "materials are the robot's; needs tfcompose[view]",
     )  # fmt: skip
 
 

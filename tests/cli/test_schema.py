@@ -99,6 +99,6 @@ def test_a_robot_without_its_name_or_version_is_refused() -> None:
 def test_every_key_has_a_place_in_the_schema_and_every_mapping_says_what_it_is() -> None:
     for language in ("robot", "preset"):
         schema = json.loads(schema_text(language))
-        for definition in [schema, *schema["$defs"].values()]:
+        for definition in [schema, *(one for one in schema["$defs"].values() if "properties" in one)]:
             assert definition["description"]
             assert definition["additionalProperties"] is False

@@ -44,7 +44,7 @@ COMMANDS = {
     "explain": "a code's page, or the chain between two frames",
     "diff": "what moved or changed owner between two robots",
     "presets": "the sensors and nodes that are known; one of them in full",
-    "schema": "the JSON Schema of the language",
+    "schema": "the language as JSON Schema for editors, or with `--reference` as Markdown for people",
     "import": "a robot file from a URDF or xacro file",
 }
 #: A module cannot have the name of every command: ``import`` is a word of Python's own.

@@ -18,6 +18,8 @@ from tfcompose.load.scalars import plain
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from pydantic.fields import FieldInfo
+
     from tfcompose.language.base import Spec
     from tfcompose.language.preset import Option
 
@@ -35,7 +37,11 @@ def json_schema(language: str, presets: Mapping[str, PresetSpec], nodes: Iterabl
     for _, kind in walk(root):
         schema = own if kind is root else definitions[kind.__name__]
         for name, field in fields_of(kind).items():
-            schema["properties"][name] |= {"description": described(field), "examples": examples_of(field)}
+            form = schema["properties"][name]
+            form |= {"description": described(field), "examples": _examples(field, form)}
+        if kind is not root:
+            schema["title"] = kind.__name__.removesuffix("Spec")
+        _exclude(schema, getattr(kind, "EXCLUSIVE", ()), definitions)
     if language == "preset":
         _overlaid(own, definitions)
     if language == "robot":
@@ -100,10 +106,29 @@ class _Generator(GenerateJsonSchema):
         return made | {"items": items[0]} if items else made
 
 
+def _examples(field: FieldInfo, form: dict[str, Any]) -> list[Any]:
+    """Return the examples that an editor can insert: where a key has several forms it shows a mapping as one word."""
+    examples = examples_of(field)
+    return [one for one in examples if not isinstance(one, dict)] if "anyOf" in form else examples
+
+
+def _exclude(schema: dict[str, Any], several: Iterable[frozenset[str]], definitions: dict[str, Any]) -> None:
+    """Let a mapping hold only one key of each set."""
+    for keys in map(sorted, several):
+        name = f"OneOf_{'_'.join(keys)}"
+        definitions[name] = {
+            "allOf": [
+                {"if": {"required": [key]}, "then": {"properties": {other: False for other in keys if other != key}}}
+                for key in keys
+            ]
+        }
+        schema.setdefault("allOf", []).append({"$ref": f"#/$defs/{name}"})
+
+
 def _overlaid(own: dict[str, Any], definitions: dict[str, Any]) -> None:
     """Let a file that is merged over another one leave out what that one has, and remove it with null."""
     own["required"] = ["preset"]
-    for model in (own, *definitions.values()):
+    for model in (own, *(one for one in definitions.values() if "properties" in one)):
         if model is not own:
             model.pop("required", None)
         model["properties"] = {
@@ -140,7 +165,7 @@ def _add_presets(own: dict[str, Any], sensor: dict[str, Any], presets: Mapping[s
         options = {key: _option(option) for key, option in preset.options.items()}
         by_options.setdefault(repr(options), []).append(name)
         schemas[repr(options)] = options
-    sensor["allOf"] = [
+    sensor["allOf"] += [
         {
             "if": {"properties": {"preset": {"enum": names}}, "required": ["preset"]},
             "then": {"properties": {"options": {"properties": schemas[key], "additionalProperties": False}}},

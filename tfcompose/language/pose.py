@@ -195,7 +195,7 @@ class CalibrationSpec(Spec):
     """A measured pose, in a file. The pose beside it is the nominal one."""
 
     file: Text = key(..., "the file, relative to the file that names it", "calibration/sensors.yaml")
-    format: Literal["auto"] | CalibrationFormat = key("auto", "the format of the file", "kalibr")
+    format: Literal["auto", CalibrationFormat] = key("auto", "the format of the file", "kalibr")
     parent: Text | None = key(None, "the entry's parent in that file; default: the parent of this frame", "tool0")
     child: Text | None = key(
         None, "the entry's child in that file; default: this frame, or one of the sensor's", "camera_link"

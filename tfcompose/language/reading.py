@@ -72,7 +72,7 @@ def read(model: type[M], data: Any, already: Iterable[Path] = ()) -> tuple[M | N
         except ValidationError as error:
             errors = [(_path_of(one["loc"], data), one) for one in error.errors(include_url=False)]
         follows = {path[:end] for path in gone for end in range(1, len(path) + 1)}
-        new = [(path, one) for path, one in errors if path not in (gone if one["type"] in _UNKNOWN else follows)]
+        new = [(path, one) for path, one in errors if path not in (gone if one["type"] in UNKNOWN_KEYS else follows)]
         refusals += _refusals(model, new, data)
         rest = _without(
             rest, [_culprit(path, one) for path, one in errors if not one.get("ctx", {}).get("keeps")], gone
@@ -149,16 +149,16 @@ def _pruned(data: Any, tree: dict[Any, Any]) -> Any:
 
 def _refusals(model: type[Spec], errors: list[tuple[Path, ErrorDetails]], data: Any) -> list[Refusal]:
     """Return what pydantic refused in one turn, in this project's words."""
-    unknown = [path for path, one in errors if one["type"] in _UNKNOWN]
+    unknown = [path for path, one in errors if one["type"] in UNKNOWN_KEYS]
     meant = Counter((path[:-1], _slip(model, path)) for path in unknown)
     return [
-        _unknown_key(model, path, data, meant) if one["type"] in _UNKNOWN else _refusal(model, path, one)
+        _unknown_key(model, path, data, meant) if one["type"] in UNKNOWN_KEYS else _refusal(model, path, one)
         for path, one in errors
     ]
 
 
 #: The kinds of errors for a key that a model, or a dataclass, does not have.
-_UNKNOWN = frozenset({"extra_forbidden", "unexpected_keyword_argument"})
+UNKNOWN_KEYS = frozenset({"extra_forbidden", "unexpected_keyword_argument"})
 
 
 def _slip(model: type[Spec], path: Path) -> str | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -107,21 +108,21 @@ def test_wrong_use_is_exit_2_and_says_what_there_is(case: str, folder: Path, tmp
 
 
 def test_a_command_that_is_nearly_one_is_named(folder: Path) -> None:
-    assert tfcompose("lnit", cwd=folder).stderr == "tfcompose: there is no command lnit; did you mean lint?\n"
+    assert re.search(r"\blnit\b.*\blint\b", tfcompose("lnit", cwd=folder).stderr)
 
 
 def test_an_unknown_profile_is_named_with_the_nearest_one(folder: Path) -> None:
     done = tfcompose("build", str(ROBOTS / "my_robot.yaml"), "--profile", "dmeo", cwd=folder)
     assert done.returncode == 1
-    assert "error[TF009] no profile dmeo" in done.stderr
-    assert "did you mean demo?" in done.stderr
+    assert re.search(r"error\[TF009\] .*\bdmeo$", done.stderr, re.MULTILINE)
+    assert re.search(r"help: .*\bdemo\b", done.stderr)
     assert not everything_below(folder)
 
 
 def test_an_unknown_frame_is_named_with_the_nearest_one(folder: Path) -> None:
     done = tfcompose("pose", str(ROBOTS / "my_robot.yaml"), "base_link", "laser_lnik", cwd=folder)
     assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr == "tfcompose: no frame laser_lnik; did you mean laser_link?\n"
+    assert re.search(r"\blaser_lnik\b.*\blaser_link\b", done.stderr)
 
 
 def test_text_that_steers_a_terminal_is_shown_and_not_obeyed(folder: Path) -> None:

@@ -185,8 +185,8 @@ def test_it_says_what_it_fixed_and_fails_for_what_remains(tmp_path: Path) -> Non
     file.write_text(HEAD + "links: {a: {}, b: {parnet: a, colour: red}}\n")
     done = run(tmp_path, "r.yaml")
     first, *rest = done.stdout.splitlines()
-    assert first == "r.yaml:3:20: fixed[TF101] unknown key parnet: now parent"
-    assert rest[0] == "r.yaml:3:31: error[TF101] unknown key colour"
+    assert re.fullmatch(r"r\.yaml:3:20: fixed\[TF101\] .*\bparnet\b.*\bparent", first)
+    assert re.fullmatch(r"r\.yaml:3:31: error\[TF101\] .*\bcolour", rest[0])
     assert "{parent: a, colour: red}" in rest[1], "the line is shown as it is now"
     assert rest[-1] == "1 error in 1 file"
     assert done.returncode == 1
@@ -196,8 +196,8 @@ def test_json_holds_what_remains_and_what_was_fixed_is_told_beside_it(tmp_path: 
     file = tmp_path / "r.yaml"
     file.write_text(HEAD + "links: {a: {}, b: {parnet: a, colour: red}}\n")
     done = run(tmp_path, "r.yaml", "--format", "json")
-    assert [one["message"] for one in json.loads(done.stdout)] == ["unknown key colour"]
-    assert "fixed[TF101] unknown key parnet" in done.stderr
+    assert [(one["code"], one["column"]) for one in json.loads(done.stdout)] == [("TF101", 31)]
+    assert re.search(r"fixed\[TF101\] .*\bparnet\b", done.stderr)
     assert done.returncode == 1
 
 

@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.support import processes
+from tests.support.findings import words
 from tfcompose.check import RULES
 from tfcompose.cli.compiling import library
 from tfcompose.cli.disk import disk
@@ -160,7 +161,9 @@ def test_the_command_line_knows_a_urdf_by_its_name_or_by_its_option(tmp_path: Pa
     assert [(one["code"], one["line"]) for one in by_name] == [(one["code"], one["line"]) for one in by_option]
     done = run(tmp_path, "a.urdf")
     assert done.returncode == 1
-    assert "a.urdf:13:48: error[TF201] tool has two parents: base_link and other_root" in done.stdout
+    assert re.search(
+        r"^a\.urdf:13:48: error\[TF201\] .*\btool\b.*\bbase_link\b.*\bother_root$", done.stdout, re.MULTILINE
+    )
     (tmp_path / "fine.urdf").write_text(FINE)
     assert (run(tmp_path, "fine.urdf").returncode, run(tmp_path, "none.urdf").returncode) == (0, 2)
 
@@ -179,8 +182,8 @@ def test_the_command_line_knows_a_urdf_by_its_name_or_by_its_option(tmp_path: Pa
 def test_what_is_nearly_the_address_of_a_file_in_a_package_is_told_how_it_is_written(written: str) -> None:
     _, found = Packages(disk()).asset(written, Span("a.urdf"))
     assert found
-    assert found.message == f"{written} is no address of a file"
-    assert found.help.removeprefix("a slash too many: ") == "package://mine/meshes/a.stl"
+    assert found.message.startswith(written)
+    assert found.help.endswith("package://mine/meshes/a.stl")
 
 
 def test_a_package_is_looked_for_where_ros_looks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -204,7 +207,7 @@ def test_a_package_is_looked_for_where_ros_looks(tmp_path: Path, monkeypatch: py
     monkeypatch.delenv("AMENT_PREFIX_PATH")
     unset = missing("package://mine/meshes/a.stl")
     assert unset
-    assert "AMENT_PREFIX_PATH is empty" in unset.help
+    assert "AMENT_PREFIX_PATH" in unset.help
 
 
 XACRO = """<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">
@@ -346,7 +349,7 @@ def test_of_a_file_that_only_defines_macros_these_are_named(tmp_path: Path) -> N
     file = tmp_path / "r.urdf.xacro"
     file.write_text(XACRO.replace('<link name="base_link"/>', "").replace('<xacro:leg n="1"/>', ""))
     (found,) = lint_urdf(str(file))
-    assert (found.code, found.message.endswith("defines macros, and no links: leg")) == ("TF206", True)
+    assert (found.code, "leg" in words(found)) == ("TF206", True)
 
 
 def test_without_xacro_that_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

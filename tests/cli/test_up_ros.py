@@ -213,7 +213,7 @@ def test_the_policy_stop_ends_everything_with_1_and_names_the_offender_in_full_o
     rogue()
     assert robot.ends() == 1
     assert [process for process in below if not gone(process)] == []
-    assert robot.text.count("odom → base_link is published by /strange/rogue; the owner is drive (/drive)") == 1
+    assert len(re.findall(r"odom → base_link .* /strange/rogue\b.* drive \(/drive\)", robot.text)) == 1
     assert "stopping: TF801 foreign_publisher\n" in robot.text
 
 
@@ -234,7 +234,7 @@ def test_an_edge_that_somebody_publishes_already_is_refused_with_the_nodes_name(
     rogue()
     robot = up(ROVER, "--settle", "40")  # what is found sooner is said at once
     assert robot.ends() == 1
-    assert "error[TF807] odom → base_link: published by /strange/rogue before the start" in robot.text
+    assert re.search(r"error\[TF807\] odom → base_link\b.* /strange/rogue ", robot.text)
     assert re.findall(r"started (\w+)", robot.text) == ["guard"]
 
 
@@ -247,7 +247,7 @@ def test_an_edge_that_turns_out_to_be_published_while_processes_start_is_refused
         assert robot.ends() == 1
         if "TF807" in robot.text:
             break
-    assert "error[TF807] odom → base_link: published by /strange/rogue before the start" in robot.text
+    assert re.search(r"error\[TF807\] odom → base_link\b.* /strange/rogue ", robot.text)
     assert "Traceback" not in robot.text
 
 

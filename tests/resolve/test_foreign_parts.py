@@ -10,6 +10,7 @@ import pytest
 import yourdfpy
 from scipy.spatial.transform import Rotation
 
+from tests.support.findings import words
 from tfcompose.cli.compiling import library
 from tfcompose.cli.disk import disk
 from tfcompose.cli.terminal import read_text
@@ -144,9 +145,10 @@ def test_a_joint_that_is_there_already_is_refused_as_a_frame_is(cell: Any, tmp_p
         (tmp_path / f"{name}.urdf").write_text(whole, encoding="utf-8")
     one, two = "one: {urdf: one.urdf, parent: table}", "two: {urdf: two.urdf, parent: table}"
     (found,) = cell(one, two).found
-    assert (found.code, found.message) == ("TF505", "the part two brings the joint j, which is there already")
+    assert found.code == "TF505"
+    assert {"two", "j"} <= words(found)
     assert [note.span.file.rpartition("/")[2] for note in found.notes if note.span] == ["one.urdf", "two.urdf"]
-    assert found.help == "a prefix of its own, prefix: two/"
+    assert "prefix: two/" in found.help
     assert sound(cell(one, two.replace("parent", "prefix: t_, parent")))
 
 
@@ -201,8 +203,8 @@ def test_a_package_of_the_robot_is_found_in_xacro_where_everything_is_relative(
     ("find", "code", "message"),
     [
         ("$(find amr)/sizes.xacro", "TF724", "no package amr"),
-        ("$(find arm)/none.xacro", "TF018", "No such file or directory: "),
-        ("$(find arm)/base.stl", "TF018", "base.stl: xacro: no element found: line 1, column 0"),
+        ("$(find arm)/none.xacro", "TF018", "none.xacro"),
+        ("$(find arm)/base.stl", "TF018", "base.stl"),
     ],
 )
 def test_what_xacro_cannot_find_is_said_once(cell: Any, tmp_path: Path, find: str, code: str, message: str) -> None:
@@ -228,9 +230,9 @@ def test_an_error_of_xacro_in_a_macro_of_another_file_is_found_there(cell: Any, 
     outer = f'<robot name="o" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="w"/>{call}</robot>'
     (tmp_path / "third/arm/outer.xacro").write_text(outer, "utf-8")
     (found,) = cell("o: {xacro: third/arm/outer.xacro, parent: table}").found
-    assert "name 'hight' is not defined" in found.message
-    said = [(note.message, note.span and note.span.file.endswith("mast.xacro")) for note in found.notes]
-    assert said == [("it stands here", True), ("in the macro mast", True), ("as the part o", False)]
+    assert "'hight'" in found.message
+    assert [note.span and note.span.file.endswith("mast.xacro") for note in found.notes] == [True, True, False]
+    assert [note.message.rpartition(" ")[2] for note in found.notes[1:]] == ["mast", "o"]
     line = MACRO.splitlines()[found.notes[0].span.line - 1]
     assert line[found.notes[0].span.column - 1 :].startswith("${height}")
 
@@ -403,14 +405,14 @@ def test_warnings_about_somebody_elses_file_are_left_to_its_own_lint(cell: Any, 
             "a: {xacro: third/arm/mast.xacro, macro: mst, parent: table}",
             "TF018",
             "xacro:mst",
-            "mean mast?",
+            "mast",
             "cell.yaml",
         ),
         (
             "a: {xacro: third/arm/mast.xacro, macro: mast, params: {b: 1}}",
             "TF018",
             "parameter",
-            "mast takes name parent_link tall:=false *origin",
+            "name parent_link tall:=false *origin",
             "cell.yaml",
         ),
         (
@@ -424,20 +426,20 @@ def test_warnings_about_somebody_elses_file_are_left_to_its_own_lint(cell: Any, 
             "a: {xacro: third/arm/mast.xacro, macro: mast, params: {origin: {xzy: 1}}}",
             "TF101",
             "xzy",
-            "mean xyz?",
+            "xyz",
             "cell.yaml",
         ),
         (
             "a: {xacro: third/arm/bare.xacro, parent: table}",
             "TF106",
-            "the argument side has no value",
+            "side",
             "args: {side: …}",
             "cell.yaml",
         ),
         ("a: {urdf: third/arm/arm.urdf, prefix: /x, parent: table}", "TF501", "'/x'", "left_", "cell.yaml"),
         ("a: {urdf: third/arm/arm.urdf, prefix: a b, parent: table}", "TF501", "'a b'", "left_", "cell.yaml"),
-        ("a: {urdf: third/arm/arm.urdf, root: bse, parent: table}", "TF203", "bse", "did you mean base?", "cell.yaml"),
-        ("a: {urdf: third/arm/arm.urdf, vars: {b: 1}, parent: table}", "TF107", "vars goes with spec", "", "cell.yaml"),
+        ("a: {urdf: third/arm/arm.urdf, root: bse, parent: table}", "TF203", "bse", "base", "cell.yaml"),
+        ("a: {urdf: third/arm/arm.urdf, vars: {b: 1}, parent: table}", "TF107", "vars", "", "cell.yaml"),
         ("a: {urdf: third/arm/arm.urdf, xacro: b, parent: table}", "TF107", "exclude", "", "cell.yaml"),
         (
             "a: {xacro: third/arm/slide.xacro, params: {b: 1}, parent: table}",
@@ -446,7 +448,7 @@ def test_warnings_about_somebody_elses_file_are_left_to_its_own_lint(cell: Any, 
             "",
             "cell.yaml",
         ),
-        ("a: {parent: table}", "TF102", "a part without a robot", "spec, urdf or xacro", "cell.yaml"),
+        ("a: {parent: table}", "TF102", "", "spec", "cell.yaml"),
     ],
 )
 def test_what_cannot_be_a_part_is_said_with_its_place(  # noqa: PLR0913, PLR0917 (what is said, in its parts)

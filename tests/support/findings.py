@@ -1,0 +1,17 @@
+"""What a finding names. How it says so stands in tests/golden/wording."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tfcompose.findings import Finding
+
+
+def words(found: Finding) -> set[str]:
+    """Return the words of a finding's message, without the punctuation behind them."""
+    return words_of(found.message)
+
+
+def words_of(text: str) -> set[str]:
+    return {word.rstrip(",;:.?") for word in text.split()}

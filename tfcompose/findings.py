@@ -6,8 +6,8 @@ was seen read alike. A code is never used again for something else.
 
 from __future__ import annotations
 
+import difflib
 from dataclasses import dataclass, replace
-from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple
 
 from tfcompose.catalogue import CATALOGUE
@@ -128,8 +128,7 @@ def without_duplicates(found: Iterable[Finding]) -> list[Finding]:
 
 def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:
     """Return the known word that a person most likely meant by ``word``, or None; 1 is as near as the word itself."""
-    find = import_module("difflib").get_close_matches  # loaded when a word is wrong
-    found = find(word.lower(), {name.lower(): name for name in known}, n=1, cutoff=cutoff)
+    found = difflib.get_close_matches(word.lower(), {name.lower(): name for name in known}, n=1, cutoff=cutoff)
     return next((name for name in known if name.lower() == found[0]), None) if found else None
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from tfcompose.cli.node_page import facts, text
 from tfcompose.cli.parser import main
-from tfcompose.resolve.node_presets import node_preset, node_preset_names
+from tfcompose.resolve.presets import node_preset, node_preset_names
 
 
 @pytest.mark.parametrize("name", node_preset_names())

@@ -12,7 +12,7 @@ from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
 from tfcompose.plan.file import read_plan
-from tfcompose.resolve.node_presets import node_preset, node_preset_names
+from tfcompose.resolve.presets import node_preset, node_preset_names
 
 ROBOT = """tfcompose: 1
 robot: r

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.resolve.node_presets import node_preset, node_preset_names
+from tfcompose.resolve.presets import node_preset, node_preset_names
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import html
 import re
 from dataclasses import dataclass, field, replace
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -74,5 +74,4 @@ class Block:
             again = names.get(html.unescape(name) if "&" in name else name)
             return found[0] if again is None else before + held.replace(name, html.escape(again))
 
-        html = import_module("html")  # loaded only for robots with such blocks
         return replace(self, text=_HELD.sub(other, self.text))

@@ -1,26 +1,25 @@
-"""What nodes publish by themselves: switched off where somebody else owns the edge, and told the frames' names.
+"""What nodes publish by themselves: switched off where somebody else owns the edge, and given the frames' names.
 
 A claim that cannot be settled by parameters of a process that tfcompose starts is a finding, with the exact switch.
 """
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, RejectedError, Span, did_you_mean, finding
-from tfcompose.model import BUILT_IN, Claim, Edge, Node, Process
+from tfcompose.model import BUILT_IN, SHELL, AsInFile, Claim, Edge, Node, Process
 from tfcompose.plan import switch_text
-from tfcompose.resolve.node_presets import node_preset, node_preset_names
-from tfcompose.resolve.roles import Roles
-from tfcompose.resolve.told import Told, flat
+from tfcompose.resolve.presets import node_preset, node_preset_names
 
 if TYPE_CHECKING:
     from tfcompose.language.node_preset import ClaimSpec, NodePresetSpec
     from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Path, Source
-    from tfcompose.model import Robot
+    from tfcompose.model import Edge, Robot
 
 
 def settled(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Finding]]:
@@ -228,3 +227,138 @@ class _Work:
 
     def _at(self, told: Told, key: str) -> Span:
         return self.source.at((*told.node.path, "params", *key.split(".")))
+
+
+def flat(params: dict[str, Any], above: str = "") -> dict[str, Any]:
+    """Return nested parameters by their full names, with dots."""
+    found: dict[str, Any] = {}
+    for key, value in params.items():
+        found |= flat(value, f"{above}{key}.") if isinstance(value, dict) else {f"{above}{key}": _meant(value)}
+    return found
+
+
+def _meant(value: Any) -> Any:
+    """Return a word of a parameter file as ROS reads it, as far as switches and names need it: true, false, or text."""
+    if not isinstance(value, AsInFile):
+        return value
+    return {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}.get(
+        value.lower(), str(value)
+    )
+
+
+@dataclass(slots=True)
+class Told:
+    """One node: what is known of it, what the user told it, and what tfcompose tells it."""
+
+    process: Process
+    node: Node
+    claims: tuple[ClaimSpec, ...]
+    preset: NodePresetSpec | None
+    roles: Roles
+    given: dict[str, Any]
+    computed: dict[str, Any] = field(default_factory=dict)
+
+    def ends(self, claim: ClaimSpec) -> tuple[str, str]:
+        """Return the frames that the claim is about, parent and child."""
+        return self.roles.fill(claim.parent), self.roles.fill(claim.child)
+
+    def has(self, params: dict[str, Any]) -> bool:
+        """Return whether the user gave exactly these parameters."""
+        return bool(params) and all(self.given.get(key) == value for key, value in params.items())
+
+    def is_published(self, claim: ClaimSpec) -> bool:
+        """Return whether the node publishes the edge as the user has set it."""
+        return (claim.by_default or self.has(claim.on)) and not self.has(claim.off)
+
+    @property
+    def can_be_told(self) -> bool:
+        """Return whether parameters that tfcompose writes reach the node: launch files and shells have to pass them."""
+        process = self.process
+        if process.kind != "run":
+            return False
+        is_node = process.launch is None and process.argv[:2] != SHELL
+        return is_node or "${params_file}" in " ".join(process.argv)
+
+
+_HOLE = re.compile(r"\{(\w+)\}")
+
+
+class Roles:
+    """A node's frames by role.
+
+    First come the ends of the edges that its process owns; then frames with the names that the node expects; for the
+    base what hangs on its odom, else the robot's base. What is nowhere in the tree has the node's own name for it.
+    """
+
+    def __init__(
+        self, robot: Robot, process: str, preset: NodePresetSpec | None, claims: tuple[ClaimSpec, ...]
+    ) -> None:
+        self._robot = robot
+        self._usual = {role: said.default for role, said in preset.frames.items()} if preset else {}
+        self._bound: dict[str, str] = {}
+        self.frames: dict[str, str] = {}
+        """role → frame of the tree"""
+        for edge in robot.edges:
+            if edge.owner == process:
+                self._bind(edge, claims)
+        self.frames |= self._bound
+        for role, usual in self._usual.items():
+            frame = self._bound.get(role) or self._open(role, usual)
+            if frame is not None:
+                self.frames[role] = frame
+
+    def is_bound(self, role: str) -> bool:
+        """Return whether the role follows from an edge that the process owns."""
+        return role in self._bound
+
+    def fill(self, template: str) -> str:
+        """Return a name with roles in it as a name of the tree."""
+        return _HOLE.sub(lambda hole: self.frames.get(hole[1], self._usual.get(hole[1], hole[0])), template)
+
+    def final(self, value: Any) -> Any:
+        """Return a parameter's value; a role in it is the frame's name on the live tree."""
+        whole = _HOLE.fullmatch(value) if isinstance(value, str) else None
+        if whole is None:
+            return value
+        frame = self.frames.get(whole[1])
+        return self._robot.final(frame) if frame else self._usual.get(whole[1], value)
+
+    def _bind(self, edge: Edge, claims: tuple[ClaimSpec, ...]) -> None:
+        """Give an owned edge's ends the roles of the claim that fits it best."""
+        fitting = [(self._fit(edge, claim), -index, claim) for index, claim in enumerate(claims)]
+        fitting = [one for one in fitting if one[0] >= 0]
+        if not fitting:
+            return
+        claim = max(fitting, key=lambda one: one[:2])[2]
+        for template, frame in ((claim.parent, edge.parent), (claim.child, edge.child)):
+            whole = _HOLE.fullmatch(template)
+            if whole:
+                self._bound.setdefault(whole[1], frame)
+
+    def _fit(self, edge: Edge, claim: ClaimSpec) -> int:
+        """Return how well an edge fits a claim: by its ends' names, and by what hangs below; negative if not at all."""
+        score = 0
+        for template, frame in ((claim.parent, edge.parent), (claim.child, edge.child)):
+            whole = _HOLE.fullmatch(template)
+            usual = self._usual.get(whole[1]) if whole else None
+            if whole is None and _HOLE.sub("", template) == template and template != frame:
+                return -1
+            if whole is None and _HOLE.search(template) and self.fill(template) != frame:
+                return -1
+            score += 4 * (usual == frame)
+        ends = _HOLE.fullmatch(claim.child)
+        moves_on = any(below.parent == edge.child and below.kind == "dynamic" for below in self._robot.edges)
+        return score + (ends is not None and (ends[1] == "odom") == moves_on)
+
+    def _open(self, role: str, usual: str) -> str | None:
+        robot = self._robot
+        if role == "base":
+            odom = self._bound.get("odom") or self.frames.get("odom")
+            below = (edge.child for edge in robot.edges if edge.parent == odom and edge.kind == "dynamic")
+            taken = {self._bound.get("map"), odom, self.frames.get("map")}
+            base = usual if usual in robot.frames else robot.base
+            return next(below, None) or (base if base not in taken else None)
+        if role == "odom" and usual not in robot.frames:
+            above = self._bound.get("map")
+            return next((edge.child for edge in robot.edges if edge.parent == above and edge.kind == "dynamic"), None)
+        return usual if usual in robot.frames else None

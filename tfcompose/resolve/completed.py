@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.resolve.blocks import blocks_of, hardware_of
-from tfcompose.resolve.filling import Filler
-from tfcompose.resolve.isolation import isolate
-from tfcompose.resolve.nodes import has_claims
+from tfcompose.resolve.claims import settled
+from tfcompose.resolve.isolation import Filler, isolate
+from tfcompose.resolve.processes import has_claims
+from tfcompose.resolve.stock import with_stock
 from tfcompose.urdf.ros2_control import unknown_joints
 
 if TYPE_CHECKING:
@@ -28,12 +28,12 @@ def completed(robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None) 
         found += refused
     robot = replace(robot, base=_base(robot, spec, source, found))
     if spec.ros.state_publisher == "stock":
-        robot, refused = import_module("tfcompose.resolve.stock").with_stock(robot)
+        robot, refused = with_stock(robot)
         found += refused
     robot, refused = isolate(robot, spec, source, disk)
     found += refused
     if has_claims(spec):  # what knows them is loaded only then
-        robot, refused = import_module("tfcompose.resolve.claims").settled(robot, spec, source)
+        robot, refused = settled(robot, spec, source)
         found += refused
     filler = Filler(robot, source, disk)
     found += [one for process in robot.processes for one in filler.needless(process)]

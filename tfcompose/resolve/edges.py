@@ -1,27 +1,46 @@
-"""Edges as the user gave them: frames, links with a parent, joints and parts; each with its owner."""
+"""Edges as the user gave them: frames, links with a parent, joints and parts; each with its owner.
+
+The numbers of poses and limits are kept as they were written too: a pose keeps a unit quaternion, and forgets whether
+somebody wrote 90, 1.57 or 90 deg. The rules about units and slips of the pen need to know.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, Span, finding
-from tfcompose.model import FREE, JOINTS, STATIC, Edge, Joint, Link, MountedSensor, Process, is_optical
-from tfcompose.resolve.joints import idle_keys, joint_of
+from tfcompose.geometry import norm
+from tfcompose.language.base import Spec
+from tfcompose.model import (
+    FREE,
+    JOINTS,
+    STATIC,
+    AsWritten,
+    Edge,
+    Joint,
+    Limit,
+    Link,
+    MountedSensor,
+    Process,
+    is_optical,
+)
 from tfcompose.resolve.optical_edits import optical_edits
 from tfcompose.resolve.poses import Draft, pose_of
+from tfcompose.units import Written
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
+    from tfcompose.findings import Span
     from tfcompose.language import Validated
     from tfcompose.language.pose import EdgeKeys
-    from tfcompose.language.robot import RobotSpec
+    from tfcompose.language.robot import JointSpec, RobotSpec
     from tfcompose.load import Path, Source
     from tfcompose.plan import EdgeKind
     from tfcompose.resolve.bodies import Bodies
-    from tfcompose.resolve.part import Joined
+    from tfcompose.resolve.parts import Joined
     from tfcompose.resolve.presets import Sensor
 
 
@@ -178,3 +197,100 @@ class Drafts:
         if joint and owner == JOINTS:
             return "joint"
         return "static" if keys.static and owner not in self.simulated else "dynamic"
+
+
+_MOVING = "revolute, continuous or prismatic"
+#: What is said of a joint's motion, by types of joints of which it says nothing.
+_IDLE = {
+    "fixed": ("axis", "limit", "mimic", "dynamics", "safety_controller", "calibration"),
+    "floating": ("axis", "limit", "mimic", "dynamics", "safety_controller", "calibration"),
+    "planar": ("mimic",),
+}
+
+
+def joint_of(name: str, written: JointSpec, at: Span) -> Joint | None:
+    """Return the joint with a unit axis, or None where it is fixed."""
+    kind: Any = written.type
+    if kind == "fixed":
+        return None
+    length = norm(written.axis)
+    x, y, z = written.axis
+    mimic = written.mimic
+    return Joint(
+        name=name,
+        type=kind,
+        at=at,
+        axis=(x / length, y / length, z / length),
+        limit=written.limit,
+        mimic=mimic.joint if mimic else None,
+        multiplier=mimic.multiplier if mimic else 1.0,
+        offset=mimic.offset if mimic else 0.0,
+        axis_length=length,
+        dynamics=written.dynamics,
+        safety=written.safety_controller,
+        reference=written.calibration,
+    )
+
+
+def idle_keys(name: str, joint: JointSpec, source: Source) -> Iterator[Finding]:
+    """Yield a finding where a joint has keys that joints of its type do not use."""
+    at: Path = ("joints", name)
+    idle = source.in_order(at, joint.model_fields_set & {*_IDLE.get(joint.type, ())})
+    advice = "leave it out" if joint.type in FREE else f"leave it out; if {name} moves, type: {_MOVING}"
+    if joint.type == "continuous" and joint.limit:
+        at = (*at, "limit")
+        idle = source.in_order(at, [key for key in ("lower", "upper") if getattr(joint.limit, key) is not None])
+        advice = "leave it out; if there is an end, type: revolute"
+    if idle:
+        message = f"the joint {name} is {joint.type}: {', '.join(idle)} {'have' if idle[1:] else 'has'} no effect"
+        yield finding("TF727", message, source.at_key((*at, idle[0])), help=advice, severity="warning")
+
+
+_SECTIONS = ("frames", "links", "joints", "sensors", "parts", "processes")
+_LISTS = frozenset({"xyz", "rpy", "quat_xyzw"})
+_MAPPINGS = {
+    "axis_angle": ("angle",),
+    "look": ("up", "down", "left", "right", "roll"),
+    "limit": ("lower", "upper"),
+}
+
+
+def as_written(spec: RobotSpec, source: Source) -> tuple[AsWritten, ...]:
+    """Return the numbers of every pose and joint limit of the spec."""
+    return tuple(
+        found
+        for section in _SECTIONS
+        for name, entry in getattr(spec, section).items()
+        for found in _of(entry, (section, name), source)
+    )
+
+
+def _of(spec: Spec, path: Path, source: Source) -> Iterator[AsWritten]:
+    for key in spec.model_fields_set:
+        value, here = getattr(spec, key), (*path, key)
+        if key in _LISTS and value is not None:
+            yield _numbers(dict(enumerate(value)), here, source)
+        elif key in _MAPPINGS and isinstance(value, (Spec, Limit)):
+            given = {step: getattr(value, step) for step in _MAPPINGS[key] if source.has((*here, step))}
+            numbers = {step: number for step, number in given.items() if number is not None}
+            if numbers:
+                yield _numbers(numbers, here, source)
+        elif isinstance(value, Spec):
+            yield from _of(value, here, source)
+        elif isinstance(value, (tuple, dict)) and key != "params":
+            yield from _inside(value, here, source)
+
+
+def _inside(value: Any, path: Path, source: Source) -> Iterator[AsWritten]:
+    """Yield the numbers in a list or mapping; one item may stand for a list of it."""
+    for step, item in value.items() if isinstance(value, dict) else enumerate(value):
+        if isinstance(item, Spec):
+            here = (*path, step)
+            yield from _of(item, here if source.has(here) else path, source)
+
+
+def _numbers(numbers: dict[Any, float], path: Path, source: Source) -> AsWritten:
+    steps = list(numbers)
+    values = tuple(numbers.values())
+    with_unit = tuple(isinstance(value, Written) for value in values)
+    return AsWritten(path, tuple(map(float, values)), with_unit, lambda index: source.at((*path, steps[index])))

@@ -13,8 +13,8 @@ from tfcompose.language.robot import Origin
 from tfcompose.load import path_named
 from tfcompose.model import BUILT_IN, Node, Process, Robot
 from tfcompose.resolve.isolation import topics_below
-from tfcompose.resolve.nodes import full_name
 from tfcompose.resolve.poses import pose_of
+from tfcompose.resolve.processes import full_name
 from tfcompose.resolve.stock import with_stock
 from tfcompose.urdf.blocks import read_block
 from tfcompose.urdf.convert import robot_of
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tfcompose.plan import RosSettings
-    from tfcompose.resolve.part import PartEntry
+    from tfcompose.resolve.parts import PartEntry
     from tfcompose.urdf.packages import Packages
 
 _WORD = re.compile(r"""["']?(\w+)["']?""")

@@ -7,18 +7,21 @@ remapped below the namespace for every process at once.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING
+import re
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, did_you_mean, finding
-from tfcompose.plan import RosSettings
-from tfcompose.resolve.filling import Filler
+from tfcompose.load import path_named
+from tfcompose.model import SHELL
+from tfcompose.plan import RosSettings, told_at_start
 
 if TYPE_CHECKING:
     from tfcompose.language.robot import RobotSpec, RosSpec
-    from tfcompose.load import Source
-    from tfcompose.model import Robot
+    from tfcompose.load import Path, Source
+    from tfcompose.model import Node, Process, Robot
     from tfcompose.urdf.packages import Disk
+
 
 TF_TOPICS = ("/tf", "/tf_static")
 
@@ -63,3 +66,112 @@ def _wrong(robot: Robot, spec: RobotSpec, source: Source) -> list[Finding]:
             advice = did_you_mean(frame, robot.frames, "remove it")
             found.append(finding("TF203", f"shared_frames: no frame {frame}", place, help=advice))
     return found
+
+
+_WORDS = {
+    "remap": "-r FROM:=TO",
+    "log_level": "--log-level LEVEL",
+    "namespace": "-r __ns:=/NAMESPACE",
+    "params": "--params-file ${params_file}",
+}
+_HOLE = re.compile(r"\$\{\s*(frame|file)\(\s*([^(){}]*?)\s*\)\s*\}")
+
+
+@dataclass(slots=True)
+class Filler:
+    """Fills in processes; ``found`` is what cannot be."""
+
+    robot: Robot
+    source: Source
+    disk: Disk | None
+    found: list[Finding] = field(default_factory=list)
+
+    def filled(self, process: Process) -> Process:
+        """Return the process with every ``${frame(NAME)}`` and ``${file(PATH)}`` replaced."""
+        section: Path = ("processes", process.name)
+        if not self.source.has(section):
+            section = ("sensors", process.name, "driver")
+        done = replace(
+            process,
+            nodes=tuple(replace(n, params=self._fill(n.params, (*n.path, "params"))) for n in process.nodes),
+            argv=self._fill(process.argv, (*section, "run")),
+            remap=self._fill(process.remap, (*section, "remap")),
+            env=self._fill(process.env, (*section, "env")),
+            cwd=self._folder(process.cwd, (*section, "cwd")),
+        )
+        for node in done.nodes:
+            self._check_paths(done, node)
+        return done
+
+    def needless(self, process: Process) -> list[Finding]:
+        """Return what is said and reaches nobody: a file of no parameters, and keys beside a shell's text."""
+        at: Path = ("processes", process.name, "run")
+        asked = any("${params_file}" in word for word in (*process.argv, *process.env.values()))
+        if process.argv[:2] == SHELL:
+            return self._not_reached(process, asked=asked)
+        if not asked or any(node.params for node in process.nodes) or not self.source.has(at):
+            return []
+        message = f"{process.name} is given ${{params_file}}, and has no parameters"
+        return [finding("TF816", message, self.source.at(at), help="params: {…}")]
+
+    def _not_reached(self, process: Process, *, asked: bool) -> list[Finding]:
+        """Return a warning for each key that would be told by arguments, which end before the text's programs."""
+        found = []
+        for key in ("remap", "log_level", "namespace", *(() if asked else ("params",))):
+            at: Path = ("processes", process.name, key)
+            if getattr(process, key) and self.source.has(at):
+                message = f"{key} does not reach {process.name}, which a shell reads"
+                advice = f"write it into the text: --ros-args {_WORDS[key]}; or give run as a list"
+                found.append(finding("TF107", message, self.source.at_key(at), help=advice, severity="warning"))
+        return found
+
+    def _fill(self, value: Any, path: Path) -> Any:
+        if isinstance(value, str):
+            return _HOLE.sub(lambda hole: self._meant(hole[1], hole[2], path), value) if "${" in value else value
+        if isinstance(value, dict):
+            return {key: self._fill(item, (*path, key)) for key, item in value.items()}
+        if isinstance(value, (list, tuple)):
+            return type(value)(self._fill(item, (*path, index)) for index, item in enumerate(value))
+        return value
+
+    def _meant(self, what: str, name: str, path: Path) -> str:
+        return self._frame(name, path) if what == "frame" else self._file(name, path)
+
+    def _frame(self, frame: str, path: Path) -> str:
+        if frame not in self.robot.frames and not self.robot.excuses(frame):
+            advice = did_you_mean(frame, self.robot.frames)
+            at = self.source.at(path)
+            self.found.append(finding("TF203", f"${{frame({frame})}}: no frame {frame}", at, help=advice))
+        return self.robot.final(frame)
+
+    def _file(self, name: str, path: Path) -> str:
+        at = self.source.at(path)
+        place = path_named(name, at)
+        if name.startswith("/"):
+            advice = "a path from this file's folder; or write the path alone, which no other machine has"
+            self.found.append(finding("TF106", f"${{file({name})}} is an absolute path", at, help=advice))
+        elif self.disk and not (self.disk.is_file(place) or self.disk.is_folder(place)):
+            message = f"${{file({name})}}: {place} is not there"
+            self.found.append(finding("TF019", message, at, help="a path is relative to the file that writes it"))
+        return f"${{file:{place}}}"
+
+    def _folder(self, cwd: str | None, path: Path) -> str | None:
+        """Return the folder that a process runs in: a relative one is beside the file that names it."""
+        if cwd is None or cwd.startswith(("/", "${")):
+            return self._fill(cwd, path)  # type: ignore[no-any-return]
+        at = self.source.at(path)
+        place = path_named(cwd, at)
+        if self.disk and not self.disk.is_folder(place):
+            advice = "a path is relative to the file that writes it"
+            self.found.append(finding("TF019", f"cwd: the folder {place} is not there", at, help=advice))
+        return f"${{file:{place}}}"
+
+    def _check_paths(self, process: Process, node: Node) -> None:
+        """Find parameters with a path that only the launcher knows, where it has no way to tell the node."""
+        can = process.kind == "run" and process.package is not None and len(process.nodes) == 1
+        for key, value in node.params.items() if not can else ():
+            if told_at_start(value):
+                message = f"the parameter {key} of {process.name} holds a path that is known at the start only"
+                advice = "write it among the arguments of run"
+                place = self.source.at((*node.path, "params", key))
+                self.found.append(finding("TF816", message, place, help=advice))

@@ -10,7 +10,7 @@ from tfcompose.findings import Finding, Note, RejectedError, finding, nearest
 from tfcompose.load import path_named
 from tfcompose.load.params import NodeParams, ParamsFile, Word, load_params
 from tfcompose.model import AsInFile
-from tfcompose.resolve.nodes import FILE_KEY, full_name, names_files
+from tfcompose.resolve.processes import FILE_KEY, full_name, names_files
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

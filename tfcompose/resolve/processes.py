@@ -1,24 +1,30 @@
-"""Processes: what is started, or expected to run."""
+"""Processes: what is started, simulated or expected to run, under which names, and how it is kept alive and ended.
+
+tfcompose's own processes are here as well: ``static``, ``joints`` and ``guard``.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, did_you_mean, finding
-from tfcompose.language.process import SIMULATIONS
-from tfcompose.model import BUILT_IN, Node, Process
-from tfcompose.plan import Simulation
-from tfcompose.resolve.built_in import built_in_keys
-from tfcompose.resolve.nodes import namespace_of, nodes_of
+from tfcompose.language.process import RUNNING, SIMULATIONS, SWEEP
+from tfcompose.model import BUILT_IN, GUARD, JOINTS, SHELL, STATIC, Node, Process
+from tfcompose.plan import Ready, Simulation, StopRule, Sweep
 from tfcompose.resolve.poses import pose_of
-from tfcompose.resolve.running import EXTERNAL_KEYS, SIMULATED_KEYS, how, program
+from tfcompose.resolve.presets import node_preset, node_preset_names
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from tfcompose.language import Validated
-    from tfcompose.language.process import ProcessSpec, Simulate
+    from tfcompose.language.process import ProcessSpec, ReadySpec, Run, Simulate, Started
     from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Path, Source
+    from tfcompose.model import Edge, Joint
+    from tfcompose.plan import ProcessKind
 
 
 def user_process(name: str, said: ProcessSpec, validated: Validated) -> tuple[Process | None, list[Finding]]:
@@ -122,3 +128,294 @@ def unknown_names(
                     finding("TF813", f"{process.name} waits for {other}, which is no process", place, help=advice)
                 )
     return found
+
+
+#: Keys of a process that have the same name in the model.
+_AS_WRITTEN = ("after", "cwd", "env", "host", "log_level", "max_restarts", "remap", "required", "restart")
+#: All that ``how`` reads, of a process that tfcompose starts.
+KEYS = (*_AS_WRITTEN, "stop", "ready")
+#: Those of a process that somebody else starts, and of one that is simulated.
+EXTERNAL_KEYS = ("after", "host", "ready")
+SIMULATED_KEYS = ("after", "env", "host", "max_restarts", "remap", "required", "restart", "stop")
+
+
+def how(said: Started, namespace: str, keys: tuple[str, ...] = KEYS) -> dict[str, Any]:
+    """Return a process's fields from what was written, those of ``keys``; ``namespace`` is that of its nodes."""
+    fields = {key: getattr(said, key) for key in keys if key in _AS_WRITTEN}
+    if said.namespace is not None:
+        fields["namespace"] = namespace
+    if "stop" in keys and said.stop:
+        fields["stop"] = StopRule(said.stop.signal, said.stop.timeout)
+    if "ready" in keys and said.ready:
+        fields["ready"] = _ready(said.ready, namespace)
+    return fields
+
+
+def program(run: Run, *, shell: bool) -> dict[str, Any]:
+    """Return what is started: a package's program, a launch file, or a command; a shell's command is one text."""
+    argv = (*SHELL, *run.argv) if shell and run.argv else run.argv or run.args
+    return {"package": run.package, "executable": run.executable, "launch": run.launch, "argv": argv}
+
+
+def _ready(said: ReadySpec, namespace: str) -> Ready | None:
+    timeout_s = said.timeout
+    if said.topic is not None:
+        return Ready("topic", full_name(namespace, said.topic), timeout_s=timeout_s)
+    if said.service is not None:
+        return Ready("service", full_name(namespace, said.service), timeout_s=timeout_s)
+    if said.lifecycle is not None:
+        return Ready("lifecycle", said.lifecycle, timeout_s=timeout_s)
+    if said.log is not None:
+        return Ready("log", said.log, timeout_s=timeout_s)
+    if said.exit is not None:
+        return Ready("exit", number=float(said.exit), timeout_s=timeout_s)
+    if said.time is not None:
+        return Ready("time", number=said.time, timeout_s=timeout_s)
+    return Ready("edges", timeout_s=timeout_s) if said.edges else None  # what else was said was refused
+
+
+_BUILT_IN_KEYS = frozenset({"rate", "remap", "env", "host", "after"})
+#: The parameters of ``joints``: robot_state_publisher's, where it has them, each with an example.
+_JOINTS_PARAMS: dict[str, Any] = {"publish_frequency": 30.0, "ignore_timestamp": True}
+_KINDS: dict[str, ProcessKind] = {STATIC: "static", JOINTS: "joints", GUARD: "guard"}
+
+
+def built_in(spec: RobotSpec, source: Source) -> list[Process]:
+    """Return tfcompose's own processes, with what stands of them under ``processes``."""
+    own = []
+    for name in BUILT_IN:
+        said = spec.processes.get(name)
+        at = source.at_key(("processes", name)) if said else source.at_key(("robot",))
+        path: Path = ("processes", name)
+        params = said.params if said and name == JOINTS else {}
+        node = Node(full_name(spec.ros.namespace, f"tfcompose_{name}"), at, path, params)
+        process = Process(name, _KINDS[name], at, (node,))
+        if said:
+            given = {key: getattr(said, key) for key in _BUILT_IN_KEYS}
+            process = replace(process, **given)
+        own.append(process)
+    return own
+
+
+def built_in_keys(name: str, said: ProcessSpec, source: Source) -> list[Finding]:
+    """Return findings about what stands under the name of one of tfcompose's own processes."""
+    at: Path = ("processes", name)
+    known = _BUILT_IN_KEYS | ({"params"} if name == JOINTS else set())
+    wrong = said.model_fields_set - known
+    advice = f"its keys can be: {', '.join(sorted(known))}"
+    found = [
+        finding("TF101", f"{name} is built in and has no {key}", source.at_key((*at, key)), help=advice)
+        for key in wrong
+    ]
+    return found + (_joints_params(said.params, source) if name == JOINTS else [])
+
+
+def _joints_params(params: dict[str, Any], source: Source) -> list[Finding]:
+    """Return findings about the parameters of ``joints``."""
+    found = []
+    for name, value in params.items():
+        at: Path = ("processes", JOINTS, "params", name)
+        example = _JOINTS_PARAMS.get(name)
+        if example is None:
+            advice = did_you_mean(name, _JOINTS_PARAMS, f"it has {' and '.join(_JOINTS_PARAMS)}")
+            found.append(finding("TF101", f"joints has no parameter {name}", source.at_key(at), help=advice))
+        elif isinstance(value, bool) != isinstance(example, bool) or not isinstance(value, (bool, int, float)):
+            advice = f"for example {name}: {str(example).lower()}"
+            what = "true or false" if isinstance(example, bool) else "a number of hertz"
+            found.append(finding("TF103", f"{name} is {what}", source.at(at), help=advice))
+        elif not isinstance(value, bool) and not 0 < value < math.inf:
+            advice = "leave it out, and every joint state is published"
+            found.append(finding("TF106", f"{name} has to be above 0", source.at(at), help=advice))
+    return found
+
+
+#: What is read of every process; of two ways of running one is refused elsewhere, as is a rate.
+_ALWAYS = frozenset({*RUNNING, "node", "nodes", "namespace", "rate"})
+#: For each way of running: the keys that are read, how it is called, and whom the other keys are for.
+_READ = {
+    "external": (
+        _ALWAYS | {*EXTERNAL_KEYS, "publishes", "params", "lifecycle"},
+        "started by others",
+        "whoever starts the process",
+    ),
+    "simulate": (_ALWAYS | {*SIMULATED_KEYS}, "simulated", "the real process"),
+}
+
+
+def idle_keys(spec: RobotSpec, source: Source) -> list[Finding]:
+    """Return a finding for each key of a process that does nothing there."""
+    said: dict[Path, tuple[str, Started | None]] = {}
+    said |= {("processes", name): (name, process) for name, process in spec.processes.items()}
+    said |= {("sensors", name, "driver"): (f"the driver of {name}", s.driver) for name, s in spec.sensors.items()}
+    found: list[Finding] = []
+    for path, (name, process) in said.items():
+        if process is not None:
+            found += _idle_rate(path, name, process, source)
+            found += _idle(path, name, process, source)
+    return found
+
+
+def _idle_rate(path: Path, name: str, process: Started, source: Source) -> Iterator[Finding]:
+    """Yield a finding about a rate: only ``joints`` has one."""
+    if process.rate is None or path == ("processes", JOINTS):
+        return
+    advice = "remove it; an edge says itself how often it is sent: odom: {parent: map, owner: …, rate: 10 Hz}"
+    if process.simulate:
+        advice = "write it under simulate"
+    elif path == ("processes", STATIC):
+        advice = "remove it; fixed edges are sent once"
+    message = f"{name} has no rate; only the process joints has"
+    yield finding("TF101", message, source.at_key((*path, "rate")), help=advice)
+
+
+def _idle(path: Path, name: str, process: Started, source: Source) -> Iterator[Finding]:
+    """Yield a finding for each key beside external or simulate that does nothing.
+
+    Where an overlay puts that in the place of something else, the keys below it are meant for what they stood beside.
+    """
+    way = "external" if process.external else "simulate" if process.simulate else None
+    if way is None or (*path, way) in source.replaced or (way == "simulate" and path[0] == "sensors"):
+        return  # no driver is simulated: that is refused
+    read, how, whom = _READ[way]
+    for key in process.model_fields_set - read:
+        message, advice = f"{name} is {how}: {key} does nothing there", f"remove it: it is for {whom}"
+        yield finding("TF851", message, source.at_key((*path, key)), help=advice, severity="warning")
+
+
+#: The key among a process's parameters that names files with more of them.
+FILE_KEY = "file"
+
+
+def full_name(namespace: str, name: str) -> str:
+    """Return a node's, topic's or service's full name: below the namespace unless it begins with a slash."""
+    if name.startswith("/"):
+        return name
+    return "/" + "/".join(part for part in (namespace.strip("/"), name) if part)
+
+
+def namespace_of(said: Started | None, namespace: str) -> str:
+    """Return the namespace of a process's nodes, without a leading slash: its own, or the robot's ``namespace``."""
+    if said is None or said.namespace is None:
+        return namespace
+    return full_name(namespace, said.namespace).strip("/")
+
+
+def has_claims(spec: RobotSpec) -> bool:
+    """Return whether anything is said of what nodes publish, or a process has several nodes."""
+    return any(said.nodes or said.publishes or (said.node and said.node.preset) for said in spec.processes.values())
+
+
+def names_files(params: dict[str, Any]) -> bool:
+    """Return whether parameters name files."""
+    return isinstance(params.get(FILE_KEY), (str, list))
+
+
+def _usual(said: ProcessSpec) -> str | None:
+    """Return the name that a known node has where tfcompose cannot give it another."""
+    if said.node is None or said.node.preset is None or (said.run and said.run.package):
+        return None
+    return node_preset(said.node.preset).node if said.node.preset in node_preset_names() else None
+
+
+def nodes_of(name: str, said: ProcessSpec, namespace: str, source: Source) -> tuple[tuple[Node, ...], list[Finding]]:
+    """Return the nodes of a process, at least one, and what is wrong with them."""
+    at: Path = ("processes", name)
+    if not said.nodes:
+        place = source.at(("processes", name, "node")) if said.node else source.at_key(at)
+        own_name = (said.node.name if said.node else None) or _usual(said) or name
+        return (Node(full_name(namespace, own_name), place, at, said.params, said.lifecycle),), []
+    found = []
+    for key in ("publishes",) if said.publishes else ():
+        message = f"{name} has nodes, and {key} names none of them"
+        found.append(finding("TF107", message, source.at_key((*at, key)), help="write it under one of its nodes"))
+    for key in said.params:
+        advice = f"write it under nodes: {{{next(iter(said.nodes))}: {{params: {{{key}: …}}}}}}"
+        message = f"{name} has nodes, and the parameter {key} names none of them"
+        found.append(finding("TF107", message, source.at_key((*at, "params", key)), help=advice))
+    nodes = [
+        Node(
+            full_name(namespace, node),
+            source.at_key((*at, "nodes", node)),
+            (*at, "nodes", node),
+            own.params,
+            own.lifecycle,
+        )
+        for node, own in said.nodes.items()
+    ]
+    return tuple(nodes), found
+
+
+#: The time of one sweep, in seconds; longer where a joint may not move that fast.
+PERIOD_S = 6.0
+
+
+def with_positions(
+    process: Process, spec: RobotSpec, edges: tuple[Edge, ...], source: Source, found: list[Finding]
+) -> Process:
+    """Give a stand-in for joint states what it says of every joint that has a position of its own.
+
+    A joint that mimics another is left out: it follows, and the process computes it. Where nothing is said a joint is
+    at 0, or in the middle between its limits if 0 is not between them, as joint_state_publisher has it.
+    """
+    said = spec.processes.get(process.name)
+    wanted = said.simulate.joints if said and said.simulate else None
+    if process.simulate is None or process.simulate.kind != "joints" or wanted is None:
+        return process
+    all_joints = {edge.joint.name: edge.joint for edge in edges if edge.joint}
+    joints = {name: joint for name, joint in all_joints.items() if _has_position(joint)}
+    if isinstance(wanted, dict):
+        found += _findings(wanted, all_joints, process, source)
+    each = {name: wanted.get(name, None) if isinstance(wanted, dict) else wanted for name in joints}
+    positions = {
+        name: _rest(joints[name]) if what is None or isinstance(what, str) else what for name, what in each.items()
+    }
+    sweeps = {name: _sweep(joints[name]) for name, what in each.items() if what == SWEEP}
+    moving = {name: sweep for name, sweep in sweeps.items() if sweep}
+    return replace(process, simulate=replace(process.simulate, joints=positions, sweep=moving))
+
+
+def _findings(wanted: dict[str, Any], joints: dict[str, Joint], process: Process, source: Source) -> Iterator[Finding]:
+    """Give a finding for each joint that is not there, or cannot move as it should."""
+    movable = [name for name, joint in joints.items() if _has_position(joint)]
+    for name, what in wanted.items():
+        place = source.at_key(("processes", process.name, "simulate", "joints", name))
+        joint = joints.get(name)
+        if joint and joint.mimic:
+            advice = f"say the position of {joint.mimic}"
+            yield finding("TF703", f"{name} has no position of its own: it mimics {joint.mimic}", place, help=advice)
+        elif name not in movable:
+            advice = did_you_mean(name, movable, f"there is {', '.join(movable)}" if movable else "no joint moves")
+            yield finding("TF703", f"no moving joint {name}", place, help=advice)
+        elif joint and what == SWEEP and _sweep(joint) is None:
+            advice = f"give {name} a limit: {{lower, upper}}, or say a position here"
+            yield finding("TF106", f"{name} slides and has no limits to sweep between", place, help=advice)
+
+
+def _has_position(joint: Joint) -> bool:
+    """Whether the joint has a single position, and one of its own."""
+    return joint.mimic is None and joint.type in {"revolute", "continuous", "prismatic"}
+
+
+def _rest(joint: Joint) -> float:
+    limit = joint.limit
+    if joint.type == "continuous" or limit is None or limit.lower is None or limit.upper is None:
+        return 0.0
+    return 0.0 if limit.lower <= 0 <= limit.upper else (limit.lower + limit.upper) / 2
+
+
+def _sweep(joint: Joint) -> Sweep | None:
+    """Return the sweep between the joint's limits, no faster than it may move; None for a slide without limits.
+
+    Of two limits a missing one is 0, as URDF's readers have it.
+    """
+    limit = joint.limit
+    fastest = limit.velocity if limit and limit.velocity else math.inf
+    if joint.type == "continuous":
+        return Sweep(max(PERIOD_S, math.tau / fastest))
+    if limit is not None and (limit.lower is not None or limit.upper is not None):
+        lower, upper = limit.lower or 0.0, limit.upper or 0.0
+    elif joint.type == "revolute":
+        lower, upper = -math.pi, math.pi
+    else:
+        return None
+    return Sweep(max(PERIOD_S, math.pi * (upper - lower) / fastest), lower, upper)

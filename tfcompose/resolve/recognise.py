@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from tfcompose.language.preset import PresetFrame, PresetSpec
     from tfcompose.model import Edge, Robot
-    from tfcompose.resolve.library import Library
+    from tfcompose.resolve.presets import Library
 
 #: As near (m, rad) as a pose must be to a preset's to be taken for it.
 NEAR = 1e-6

@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, finding
 from tfcompose.load import path_named
 from tfcompose.model import Edge, Process, Robot
 from tfcompose.plan import EdgePattern, GuardPolicy
 from tfcompose.resolve.bodies import Bodies, with_colours
-from tfcompose.resolve.built_in import built_in
+from tfcompose.resolve.calibration import calibrated
 from tfcompose.resolve.completed import completed
-from tfcompose.resolve.edges import Drafts
-from tfcompose.resolve.idle import idle_keys
+from tfcompose.resolve.edges import Drafts, as_written
 from tfcompose.resolve.isolation import settings_of
-from tfcompose.resolve.nodes import names_files
+from tfcompose.resolve.param_files import with_param_files
+from tfcompose.resolve.parts import Parts, Whole
 from tfcompose.resolve.poses import Solver
 from tfcompose.resolve.presets import sensor_of
-from tfcompose.resolve.processes import name_clashes, unknown_names, user_process
+from tfcompose.resolve.processes import (
+    built_in,
+    idle_keys,
+    name_clashes,
+    names_files,
+    unknown_names,
+    user_process,
+    with_positions,
+)
 from tfcompose.resolve.sensors import add_sensor
-from tfcompose.resolve.simulated import with_positions
-from tfcompose.resolve.whole import Whole
-from tfcompose.resolve.written import as_written
 from tfcompose.urdf.packages import Packages
 
 if TYPE_CHECKING:
@@ -33,10 +37,9 @@ if TYPE_CHECKING:
     from tfcompose.language.robot import GuardSpec, RobotSpec
     from tfcompose.load import Source
     from tfcompose.model import Block
-    from tfcompose.resolve.library import Library
-    from tfcompose.resolve.part import Joined
-    from tfcompose.resolve.parts import Parts
+    from tfcompose.resolve.parts import Joined
     from tfcompose.resolve.poses import Draft
+    from tfcompose.resolve.presets import Library
     from tfcompose.urdf.packages import Disk
 
 
@@ -107,8 +110,7 @@ class _Work:
         self.found += [*drafts.found, *bodies.found, *solver.found, *self._wrong_names(own)]
         robot = self._robot(drafts, edges, self._everybody(own))
         if any(names_files(node.params) for process in own for node in process.nodes):
-            work = import_module("tfcompose.resolve.param_files")
-            robot = self._take(work.with_param_files(robot, self.source, self.read))
+            robot = self._take(with_param_files(robot, self.source, self.read))
         robot = self._take(completed(robot, self.spec, self.source, self.disk))
         found = [one for one in self.found if not self._may_follow(one)] if self.broken else self.found
         return Resolved(robot, (*self.of_parts, *found), self.whole)
@@ -131,9 +133,7 @@ class _Work:
         """Resolve the parts; few robots have any, and what joins them is loaded only then."""
         if not self.spec.parts:
             return
-        parts = self.holder or import_module("tfcompose.resolve.parts").Parts(
-            self.library, self.read, self.disk, resolve, (self.source.file,), self.whole
-        )
+        parts = self.holder or Parts(self.library, self.read, self.disk, resolve, (self.source.file,), self.whole)
         self.joined = parts.join(self.validated, settings_of(self.spec.ros).frame_prefix, packages)
         self.of_parts = parts.found
         self.broken |= {*parts.missing, *(entry for part in self.joined for entry in part.robot.broken)}
@@ -176,10 +176,9 @@ class _Work:
         """Return the edges with the poses of calibrations; what reads those is loaded only where there are some."""
         if not _has_calibrations(self.spec):
             return drafts.edges
-        calibrated = import_module("tfcompose.resolve.calibration").calibrated
         measured, refused = calibrated(drafts.edges, drafts.frames, self.spec, self.source, self.read)
         self.found += refused
-        return cast("list[Draft]", measured)
+        return measured
 
     def _wrong_names(self, own: list[Process]) -> list[Finding]:
         everybody = self._everybody(own)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, finding
 from tfcompose.model import JOINTS, STATIC, Node
-from tfcompose.resolve.nodes import full_name
+from tfcompose.resolve.processes import full_name
 
 if TYPE_CHECKING:
     from tfcompose.model import Process, Robot

@@ -17,7 +17,7 @@ from tfcompose.cli import node_page as _nodes
 from tfcompose.cli.shelves import library
 from tfcompose.cli.terminal import complain, print_findings
 from tfcompose.findings import RejectedError, did_you_mean
-from tfcompose.resolve.node_presets import node_preset_names
+from tfcompose.resolve.presets import node_preset_names
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace

@@ -14,7 +14,7 @@ from tfcompose.cli.shelves import library
 from tfcompose.language.json_schema import json_schema
 from tfcompose.language.reference import reference
 from tfcompose.plan.schema import plan_schema
-from tfcompose.resolve.node_presets import node_preset_names
+from tfcompose.resolve.presets import node_preset_names
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace

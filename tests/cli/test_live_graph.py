@@ -34,15 +34,15 @@ def test_each_edge_has_its_publisher_its_kind_and_its_rate(census: Census) -> No
     arrows = {(one.parent, one.child): one for one in graph_of_censuses([census], "/tf").arrows}
     assert len(arrows) == 3
     moving, fixed, second = arrows["odom", "base"], arrows["base", "lidar"], arrows["mast", "lidar"]
-    assert (moving.owner, moving.kind, moving.beside, moving.below) == ("/drive", "dynamic", "1.0 Hz", "")
-    assert (fixed.owner, fixed.kind, fixed.beside) == ("/static", "static", "")
+    assert (moving.owner, moving.kind, moving.detail, moving.pose) == ("/drive", "dynamic", "1.0 Hz", "")
+    assert (fixed.owner, fixed.kind, fixed.detail) == ("/static", "static", "")
     assert second.owner == "somebody"
 
 
 def test_poses_stand_below_and_a_rotation_that_is_none_is_said(census: Census) -> None:
     arrows = {(one.parent, one.child): one for one in graph_of_censuses([census], "/tf", poses=True).arrows}
-    assert arrows["base", "lidar"].below == "xyz 0.25 0 0"
-    assert arrows["mast", "lidar"].below == "no rotation"
+    assert arrows["base", "lidar"].pose == "xyz 0.25 0 0"
+    assert arrows["mast", "lidar"].pose == "no rotation"
 
 
 def test_what_the_plan_expects_and_nobody_publishes_is_said_to_be_missing(census: Census) -> None:
@@ -52,7 +52,7 @@ def test_what_the_plan_expects_and_nobody_publishes_is_said_to_be_missing(census
     )
     plan = Plan("rover", "0", "base", RosSettings(), edges, ())
     graph = graph_of_censuses([census], "rover", plan)
-    assert [(one.child, one.owner) for one in graph.arrows if one.beside == "missing"] == [("imu", "/static")]
+    assert [(one.child, one.owner) for one in graph.arrows if one.detail == "missing"] == [("imu", "/static")]
 
 
 @pytest.mark.parametrize(

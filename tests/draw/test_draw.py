@@ -20,13 +20,11 @@ from PIL import Image
 from tests.support.tables import for_each
 from tfcompose.draw import Arrow, Graph, Group
 from tfcompose.draw.dot import dot
-from tfcompose.draw.letters import width_of
 from tfcompose.draw.mermaid import mermaid
 from tfcompose.draw.pdf import pdf
-from tfcompose.draw.picture import draw
+from tfcompose.draw.picture import Box, Drawing, Text, draw
 from tfcompose.draw.png import png
-from tfcompose.draw.shapes import Box, Drawing, Text
-from tfcompose.draw.style import STYLES
+from tfcompose.draw.style import STYLES, width_of
 from tfcompose.draw.svg import svg
 
 if TYPE_CHECKING:
@@ -91,7 +89,7 @@ FAMILY = [(seed, frames, poses) for seed in range(12) for frames in (1, 2, 9, 10
 
 
 def looks(drawing: Drawing, *prefixes: str) -> list[Box]:
-    return [shape for shape in drawing.shapes if isinstance(shape, Box) and shape.look.startswith(prefixes)]
+    return [shape for shape in drawing.shapes if isinstance(shape, Box) and shape.style.startswith(prefixes)]
 
 
 def overlaps(first: tuple[float, ...], second: tuple[float, ...]) -> bool:
@@ -108,7 +106,7 @@ def around(shape: Box | Text) -> tuple[float, float, float, float]:
     if isinstance(shape, Box):
         return shape.x, shape.y, shape.x + shape.width, shape.y + shape.height
     left = shape.x - shape.width / 2 if shape.middle else shape.x
-    size = STYLES[shape.look].size
+    size = STYLES[shape.style].size
     return left, shape.y - 0.75 * size, left + shape.width, shape.y + 0.2 * size
 
 
@@ -144,7 +142,7 @@ def test_the_area_of_a_group_holds_its_frames_whole_and_cuts_no_box(seed: int, f
 
 
 def _names(drawing: Drawing) -> list[str]:
-    return [shape.text for shape in drawing.shapes if isinstance(shape, Text) and shape.look == "name"]
+    return [shape.text for shape in drawing.shapes if isinstance(shape, Text) and shape.style == "name"]
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -242,8 +240,8 @@ def test_a_png_shows_boxes_and_letters_where_the_drawing_has_them() -> None:
     assert image.getpixel((4, 4)) == (255, 255, 255)
     for badge in looks(drawing, "badge"):
         corner = image.getpixel((round(2 * (badge.x + 3)), round(2 * (badge.y + badge.height - 3))))
-        assert corner == _rgb(STYLES[badge.look].fill[0])
-    for text in (shape for shape in drawing.shapes if isinstance(shape, Text) and shape.look == "name"):
+        assert corner == _rgb(STYLES[badge.style].fill[0])
+    for text in (shape for shape in drawing.shapes if isinstance(shape, Text) and shape.style == "name"):
         left, top, right, bottom = (round(2 * edge) for edge in around(text))
         dark = sum(image.crop((left, top, right, bottom)).convert("L").histogram()[:80])
         assert dark > 20, text.text

@@ -59,11 +59,11 @@ def _invalid(name: str, at: Span, what: str, severity: Severity = "error") -> Fi
     if what == "name" and bare != name and _GOOD.fullmatch(bare):
         return finding("TF501", f"invalid {what} {name!r}", at, help=f"write {bare}: tf2 drops a leading slash")
     better = re.sub(r"[^A-Za-z0-9_/]+|//+", "_", name).strip("/")
-    advice = f"for example {better}" if _GOOD.fullmatch(better) and better != name.strip("/") else _LETTERS
+    advice = f"for example {better}" if _GOOD.fullmatch(better) and better != name.strip("/") else _ALLOWED
     return finding("TF501", f"invalid {what} {name!r}", at, help=advice, severity=severity)
 
 
-_LETTERS = "use letters, digits and _; a node's name does not begin with a digit"
+_ALLOWED = "use letters, digits and _; a node's name does not begin with a digit"
 
 
 @rule("TF503", of_urdf=True)

@@ -61,7 +61,7 @@ _ROUND_DEG = frozenset(
 )
 _ROUND_LIMITS_DEG = _ROUND_DEG | {150.0, 165.0, 170.0, 175.0, 180.0, 185.0, 190.0, 270.0, 350.0, 360.0, 720.0}
 #: A full turn, with a margin for rounding.
-_FULL_TURN_RAD = 6.29
+_FULL_CIRCLE_RAD = 6.29
 
 
 @rule("TF410")
@@ -80,7 +80,7 @@ def degrees_as_radians(robot: Robot) -> Iterator[Finding]:
         for index, (number, with_unit) in enumerate(zip(value.numbers, value.with_unit, strict=True)):
             size = abs(number)
             if not with_unit and (
-                size in _ROUND_LIMITS_DEG if is_limit else size in _ROUND_DEG or size > _FULL_TURN_RAD
+                size in _ROUND_LIMITS_DEG if is_limit else size in _ROUND_DEG or size > _FULL_CIRCLE_RAD
             ):
                 message = f"{value.entry}: {value.key} is {number:g} rad, {number / math.tau:.3g} turns"
                 yield finding("TF410", message, value.place(index), help=f"if degrees are meant, write {number:g} deg")
@@ -129,7 +129,7 @@ def _is_rounded(number: float) -> bool:
 
 
 #: A rotation with this w or more is smaller than 64 degrees.
-_SMALL_TURN_W = 0.85
+_SMALL_ROTATION_W = 0.85
 
 
 @rule("TF412")
@@ -146,7 +146,7 @@ def quaternion_w_first(robot: Robot) -> Iterator[Finding]:
             continue
         first, second, third, fourth = value.numbers
         identity = abs(first) == 1 and not (second or third or fourth)
-        small = _SMALL_TURN_W < abs(first) < 1 and second == 0 and (third == 0) != (fourth == 0)
+        small = _SMALL_ROTATION_W < abs(first) < 1 and second == 0 and (third == 0) != (fourth == 0)
         if identity or small:
             turns = f"turns by {_degrees(fourth)} deg, and by {_degrees(first)} deg if w is first"
             message = f"{value.entry}: quat_xyzw {_listed(value.numbers)} {turns}"

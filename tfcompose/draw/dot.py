@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.draw.letters import visible
-from tfcompose.draw.style import STYLES, colour_of
+from tfcompose.draw.style import STYLES, colour_of, visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -41,7 +40,7 @@ def _node(arrow: Arrow | None, frame: str, owners: dict[str, int]) -> str:
     if arrow is None:
         return f" [label={_quoted(frame)}]"
     colour = colour_of(owners[arrow.owner])
-    label = _quoted(frame, arrow.below) if arrow.below else _quoted(frame)
+    label = _quoted(frame, arrow.pose) if arrow.pose else _quoted(frame)
     line, fill = STYLES[f"box{colour}"].stroke[0], STYLES[f"box{colour}"].fill[0]
     return f' [label={label}, color="#{line}", fillcolor="#{fill}"]'
 
@@ -51,7 +50,7 @@ def _edge(arrow: Arrow, owners: dict[str, int]) -> str:
     kind = "alternative" if arrow.alternative else arrow.kind
     wide = "" if kind == "static" else ", penwidth=1.6"
     free = ", constraint=false" if arrow.alternative else ""
-    label = _quoted(arrow.owner, arrow.beside) if arrow.beside else _quoted(arrow.owner)
+    label = _quoted(arrow.owner, arrow.detail) if arrow.detail else _quoted(arrow.owner)
     return f'[label={label}, color="#{line}", style={_LINES[kind]}{wide}{free}]'
 
 

@@ -1,4 +1,4 @@
-"""What a picture shows: frames, edges, groups and owners, whether they were declared or seen."""
+"""What a picture shows: frames, edges, groups and owners, whether they were declared or observed."""
 
 from __future__ import annotations
 
@@ -13,17 +13,18 @@ Kind = Literal["static", "joint", "dynamic"]
 
 @dataclass(frozen=True, slots=True)
 class Arrow:
-    """An edge: ``beside`` stands in the child's box behind its name, ``below`` under it.
+    """An edge: in the child's box, ``detail`` follows its name, and ``pose`` is on a second line.
 
-    An ``alternative`` is a parent that the child may get, as with a tool changer; it takes no part in the layout.
+    An ``alternative`` is a further parent between which an owner switches, as a tool changer does; the layout ignores
+    it.
     """
 
     parent: str
     child: str
     kind: Kind
     owner: str
-    beside: str = ""
-    below: str = ""
+    detail: str = ""
+    pose: str = ""
     alternative: bool = False
 
 
@@ -37,10 +38,10 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Graph:
-    """A tree, or whatever there is instead: several roots, second parents and loops are drawn as they are.
+    """A tree, or what is there instead: several roots, second parents and cycles are drawn as they are.
 
-    Frames that only edges name need not stand in ``frames``. The order of frames and edges is that of the picture;
-    ``owners`` are in the order of their colours.
+    Frames that edges name need not be in ``frames``. The order of frames and edges is that of the picture; ``owners``
+    are in the order of their colours.
     """
 
     title: str
@@ -61,9 +62,9 @@ class Graph:
 
 @dataclass(frozen=True, slots=True)
 class Forest:
-    """A graph as trees: ``order`` holds the frames from top to bottom, each before all that hangs on it.
+    """A graph as trees: ``order`` holds the frames from top to bottom, each before its descendants.
 
-    ``up`` is the arrow that a frame hangs on, ``extra`` are the others, ``group`` the index of a frame's group.
+    ``up`` is the arrow from a frame's parent, ``extra`` are the others, ``group`` the index of a frame's group.
     """
 
     order: tuple[str, ...]
@@ -79,7 +80,7 @@ class Forest:
 
 
 def forest_of(graph: Graph) -> Forest:
-    """Return the graph as trees: of several parents a frame hangs on the first, and a loop is cut once.
+    """Return the graph as trees: a frame with several parents is below the first, and a cycle is broken once.
 
     Children of the same group as their parent come first, so that a group stays together.
     """
@@ -105,7 +106,7 @@ def forest_of(graph: Graph) -> Forest:
 def _walk(
     frames: Iterable[str], first: dict[str, Arrow], below: dict[str, list[str]]
 ) -> tuple[tuple[str, ...], dict[str, Arrow]]:
-    """Return the frames in the order of the picture, and the arrow that each hangs on; what is in a loop comes last."""
+    """Return the frames in the order of the picture, and the arrow from each one's parent; cycles come last."""
     order: dict[str, None] = {}
     up: dict[str, Arrow] = {}
     for root in (*(frame for frame in frames if frame not in first), *frames):

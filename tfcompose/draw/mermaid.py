@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from tfcompose.draw.letters import visible
-from tfcompose.draw.style import STYLES, colour_of
+from tfcompose.draw.style import STYLES, colour_of, visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -37,13 +36,13 @@ def _lines(graph: Graph) -> Iterator[str]:
         yield "  end"
     for arrow in graph.arrows:
         line = "-->" if arrow.kind == "static" and not arrow.alternative else "-.->"
-        label = f"{_text(arrow.owner)} {_text(arrow.beside)}".strip()
+        label = f"{_text(arrow.owner)} {_text(arrow.detail)}".strip()
         yield f'  {numbers[arrow.parent]} {line}|"{label}"| {numbers[arrow.child]}'
     yield from _colours(graph, owners)
 
 
 def _node(frame: str, number: str, arrow: Arrow | None, owners: dict[str, int]) -> str:
-    below = f"<br/>{_text(arrow.below)}" if arrow and arrow.below else ""
+    below = f"<br/>{_text(arrow.pose)}" if arrow and arrow.pose else ""
     colour = f":::owner{owners[arrow.owner]}" if arrow else ""
     return f'{number}["{_text(frame)}{below}"]{colour}'
 

@@ -1,6 +1,7 @@
-"""A drawing as PDF, on one page of its size; written here, because a page of boxes, curves and texts needs no library.
+"""A drawing as PDF 1.4 (ISO 32000-1), on one page of its size, in Helvetica, which each reader has.
 
-It is PDF 1.4 (ISO 32000-1): its fonts are Helvetica, which each reader brings along, and no file is needed for it.
+Written here, because svglib with reportlab draws our SVG alike but takes 20 times as long, gives other bytes each time
+and loses characters beyond Latin-1, and CairoSVG takes whatever font and libcairo the system has.
 """
 
 from __future__ import annotations
@@ -8,14 +9,13 @@ from __future__ import annotations
 import zlib
 from typing import TYPE_CHECKING
 
-from tfcompose.draw.letters import width_of
-from tfcompose.draw.shapes import Box, Curve, Text
-from tfcompose.draw.style import style_of
+from tfcompose.draw.picture import Box, Curve, Text
+from tfcompose.draw.style import style_of, width_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.draw.shapes import Drawing
+    from tfcompose.draw.picture import Drawing
     from tfcompose.draw.style import Style
 
 POINTS_PER_PX = 0.75
@@ -26,7 +26,7 @@ ROUND = 0.5523  # where the control points of a quarter of a circle are, in radi
 def pdf(drawing: Drawing) -> bytes:
     """Return the drawing as a PDF of one page; a very long one is made smaller. The same drawing gives the same bytes.
 
-    What Helvetica in the encoding of Windows has no sign for is written as an escape.
+    Characters that Helvetica in the encoding of Windows does not have are written as escapes.
     """
     scale = min(POINTS_PER_PX, MOST_POINTS / max(drawing.width, drawing.height))
     width, height = drawing.width * scale, drawing.height * scale
@@ -61,7 +61,7 @@ def _file(objects: list[bytes]) -> bytes:
 
 
 def _shape(shape: Box | Curve | Text) -> Iterator[str]:
-    style = style_of(shape.look)
+    style = style_of(shape.style)
     if isinstance(shape, Text):
         yield _text(shape, style)
         return
@@ -99,7 +99,7 @@ def _box(box: Box) -> str:
 
 
 def _text(text: Text, style: Style) -> str:
-    """Return the text in the space that it has: narrower where the font is wider than was thought."""
+    """Return the text in the space that it has: narrower where the font is wider than assumed."""
     data = text.text.encode("cp1252", "backslashreplace")
     wide = width_of(data.decode("cp1252"), style.size, bold=style.bold)
     narrow = min(1.0, text.width / wide) if wide else 1.0

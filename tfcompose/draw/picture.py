@@ -1,27 +1,101 @@
-"""A graph as a drawing: boxes, curves and texts, of which any format can be written."""
+"""A graph as a drawing: boxes, curves and texts, with a legend, which any format can be written from.
+
+Lengths are in px from the top left corner, y down.
+"""
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Union
 
-from tfcompose.draw.areas import PAD
 from tfcompose.draw.graph import forest_of
-from tfcompose.draw.layout import BADGE_WIDTH, BETWEEN, LABEL_STRIP, POSE_HEIGHT, layout
-from tfcompose.draw.legend import legend
-from tfcompose.draw.letters import shown, width_of
-from tfcompose.draw.shapes import Box, Curve, Drawing, Text, hanging, level
-from tfcompose.draw.style import STYLES, colour_of
+from tfcompose.draw.layout import BADGE_WIDTH, BETWEEN, LABEL_STRIP, PAD, POSE_HEIGHT, layout
+from tfcompose.draw.style import STYLES, colour_of, shortened, width_of
 
 if TYPE_CHECKING:
-    from tfcompose.draw.areas import Area, Place
     from tfcompose.draw.graph import Arrow, Forest, Graph
-    from tfcompose.draw.layout import Layout
-    from tfcompose.draw.shapes import Point, Shape
+    from tfcompose.draw.layout import Area, Layout, Place
+
+Point = tuple[float, float]
 
 MARGIN = 16.0
 CORNER = 5.0
 BASE = 4.2  # from the middle of a name down to its base line
+MIN_WIDTH = 440.0
+LEGEND_LINE = 22.0
+ITEM_GAP = 20.0
+SAMPLE_WIDTH = 34.0
+#: What each kind of line means, in the order of the legend.
+LINES = {
+    "static": "fixed",
+    "joint": "moved by joint states",
+    "dynamic": "moving",
+    "alternative": "another parent, by turns",
+}
+
+
+@dataclass(slots=True)
+class Box:
+    """A rectangle with rounded corners."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+    radius: float
+    style: str
+
+
+@dataclass(slots=True)
+class Curve:
+    """A cubic curve by its four points; ``about`` is its description, in formats that can show one."""
+
+    points: tuple[Point, Point, Point, Point]
+    style: str
+    about: str = ""
+
+    @property
+    def straight(self) -> bool:
+        """Whether it is a level line from left to right."""
+        return self.points[0][1] == self.points[1][1] == self.points[2][1] == self.points[3][1]
+
+
+def _level(start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
+    """Return the curve that leaves and arrives horizontally."""
+    bend = (start[0] + end[0]) / 2
+    return start, (bend, start[1]), (bend, end[1]), end
+
+
+def _sagging(start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
+    """Return the curve that leaves and arrives from below, and sags more the farther it goes."""
+    sag = 26.0 + 0.08 * (abs(end[0] - start[0]) + abs(end[1] - start[1]))
+    return start, (start[0], start[1] + sag), (end[0], end[1] + sag), end
+
+
+@dataclass(slots=True)
+class Text:
+    """A line of text: the beginning, or the middle, of its base line, and the width that it may take."""
+
+    x: float
+    y: float
+    text: str
+    style: str
+    width: float
+    middle: bool = False
+
+
+Shape = Union[Box, Curve, Text]  # noqa: UP007 (evaluated when it is loaded, by Python 3.10 too)
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """Shapes, from back to front, and the size of the paper."""
+
+    title: str
+    width: float
+    height: float
+    shapes: tuple[Shape, ...]
 
 
 def draw(graph: Graph) -> Drawing:
@@ -29,7 +103,7 @@ def draw(graph: Graph) -> Drawing:
     forest = forest_of(graph)
     places = layout(graph, forest)
     owners = {name: index for index, name in enumerate(graph.all_owners())}
-    head, width, top = legend(graph, owners, places.width, MARGIN)
+    head, width, top = _legend(graph, owners, places.width, MARGIN)
     pen = _Pen(graph, forest, places, owners, MARGIN, top)
     extras = pen.extras()
     bottom = max(top + places.height, *(y for curve in extras for _, y in curve.points), 0.0)
@@ -53,7 +127,7 @@ class _Pen:
         return [shape for area in self.layout.areas for shape in self._area(area)]
 
     def _area(self, area: Area) -> tuple[Shape, ...]:
-        label = shown(self.graph.groups[self.forest.group[area.frame]].label)
+        label = shortened(self.graph.groups[self.forest.group[area.frame]].label)
         x, y = area.x + self.left, area.top + self.top
         return (
             Box(x, y, area.right - area.x, area.bottom - area.top, 7.0, "group"),
@@ -69,7 +143,7 @@ class _Pen:
         return curves
 
     def tree(self) -> list[Shape]:
-        """Return each frame with the edge that it hangs on."""
+        """Return each frame with the edge from its parent."""
         shapes: list[Shape] = []
         for frame in self.forest.order:
             place, arrow = self.layout.places[frame], self.forest.up.get(frame)
@@ -81,12 +155,12 @@ class _Pen:
     def _edge(self, arrow: Arrow) -> Curve:
         parent, child = self.layout.places[arrow.parent], self.layout.places[arrow.child]
         start = (parent.right + self.left, parent.y + self.top)
-        return self._curve(arrow, level(start, (child.x + self.left, child.y + self.top)))
+        return self._curve(arrow, _level(start, (child.x + self.left, child.y + self.top)))
 
     def _back(self, arrow: Arrow) -> Curve:
         parent, child = self.layout.places[arrow.parent], self.layout.places[arrow.child]
         start = (parent.x + 0.7 * parent.width + self.left, parent.bottom + self.top)
-        return self._curve(arrow, hanging(start, (child.x + 0.3 * child.width + self.left, child.bottom + self.top)))
+        return self._curve(arrow, _sagging(start, (child.x + 0.3 * child.width + self.left, child.bottom + self.top)))
 
     def _curve(self, arrow: Arrow, points: tuple[Point, Point, Point, Point]) -> Curve:
         kind = "alternative" if arrow.alternative else arrow.kind
@@ -97,36 +171,107 @@ class _Pen:
         x, y = place.x + self.left, place.y + self.top
         if arrow is None:
             box = Box(x, y - place.height / 2, place.width, place.height, CORNER, "root")
-            return [box, _text(shown(frame), "name", x + PAD, y + BASE)]
+            return [box, _text(shortened(frame), "name", x + PAD, y + BASE)]
         owner = self.owners[arrow.owner]
         colour, number = colour_of(owner), str(owner + 1)
-        base = y + BASE - (POSE_HEIGHT / 2 - 1.0 if arrow.below else 0.0)
+        base = y + BASE - (POSE_HEIGHT / 2 - 1.0 if arrow.pose else 0.0)
         left = x + BADGE_WIDTH + PAD
-        name = _text(shown(frame), "name", left, base)
+        name = _text(shortened(frame), "name", left, base)
         shapes: list[Shape] = [
             Box(x, y - place.height / 2, place.width, place.height, CORNER, f"box{colour}"),
             Box(x, y - place.height / 2, BADGE_WIDTH, place.height, CORNER, f"badge{colour}"),
             Text(
-                x + BADGE_WIDTH / 2, y + 3.6, number, f"number{colour}", _wide(number, f"number{colour}"), middle=True
+                x + BADGE_WIDTH / 2, y + 3.6, number, f"number{colour}", _width(number, f"number{colour}"), middle=True
             ),
             name,
         ]
-        if arrow.beside:
-            shapes.append(_text(shown(arrow.beside), "more", left + name.width + BETWEEN, base))
-        if arrow.below:
-            shapes.append(_text(shown(arrow.below), "more", left, base + POSE_HEIGHT))
+        if arrow.detail:
+            shapes.append(_text(shortened(arrow.detail), "more", left + name.width + BETWEEN, base))
+        if arrow.pose:
+            shapes.append(_text(shortened(arrow.pose), "more", left, base + POSE_HEIGHT))
         return shapes
 
 
-def _text(text: str, look: str, x: float, y: float) -> Text:
-    return Text(x, y, text, look, _wide(text, look))
+def _text(text: str, style: str, x: float, y: float) -> Text:
+    return Text(x, y, text, style, _width(text, style))
 
 
-def _wide(text: str, look: str) -> float:
-    style = STYLES[look]
-    return width_of(text, style.size, bold=style.bold)
+def _width(text: str, style: str) -> float:
+    font = STYLES[style]
+    return width_of(text, font.size, bold=font.bold)
 
 
 def _facts(arrow: Arrow) -> list[str]:
     kind = f"{arrow.kind}, by turns" if arrow.alternative else arrow.kind
-    return [fact for fact in (kind, f"by {arrow.owner}", arrow.beside, arrow.below) if fact]
+    return [fact for fact in (kind, f"by {arrow.owner}", arrow.detail, arrow.pose) if fact]
+
+
+def _legend(graph: Graph, owners: dict[str, int], width: float, margin: float) -> tuple[list[Shape], float, float]:
+    """Return the title and the legend, the width of everything without margins, and the y where the tree begins."""
+    edges = Counter(arrow.owner for arrow in graph.arrows if not arrow.alternative)
+    title = shortened(graph.title)
+    counted = f"{_count(len(graph.all_frames()), 'frame')} · {_count(edges.total(), 'edge')}"
+    title_width = width_of(title, STYLES["title"].size, bold=True)
+    counted_width = width_of(counted, STYLES["label"].size)
+    base = margin + 14.0
+    shapes: list[Shape] = [
+        Text(margin, base, title, "title", title_width),
+        Text(margin + title_width + 12.0, base, counted, "label", counted_width),
+    ]
+    width = max(width, MIN_WIDTH, title_width + 12.0 + counted_width)
+    y = base + LEGEND_LINE
+    for row in (_owner_items(owners, edges), _line_items(graph)):
+        more, y, width = _wrapped(row, margin, y, width)
+        shapes += more
+    return shapes, width, y + 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Item:
+    """What a kind of line, or else the number and colour of an owner, means."""
+
+    text: str
+    kind: str = ""
+    owner: int = 0
+
+
+def _count(number: int, thing: str) -> str:
+    return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
+def _owner_items(owners: dict[str, int], edges: Counter[str]) -> list[_Item]:
+    return [
+        _Item(f"{shortened(name)} ({_count(edges[name], 'edge')})", owner=index)
+        for name, index in owners.items()
+        if edges[name]
+    ]
+
+
+def _line_items(graph: Graph) -> list[_Item]:
+    used = {"alternative" if arrow.alternative else arrow.kind for arrow in graph.arrows}
+    return [_Item(text, kind=kind) for kind, text in LINES.items() if kind in used]
+
+
+def _wrapped(items: list[_Item], margin: float, y: float, width: float) -> tuple[list[Shape], float, float]:
+    """Return the items in lines that fit ``width``, the y of the next line, and the width, if one alone is wider."""
+    shapes: list[Shape] = []
+    x = margin
+    for item in items:
+        text_width = width_of(item.text, STYLES["label"].size)
+        item_width = (SAMPLE_WIDTH if item.kind else BADGE_WIDTH) + 6.0 + text_width
+        if x > margin and x + item_width > margin + width:
+            x, y = margin, y + LEGEND_LINE
+        width = max(width, item_width)
+        shapes += _symbol(item, x, y)
+        shapes.append(Text(x + item_width - text_width, y, item.text, "label", text_width))
+        x += item_width + ITEM_GAP
+    return shapes, y + (LEGEND_LINE if items else 0.0), width
+
+
+def _symbol(item: _Item, x: float, y: float) -> list[Shape]:
+    if item.kind:
+        return [Curve(_level((x, y - 3.8), (x + SAMPLE_WIDTH, y - 3.8)), f"sample {item.kind}")]
+    colour, text = colour_of(item.owner), str(item.owner + 1)
+    middle = x + BADGE_WIDTH / 2
+    number = Text(middle, y - 0.2, text, f"number{colour}", width_of(text, 10.0, bold=True), middle=True)
+    return [Box(x, y - 11.8, BADGE_WIDTH, 16.0, 4.0, f"badge{colour}"), number]

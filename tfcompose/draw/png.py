@@ -1,16 +1,17 @@
-"""A drawing as PNG: the PDF, drawn by PDFium, which the package ``pypdfium2`` brings along with its fonts."""
+"""A drawing as PNG: the PDF, rendered by PDFium, which the package ``pypdfium2`` contains with its fonts."""
 
 from __future__ import annotations
 
 import struct
 import zlib
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+import pypdfium2
 
 from tfcompose.draw.pdf import POINTS_PER_PX, pdf
 
 if TYPE_CHECKING:
-    from tfcompose.draw.shapes import Drawing
+    from tfcompose.draw.picture import Drawing
 
 PIXELS_PER_PX = 2.0  # for screens that have them, and for print
 MOST_PIXELS = 50e6
@@ -18,16 +19,11 @@ MOST_TO_A_SIDE = 32_000.0  # viewers count these in 15 bits
 
 
 def png(drawing: Drawing) -> bytes:
-    """Return the drawing as PNG with two pixels to a px, fewer for a very large one.
-
-    Raises:
-        ImportError: if ``pypdfium2`` is not installed.
-    """
-    pdfium: Any = import_module("pypdfium2")
+    """Return the drawing as PNG with two pixels to a px, fewer for a very large one."""
     finest = min(
         (MOST_PIXELS / (drawing.width * drawing.height)) ** 0.5, MOST_TO_A_SIDE / max(drawing.width, drawing.height)
     )
-    document = pdfium.PdfDocument(pdf(drawing))
+    document = pypdfium2.PdfDocument(pdf(drawing))
     try:
         page = document[0]
         points = page.get_width() / drawing.width  # to a px

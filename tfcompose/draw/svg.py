@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.draw.letters import visible
-from tfcompose.draw.shapes import Box, Curve
-from tfcompose.draw.style import SANS, STYLES
+from tfcompose.draw.picture import Box, Curve
+from tfcompose.draw.style import SANS, STYLES, visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.draw.shapes import Drawing, Shape, Text
+    from tfcompose.draw.picture import Drawing, Shape, Text
     from tfcompose.draw.style import Style
 
 _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"})
@@ -20,7 +19,7 @@ _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"}
 def svg(drawing: Drawing) -> str:
     """Return the drawing as SVG; the same drawing gives the same text.
 
-    Each edge is a path with a title, which browsers show beside the pointer.
+    Each edge is a path with a title, which browsers show at the pointer.
     """
     width, height = f"{drawing.width:g}", f"{drawing.height:g}"
     title = _text(drawing.title)
@@ -36,8 +35,8 @@ def svg(drawing: Drawing) -> str:
 
 
 def _sheet(drawing: Drawing) -> Iterator[str]:
-    """Yield the rules of what the drawing has, and those of the colours by night."""
-    used = {"paper", *(name for shape in drawing.shapes for name in shape.look.split())}
+    """Yield the rules of the styles that the drawing uses, and of their colours in dark mode."""
+    used = {"paper", *(name for shape in drawing.shapes for name in shape.style.split())}
     styles = {name: style for name, style in STYLES.items() if name in used}
     yield "path{fill:none}\n"
     for name, style in styles.items():
@@ -50,11 +49,11 @@ def _sheet(drawing: Drawing) -> Iterator[str]:
     yield "}\n"
 
 
-def _colours(style: Style, night: int) -> Iterator[str]:
-    if style.fill[night]:
-        yield f"fill:#{style.fill[night]}"
-    if style.stroke[night]:
-        yield f"stroke:#{style.stroke[night]}"
+def _colours(style: Style, dark: int) -> Iterator[str]:
+    if style.fill[dark]:
+        yield f"fill:#{style.fill[dark]}"
+    if style.stroke[dark]:
+        yield f"stroke:#{style.stroke[dark]}"
 
 
 def _form(style: Style) -> Iterator[str]:
@@ -71,7 +70,7 @@ def _form(style: Style) -> Iterator[str]:
 def _shape(shape: Shape) -> str:
     if isinstance(shape, Box):
         return (
-            f'<rect class="{shape.look}" x="{shape.x:g}" y="{shape.y:g}"'
+            f'<rect class="{shape.style}" x="{shape.x:g}" y="{shape.y:g}"'
             f' width="{shape.width:g}" height="{shape.height:g}" rx="{shape.radius:g}"/>\n'
         )
     if isinstance(shape, Curve):
@@ -83,13 +82,13 @@ def _curve(curve: Curve) -> str:
     start, *others = [f"{x:g} {y:g}" for x, y in curve.points]
     way = f"M{start}H{curve.points[3][0]:g}" if curve.straight else f"M{start}C{' '.join(others)}"
     if not curve.about:
-        return f'<path class="{curve.look}" d="{way}"/>\n'
-    return f'<path class="{curve.look}" d="{way}"><title>{_text(curve.about)}</title></path>\n'
+        return f'<path class="{curve.style}" d="{way}"/>\n'
+    return f'<path class="{curve.style}" d="{way}"><title>{_text(curve.about)}</title></path>\n'
 
 
 def _line(text: Text) -> str:
-    """Return a text; its length is said, so that it fits its box in whatever font there is."""
-    where = f'class="{text.look}" x="{text.x:g}" y="{text.y:g}"'
+    """Return a text with its length, so that it fits its box in any font."""
+    where = f'class="{text.style}" x="{text.x:g}" y="{text.y:g}"'
     if text.middle:
         return f'<text {where} text-anchor="middle">{_text(text.text)}</text>\n'
     long = f'textLength="{text.width:g}" lengthAdjust="spacingAndGlyphs"'

@@ -28,8 +28,8 @@ def _one(found: Finding) -> str:
             properties["endColumn"] = at.end_column
     notes = [f"{note.span}: {note.message}" if note.span else note.message for note in found.notes]
     message = "\n".join([found.message, *notes, *([f"help: {found.help}"] if found.help else [])])
-    said = ",".join(f"{name}={_property(str(value))}" for name, value in properties.items())
-    return f"::{found.severity} {said}::{_message(message)}\n"
+    listed = ",".join(f"{name}={_property(str(value))}" for name, value in properties.items())
+    return f"::{found.severity} {listed}::{_message(message)}\n"
 
 
 def _message(text: str) -> str:

@@ -1,4 +1,4 @@
-"""Findings as JUnit's XML, which CI servers show: a suite, and a case for each thing that was looked at."""
+"""Findings as JUnit's XML, which CI servers show: a suite, and a case for each thing that was checked."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _CHARACTER = re.compile('[&<>"\n\r\t]')
 def render_junit(
     suite: str, cases: Iterable[tuple[str, str, tuple[Finding, ...]]], *, failing: frozenset[str], seconds: float
 ) -> str:
-    """Return a test suite of cases (group, name, findings); one fails whose findings are of a ``failing`` severity.
+    """Return a test suite of cases (group, name, findings); one fails if a finding has a ``failing`` severity.
 
-    What else was found stands in its output.
+    The other findings are in its output.
     """
     rows, failed, count = [], 0, 0
     for group, name, found in cases:

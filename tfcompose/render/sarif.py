@@ -17,7 +17,7 @@ SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
 def render_sarif(found: Sequence[Finding], version: str, pages: Mapping[str, str]) -> str:
-    """Return the findings as one run of tfcompose; ``pages`` holds what there is to say about a code."""
+    """Return the findings as one run of tfcompose; ``pages`` holds the page of each code."""
     codes = sorted({one.code for one in found})
     run = {
         "tool": {"driver": {"name": "tfcompose", "version": version, "rules": [_rule(code, pages) for code in codes]}},

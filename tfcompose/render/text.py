@@ -11,12 +11,12 @@ if TYPE_CHECKING:
 
 RED, YELLOW, BLUE, GREEN, BOLD, PLAIN = "\033[31m", "\033[33m", "\033[34m", "\033[32m", "\033[1m", "\033[0m"
 
-_LONGEST = 160
-_LONGEST_SAID = 1000
+_LONGEST_LINE = 160
+_LONGEST_MESSAGE = 1000
 
 
 def render_text(found: Sequence[Finding], line_of: Callable[[str, int], str | None], *, colour: bool) -> str:
-    """Return the findings as text; ``line_of`` gives a file's line (from 1), or None where it cannot be had."""
+    """Return the findings as text; ``line_of`` returns a line of a file (from 1), or None if it cannot be read."""
     return "".join(_one(one, line_of, _Paint(colour=colour)) for one in found)
 
 
@@ -31,8 +31,8 @@ class _Paint:
 def _one(found: Finding, line_of: Callable[[str, int], str | None], paint: _Paint) -> str:
     shade = RED if found.severity == "error" else YELLOW
     place = _printable(f"{found.span}: ") if found.span else ""
-    said = _printable(found.message)
-    head = f"{paint(place, BOLD)}{paint(f'{found.severity}[{found.code}]', shade, BOLD)} {paint(said, BOLD)}"
+    message = _printable(found.message)
+    head = f"{paint(place, BOLD)}{paint(f'{found.severity}[{found.code}]', shade, BOLD)} {paint(message, BOLD)}"
     lines = [head]
     if found.span:
         lines += _excerpt(found.span, line_of, paint, shade)
@@ -45,8 +45,8 @@ def _one(found: Finding, line_of: Callable[[str, int], str | None], paint: _Pain
 
 
 def _printable(text: str) -> str:
-    """Return the text on one line of bounded length, without characters that steer a terminal."""
-    shown = text if len(text) <= _LONGEST_SAID else f"{text[:_LONGEST_SAID]}…"
+    """Return the text on one line of bounded length, without control characters."""
+    shown = text if len(text) <= _LONGEST_MESSAGE else f"{text[:_LONGEST_MESSAGE]}…"
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in shown)
 
 
@@ -56,19 +56,19 @@ def _excerpt(span: Span, line_of: Callable[[str, int], str | None], paint: _Pain
         return []
     start = span.column - 1
     end = span.end_column - 1 if span.end_line == span.line else len(line.rstrip())
-    shown, cut = line, max(0, start - _LONGEST // 2)
-    if len(line) > _LONGEST:
-        shown = line[cut : cut + _LONGEST]
+    shown, skipped = line, max(0, start - _LONGEST_LINE // 2)
+    if len(line) > _LONGEST_LINE:
+        shown = line[skipped : skipped + _LONGEST_LINE]
     else:
-        cut = 0
-    width = max(1, min(end, cut + len(shown)) - start)
-    lead = "".join("\t" if character == "\t" else " " for character in shown[: start - cut])
+        skipped = 0
+    width = max(1, min(end, skipped + len(shown)) - start)
+    lead = "".join("\t" if character == "\t" else " " for character in shown[: start - skipped])
     shown = "".join(c if c.isprintable() or c == "\t" else "?" for c in shown.rstrip())
     return [f"{span.line:>5} | {shown}", f"      | {lead}{paint('^' * width, shade, BOLD)}"]
 
 
 def summary(found: Sequence[Finding], files: int) -> str:
-    """Return the last line: how much was found in how many files."""
+    """Return the last line: the number of findings and of files."""
     errors = sum(one.severity == "error" for one in found)
     warnings = len(found) - errors
     where = f"in {files} file{'s' if files != 1 else ''}"

@@ -10,12 +10,10 @@ import difflib
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
-from tfcompose.catalogue import CATALOGUE
+from tfcompose.catalogue import CATALOGUE, Severity
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-
-    from tfcompose.catalogue import Severity
 
 
 class Span(NamedTuple):

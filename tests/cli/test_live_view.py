@@ -24,9 +24,9 @@ from tfcompose.cli.printable import coloured_only, plain
 from tfcompose.cli.status import Status
 from tfcompose.findings import finding
 from tfcompose.geometry import Pose
+from tfcompose.ipc import Ended, FindingShown, LogLine, OwnerLive, ProcessState, Stopping
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.plan.file import write_plan
-from tfcompose.run.launcher.notice import Ended, FindingShown, LogLine, OwnerLive, ProcessState, Stopping
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

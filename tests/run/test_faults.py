@@ -17,6 +17,7 @@ import pytest
 
 from tests.support import processes
 from tests.support.waiting import TIMEOUT_S, gone, until
+from tfcompose.ipc import Done, DownRequest, ProcessRequest, ProcessStatus, RobotStatus, StatusRequest, Verb
 from tfcompose.plan import Plan, PlanProcess, RosSettings
 from tfcompose.plan.file import write_plan
 from tfcompose.run.launcher.control import ask, connect
@@ -110,12 +111,12 @@ class Run:
         command = [sys.executable, "-c", clock + LAUNCHER, str(file), NAME, *words]
         self.popen = processes.start(command, stdout=stdout, cwd=folder)
 
-    def ps(self) -> dict[str, dict[str, Any]]:
-        return {process["name"]: process for process in ask(self.place, do="ps")["processes"]}
+    def ps(self) -> dict[str, ProcessStatus]:
+        return {process.name: process for process in ask(self.place, StatusRequest(), RobotStatus).processes}
 
     def is_up(self) -> bool:
         try:
-            return all(process["state"] == "RUNNING" for process in self.ps().values())
+            return all(process.state == "RUNNING" for process in self.ps().values())
         except OSError:
             return False
 
@@ -126,7 +127,7 @@ class Run:
         self.ps()  # it is answered in the turn after that one
 
     def down(self) -> int:
-        assert ask(self.place, do="down") == {"ok": True}
+        assert ask(self.place, DownRequest(), Done).ok
         return self.popen.wait(TIMEOUT_S)
 
 
@@ -179,7 +180,7 @@ def test_a_reader_that_stops_reading_stops_nobody(launch: Callable[..., Run]) ->
     os.close(writer)
     try:
         assert until(run.is_up)
-        assert until(lambda: run.ps()["flood"]["state"] == "RUNNING")
+        assert until(lambda: run.ps()["flood"].state == "RUNNING")
         assert run.down() == 0
     finally:
         os.close(reader)
@@ -203,7 +204,7 @@ def test_a_daemon_that_left_its_group_ends_with_the_run(launch: Callable[..., Ru
     run = launch(program("daemon", DAEMON), program("calm", SLEEPER))
     assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
     pid = int((tmp_path / "daemon").read_text())
-    assert until(lambda: run.ps()["daemon"]["state"] == "EXITED")
+    assert until(lambda: run.ps()["daemon"].state == "EXITED")
     assert not gone(pid)
     if how == "is killed":
         run.popen.kill()
@@ -214,7 +215,7 @@ def test_a_daemon_that_left_its_group_ends_with_the_run(launch: Callable[..., Ru
 
 @pytest.mark.parametrize("how", ["restart", "stop"])
 def test_what_left_its_group_ends_with_its_process_that_is_stopped_or_started_again(
-    launch: Callable[..., Run], tmp_path: Path, how: str
+    launch: Callable[..., Run], tmp_path: Path, how: Verb
 ) -> None:
     """One that ignores signals ends before the next one of its process begins, and others when that is stopped."""
     assert "signal.SIG_IGN" in DAEMON
@@ -222,13 +223,13 @@ def test_what_left_its_group_ends_with_its_process_that_is_stopped_or_started_ag
     run = launch(program("lidar", code), program("calm", SLEEPER))
     assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
     first = int((tmp_path / "daemon").read_text())
-    calm = run.ps()["calm"]["pid"]
-    ask(run.place, do=how, name="lidar")
+    calm = run.ps()["calm"].pid
+    ask(run.place, ProcessRequest(how, "lidar"), Done)
     assert until(lambda: gone(first))
     if how == "restart":
         assert until(lambda: (tmp_path / "daemon").read_text() not in {"", str(first)})
         assert not gone(int((tmp_path / "daemon").read_text()))
-    assert run.ps()["calm"]["pid"] == calm
+    assert run.ps()["calm"].pid == calm
     assert run.down() == 0
 
 
@@ -241,7 +242,7 @@ def test_what_left_its_group_and_its_environment_ends_with_the_run(
     run = launch(bare, program("calm", SLEEPER))
     assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
     pid = int((tmp_path / "daemon").read_text())
-    assert until(lambda: run.ps()["bare"]["state"] == ("RUNNING" if parent == "stays" else "EXITED"))
+    assert until(lambda: run.ps()["bare"].state == ("RUNNING" if parent == "stays" else "EXITED"))
     assert pid not in {one.pid for one in leftovers(f"{NAME}:")}
     if how == "is killed":
         run.look_around()
@@ -294,7 +295,7 @@ def test_leftovers_are_recognised_by_the_runs_id_and_ended_on_request_only(
 def test_200_processes_are_started_listed_and_stopped_and_all_are_gone(launch: Callable[..., Run]) -> None:
     run = launch(*(PlanProcess(f"p{number}", "run", argv=("sleep", "180")) for number in range(200)))
     assert until(run.is_up)
-    pids = [process["pid"] for process in run.ps().values()]
+    pids = [process.pid for process in run.ps().values() if process.pid]
     assert len(set(pids)) == 200
     assert run.down() == 0
     assert all(map(gone, pids))
@@ -306,11 +307,13 @@ def test_500_stops_and_starts_leave_no_process_no_descriptor_and_no_memory(launc
     assert until(run.is_up)
     launcher = psutil.Process(run.popen.pid)
 
+    verbs: tuple[tuple[Verb, str], ...] = (("stop", "STOPPED"), ("start", "RUNNING"))
+
     def cycle(count: int) -> None:
         for _ in range(count):
-            for verb, state in (("stop", "STOPPED"), ("start", "RUNNING")):
-                assert ask(run.place, do=verb, name="a")["ok"]
-                assert until(lambda state=state: run.ps()["a"]["state"] == state)  # type: ignore[misc]
+            for verb, state in verbs:
+                assert ask(run.place, ProcessRequest(verb, "a"), Done).ok
+                assert until(lambda state=state: run.ps()["a"].state == state)  # type: ignore[misc]
 
     cycle(5)
     fds, children, memory = launcher.num_fds(), len(launcher.children(recursive=True)), launcher.memory_info().rss
@@ -318,7 +321,7 @@ def test_500_stops_and_starts_leave_no_process_no_descriptor_and_no_memory(launc
     assert until(lambda: launcher.num_fds() <= fds)
     assert len(launcher.children(recursive=True)) == children
     assert launcher.memory_info().rss < 1.1 * memory
-    assert run.ps()["a"]["restarts"] == 505
+    assert run.ps()["a"].restarts == 505
     assert run.down() == 0
 
 
@@ -330,10 +333,10 @@ def test_a_clock_that_goes_back_an_hour_stops_nothing_and_delays_nothing(
     run = launch(program("a", SLEEPER), failing, clock=CLOCK_GOES_BACK)
     assert until(run.is_up)
     (tmp_path / "back").touch()
-    assert until(lambda: run.ps()["failing"]["state"] == "FATAL"), "1 s and 2 s of waiting are over"
-    assert run.ps()["a"]["uptime"] > 2
-    assert ask(run.place, do="restart", name="a")["ok"]
-    assert until(lambda: run.ps()["a"]["restarts"] == 1)
+    assert until(lambda: run.ps()["failing"].state == "FATAL"), "1 s and 2 s of waiting are over"
+    assert (run.ps()["a"].uptime or 0) > 2
+    assert ask(run.place, ProcessRequest("restart", "a"), Done).ok
+    assert until(lambda: run.ps()["a"].restarts == 1)
     assert run.down() == 0
     said = [line.split()[0] for line in (tmp_path / "log" / "tfcompose.log").read_text().splitlines()]
     assert said != sorted(said), "the clock did go back"

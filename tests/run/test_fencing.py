@@ -15,9 +15,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tfcompose.geometry import Pose
+from tfcompose.ipc import REMAPPED
 from tfcompose.plan import FenceWay, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.ros.environment import child_environment
-from tfcompose.run.fenced import REMAPPED, private_topics
+from tfcompose.run.fenced import private_topics
 from tfcompose.run.launcher.launch_wrapper import LAUNCH
 from tfcompose.run.launcher.preflight import commands_of
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tfcompose.geometry import Pose
+from tfcompose.ipc import AllReady, FindingShown, Notice, ProcessReady
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, Ready, RosSettings, Simulation, SourceLine
 from tfcompose.plan.file import write_plan
-from tfcompose.run.launcher.notice import AllReady, FindingShown, Notice, ProcessReady
 from tfcompose.run.launcher.supervisor import supervise
 
 if TYPE_CHECKING:

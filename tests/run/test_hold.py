@@ -12,10 +12,9 @@ import pytest
 
 from tests.support.launcher import LISTEN, SLEEPER, plan_of, program
 from tests.support.waiting import TIMEOUT_S, gone, until
+from tfcompose.ipc import GO, GUARD_EVENTS, HOLD_FD, Clear, LogLine, Notice, ProcessState
 from tfcompose.ros.stop import Stop
-from tfcompose.run.events import Clear, to_line
-from tfcompose.run.hold import GO, HOLD_FD, wait_for_go
-from tfcompose.run.launcher.notice import LogLine, Notice, ProcessState
+from tfcompose.run.hold import wait_for_go
 from tfcompose.run.launcher.supervisor import supervise
 
 if TYPE_CHECKING:
@@ -40,7 +39,7 @@ time.sleep(180)
 def looking_until(file: str) -> PlanProcess:
     """Return a guard whose look before the start ends when there is such a file."""
     look = f"import os, time\nwhile not os.path.exists({file!r}): time.sleep(0.01)\n"
-    say = f"os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']), {to_line(Clear()).encode()!r}); {SLEEPER}"
+    say = f"os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']), {GUARD_EVENTS.line(Clear()).encode()!r}); {SLEEPER}"
     return program("guard", f"{LISTEN}; {look}{say}", kind="guard", cwd=".")
 
 

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.support.guard_history import FIXED, LOOK_S, SETTLE_S, History, Publisher
+from tfcompose.ipc import Clear, Complete, Found, Live, OwnerReady, Recovered
 from tfcompose.plan import EdgePattern, GuardPolicy
-from tfcompose.run.events import Clear, Complete, Found, Live, OwnerReady, Recovered
 
 
 def test_owners_are_live_and_nothing_is_found(running: History) -> None:

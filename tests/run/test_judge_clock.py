@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.support.guard_history import FIXED, History, Publisher, edge, wall
-from tfcompose.run.events import Recovered
+from tfcompose.ipc import Recovered
 
 
 def stamped(running: History, publisher: Publisher, edges: str, stamps: list[float]) -> History:

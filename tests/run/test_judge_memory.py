@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from tests.support.guard_history import EDGES, FIXED, History, edge, wall
 from tfcompose.geometry import Pose
+from tfcompose.ipc import Clear, Found, Live, Recovered
 from tfcompose.plan import Claim, EdgePattern, GuardPolicy, PlanEdge, PlanProcess, SourceLine
-from tfcompose.run.events import Clear, Found, Live, Recovered
 from tfcompose.run.guard.health import statuses
 from tfcompose.run.guard.judge import Writer
 

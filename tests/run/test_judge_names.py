@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from tests.support.guard_history import EDGES, FIXED, LOOK_S, PROCESSES, SETTLE_S, History
+from tfcompose.ipc import Live, Recovered, Taken
 from tfcompose.plan import Plan, RosSettings
-from tfcompose.run.events import Live, Recovered, Taken
 from tfcompose.run.guard.judge import Judge
 
 

@@ -7,7 +7,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tests.support.guard_history import History
-from tfcompose.run.events import Clear, Found, Taken
+from tfcompose.ipc import Clear, Found, Taken
 
 
 def test_a_planned_edge_that_is_published_before_the_start_is_taken_and_the_node_named(history: History) -> None:

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from tests.support.guard_history import EDGES, PROCESSES, SETTLE_S, TOOL, History
+from tfcompose.ipc import Found, Recovered, Taken
 from tfcompose.plan import EdgePattern, GuardPolicy, Plan, RosSettings
-from tfcompose.run.events import Found, Recovered, Taken
 from tfcompose.run.guard.judge import Judge, Writer
 
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tfcompose.ipc import LogLine, Notice
 from tfcompose.plan import Plan, PlanProcess, RosSettings
 from tfcompose.ros.environment import child_environment
-from tfcompose.run.launcher.notice import LogLine, Notice
 from tfcompose.run.launcher.preflight import commands_of
 from tfcompose.run.launcher.supervisor import supervise
 

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tfcompose.geometry import Pose
+from tfcompose.ipc import GUARD_EVENTS, Complete, Found, GuardEvent, Live, OwnerReady, Recovered
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
-from tfcompose.run.events import Complete, Found, GuardEvent, Live, OwnerReady, Recovered, from_line, to_line
 from tfcompose.run.guard.liveness import Liveness
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def test_what_comes_in_one_message_is_announced_in_few_events(watch: Callable[..
     live = [event for event in history.live.arrived(tuple(names), history.now) if isinstance(event, Live)]
     assert [len(event.children) for event in live] == [1000, 1000, 500]
     assert [child for event in live for child in event.children] == names
-    assert [from_line(to_line(event)) for event in live] == live
+    assert [GUARD_EVENTS.read(GUARD_EVENTS.line(event)) for event in live] == live
 
 
 def test_edges_owners_and_the_tree_are_each_announced_once(watch: Callable[..., History]) -> None:

@@ -9,19 +9,32 @@ from typing import Any
 import pytest
 
 from tests.support.machine_history import GUARD, SLAM, STATIC, begin, plan_of, run_process
-from tfcompose.plan import GuardPolicy, Plan, PlanProcess, Ready, RestartPolicy, StopRule
-from tfcompose.run.events import Alive, Clear, Complete, GateOpen, GateShut, Live, OwnerReady, Remember, Silent
-from tfcompose.run.launcher.answers import status
-from tfcompose.run.launcher.happening import Asked, Down, Exited, LogSeen, NewPlan, Signalled
-from tfcompose.run.launcher.lives import refusal
-from tfcompose.run.launcher.notice import (
+from tfcompose.ipc import (
+    Absent,
+    Alive,
     AllReady,
     AllStarted,
+    Clear,
+    Complete,
+    DownRequest,
+    Gate,
+    GateOpen,
+    GateShut,
+    Live,
+    OwnerReady,
+    Present,
     ProcessReady,
+    ProcessRequest,
     RecoveredShown,
+    Remember,
     Replanned,
+    Silent,
+    Verb,
 )
-from tfcompose.run.orders import Absent, Gate, Present
+from tfcompose.plan import GuardPolicy, Plan, PlanProcess, Ready, RestartPolicy, StopRule
+from tfcompose.run.launcher.answers import status
+from tfcompose.run.launcher.happening import Exited, LogSeen, NewPlan, Signalled
+from tfcompose.run.launcher.lives import refusal
 
 
 def gated(name: str = "lidar", *, kind: Any = "topic", text: str = "/scan", **more: Any) -> PlanProcess:
@@ -40,11 +53,12 @@ AFTER = run_process("b", after={"lidar": "ready"})
     [
         ("topic", Gate("lidar", topic="/scan")),
         ("service", Gate("lidar", service="/scan")),
-        ("lifecycle", Gate("lidar", nodes={"/lidar": "/scan"})),
+        ("lifecycle", Gate("lidar", nodes={"/lidar": "active"})),
     ],
 )
 def test_the_guard_looks_at_a_gate_and_what_waits_is_started_when_it_opens(kind: str, gate: Gate) -> None:
-    history = begin(GUARD, gated(kind=kind), AFTER).feed(Clear())
+    text = "active" if kind == "lifecycle" else "/scan"
+    history = begin(GUARD, gated(kind=kind, text=text), AFTER).feed(Clear())
     assert history.orders == [gate]
     assert history.started == ["guard", "lidar"]
     history.wait(2).feed(GateOpen("lidar", "/scan is published by /lidar"))
@@ -172,7 +186,7 @@ def test_the_signals_and_times_are_the_plans(rule: StopRule, signals: list[int],
 
 
 def test_everything_is_stopped_on_request_with_exit_code_0() -> None:
-    history = begin(STATIC, run_process("a")).feed(Down())
+    history = begin(STATIC, run_process("a")).feed(DownRequest())
     assert history.killed == [("a", SIGINT), ("static", SIGINT)]
     assert history.feed(Exited("a", 0), Exited("static", 0)).exit_code == 0
 
@@ -182,7 +196,7 @@ def test_everything_is_stopped_on_request_with_exit_code_0() -> None:
 
 def test_a_process_is_restarted_and_the_guard_is_told_before_and_after() -> None:
     history = begin(GUARD, STATIC, SLAM).feed(Clear(), Live("slam", ("odom",)), OwnerReady("slam"))
-    history.feed(Asked("slam", "restart"))
+    history.feed(ProcessRequest("restart", "slam"))
     assert history.killed == [("slam", SIGINT)]
     assert history.orders == [Absent("slam")]
     assert "odom" not in history.state.live
@@ -194,23 +208,24 @@ def test_a_process_is_restarted_and_the_guard_is_told_before_and_after() -> None
 
 
 def test_a_process_that_was_stopped_stays_so_until_it_is_started() -> None:
-    history = begin(STATIC, run_process("a", restart="always")).feed(Asked("a", "stop"), Exited("a", 1)).wait(60)
+    history = begin(STATIC, run_process("a", restart="always"))
+    history.feed(ProcessRequest("stop", "a"), Exited("a", 1)).wait(60)
     assert (history.states("a")[-1], history.exit_code) == ("STOPPED", None)
     assert history.started == ["static", "a"]
-    assert history.feed(Asked("a", "start")).started == ["static", "a", "a"]
+    assert history.feed(ProcessRequest("start", "a")).started == ["static", "a", "a"]
     assert history.found() == []
 
 
 def test_a_process_that_ignores_a_request_to_stop_is_told_more_firmly() -> None:
-    history = begin(STATIC, run_process("a")).feed(Asked("a", "stop"))
+    history = begin(STATIC, run_process("a")).feed(ProcessRequest("stop", "a"))
     assert [history.sleep_until_due(), history.sleep_until_due()] == pytest.approx([5, 5])
     assert history.killed == [("a", SIGINT), ("a", SIGTERM), ("a", SIGKILL)]
 
 
 def test_a_process_that_waits_for_its_restart_can_be_started_at_once_or_stopped() -> None:
     history = begin(STATIC, run_process("a", restart="always")).feed(Exited("a", 1))
-    assert history.feed(Asked("a", "start")).started == ["static", "a", "a"]
-    history.feed(Exited("a", 1), Asked("a", "stop")).wait(60)
+    assert history.feed(ProcessRequest("start", "a")).started == ["static", "a", "a"]
+    history.feed(Exited("a", 1), ProcessRequest("stop", "a")).wait(60)
     assert len(history.started) == 3
 
 
@@ -223,16 +238,16 @@ def test_a_process_that_waits_for_its_restart_can_be_started_at_once_or_stopped(
         ("drive", "restart", "somebody else starts and stops drive"),
     ],
 )
-def test_what_cannot_be_done_is_refused_with_the_reason(name: str, verb: str, why: str) -> None:
+def test_what_cannot_be_done_is_refused_with_the_reason(name: str, verb: Verb, why: str) -> None:
     history = begin(GUARD, STATIC, PlanProcess("drive", "external")).feed(Clear())
     assert (refusal(history.state, name, verb) or "").startswith(why)
     assert refusal(history.state, "guard", "restart") is None
 
 
 def test_a_guard_that_is_restarted_is_told_who_is_absent_and_which_gates_are_shut() -> None:
-    history = begin(GUARD, STATIC, SLAM, gated()).feed(Clear(), Asked("slam", "stop"), Exited("slam", 0))
+    history = begin(GUARD, STATIC, SLAM, gated()).feed(Clear(), ProcessRequest("stop", "slam"), Exited("slam", 0))
     history.orders.clear()
-    history.feed(Asked("guard", "restart"), Exited("guard", 0))
+    history.feed(ProcessRequest("restart", "guard"), Exited("guard", 0))
     assert history.started[-1] == "guard"
     assert history.orders == [Absent("slam"), Gate("lidar", topic="/scan")]
     assert history.found() == []
@@ -282,18 +297,18 @@ def test_a_guard_that_is_heard_again_before_it_is_believed_to_hang_goes_on() -> 
 
 
 def test_edges_that_are_silent_are_not_counted_as_live_until_they_are_heard_again() -> None:
-    def counted() -> tuple[bool, list[str], int]:
+    def counted() -> tuple[bool, tuple[str, ...], int]:
         said = status(history.state, history.now)
-        return said["complete"], said["silent"], said["processes"][1]["live"]
+        return said.complete, said.silent, said.processes[1].live
 
     history = begin(GUARD, STATIC).feed(Clear(), Live("static", ("laser",)), OwnerReady("static"), Complete(1))
-    assert counted() == (True, [], 1)
+    assert counted() == (True, (), 1)
     history.feed(Silent(("laser",), over=False))
-    assert counted() == (False, ["base_link → laser"], 0)
+    assert counted() == (False, ("base_link → laser",), 0)
     history.feed(Silent(("laser",), over=True))
-    assert counted() == (True, [], 1)
+    assert counted() == (True, (), 1)
     history.feed(Remember({"a": 1}), Silent(("laser",), over=False), Exited("guard", -SIGKILL)).wait(1)
-    assert counted() == (True, [], 1), "the next guard says itself what is silent"
+    assert counted() == (True, (), 1), "the next guard says itself what is silent"
 
 
 def test_a_strict_guard_that_dies_lets_nothing_pass_and_says_so() -> None:
@@ -326,7 +341,7 @@ def test_a_guard_that_dies_again_and_again_ends_everything_with_1() -> None:
 
 def test_a_guard_that_is_asked_for_anew_or_follows_another_plan_begins_without_memory() -> None:
     history = begin(GUARD, STATIC).feed(Clear(), Remember({"a": 1}), Live("static", ("laser",)))
-    history.feed(Asked("guard", "restart"), Exited("guard", 0))
+    history.feed(ProcessRequest("restart", "guard"), Exited("guard", 0))
     assert (history.state.memory, history.state.live, history.found()) == ({}, frozenset(), [])
     history.feed(Clear(), Remember({"a": 1}), Exited("guard", 1))
     history.feed(NewPlan(plan_of(GUARD, STATIC), frozenset({"guard"})))
@@ -354,9 +369,9 @@ def test_a_tree_stays_complete_where_another_plan_changes_nothing_of_it() -> Non
     a = run_process("a")
     history = begin(GUARD, STATIC, a).feed(Clear(), Live("static", ("laser",)), OwnerReady("static"), Complete(1))
     history.feed(NewPlan(plan_of(GUARD, STATIC, replace(a, argv=("other",))), frozenset({"a"})), Exited("a", 0))
-    assert status(history.state, history.now)["complete"]
+    assert status(history.state, history.now).complete
     history.feed(NewPlan(plan_of(GUARD, replace(STATIC, argv=("other",)), a), frozenset({"static"})))
-    assert not status(history.state, history.now)["complete"], "its owner is restarted"
+    assert not status(history.state, history.now).complete, "its owner is restarted"
     history.feed(Exited("static", 0), Live("static", ("laser",)), OwnerReady("static"))
     history.feed(NewPlan(plan_of(GUARD, STATIC, SLAM), frozenset()))
-    assert not status(history.state, history.now)["complete"], "an edge is new"
+    assert not status(history.state, history.now).complete, "an edge is new"

@@ -10,20 +10,28 @@ import pytest
 
 from tests.support.machine_history import GUARD, SLAM, STATIC, begin, plan_of, run_process
 from tfcompose.findings import finding
-from tfcompose.plan import GuardPolicy, PlanProcess
-from tfcompose.run.events import SETTLE, Clear, Complete, Found, Live, OwnerReady, Recovered, Taken
-from tfcompose.run.launcher.action import Finish, Kill, Start
-from tfcompose.run.launcher.happening import Asked, Begin, Exited, OutputLost, Signalled, Started, StartFailed, TimeUp
-from tfcompose.run.launcher.machine import step
-from tfcompose.run.launcher.notice import (
+from tfcompose.ipc import (
+    SETTLE,
+    Clear,
+    Complete,
     Ended,
+    Found,
+    Live,
     Missing,
     OwnerLive,
+    OwnerReady,
+    ProcessRequest,
+    Recovered,
     RecoveredShown,
     Stopping,
+    Taken,
     TreeComplete,
     Waiting,
 )
+from tfcompose.plan import GuardPolicy, PlanProcess
+from tfcompose.run.launcher.action import Finish, Kill, Start
+from tfcompose.run.launcher.happening import Begin, Exited, OutputLost, Signalled, Started, StartFailed, TimeUp
+from tfcompose.run.launcher.machine import step
 from tfcompose.run.launcher.state import initial
 from tfcompose.run.launcher.timing import wake_time
 
@@ -401,7 +409,7 @@ def test_time_is_up_ends_with_1_and_names_the_edges_that_were_never_seen() -> No
 def test_a_process_that_was_stopped_is_not_said_to_have_never_published() -> None:
     slam = replace(SLAM, argv=("slam",))
     history = begin(GUARD, STATIC, slam).feed(Clear(), Live("static", ("laser",)), Live("slam", ("odom",)), Complete(2))
-    history.feed(Asked("slam", "stop"), Exited("slam", -SIGINT), TimeUp())
+    history.feed(ProcessRequest("stop", "slam"), Exited("slam", -SIGINT), TimeUp())
     assert [found.message for found in history.found()] == ["nobody publishes map → odom: slam is stopped: SIGINT"]
 
 

@@ -9,11 +9,10 @@ from typing import Any
 import pytest
 
 from tests.support.machine_history import GUARD, SLAM, STATIC, History, begin, run_process
+from tfcompose.ipc import AllReady, AllStarted, Clear, Ended, Live, OwnerReady, ProcessRequest, Waiting
 from tfcompose.plan import PlanProcess, Ready, RestartPolicy
-from tfcompose.run.events import Clear, Live, OwnerReady
 from tfcompose.run.launcher.answers import status
-from tfcompose.run.launcher.happening import Asked, Exited, Signalled, StartFailed, TimeUp
-from tfcompose.run.launcher.notice import AllReady, AllStarted, Ended, Waiting
+from tfcompose.run.launcher.happening import Exited, Signalled, StartFailed, TimeUp
 
 LIVE = (Live("static", ("laser",)), OwnerReady("static"))
 
@@ -109,7 +108,7 @@ def test_one_that_never_ran_does_not_count_as_started() -> None:
 def test_it_is_started_again_on_request_and_what_waited_for_it_follows() -> None:
     camera = replace(optional(), ready=Ready("time", number=1.0))
     history = begin(STATIC, camera, optional("nav", after={"camera": "ready"})).feed(Exited("camera", 1))
-    history.feed(Asked("camera", "start"))
+    history.feed(ProcessRequest("start", "camera"))
     assert history.state.given_up == ("nav",)
     history.wait(1)
     assert history.started[-2:] == ["camera", "nav"]
@@ -135,10 +134,10 @@ def test_an_optional_process_does_not_hold_back_that_all_is_started() -> None:
 
 def test_ps_says_what_is_optional_why_it_ended_and_that_it_has_failed() -> None:
     history = failed(SLAM)
-    said = {one["name"]: one for one in status(history.state, history.now)["processes"]}
+    said = {one.name: one for one in status(history.state, history.now).processes}
     camera = said["camera"]
-    assert (camera["state"], camera["detail"], camera["failed"]) == ("EXITED", "exit code 3", True)
-    assert (camera["required"], said["slam"]["required"]) == (False, None)
+    assert (camera.state, camera.detail, camera.failed) == ("EXITED", "exit code 3", True)
+    assert (camera.required, said["slam"].required) == (False, None)
 
 
 def test_what_waited_in_vain_is_not_named_as_the_first_that_failed() -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tests.support.guard_history import FIXED, History, edge
-from tfcompose.run.events import Silent
+from tfcompose.ipc import Silent
 from tfcompose.run.guard.quiet import Quiet
 
 if TYPE_CHECKING:
-    from tfcompose.run.events import GuardEvent
+    from tfcompose.ipc import GuardEvent
 
 
 def test_each_edge_that_falls_silent_or_whose_publisher_is_gone_is_said_once_and_when_it_is_back() -> None:

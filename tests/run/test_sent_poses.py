@@ -7,8 +7,8 @@ from math import nan
 import pytest
 
 from tfcompose.geometry import OPTICAL_XYZW, Pose, multiply, quat_from_rpy
+from tfcompose.ipc import Found
 from tfcompose.plan import Driven, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
-from tfcompose.run.events import Found
 from tfcompose.run.guard.senders import Message, Senders, Writer
 from tfcompose.run.guard.sent_poses import SentPoses
 

@@ -14,10 +14,22 @@ import pytest
 
 from tests.support.launcher import SLEEPER, Launcher, guard, plan_of, program
 from tests.support.waiting import TIMEOUT_S, gone, until
+from tfcompose.ipc import (
+    GUARD_EVENTS,
+    Clear,
+    Complete,
+    Ended,
+    FindingShown,
+    Live,
+    LogLine,
+    Notice,
+    OwnerReady,
+    ProcessState,
+    Remember,
+    Stopping,
+)
 from tfcompose.plan import Plan, PlanProcess, RosSettings
-from tfcompose.run.events import Clear, Complete, Live, OwnerReady, Remember, to_line
 from tfcompose.run.launcher.child import READ_SIZE
-from tfcompose.run.launcher.notice import Ended, FindingShown, LogLine, Notice, ProcessState, Stopping
 from tfcompose.run.launcher.state import Times
 from tfcompose.run.launcher.supervisor import supervise
 
@@ -257,7 +269,7 @@ if "TFCOMPOSE_MEMORY_FD" in os.environ:
         time.sleep(0.01)
 os.write(int(os.environ["TFCOMPOSE_EVENTS_FD"]), SAID)
 """
-    said = to_line(Clear()) + to_line(Remember({"é": [1, None]}))
+    said = GUARD_EVENTS.line(Clear()) + GUARD_EVENTS.line(Remember({"é": [1, None]}))
     dies = program("guard", code.replace("SAID", repr(said.encode())), kind="guard", cwd=".")
     remembered: list[str] = []
     counted: list[int] = []

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from tfcompose.ipc import MEMORY_FD, Found, GuardEvent, Remember
 from tfcompose.plan import Driven, Plan, PlanProcess, RosSettings
-from tfcompose.run.events import MEMORY_FD, Found, GuardEvent, Remember
 from tfcompose.run.guard import switches
 from tfcompose.run.guard.memory import SwitchMemory, recalled
 from tfcompose.run.guard.switches import Switches, not_taken

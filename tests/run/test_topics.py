@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tfcompose.ipc import Clear, Complete, GuardEvent, OwnerReady
 from tfcompose.plan import Plan, PlanProcess, RosSettings
-from tfcompose.run.events import Clear, Complete, GuardEvent, OwnerReady
 from tfcompose.run.guard.topics import plans_by_topics, together
 
 if TYPE_CHECKING:

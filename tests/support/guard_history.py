@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.geometry import Pose
+from tfcompose.ipc import Clear, Found, GuardEvent, Taken
 from tfcompose.plan import Claim, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
-from tfcompose.run.events import Clear, Found, GuardEvent, Taken
 from tfcompose.run.guard.judge import Judge, Message, Writer
 
 if TYPE_CHECKING:

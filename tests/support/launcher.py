@@ -13,9 +13,9 @@ import psutil
 
 from tests.support import processes
 from tests.support.waiting import TIMEOUT_S, whole_lines
+from tfcompose.ipc import GUARD_EVENTS
 from tfcompose.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.plan.file import write_plan
-from tfcompose.run.events import to_line
 
 if TYPE_CHECKING:
     import subprocess
@@ -43,7 +43,7 @@ def program(name: str, code: str, *words: str, **more: Any) -> PlanProcess:
 
 def guard(*events: Any, end: str = SLEEPER) -> PlanProcess:
     """Return a guard that says these events, or lines, and then sleeps."""
-    lines = "".join(event if isinstance(event, str) else to_line(event) for event in events)
+    lines = "".join(event if isinstance(event, str) else GUARD_EVENTS.line(event) for event in events)
     say = f"{LISTEN}; import os; os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']), {lines.encode()!r}); {end}"
     return program("guard", say, kind="guard")
 

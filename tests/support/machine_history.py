@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from tfcompose.geometry import Pose
+from tfcompose.ipc import FindingShown, Notice, ProcessState
 from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.run.launcher.action import Action, Finish, Kill, Order, Start, Tell, TellLate
 from tfcompose.run.launcher.happening import Begin, Event, Started, Tick
 from tfcompose.run.launcher.machine import step
-from tfcompose.run.launcher.notice import FindingShown, Notice, ProcessState
 from tfcompose.run.launcher.state import State, initial
 from tfcompose.run.launcher.timing import wake_time
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from tfcompose.findings import Finding
+    from tfcompose.ipc import GuardOrder
     from tfcompose.plan import RestartPolicy, StartCondition
-    from tfcompose.run.orders import GuardOrder
 
 N = TypeVar("N", bound=Notice)
 

@@ -10,6 +10,7 @@ from tfcompose.cli.keeping import kept
 from tfcompose.cli.missing import until_ready
 from tfcompose.cli.running import asked, since
 from tfcompose.cli.terminal import complain
+from tfcompose.ipc import PlanChange, UpdateRequest
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -28,17 +29,17 @@ def up_again(plan: Plan, file: Path, place: Place, arguments: Namespace) -> int:
     copy = kept(plan, file, place, alone=False)
     if isinstance(copy, int):
         return copy
-    answer = asked(place, do="update", plan=str(copy), base=str(file.absolute().parent))
+    answer = asked(place, UpdateRequest(str(copy), str(file.absolute().parent)), PlanChange)
     if isinstance(answer, int):
         complain(who)
         return answer
-    parts = (("restarted", answer["changed"]), ("started", answer["added"]), ("stopped", answer["removed"]))
+    parts = (("restarted", answer.changed), ("started", answer.added), ("stopped", answer.removed))
     said = "; ".join(f"{word}: {', '.join(names)}" for word, names in parts if names)
     if not said:
         background = arguments.detach or arguments.wait
         complain(f"{who}; the plan is the same; tfcompose down ends it")
         return (until_ready(place, arguments.timeout) if arguments.wait else 0) if background else 1
     sys.stdout.write(f"{who}; {said}\n")
-    if answer["held"]:
-        sys.stdout.write(f"{held(tuple(answer['held']))}\n")
+    if answer.held:
+        sys.stdout.write(f"{held(answer.held)}\n")
     return until_ready(place, arguments.timeout) if arguments.wait else 0

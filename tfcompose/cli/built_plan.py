@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
 from tfcompose.findings import RejectedError
+from tfcompose.ipc import SETTLE
 from tfcompose.plan import Plan
 from tfcompose.plan.file import read_plan
-from tfcompose.run.events import SETTLE
 from tfcompose.run.hosts import share_of
 
 if TYPE_CHECKING:

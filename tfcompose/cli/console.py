@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 from tfcompose.cli.printable import coloured_only, head_of, plain, width_of
 from tfcompose.cli.start_table import table_of
 from tfcompose.cli.terminal import line_of
-from tfcompose.render.text import BOLD, GREEN, PLAIN, RED, YELLOW, render_text
-from tfcompose.run.launcher.notice import (
+from tfcompose.ipc import (
     AllReady,
     AllStarted,
     Ended,
@@ -24,13 +23,14 @@ from tfcompose.run.launcher.notice import (
     TreeComplete,
     Waiting,
 )
+from tfcompose.render.text import BOLD, GREEN, PLAIN, RED, YELLOW, render_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tfcompose.cli.status import Status
+    from tfcompose.ipc import Notice
     from tfcompose.plan import Plan
-    from tfcompose.run.launcher.notice import Notice
 
 #: Colours that are told apart on dark and light terminals; a process keeps its own by its place in the plan.
 COLOURS = tuple(f"\033[{code}m" for code in (36, 35, 34, 32, 33, 96, 95, 94))

@@ -13,8 +13,8 @@ from tfcompose.cli.keeping import left_behind
 from tfcompose.cli.missing import say_missing
 from tfcompose.cli.running import events
 from tfcompose.cli.terminal import coloured, complain
+from tfcompose.ipc import AllReady, AllStarted, Ended
 from tfcompose.run.launcher.logs import Logs
-from tfcompose.run.launcher.notice import AllReady, AllStarted, Ended
 from tfcompose.run.launcher.supervisor import supervise
 
 if TYPE_CHECKING:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import sys
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar
 
 from tfcompose.cli.reader import wait_for
 from tfcompose.cli.terminal import UNREADABLE, complain
-from tfcompose.run.launcher.control import ask, connect
-from tfcompose.run.launcher.told import notice_of
+from tfcompose.ipc import REQUESTS, Done, EventsRequest, ProcessRequest, read_notice
+from tfcompose.run.launcher.control import RefusedError, ask, connect
 from tfcompose.run.place import PlaceError, places
 
 if TYPE_CHECKING:
@@ -18,8 +18,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from typing import TextIO
 
-    from tfcompose.run.launcher.notice import Notice
+    from tfcompose.ipc import Notice, Request, Verb
     from tfcompose.run.place import Holder, Place
+
+A = TypeVar("A")
 
 
 def add_robot(parser: ArgumentParser) -> None:
@@ -67,34 +69,30 @@ def chosen(name: str | None, *, among: Callable[[], list[Place]] | None = None) 
     return 1
 
 
-def asked(place: Place, **request: Any) -> dict[str, Any] | int:
+def asked(place: Place, request: Request, answer: type[A]) -> A | int:
     """Return the launcher's answer, or the exit code after saying why there is none."""
     try:
-        answer = ask(place, **request)
+        return ask(place, request, answer)
+    except RefusedError as error:
+        complain(str(error))
     except OSError as error:
         complain(f"{place.name} does not answer: {error}")
-        return 1
-    if "error" in answer:
-        complain(str(answer["error"]))
-        return 1
-    return answer
+    return 1
 
 
-def ask_of_each(arguments: Namespace, do: str, doing: str) -> int:
+def ask_of_each(arguments: Namespace, do: Verb, doing: str) -> int:
     """Have the launcher do it with each of the named processes; return the exit code."""
     place = chosen(arguments.robot)
     if isinstance(place, int):
         return place
     codes = []
     for name in arguments.name:
-        answer = asked(place, do=do, name=name)
-        codes.append(answer if isinstance(answer, int) else told(f"{name}: {doing}{_later(answer)}"))
+        answer = asked(place, ProcessRequest(do, name), Done)
+        if isinstance(answer, Done):
+            later = f", and waits for {answer.waits}" if answer.waits else ""
+            answer = told(f"{name}: {doing}{later}")
+        codes.append(answer)
     return max(codes)
-
-
-def _later(answer: dict[str, Any]) -> str:
-    """Return what must happen before what was asked for can; nothing where nothing must."""
-    return f", and waits for {answer['waits']}" if answer.get("waits") else ""
 
 
 def events(
@@ -109,7 +107,7 @@ def events(
     """
     end = None if timeout_s is None else time.monotonic() + timeout_s
     with connect(place) as connection:
-        connection.sendall(b'{"do": "events"}\n')
+        connection.sendall(REQUESTS.line(EventsRequest()).encode())
         rest = b""
         while True:
             left = None if end is None else end - time.monotonic()
@@ -123,7 +121,7 @@ def events(
                 return
             *lines, rest = (rest + data).split(b"\n")
             for line in lines:
-                yield notice_of(line.decode())
+                yield read_notice(line)
 
 
 def since(holder: Holder) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tfcompose.run.launcher.notice import AllReady
+    from tfcompose.ipc import AllReady
 
 
 def table_of(notice: AllReady) -> list[str]:

@@ -6,21 +6,13 @@ import os
 import time
 from typing import TYPE_CHECKING
 
-from tfcompose.run.launcher.notice import (
-    AllReady,
-    Ended,
-    FindingShown,
-    OwnerLive,
-    ProcessState,
-    Stopping,
-    TreeComplete,
-)
+from tfcompose.ipc import AllReady, Ended, FindingShown, OwnerLive, ProcessState, Stopping, TreeComplete
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from tfcompose.ipc import Notice
     from tfcompose.plan import Plan
-    from tfcompose.run.launcher.notice import Notice
 
 #: The line is drawn at most so often, in seconds.
 EVERY_S = 0.2

@@ -133,18 +133,15 @@ class TaggedUnion(Generic[T]):
     def __init__(self, key: str, kinds: Iterable[type[T]]) -> None:
         self._key = key
         self._kinds: dict[str, type[T]] = {}
-        self._named: set[type[T]] = set()
         for kind in kinds:
             of: Any = kind
-            words = next((get_args(field.kind) for field in fields_of(of) if field.name == key), None)
-            if words is None:
-                self._named.add(kind)
-            self._kinds |= dict.fromkeys(words or (kind.__name__,), kind)
+            words = get_args(get_type_hints(kind)[key]) if key in of.__dataclass_fields__ else (kind.__name__,)
+            self._kinds |= dict.fromkeys(words, kind)
 
     def encode(self, message: T) -> dict[str, Any]:
         """Return the message as data, with its tag first."""
         data: dict[str, Any] = encode(message)
-        return {self._key: type(message).__name__} | data if type(message) in self._named else data
+        return data if self._key in data else {self._key: type(message).__name__} | data
 
     def decode(self, data: Any) -> T:
         """Return the message that the data are.

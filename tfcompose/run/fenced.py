@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     Topics = tuple[str, str]
 
-#: Says to the guard that the processes of its run are fenced off by remapping.
-REMAPPED = "TFCOMPOSE_REMAPPED"
 #: What no part of a topic's name may hold.
 _UNDERSCORES = re.compile(r"__+|_(?=/|$)")
 

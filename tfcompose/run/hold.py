@@ -9,13 +9,11 @@ import os
 from select import select
 from typing import TYPE_CHECKING
 
+from tfcompose.ipc import GO, HOLD_FD
+
 if TYPE_CHECKING:
     from tfcompose.ros.stop import Stop
 
-#: The variable that names the descriptor from which the word comes.
-HOLD_FD = "TFCOMPOSE_HOLD_FD"
-#: What comes there when the process may go on.
-GO = b"go\n"
 _LOOK_EVERY_S = 0.2
 
 

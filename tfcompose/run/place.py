@@ -23,10 +23,6 @@ if TYPE_CHECKING:
 
     from tfcompose.plan import Plan
 
-#: The variable that every process of a run carries, and its children: ROBOT@DOMAIN:ID.
-RUN_ID = "TFCOMPOSE_RUN"
-#: The variable that says to which process of the plan it belongs.
-PROCESS = "TFCOMPOSE_PROCESS"
 #: Where systemd makes a folder for each user who is logged in, also for services and cron, which are not told of it.
 USERS = Path("/run/user")
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.options import positive
 from tfcompose.cli.running import add_robot, asked, chosen, events, told
 from tfcompose.cli.terminal import complain
+from tfcompose.ipc import Done, DownRequest, Ended
 from tfcompose.run.launcher.leftovers import end, leftovers
-from tfcompose.run.launcher.notice import Ended
 from tfcompose.run.place import places
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def run(arguments: Namespace) -> int:
     place = chosen(arguments.robot)
     if isinstance(place, int):
         return place
-    answer = asked(place, do="down")
+    answer = asked(place, DownRequest(), Done)
     if isinstance(answer, int):
         return answer
     try:

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.console import Console
 from tfcompose.cli.running import add_robot, chosen, events
 from tfcompose.cli.terminal import coloured, complain
+from tfcompose.ipc import Ended, notice_line
 from tfcompose.plan import Plan, RosSettings
-from tfcompose.run.launcher.notice import Ended
-from tfcompose.run.launcher.told import told_line
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -40,7 +39,7 @@ def run(arguments: Namespace) -> int:
         for notice, at in events(place, for_whom=sys.stdout):
             ended = isinstance(notice, Ended)
             if arguments.format == "json":
-                sys.stdout.write(f"{told_line(notice, at)}\n")
+                sys.stdout.write(f"{notice_line(notice, at)}\n")
             else:
                 lines.at = at
                 console(notice)

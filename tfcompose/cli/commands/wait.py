@@ -12,7 +12,7 @@ from tfcompose.cli.missing import until_ready
 from tfcompose.cli.options import positive
 from tfcompose.cli.running import add_robot, chosen, events
 from tfcompose.cli.terminal import complain
-from tfcompose.run.launcher.notice import Ended
+from tfcompose.ipc import Ended
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Note
-from tfcompose.run.events import Found, GuardEvent, Recovered, Taken
+from tfcompose.ipc import Found, GuardEvent, Recovered, Taken
 from tfcompose.run.guard.senders import FEWEST_GAPS, NAMELESS_S
 from tfcompose.verdict.driven import drives_of, sensor_of
 from tfcompose.verdict.offence import NAMELESS, Offence

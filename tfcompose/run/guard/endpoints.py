@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tfcompose.ipc import Found
 from tfcompose.ros.misfits import best_effort_writer, leak, replaced_latched, volatile_writer
-from tfcompose.run.events import Found
 from tfcompose.run.guard.senders import UNCOUNTED
 
 if TYPE_CHECKING:

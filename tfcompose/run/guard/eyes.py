@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node
 
-    from tfcompose.run.events import GuardEvent
+    from tfcompose.ipc import GuardEvent
     from tfcompose.run.guard.ear import Heard
     from tfcompose.run.guard.judge import Judge
 

@@ -6,17 +6,16 @@ import time
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from tfcompose.ipc import Gate, GateOpen, GateShut
 from tfcompose.ros.graph import is_offered, services, writers
-from tfcompose.run.events import GateOpen, GateShut
-from tfcompose.run.orders import Gate
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from rclpy.node import Node
 
+    from tfcompose.ipc import GuardEvent
     from tfcompose.ros.lifecycle import Lifecycle
-    from tfcompose.run.events import GuardEvent
 
 #: How often a gate is looked at, in seconds.
 LOOK_EVERY_S = 0.2

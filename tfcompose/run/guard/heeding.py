@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
-from tfcompose.run.orders import ORDERS_FD, Absent, Gate, Present, order_of
+from tfcompose.ipc import GUARD_ORDERS, ORDERS_FD, Absent, Gate, Present
 
 if TYPE_CHECKING:
     from tfcompose.run.guard.gatekeeper import Gates
@@ -26,7 +26,7 @@ class Orders:
     def take(self) -> None:
         """Follow the orders that have come, and look at the gates."""
         for line in self._lines():
-            match order_of(line):
+            match GUARD_ORDERS.read(line):
                 case Absent(process):
                     for judge in self._judges:
                         judge.absent(process)

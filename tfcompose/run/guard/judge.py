@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.run.events import Clear, GuardEvent
+from tfcompose.ipc import Clear, GuardEvent
 from tfcompose.run.guard.cases import Cases, Start
 from tfcompose.run.guard.endpoints import Endpoints
 from tfcompose.run.guard.health import EdgeHealth

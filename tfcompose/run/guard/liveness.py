@@ -12,8 +12,8 @@ from collections import deque
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.ipc import Complete, Found, GuardEvent, Live, OwnerReady, Recovered
 from tfcompose.plan import SLOW_BELOW
-from tfcompose.run.events import Complete, Found, GuardEvent, Live, OwnerReady, Recovered
 from tfcompose.run.guard.silence import change_event
 from tfcompose.run.guard.track import Track, Watched
 from tfcompose.verdict.timing import left

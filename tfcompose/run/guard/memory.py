@@ -10,12 +10,12 @@ import json
 import os
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.run.events import MEMORY_FD, Remember
+from tfcompose.ipc import MEMORY_FD, Remember
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from tfcompose.run.events import GuardEvent
+    from tfcompose.ipc import GuardEvent
     from tfcompose.run.guard.judge import Judge
     from tfcompose.run.guard.relay import Relay
     from tfcompose.run.guard.switches import Switches

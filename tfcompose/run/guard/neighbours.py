@@ -6,11 +6,11 @@ import os
 from hashlib import blake2b
 from typing import TYPE_CHECKING
 
+from tfcompose.ipc import PROCESS, RUN_ID
 from tfcompose.ros.graph import UNKNOWN_NODE, ids_say_who, own_gid, writers, writers_unmapped
 from tfcompose.ros.processes import has_variable, origin, variable_of
 from tfcompose.ros.topics import GLOBAL
 from tfcompose.run.guard.senders import PARTICIPANT, Writer
-from tfcompose.run.place import PROCESS, RUN_ID
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

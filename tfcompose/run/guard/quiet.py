@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.run.events import Silent
+from tfcompose.ipc import Silent
 from tfcompose.run.guard.liveness import MOST_NAMED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from tfcompose.run.events import GuardEvent
+    from tfcompose.ipc import GuardEvent
     from tfcompose.run.guard.judge import Judge
 
 

@@ -8,13 +8,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from tfcompose.run.events import Found
+from tfcompose.ipc import Found
 from tfcompose.verdict.poses import Expected, driver_pose_differs, expected_of, is_off
 
 if TYPE_CHECKING:
     from tfcompose.geometry import Pose
+    from tfcompose.ipc import GuardEvent
     from tfcompose.plan import Plan
-    from tfcompose.run.events import GuardEvent
     from tfcompose.run.guard.senders import Message, Senders
 
 #: So many frames of publishers without a name are kept at most.

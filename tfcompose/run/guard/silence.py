@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.run.events import Found, GuardEvent, Recovered
+from tfcompose.ipc import Found, GuardEvent, Recovered
 from tfcompose.verdict.timing import named, silent, slow
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, finding
-from tfcompose.run.events import Found
+from tfcompose.ipc import Found
 from tfcompose.run.guard.judge import FINDING_S
 
 if TYPE_CHECKING:
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node
 
+    from tfcompose.ipc import GuardEvent
     from tfcompose.plan import Driven, Plan
     from tfcompose.ros.parameters import ParameterReader, Value
-    from tfcompose.run.events import GuardEvent
 
 #: How often nodes are looked for, in seconds.
 LOOK_EVERY_S = 0.5

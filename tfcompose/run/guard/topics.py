@@ -8,14 +8,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from tfcompose.ipc import Clear, Complete
 from tfcompose.ros.topics import parts_of
-from tfcompose.run.events import Clear, Complete
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from tfcompose.ipc import GuardEvent
     from tfcompose.plan import Plan, PlanProcess
-    from tfcompose.run.events import GuardEvent
 
     Topics = tuple[str, str]
 

@@ -7,8 +7,9 @@ import select
 import sys
 import time
 
-from tfcompose.run.events import (
+from tfcompose.ipc import (
     EVENTS_FD,
+    GUARD_EVENTS,
     Alive,
     Clear,
     Complete,
@@ -19,7 +20,6 @@ from tfcompose.run.events import (
     OwnerReady,
     Remember,
     Silent,
-    to_line,
 )
 from tfcompose.run.own import say
 
@@ -45,9 +45,9 @@ class Voice:
         if not self._judges and not isinstance(event, _SEEN):
             return
         if self._pipe is not None:
-            self._said.append(to_line(event))
+            self._said.append(GUARD_EVENTS.line(event))
         elif not isinstance(event, (Remember, Silent)):
-            say(to_line(event).rstrip())
+            say(GUARD_EVENTS.line(event).rstrip())
 
     def pulse(self) -> None:
         """Say from time to time that the guard looks; a launcher that does not listen is not waited for."""

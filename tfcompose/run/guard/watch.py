@@ -6,12 +6,12 @@ import os
 import time
 from typing import TYPE_CHECKING
 
+from tfcompose.ipc import JOINS, ORDERS_FD, REMAPPED, SETTLE
 from tfcompose.ros.graph import ids_say_who
 from tfcompose.ros.node import open_node, wait
 from tfcompose.ros.topics import GLOBAL
 from tfcompose.run.clock_watch import ClockWatch
-from tfcompose.run.events import SETTLE
-from tfcompose.run.fenced import REMAPPED, private_topics
+from tfcompose.run.fenced import private_topics
 from tfcompose.run.guard.bulletin import Bulletin
 from tfcompose.run.guard.eyes import LOOK_EVERY_S, Eyes, held_back
 from tfcompose.run.guard.gatekeeper import Gates
@@ -24,7 +24,6 @@ from tfcompose.run.guard.topics import plans_by_topics, together
 from tfcompose.run.guard.unattended import Unattended
 from tfcompose.run.guard.voice import Voice
 from tfcompose.run.notify import ready
-from tfcompose.run.orders import JOINS, ORDERS_FD
 from tfcompose.run.own import say
 
 if TYPE_CHECKING:
@@ -33,9 +32,9 @@ if TYPE_CHECKING:
 
     from rclpy.node import Node
 
+    from tfcompose.ipc import GuardEvent
     from tfcompose.plan import Plan
     from tfcompose.ros.stop import Stop
-    from tfcompose.run.events import GuardEvent
     from tfcompose.run.own import Own
 
     Topics = tuple[str, str]

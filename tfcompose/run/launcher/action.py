@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from tfcompose.findings import Finding
-    from tfcompose.run.launcher.notice import Notice
-    from tfcompose.run.orders import GuardOrder
+    from tfcompose.ipc import GuardOrder, Notice
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,27 +12,23 @@ from io import FileIO
 from selectors import EVENT_READ
 from typing import TYPE_CHECKING
 
-from tfcompose.run.events import from_line
-from tfcompose.run.hold import GO, HOLD_FD
+from tfcompose.ipc import GO, GUARD_EVENTS, HOLD_FD, LAUNCHER, PROCESS, RUN_ID, LogLine
 from tfcompose.run.launcher.child import LAST_LINE_LENGTH, Child, Pipe, bury_adopted, has_ended, kill_group, spawn
 from tfcompose.run.launcher.happening import Exited, LogSeen, Started, StartFailed
 from tfcompose.run.launcher.keeper import Keeper
-from tfcompose.run.launcher.leftovers import LAUNCHER, launcher_mark, leftovers, tell, these
 from tfcompose.run.launcher.leftovers import end as end_leftovers
-from tfcompose.run.launcher.notice import LogLine
+from tfcompose.run.launcher.leftovers import launcher_mark, leftovers, tell, these
 from tfcompose.run.launcher.processes import descendants
-from tfcompose.run.place import PROCESS, RUN_ID
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from selectors import BaseSelector
 
+    from tfcompose.ipc import GuardOrder, Notice, Stream
     from tfcompose.plan import PlanProcess
     from tfcompose.run.launcher.command import Command
     from tfcompose.run.launcher.guard_pipes import GuardPipes
     from tfcompose.run.launcher.happening import Event
-    from tfcompose.run.launcher.notice import Notice, Stream
-    from tfcompose.run.orders import GuardOrder
 
 #: So much of a line is compared with what a gate waits for, in characters.
 LONGEST_MATCHED = 4000
@@ -217,7 +213,7 @@ class Children:
 
     def _guard_said(self, name: str, line: str) -> None:
         try:
-            event = from_line(line)
+            event = GUARD_EVENTS.read(line)
         except (ValueError, TypeError, KeyError, AttributeError):
             self._tell(LogLine(name, "stderr", f"not an event: {line}"))
         else:

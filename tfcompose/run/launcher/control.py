@@ -13,20 +13,29 @@ import selectors
 import socket
 import struct
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar
 
+from tfcompose.ipc import REQUESTS, EventsRequest, Refusal
+from tfcompose.plan.codec import decode, encode
 from tfcompose.run.launcher.processes import STATE, fields_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from tfcompose.ipc import Request
     from tfcompose.run.place import Place
+
+A = TypeVar("A")
 
 #: A longer request is refused; a listener that is so far behind is let go; bytes.
 LONGEST_REQUEST = 64 * 1024
 LONGEST_BACKLOG = 1024 * 1024
 #: How long the launcher may take to answer, in seconds.
 ANSWER_S = 20.0
+
+
+class RefusedError(Exception):
+    """Raised where the launcher does not do what it is asked; the message is its reason."""
 
 
 @dataclass(slots=True, eq=False)
@@ -92,27 +101,33 @@ def _ensure_it_runs(place: Place) -> None:
             raise ConnectionError(f"its launcher {holder.pid} is stopped; kill -CONT {holder.pid} lets it go on")
 
 
-def ask(place: Place, **request: Any) -> dict[str, Any]:
-    """Return the launcher's answer to one request.
+def ask(place: Place, request: Request, answer: type[A]) -> A:
+    """Return the launcher's answer to one request, of the class that answers it.
 
     Raises:
+        RefusedError: with the launcher's reason, if it does not do it.
         OSError: if nobody runs the robot, or does not answer.
     """
     with connect(place) as connection:
-        connection.sendall(json.dumps(request).encode() + b"\n")
+        connection.sendall(REQUESTS.line(request).encode())
         with connection.makefile("rb") as lines:
             line = lines.readline()
     if not line:
         raise ConnectionResetError("the launcher has ended")
-    answer: dict[str, Any] = json.loads(line)
-    return answer
+    try:
+        data = json.loads(line)
+        if "error" in data:
+            raise RefusedError(decode(Refusal, data).error)
+        return decode(answer, data)
+    except (ValueError, TypeError) as error:
+        raise ConnectionError(f"its launcher answers what this tfcompose does not understand: {error}") from None
 
 
 class Control:
-    """The launcher's end. ``answer`` is given each request and returns what is sent back."""
+    """The launcher's end. ``answer`` is given each request and returns the object that is sent back."""
 
     def __init__(
-        self, listener: socket.socket, selector: selectors.BaseSelector, answer: Callable[[dict[str, Any]], Any]
+        self, listener: socket.socket, selector: selectors.BaseSelector, answer: Callable[[Request], object]
     ) -> None:
         self._listener = listener
         self._selector = selector
@@ -178,17 +193,16 @@ class Control:
 
     def _take(self, client: Client, line: bytes) -> None:
         try:
-            request = json.loads(line)
-        except ValueError:
-            request = None
-        if not isinstance(request, dict):
-            self._send(client, json.dumps({"error": "not a request"}))
-        elif request.get("do") == "events":
+            request = REQUESTS.read(line)
+        except (ValueError, RecursionError) as error:
+            self._send(client, json.dumps(encode(Refusal(f"not a request: {error}"))))
+            return
+        if isinstance(request, EventsRequest):
             client.listens = True
             for told in self._told:
                 self._send(client, told)
         else:
-            self._send(client, json.dumps(self._answer(request)))
+            self._send(client, json.dumps(encode(self._answer(request))))
 
     def _send(self, client: Client, line: str) -> None:
         client.owed += line.encode() + b"\n"

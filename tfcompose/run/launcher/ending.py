@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from tfcompose.ipc import DownRequest
 from tfcompose.run.launcher.action import Kill
 from tfcompose.run.launcher.failures import in_short, never_seen, signal_name
-from tfcompose.run.launcher.happening import Down, OutputLost, Signalled, TimeUp
+from tfcompose.run.launcher.happening import OutputLost, Signalled, TimeUp
 from tfcompose.run.launcher.lives import lose
 from tfcompose.run.launcher.state import UNREAD, Stop
 from tfcompose.run.launcher.timing import by_owner, stop_level, stop_signals
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 def asked_to_end(turn: Turn, event: Event) -> None:
     """Begin to stop everything if that is what the event asks for."""
     match event:
-        case Down():
+        case DownRequest():
             turn.stop(Stop("signal", 0, 1, turn.now), "tfcompose down")
         case Signalled(number):
             _signalled(turn, signal_name(number))

@@ -6,10 +6,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 from tfcompose.findings import Note, finding
+from tfcompose.ipc import AllReady, AllStarted, Gate, ProcessReady, StartRow
 from tfcompose.run.launcher.action import Order, TellLate
-from tfcompose.run.launcher.notice import AllReady, AllStarted, ProcessReady, StartRow
 from tfcompose.run.launcher.prerequisites import unmet_in_words
-from tfcompose.run.orders import Gate
 
 if TYPE_CHECKING:
     from tfcompose.findings import Finding

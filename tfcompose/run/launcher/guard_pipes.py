@@ -8,11 +8,10 @@ import json
 import os
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.run.events import EVENTS_FD, MEMORY_FD
-from tfcompose.run.orders import JOINS, ORDERS_FD, order_line
+from tfcompose.ipc import EVENTS_FD, GUARD_ORDERS, JOINS, MEMORY_FD, ORDERS_FD
 
 if TYPE_CHECKING:
-    from tfcompose.run.orders import GuardOrder
+    from tfcompose.ipc import GuardOrder
 
 
 class GuardPipes:
@@ -42,7 +41,7 @@ class GuardPipes:
     def order(self, order: GuardOrder) -> None:
         """Tell the guard; one that is stuck is told nothing."""
         with contextlib.suppress(OSError):
-            os.write(self._orders, order_line(order).encode())
+            os.write(self._orders, GUARD_ORDERS.line(order).encode())
 
     def close(self) -> None:
         """Close the launcher's end for orders; that for events is closed by whoever reads it."""

@@ -4,13 +4,25 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.run.events import Alive, Clear, Complete, Found, Live, Recovered, Remember, Silent
+from tfcompose.ipc import (
+    Absent,
+    Alive,
+    Clear,
+    Complete,
+    Found,
+    Live,
+    OwnerLive,
+    Present,
+    Recovered,
+    RecoveredShown,
+    Remember,
+    Silent,
+    TreeComplete,
+)
 from tfcompose.run.launcher.action import Order
 from tfcompose.run.launcher.gates import kind_of, opened
-from tfcompose.run.launcher.notice import OwnerLive, RecoveredShown, TreeComplete
 from tfcompose.run.launcher.offender import judged
 from tfcompose.run.launcher.vigil import heard
-from tfcompose.run.orders import Absent, Present
 
 if TYPE_CHECKING:
     from tfcompose.run.launcher.happening import Event

@@ -1,16 +1,14 @@
-"""What can happen to the process machine: values only. What the guard says is in ``events``."""
+"""What can happen to the process machine, as values; what the guard says and other commands ask is in ``ipc``."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
-from tfcompose.run.events import GuardEvent
+from tfcompose.ipc import DownRequest, GuardEvent, ProcessRequest
 
 if TYPE_CHECKING:
     from tfcompose.plan import Plan
-
-Verb = Literal["stop", "start", "restart"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,19 +72,6 @@ class LogSeen:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """Somebody asks for one process to be stopped, started or restarted; ``refusal`` says when not to ask."""
-
-    name: str
-    verb: Verb
-
-
-@dataclass(frozen=True, slots=True)
-class Down:
-    """Somebody asks for everything to be stopped."""
-
-
-@dataclass(frozen=True, slots=True)
 class NewPlan:
     """From now on another plan holds; ``changed`` are the processes that must be started anew for it."""
 
@@ -105,8 +90,8 @@ Event = (
     | Tick
     | TimeUp
     | LogSeen
-    | Asked
-    | Down
+    | ProcessRequest
+    | DownRequest
     | NewPlan
     | GuardEvent
 )

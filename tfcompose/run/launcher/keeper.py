@@ -11,8 +11,8 @@ import signal
 import subprocess
 from typing import TYPE_CHECKING
 
+from tfcompose.ipc import RUN_ID
 from tfcompose.ros.stop import SIGNALS
-from tfcompose.run.place import RUN_ID
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

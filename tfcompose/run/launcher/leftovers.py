@@ -12,14 +12,12 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tfcompose.ipc import LAUNCHER, PROCESS, RUN_ID
 from tfcompose.run.launcher.processes import BEGAN, PROC, STATE, all_pids, began, fields_of
-from tfcompose.run.place import PROCESS, RUN_ID
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
 
-#: The variable that names the launcher of a run: its process number, and when it began (clock ticks).
-LAUNCHER = "TFCOMPOSE_LAUNCHER"
 #: The kernel ends a killed process within this time, in seconds, also where much is going on.
 KILLED_WITHIN_S = 5.0
 

@@ -6,15 +6,15 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import did_you_mean
+from tfcompose.ipc import Absent, Replanned
 from tfcompose.run.launcher.action import Order
 from tfcompose.run.launcher.failures import ended_by_itself, guard_lost, how_ended
-from tfcompose.run.launcher.notice import Replanned
 from tfcompose.run.launcher.state import MAX_RESTARTS, Tracked
 from tfcompose.run.launcher.timing import backoff_s
-from tfcompose.run.orders import Absent
 
 if TYPE_CHECKING:
-    from tfcompose.run.launcher.happening import Asked, Exited, NewPlan
+    from tfcompose.ipc import ProcessRequest, Verb
+    from tfcompose.run.launcher.happening import Exited, NewPlan
     from tfcompose.run.launcher.state import State
     from tfcompose.run.launcher.turn import Turn
 
@@ -101,7 +101,7 @@ def _restart_later(turn: Turn, one: Tracked, event: Exited) -> None:
     turn.enter(name, "BACKOFF", f"{how}; restart {failures} of {most} in {delay:g} s", failures=failures)
 
 
-def refusal(state: State, name: str, verb: str) -> str | None:
+def refusal(state: State, name: str, verb: Verb) -> str | None:
     """Return why nobody can ask this of that process, in one sentence; None if it is done."""
     one = state.tracked.get(name)
     if one is None:
@@ -120,12 +120,12 @@ def refusal(state: State, name: str, verb: str) -> str | None:
     return None
 
 
-def asked(turn: Turn, event: Asked) -> None:
+def asked(turn: Turn, event: ProcessRequest) -> None:
     """Stop, start or restart one process."""
-    if refusal(turn.state, event.name, event.verb):
+    if refusal(turn.state, event.name, event.do):
         return
     one = turn.state.tracked[event.name]
-    stays = event.verb == "stop"
+    stays = event.do == "stop"
     if one.alive:
         turn.track(event.name, replace(one, leaving="stop" if stays else "again", wanted=not stays))
         return

@@ -12,18 +12,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.run.events import (
-    GateOpen,
-    GateShut,
-    OwnerReady,
-    Taken,
-)
+from tfcompose.ipc import GateOpen, GateShut, Missing, OwnerReady, ProcessRequest, Taken, Waiting
 from tfcompose.run.launcher.ending import asked_to_end, stop_on, taken
 from tfcompose.run.launcher.failures import never_clear, not_started
 from tfcompose.run.launcher.gates import kind_of, look, opened, order_gate, say_progress
 from tfcompose.run.launcher.guard_said import guard_said, owner_ready, say_of
 from tfcompose.run.launcher.happening import (
-    Asked,
     Begin,
     Event,
     Exited,
@@ -33,7 +27,6 @@ from tfcompose.run.launcher.happening import (
     StartFailed,
 )
 from tfcompose.run.launcher.lives import asked, exited, follow
-from tfcompose.run.launcher.notice import Missing, Waiting
 from tfcompose.run.launcher.prerequisites import give_up_waiting, unmet
 from tfcompose.run.launcher.timing import backoff_s, by_owner, waiting_due
 from tfcompose.run.launcher.turn import Turn
@@ -78,7 +71,7 @@ def _react(turn: Turn, event: Event) -> None:
 
 def _asked_or_seen(turn: Turn, event: Event) -> None:
     match event:
-        case Asked():
+        case ProcessRequest():
             asked(turn, event)
         case NewPlan():
             follow(turn, event)

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Note
+from tfcompose.ipc import ProcessRequest
 from tfcompose.run.launcher.failures import in_short
-from tfcompose.run.launcher.happening import Asked
 from tfcompose.run.launcher.lives import asked, refusal
 from tfcompose.run.launcher.state import Stop
 
@@ -30,7 +30,7 @@ def judged(turn: Turn, found: Finding, process: str) -> None:
         turn.show(_noted(found, f"nothing is stopped: {why}"))
     else:
         turn.show(_noted(found, f"{process} is stopped for it, and stays so: on_violation is stop-offender"))
-        asked(turn, Asked(process, "stop"))
+        asked(turn, ProcessRequest("stop", process))
 
 
 def _noted(found: Finding, text: str) -> Finding:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 from tfcompose.findings import Finding, finding
-from tfcompose.run.fenced import REMAPPED
+from tfcompose.ipc import REMAPPED
 from tfcompose.run.launcher.command import Command
 from tfcompose.run.launcher.executable import NotFound, executable_of, filled_in, folder_of, not_found, own_env
 from tfcompose.run.launcher.fencing import by_partition, not_remapped, remapped, way_of

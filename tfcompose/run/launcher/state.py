@@ -8,11 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
-from tfcompose.run.events import SETTLE
+from tfcompose.ipc import SETTLE
 
 if TYPE_CHECKING:
+    from tfcompose.ipc import StateName
     from tfcompose.plan import Plan, PlanEdge, PlanProcess
-    from tfcompose.run.launcher.notice import StateName
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,9 +14,10 @@ import time
 from collections import deque
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tfcompose.findings import Note
+from tfcompose.ipc import Ended, FindingShown
 from tfcompose.ros.environment import child_environment
 from tfcompose.run.launcher.action import Finish, Kill, Order, Start, Tell, TellLate
 from tfcompose.run.launcher.answers import answer
@@ -25,7 +26,6 @@ from tfcompose.run.launcher.children import Children
 from tfcompose.run.launcher.guard_pipes import GuardPipes
 from tfcompose.run.launcher.happening import Begin, OutputLost, Signalled, StartFailed, Tick, TimeUp
 from tfcompose.run.launcher.machine import step
-from tfcompose.run.launcher.notice import Ended, FindingShown
 from tfcompose.run.launcher.preflight import commands_of
 from tfcompose.run.launcher.session import Session
 from tfcompose.run.launcher.signals import Signals
@@ -38,11 +38,12 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from tfcompose.findings import Finding
+    from tfcompose.ipc import Notice, Request
     from tfcompose.plan import Plan
     from tfcompose.run.launcher.action import Action
+    from tfcompose.run.launcher.answers import Answer, Outcome
     from tfcompose.run.launcher.command import Command
     from tfcompose.run.launcher.happening import Event
-    from tfcompose.run.launcher.notice import Notice
     from tfcompose.run.launcher.preflight import Environment
     from tfcompose.run.launcher.state import State, Times
 
@@ -51,9 +52,6 @@ LONGEST_SLEEP_S = 1.0
 
 #: Processes that can be held before they join ROS.
 _PREPARED = ("static", "joints", "simulate")
-
-#: The answer, what it means for the machine, and another plan's file and commands.
-Answer = tuple[dict[str, Any], "Event | None", "tuple[Path, dict[str, Command]] | None"]
 
 
 def supervise(  # noqa: PLR0913 (all but two are named, and most have what a user wants as default)
@@ -97,7 +95,7 @@ class _Supervisor:
         commands: dict[str, Command],
         report: Callable[[Notice], None],
         session: Session,
-        ask: Callable[..., Answer],
+        ask: Callable[..., Outcome],
         stack: contextlib.ExitStack,
     ) -> None:
         self._state = state
@@ -151,7 +149,7 @@ class _Supervisor:
         for process in [process for process in own if not process.after][: os.cpu_count() or 1]:
             self._children.prepare(process, self._commands[process.name])
 
-    def _answer(self, request: dict[str, Any]) -> dict[str, Any]:
+    def _answer(self, request: Request) -> Answer:
         said, event, planned = self._ask(request, self._state, self._session.plan_file)
         if planned:
             self._children.dismiss()

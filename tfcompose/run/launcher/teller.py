@@ -7,15 +7,13 @@ import time
 from functools import partial
 from typing import TYPE_CHECKING
 
+from tfcompose.ipc import LogLine, notice_line
 from tfcompose.run.launcher.control import Control
-from tfcompose.run.launcher.notice import LogLine
-from tfcompose.run.launcher.told import told_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from typing import Any
 
-    from tfcompose.run.launcher.notice import Notice
+    from tfcompose.ipc import Notice, Request
     from tfcompose.run.launcher.session import Session
 
 
@@ -37,7 +35,7 @@ class Teller:
         self._owing: int | None = None
         self._control: Control | None = None
 
-    def listen(self, session: Session, answer: Callable[[dict[str, Any]], Any]) -> None:
+    def listen(self, session: Session, answer: Callable[[Request], object]) -> None:
         """Hear other commands at the session's socket, if it has one."""
         if session.listener:
             self._control = Control(session.listener, self._selector, answer)
@@ -50,7 +48,7 @@ class Teller:
     def tell(self, notice: Notice) -> None:
         """Pass the notice on."""
         if self._control and not isinstance(notice, LogLine):
-            self._control.tell(told_line(notice, time.time()), keep=True)
+            self._control.tell(notice_line(notice, time.time()), keep=True)
         if self._report:
             self._try(partial(self._report, notice))
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from tfcompose.ipc import Ended, FindingShown, Notice, Present, ProcessState, StateName, Stopping
 from tfcompose.run.launcher.action import Action, Finish, Order, Start, Tell
 from tfcompose.run.launcher.failures import in_short
-from tfcompose.run.launcher.notice import Ended, FindingShown, Notice, ProcessState, StateName, Stopping
 from tfcompose.run.launcher.state import State, Stop, Tracked
-from tfcompose.run.orders import Present
 
 if TYPE_CHECKING:
     from tfcompose.findings import Finding

@@ -240,7 +240,7 @@ CATALOGUE: dict[str, Code] = {
         Code("TF901", "no_ros", "environment", "error"),
         Code("TF902", "bad_plan", "environment", "error"),
         Code("TF903", "rule_crashed", "environment", "error"),
-        Code("TF904", "no_xacro", "environment", "error"),
+        # TF904 was no_xacro, from when xacro was no dependency.
         Code("TF905", "no_trimesh", "environment", "error"),
         Code("TF906", "no_rosbags", "environment", "error"),
         Code("TF907", "bad_bag", "environment", "error"),

@@ -424,9 +424,6 @@ Build it again.""",
     "TF903": """A rule crashed.
 
 The other rules still ran. This is a bug in tfcompose; please report it with the robot file.""",
-    "TF904": """A xacro file is to be read, but xacro is not installed.
-
-It comes with ROS, and from PyPI: pip install xacro.""",
     "TF905": """An inertia is to be computed from a mesh, but trimesh is not installed.
 
 pip install 'tfcompose[mesh]', or give the inertia.""",

@@ -352,11 +352,7 @@ def test_of_a_file_that_only_defines_macros_these_are_named(tmp_path: Path) -> N
     assert (found.code, "leg" in words(found)) == ("TF206", True)
 
 
-def test_without_xacro_that_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "xacro", None)
-    monkeypatch.delitem(sys.modules, "tfcompose.urdf.expand", raising=False)
-    (tmp_path / "r.xacro").write_text(XACRO)
-    assert [one.code for one in lint_urdf(str(tmp_path / "r.xacro"))] == ["TF904"]
+def test_a_xacro_file_that_cannot_be_read_is_refused_as_every_other(tmp_path: Path) -> None:
     assert [one.code for one in lint_urdf(str(tmp_path / "none.xacro"))] == ["TF001"]
 
 

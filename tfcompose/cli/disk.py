@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.terminal import read_text
-from tfcompose.findings import RejectedError, Span, finding
 from tfcompose.urdf.inertia import UnmeasurableError
 from tfcompose.urdf.packages import FETCH, Disk
 
@@ -58,9 +57,6 @@ def _expanded(file: str, packages: Packages, arguments: Mapping[str, Any], text:
     """Return the URDF that xacro makes of a file, or of a text that stands for it; xacro is loaded only here."""
     if text is None:
         read_text(file)  # a file that cannot be read is refused as everywhere
-    try:
-        from tfcompose.urdf.expand import expand
-    except ImportError:
-        advice = "pip install xacro, or take the expanded file"
-        raise RejectedError([finding("TF904", "xacro is not installed", Span(file), help=advice)]) from None
+    from tfcompose.urdf.expand import expand
+
     return expand(file, packages, arguments, text)

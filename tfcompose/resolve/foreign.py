@@ -95,7 +95,7 @@ def _address(named: str, at: Span, packages: Packages) -> str:
 def _expanded(part: PartEntry, file: str, at: Span, packages: Packages) -> str:
     disk, spec = packages.disk, part.said
     if disk is None:
-        raise RejectedError([finding("TF904", f"{file}: xacro files cannot be expanded here", at)])
+        raise RejectedError([finding("TF001", f"{file}: files cannot be read here", at)])
     document = _document(part, file, packages, disk.absolute)
     try:
         return disk.expand(file, packages, spec.args, document)

@@ -31,7 +31,7 @@ _HIGHEST = 12  # so many folders above a file its package.xml is looked for
 
 
 def _not_expanded(file: str, *_: object) -> str:
-    raise RejectedError([finding("TF904", "xacro files cannot be expanded here", Span(file))])
+    raise RejectedError([finding("TF001", "files cannot be read here", Span(file))])
 
 
 @dataclass(frozen=True, slots=True)

@@ -83,8 +83,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(autouse=True)
 def _processes() -> Iterator[None]:
-    """End the processes that a test started; those of a module or the session go on."""
-    with processes.ended_at_exit():
+    """Heed every signal, and end the processes that a test started; those of a module or the session go on."""
+    with processes.default_signal_actions(), processes.ended_at_exit():
         yield
 
 

@@ -6,17 +6,12 @@ import os
 import signal
 import sys
 import weakref
-from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.support.processes import default_signal_actions
 from tfcompose import interrupt
 from tfcompose.ros.stop import Stop
 from tfcompose.run.launcher.signals import Signals
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 
 class Loaded:
@@ -35,12 +30,6 @@ def lose_an_interrupt() -> None:
     kept = weakref.ref(loaded, send_an_interrupt)
     del loaded
     assert kept() is None
-
-
-@pytest.fixture(autouse=True)
-def _heeded() -> Iterator[None]:
-    with default_signal_actions():
-        yield
 
 
 @pytest.fixture(autouse=True)

@@ -23,7 +23,7 @@ FREE: tuple[JointType, ...] = ("floating", "planar")
 class Limit:
     """What a joint can do: rad or m, N m or N, rad/s or m/s."""
 
-    __pydantic_config__: ClassVar = {"extra": "forbid"}
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
     lower: JointPosition | None = field(default=None, metadata={"description": "the lowest position"})
     upper: JointPosition | None = field(default=None, metadata={"description": "the highest position"})
@@ -37,7 +37,7 @@ class Limit:
 class Dynamics:
     """What slows a joint down: N m s/rad and N m, or N s/m and N."""
 
-    __pydantic_config__: ClassVar = {"extra": "forbid"}
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
     damping: JointDamping = field(default=0.0, metadata={"description": "the damping"})
     friction: JointEffort = field(default=0.0, metadata={"description": "the static friction"})
@@ -47,7 +47,7 @@ class Dynamics:
 class SafetyController:
     """Where a controller begins to hold a joint back before its limits, and how hard."""
 
-    __pydantic_config__: ClassVar = {"extra": "forbid"}
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
     soft_lower_limit: JointPosition = field(default=0.0, metadata={"description": "where the lower soft limit begins"})
     soft_upper_limit: JointPosition = field(default=0.0, metadata={"description": "where the upper soft limit begins"})
@@ -61,7 +61,7 @@ class SafetyController:
 class ReferencePositions:
     """Where a joint's reference switch changes; URDF calls it calibration."""
 
-    __pydantic_config__: ClassVar = {"extra": "forbid"}
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
     rising: JointPosition | None = field(default=None, metadata={"description": "where the switch goes on"})
     falling: JointPosition | None = field(default=None, metadata={"description": "where the switch goes off"})

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[1]
 WORK = r"""
 import random, resource, sys, time
 from tests.support import processes
-from tfcompose.cli.shelves import library
+from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.findings import RejectedError, Span, finding
 from tfcompose.emit import emit

@@ -148,11 +148,14 @@ def test_launcher_guard_and_publishers_do_not_know_each_other() -> None:
             assert not others & (groups - {group}), file
 
 
-def test_a_command_is_imported_by_nobody() -> None:
+def test_a_command_is_imported_by_the_parser_alone() -> None:
     """What several commands share stands in ``cli`` itself."""
-    folder = "tfcompose.cli.commands."
-    for file in FILES:
-        assert not [name for name in imports_of(file) if name.startswith(folder)], file
+    importers = [
+        file.relative_to(PACKAGE).as_posix()
+        for file in FILES
+        if any(name.startswith("tfcompose.cli.commands") for name in imports_of(file))
+    ]
+    assert importers == ["cli/parser.py"]
 
 
 def test_nothing_is_imported_inside_a_function() -> None:
@@ -171,9 +174,9 @@ def test_nothing_is_imported_inside_a_function() -> None:
 def loaded_by(code: str) -> set[str]:
     """Return the modules that are loaded when a fresh interpreter has run the code."""
     program = f"import sys\nimport contextlib\nwith contextlib.suppress(SystemExit):\n    {code}\n"
-    program += "sys.stderr.write('\\n'.join(sorted(sys.modules)))"
+    program += "sys.stderr.write('modules:' + ' '.join(sys.modules))"
     done = processes.run([sys.executable, "-c", program], check=True, cwd=ROOT)
-    return set(done.stderr.split())
+    return set(done.stderr.rpartition("modules:")[2].split())
 
 
 def foreign(modules: set[str], before: set[str]) -> set[str]:
@@ -192,15 +195,30 @@ def bare() -> set[str]:
     return loaded_by("pass")
 
 
-def test_help_loads_nothing_beyond_the_standard_library_and_the_parser(bare: set[str]) -> None:
+def parts_in(modules: set[str]) -> set[str]:
+    return {name.split(".")[1] for name in modules if name.startswith("tfcompose.")}
+
+
+def test_help_loads_the_commands_and_nothing_of_their_work(bare: set[str]) -> None:
     loaded = loaded_by(command("--help")) - bare
     assert not foreign(loaded, bare)
-    assert {name for name in loaded if name.startswith("tfcompose")} == {
-        "tfcompose",
-        "tfcompose.cli",
-        "tfcompose.cli.parser",
+    assert parts_in(loaded) == {"cli", "geometry", "interrupt"}
+    assert {name for name in loaded if name.startswith("tfcompose.cli.") and ".commands" not in name} == {
+        f"tfcompose.cli.{name}" for name in ("options", "parser", "terminal")
     }
-    assert not loaded & {"argparse", "re", "json", "dataclasses"}
+    assert "dataclasses" not in loaded
+
+
+@pytest.mark.parametrize("words", [("ps",), ("down",), ("logs",), ("up", "plan.json", "--dry-run")])
+def test_commands_after_the_plan_load_nothing_from_elsewhere_and_no_compiler(
+    words: tuple[str, ...], bare: set[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    built = "tests/golden/my_robot/plan.json"
+    loaded = loaded_by(command(*(built if word == "plan.json" else word for word in words)))
+    assert not foreign(loaded, bare)
+    assert "run" in parts_in(loaded)
+    assert not parts_in(loaded) & {*STAGES, "compile", "emit"}
 
 
 @pytest.mark.parametrize("words", [("lint",), ("tree",), ("build", "-o")], ids=lambda words: words[0])

@@ -14,8 +14,8 @@ from tests.benchmarks import bench_buffer, bench_joints
 from tests.support import processes
 from tests.support.tables import for_each
 from tfcompose.catalogue import CATALOGUE
-from tfcompose.cli.parser import COMMANDS, parser_of
-from tfcompose.cli.shelves import library
+from tfcompose.cli.compiling import library
+from tfcompose.cli.parser import COMMANDS, parser_of, summary_of
 
 if TYPE_CHECKING:
     import subprocess
@@ -77,7 +77,7 @@ def test_its_calibrated_robot_is_linted_and_explained_as_printed(tmp_path: Path)
 
 def test_its_table_of_commands_is_that_of_the_command_line() -> None:
     rows = dict(re.findall(r"^\| `tfcompose (\w+)` \| (.*) \|$", README, re.MULTILINE))
-    assert rows == COMMANDS
+    assert rows == {name: summary_of(name) for name in COMMANDS}
 
 
 @for_each(COMMANDS)

@@ -16,7 +16,7 @@ from tfcompose.check import RULES, check, unused_allows
 from tfcompose.check.rule import rule
 from tfcompose.cli.compiling import library
 from tfcompose.cli.disk import moments as measured
-from tfcompose.cli.terminal import read_text
+from tfcompose.cli.reading import read_text
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.findings import Finding, Span, finding
 from tfcompose.resolve import Disk

@@ -206,9 +206,9 @@ def test_an_error_in_a_launcher_in_the_background_is_kept_for_who_looks_for_it(
     assert tfc("ps").returncode == 1
     code = """
 import sys
-from tfcompose.cli import detach, main
+from tfcompose.cli import background, main
 def broken(*_, **__): raise ZeroDivisionError("of a launcher")
-detach.supervise = broken
+background.supervise = broken
 sys.exit(main(["up", "-d"]))
 """
     up = processes.run([sys.executable, "-c", code])

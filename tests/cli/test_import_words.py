@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.cli.test_importing import PRESETS, built, imported, urdf_of
-from tfcompose.cli import main
-from tfcompose.cli.commands import importing
+from tfcompose.cli import compiling, main
 from tfcompose.load import load
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ HEAD = '<robot name="r"><link name="base_link"/>'
 
 @pytest.fixture(autouse=True)
 def _one_library(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importing, "library", lambda: PRESETS)
+    monkeypatch.setattr(compiling, "library", lambda: PRESETS)
 
 
 def data(text: str) -> Any:

@@ -12,11 +12,10 @@ import pytest
 
 from tests.support.random_robot import spec as family
 from tests.support.same_urdf import same
-from tfcompose.cli import main
-from tfcompose.cli.commands import importing
+from tfcompose.cli import compiling, main
+from tfcompose.cli.compiling import library
 from tfcompose.cli.disk import disk
-from tfcompose.cli.shelves import library
-from tfcompose.cli.terminal import read_text
+from tfcompose.cli.reading import read_text
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
 from tfcompose.files import Target
@@ -126,7 +125,7 @@ def test_a_generated_robot_comes_back_the_same(seed: int, tmp_path: Path) -> Non
 @pytest.fixture(autouse=True)
 def _one_library(monkeypatch: pytest.MonkeyPatch) -> None:
     """Read the presets once for all tests: that is most of what importing a small robot costs."""
-    monkeypatch.setattr(importing, "library", lambda: PRESETS)
+    monkeypatch.setattr(compiling, "library", lambda: PRESETS)
 
 
 #: Presets that other ones cannot be told from by their frames, and those that the frame itself is all of.

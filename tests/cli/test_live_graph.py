@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from tfcompose.cli import main
-from tfcompose.cli.live_graph import graph_of_censuses
+from tfcompose.cli.commands.graph import graph_of_censuses
 from tfcompose.geometry import Pose
 from tfcompose.observe.census import Census, Publisher
 from tfcompose.plan import Plan, PlanEdge, RosSettings, SourceLine

@@ -19,9 +19,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.support.waiting import TIMEOUT_S, until
-from tfcompose.cli.console import Console
-from tfcompose.cli.printable import coloured_only, plain
-from tfcompose.cli.status import Status
+from tfcompose.cli.console import Console, StatusLine
+from tfcompose.cli.terminal import coloured_only, plain
 from tfcompose.findings import finding
 from tfcompose.geometry import Pose
 from tfcompose.ipc import Ended, FindingShown, LogLine, OwnerLive, ProcessState, Stopping
@@ -36,8 +35,8 @@ if TYPE_CHECKING:
 LAUNCHER = """
 import sys
 from pathlib import Path
-from tfcompose.cli.console import Console
-from tfcompose.cli.status import Status, columns_of
+from tfcompose.cli.console import Console, StatusLine
+from tfcompose.cli.terminal import columns_of
 from tfcompose.plan.file import read_plan
 from tfcompose.run.launcher.outlet import Outlet
 from tfcompose.run.launcher.session import Session
@@ -45,7 +44,7 @@ from tfcompose.run.launcher.supervisor import supervise
 file = Path(sys.argv[1])
 plan = read_plan(file.read_text(), str(file))
 output = Outlet(1)
-console = Console(plan, output, colour=True, status=Status(plan, lambda: columns_of(1)))
+console = Console(plan, output, colour=True, status=StatusLine(plan, lambda: columns_of(1)))
 code = supervise(plan, file, report=console, session=Session(file, outlet=output, refresh=console.refresh))
 output.close()
 sys.exit(code)
@@ -65,7 +64,7 @@ class View:
         self.screen = pyte.Screen(columns, rows)
         self._stream = pyte.Stream(self.screen)
         self.now = 0.0
-        status = Status(plan, lambda: self.screen.columns, lambda: self.now)
+        status = StatusLine(plan, lambda: self.screen.columns, lambda: self.now)
         self.console = Console(plan, self, colour=True, status=status)
 
     def write(self, text: str, *, log: bool = False) -> None:

@@ -23,9 +23,9 @@ import pytest
 from tests.support.bad_input import BAD
 from tests.support.mutations import mutated
 from tfcompose.check import unused_allows
+from tfcompose.cli.compiling import PRESETS, library
 from tfcompose.cli.disk import disk
-from tfcompose.cli.shelves import PRESETS, library
-from tfcompose.cli.terminal import read_text
+from tfcompose.cli.reading import read_text
 from tfcompose.compile import compile_robot, profiles_of
 from tfcompose.findings import Edit, Finding, RejectedError, Span
 from tfcompose.language import set_value, validate_node_preset
@@ -192,7 +192,7 @@ def sensor_presets() -> Iterator[Case]:
         file = Path("presets/own/model.yaml")
         without = ", tf: tfcompose, driver: none"
         uses = "preset_path: presets\nsensors: {s: {preset: own/model, parent: base_link%s}}\n"
-        for path in sorted(Path(PRESETS).glob("*/*.yaml")):
+        for path in sorted(PRESETS.glob("*/*.yaml")):
             text = path.read_text("utf-8")
             name = f"{path.parent.name}/{path.stem}"
             for number, more in ((-1, ""), (-1, without), (0, ""), (1, without)):
@@ -202,7 +202,7 @@ def sensor_presets() -> Iterator[Case]:
 
 
 def node_presets() -> Iterator[Case]:
-    for path in sorted(Path(PRESETS).glob("nodes/*/*.yaml")):
+    for path in sorted(PRESETS.glob("nodes/*/*.yaml")):
         text = path.read_text("utf-8")
         for number in range(-1, 12):
             wrong = mutated(text, f"{path.stem} {number}") if number >= 0 else text

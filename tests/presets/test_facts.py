@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from tests.support.tables import for_each
-from tfcompose.cli.shelves import library
+from tfcompose.cli.compiling import library
 from tfcompose.geometry import IDENTITY_XYZW, OPTICAL_XYZW, angle_between, quat_from_rpy
 from tfcompose.resolve.poses import rotation_of
 from tfcompose.resolve.presets import filled

@@ -10,7 +10,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from tests.support.tables import for_each
-from tfcompose.cli.shelves import library
+from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.geometry import Pose, rotate
 

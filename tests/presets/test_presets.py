@@ -10,7 +10,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from tests.support.tables import for_each
-from tfcompose.cli.shelves import library
+from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.geometry import angle_between, rotate
 from tfcompose.model import is_optical

@@ -11,11 +11,11 @@ import pytest
 import yaml
 
 from tests.support.tables import for_each
-from tfcompose.cli import shelves
+from tfcompose.cli import compiling
 from tfcompose.cli.commands import presets as presets_command
+from tfcompose.cli.compiling import library
 from tfcompose.cli.parser import main
-from tfcompose.cli.shelves import library
-from tfcompose.cli.terminal import read_text
+from tfcompose.cli.reading import read_text
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
 from tfcompose.language.preset import Chosen
@@ -350,10 +350,10 @@ def test_a_python_package_adds_presets_by_an_entry_point(tmp_path: Path, monkeyp
     (info / "entry_points.txt").write_text("[tfcompose.presets]\nmine = my_sensors.presets\ngone = not_there.presets\n")
     with monkeypatch.context() as patch:
         patch.setattr(sys, "path", [str(tmp_path), *sys.path])
-        shelves._packages.cache_clear()
+        compiling._preset_packages.cache_clear()
         assert compiled("me/mast").found == ()
         assert "me/mast" in library().names
-    shelves._packages.cache_clear()
+    compiling._preset_packages.cache_clear()
     assert compiled("me/mast").found[0].code == "TF601"
 
 
@@ -364,9 +364,9 @@ def test_only_the_presets_that_a_robot_uses_are_read(monkeypatch: pytest.MonkeyP
         read.append(Path(path).stem)
         return read_text(path)
 
-    monkeypatch.setattr(shelves.Folders, "read", noted)
-    monkeypatch.setattr(shelves.Folders, "models", lambda *_: pytest.fail("a folder was listed"))
-    monkeypatch.setattr(shelves.Folders, "packages", lambda *_: pytest.fail("packages were looked for"))
+    monkeypatch.setattr(compiling.PresetFolders, "read", noted)
+    monkeypatch.setattr(compiling.PresetFolders, "models", lambda *_: pytest.fail("a folder was listed"))
+    monkeypatch.setattr(compiling.PresetFolders, "packages", lambda *_: pytest.fail("packages were looked for"))
     assert compiled("realsense/d455").found == ()
     assert sorted(read) == ["_base", "_d400", "_imu", "d455"]
 

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from tests.support.findings import words
 from tfcompose.cli.compiling import library
 from tfcompose.cli.disk import disk
-from tfcompose.cli.terminal import read_text
+from tfcompose.cli.reading import read_text
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
 from tfcompose.plan.file import read_plan

@@ -1,26 +1,77 @@
-"""What the commands that take a robot file share: presets from the package, and one compiled robot."""
+"""From the files that the command line names to a compiled robot: presets, overlays, findings printed."""
 
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.disk import disk
-from tfcompose.cli.shelves import library
-from tfcompose.cli.terminal import UNREADABLE, print_findings, read_text, unreadable
+from tfcompose.cli.reading import read_text
+from tfcompose.cli.terminal import fail, print_findings, reject
 from tfcompose.compile import compile_robot
-from tfcompose.findings import RejectedError
+from tfcompose.findings import RejectedError, did_you_mean
 from tfcompose.language import set_value, with_includes
 from tfcompose.load import load
+from tfcompose.resolve import Library
 
 if TYPE_CHECKING:
     from argparse import Namespace
 
     from tfcompose.load import Source
-    from tfcompose.model import Robot
+    from tfcompose.model import Edge, Robot
+
+PRESETS = Path(__file__).parents[1] / "presets"
+#: A package names, under this group, the module whose folder holds its presets.
+PRESET_GROUP = "tfcompose.presets"
 
 
-__all__ = ["library", "overlays_of", "robot_or_code"]
+def library() -> Library:
+    """Return the presets that are known without a robot file: tfcompose's own, then those of packages."""
+    return Library((str(PRESETS),), PresetFolders(), str(PRESETS))
+
+
+@dataclass(frozen=True, slots=True)
+class PresetFolders:
+    """Presets in folders of this machine."""
+
+    def has(self, path: str) -> bool:
+        """Return whether the file is there."""
+        return Path(path).is_file()
+
+    def is_folder(self, path: str) -> bool:
+        """Return whether the folder is there."""
+        return Path(path).is_dir()
+
+    def read(self, path: str) -> str:
+        """Return its text; raises RejectedError."""
+        return read_text(path)
+
+    def models(self, folder: str) -> list[str]:
+        """Return the names, vendor/model, of the presets in the folder."""
+        files = sorted((file.parent.name, file.stem) for file in Path(folder).glob("*/*.yaml"))
+        return [f"{vendor}/{model}" for vendor, model in files if vendor != "nodes"]
+
+    def packages(self) -> list[str]:
+        """Return the folders that installed Python packages bring."""
+        return _preset_packages()
+
+
+@cache
+def _preset_packages() -> list[str]:
+    from importlib.metadata import entry_points  # needed only where a preset is in no other folder
+
+    folders: list[str] = []
+    for entry in entry_points(group=PRESET_GROUP):
+        try:
+            spec = find_spec(entry.value)
+        except ImportError:
+            continue
+        folders += (spec.submodule_search_locations or []) if spec else []
+    return folders
 
 
 def overlays_of(arguments: Namespace) -> list[Source]:
@@ -33,24 +84,55 @@ def overlays_of(arguments: Namespace) -> list[Source]:
     return [*files, *(set_value(setting) for setting in arguments.settings)]
 
 
-def robot_or_code(file: str, arguments: Namespace) -> Robot | int:
-    """Return the robot without errors in it, or the exit code after printing what is wrong. Warnings are printed."""
-    made = sources_and_robot(file, arguments)
-    return made if isinstance(made, int) else made[1]
+def compiled_robot(file: str, arguments: Namespace) -> Robot:
+    """Return the robot, which has no errors; warnings are printed.
+
+    Raises:
+        SystemExit: after printing what is wrong with it.
+    """
+    return robot_with_sources(file, arguments)[0]
 
 
-def sources_and_robot(file: str, arguments: Namespace) -> tuple[tuple[Source, ...], Robot] | int:
-    """Return what ``robot_or_code`` does, with what it was made from: files with overlays laid over them, parts too."""
-    compiled = None
+def robot_with_sources(file: str, arguments: Namespace) -> tuple[Robot, tuple[Source, ...]]:
+    """Return the robot, and what it was made from: files with overlays laid over them, those of parts too.
+
+    Raises:
+        SystemExit: after printing what is wrong with it.
+    """
     try:
         overlays = overlays_of(arguments)
         compiled = compile_robot(
             read_text(file), file, library(), arguments.profiles, overlays=overlays, read=read_text, disk=disk()
         )
-        found = compiled.found
     except RejectedError as error:
-        found = error.findings
-    print_findings(found, sys.stderr)
-    if compiled is None or compiled.robot is None or compiled.errors:
-        return UNREADABLE if unreadable(found) else 1
-    return compiled.sources, compiled.robot
+        reject(error.findings)
+    if compiled.robot is None or compiled.errors:
+        reject(compiled.found)
+    print_findings(compiled.found, sys.stderr)
+    return compiled.robot, compiled.sources
+
+
+def edges_between(robot: Robot, a: str, b: str) -> tuple[list[Edge], list[Edge]]:
+    """Return the edges from ``a`` up to where the ways meet, and those from ``b`` up to there.
+
+    Raises:
+        SystemExit: after saying that a frame is not there, or that nothing connects the two.
+    """
+    for frame in (a, b):
+        if frame not in robot.frames:
+            fail(f"no frame {frame}; {did_you_mean(frame, robot.frames, f'{robot.file} has other frames')}")
+    up, down = _ancestry(robot, a), _ancestry(robot, b)
+    shared = {id(edge) for edge in up} & {id(edge) for edge in down}
+    rising = [edge for edge in up if id(edge) not in shared]
+    falling = [edge for edge in down if id(edge) not in shared]
+    if (rising[-1].parent if rising else a) != (falling[-1].parent if falling else b):
+        fail(f"{a} and {b} are in two trees")
+    return rising, falling
+
+
+def _ancestry(robot: Robot, frame: str) -> list[Edge]:
+    chain = []
+    while edge := robot.parent_edge(frame):
+        chain.append(edge)
+        frame = edge.parent
+    return chain

@@ -1,13 +1,13 @@
-"""What ``up`` prints: each process's log behind its name, and what the launcher has to say between."""
+"""What ``up`` prints: each process's log behind its name, what the launcher reports between, and a status line."""
 
 from __future__ import annotations
 
+import time
 from functools import singledispatchmethod
 from typing import TYPE_CHECKING, Protocol
 
-from tfcompose.cli.printable import coloured_only, head_of, plain, width_of
-from tfcompose.cli.start_table import table_of
-from tfcompose.cli.terminal import line_of
+from tfcompose.cli.reading import line_of
+from tfcompose.cli.terminal import coloured_only, counted, listed, plain
 from tfcompose.ipc import (
     AllReady,
     AllStarted,
@@ -28,20 +28,35 @@ from tfcompose.render.text import BOLD, GREEN, PLAIN, RED, YELLOW, render_text
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tfcompose.cli.status import Status
     from tfcompose.ipc import Notice
     from tfcompose.plan import Plan
 
 #: Colours that are told apart on dark and light terminals; a process keeps its own by its place in the plan.
 COLOURS = tuple(f"\033[{code}m" for code in (36, 35, 34, 32, 33, 96, 95, 94))
-OURS = "tfcompose"
+#: Whose lines the launcher's own are.
+LAUNCHER = "tfcompose"
+#: A longer name before a line does not move all lines to the right.
+WIDEST_NAME = 24
 NAMED_AT_MOST = 4
 #: States that need no line of their own: the edges say more.
-QUIET = frozenset({"STARTING", "STOPPED"})
+UNREPORTED = frozenset({"STARTING", "STOPPED"})
+
+#: The status line is drawn at most so often, in seconds.
+STATUS_EVERY_S = 0.2
+#: Columns that stay free: the terminal writes ``^C`` there, and must not begin a new line.
+STATUS_FREE_COLUMNS = 3
+STATUS_NAMED_AT_MOST = 3
+_CLEAR_LINE = "\r\033[K"
 
 
-def _counted(number: int, word: str) -> str:
-    return f"{number} {word}{'' if number == 1 else 's'}"
+def prefix_of(name: str, width: int) -> str:
+    """Return what stands before each line of the process."""
+    return f"{name:<{width}} |"
+
+
+def prefix_width(names: list[str]) -> int:
+    """Return how wide the names before lines are: as the longest, within bounds."""
+    return min(max(map(len, names), default=0), WIDEST_NAME)
 
 
 class Output(Protocol):
@@ -68,14 +83,14 @@ class Console:
         *,
         colour: bool,
         keep: Callable[[str, str], str | None] | None = None,
-        status: Status | None = None,
+        status: StatusLine | None = None,
     ) -> None:
         names = [process.name for process in plan.processes]
         self._output = output
         self._keep = keep
         self._status = status
         self._colour = colour
-        self._width = width_of([*names, OURS])
+        self._width = prefix_width([*names, LAUNCHER])
         self._colours = {name: COLOURS[index % len(COLOURS)] for index, name in enumerate(names)}
         self._nodes = {process.name: process.nodes for process in plan.processes}
         self._hosts = {process.name: f"host {process.host}" for process in plan.processes if process.host}
@@ -111,7 +126,7 @@ class Console:
 
     @_write.register
     def _(self, notice: ProcessState) -> None:
-        if notice.state in QUIET:
+        if notice.state in UNREPORTED:
             return
         text = f"{notice.process}: {notice.state.lower()}"
         if notice.state == "RUNNING":
@@ -126,7 +141,7 @@ class Console:
 
     @_write.register
     def _(self, notice: OwnerLive) -> None:
-        edges = _counted(len(notice.edges), "edge") if len(notice.edges) > NAMED_AT_MOST else ", ".join(notice.edges)
+        edges = counted(len(notice.edges), "edge") if len(notice.edges) > NAMED_AT_MOST else ", ".join(notice.edges)
         owner = f"{notice.owner} ({notice.node})"
         self._say(f"{self._paint('live', GREEN)}  {owner}: {edges}  {notice.seconds:.2f} s")
 
@@ -142,7 +157,7 @@ class Console:
     @_write.register
     def _(self, notice: AllReady) -> None:
         if len(notice.rows) > 1:
-            for line in table_of(notice):
+            for line in _start_table(notice):
                 self._say(line)
         if notice.without:
             self._say(self._paint(f"without {', '.join(notice.without)}: failed, and not required", YELLOW))
@@ -153,19 +168,17 @@ class Console:
         said = "; ".join(f"{word}: {', '.join(names)}" for word, names in parts if names)
         self._say(f"another plan: {said or 'nothing to restart'}")
         if notice.held:
-            self._say(self._paint(held(notice.held), YELLOW))
+            self._say(self._paint(vanished(notice.held), YELLOW))
 
     @_write.register
     def _(self, notice: TreeComplete) -> None:
-        edges = _counted(notice.edges, "edge")
+        edges = counted(notice.edges, "edge")
         self._say(self._paint(f"tree complete: {edges} live after {notice.seconds:.2f} s", GREEN, BOLD))
 
     @_write.register
     def _(self, notice: Waiting) -> None:
         for one in notice.missing:
-            named = ", ".join(one.edges[:NAMED_AT_MOST])
-            more = f" and {len(one.edges) - NAMED_AT_MOST} more" if len(one.edges) > NAMED_AT_MOST else ""
-            self._say(self._paint(f"waiting for {one.owner} ({one.node}): {named}{more}", YELLOW))
+            self._say(self._paint(f"waiting for {one.owner} ({one.node}): {listed(one.edges, NAMED_AT_MOST)}", YELLOW))
 
     @_write.register
     def _(self, notice: FindingShown) -> None:
@@ -191,23 +204,116 @@ class Console:
         self._say(self._paint(f"ended with exit code {notice.exit_code}{f': {first}' if first else ''}", RED))
 
     def _say(self, text: str) -> None:
-        self._line(OURS, text, BOLD)
+        self._line(LAUNCHER, text, BOLD)
 
     def _line(self, name: str, text: str, colour: str, *, log: bool = False) -> None:
         fault = self._keep(name, plain(text)) if self._keep else None
         clear = self._status.cleared() if self._status else ""
         shown = coloured_only(text) if self._colour else plain(text)
-        self._output.write(f"{clear}{self._paint(head_of(name, self._width), colour)} {shown}\n", log=log)
+        self._output.write(f"{clear}{self._paint(prefix_of(name, self._width), colour)} {shown}\n", log=log)
         if fault:
-            head = self._paint(head_of(OURS, self._width), BOLD)
+            head = self._paint(prefix_of(LAUNCHER, self._width), BOLD)
             self._output.write(f"{head} {self._paint(fault, YELLOW)}\n")
 
     def _paint(self, text: str, *codes: str) -> str:
         return f"{''.join(codes)}{text}{PLAIN}" if self._colour else text
 
 
-def held(edges: tuple[str, ...]) -> str:
+def vanished(edges: tuple[str, ...]) -> str:
     """Return what is to be said of fixed edges that vanished."""
-    named = ", ".join(edges[:NAMED_AT_MOST])
-    more = f" and {len(edges) - NAMED_AT_MOST} more" if len(edges) > NAMED_AT_MOST else ""
-    return f"listeners that run keep {named}{more}: tf2 forgets no fixed frame; restart RViz and whoever looks them up"
+    named = listed(edges, NAMED_AT_MOST)
+    return f"listeners that run keep {named}: tf2 forgets no fixed frame; restart RViz and whoever looks them up"
+
+
+def _start_table(notice: AllReady) -> list[str]:
+    """Return the lines: process, seconds from the start until it was started, and until it was ready; and the total."""
+    width = max(len(row.process) for row in notice.rows)
+    lines = [f"{'process':<{max(width, 7)}}  started   ready"]
+    for row in sorted(notice.rows, key=lambda row: row.ready):
+        started = "      –" if row.started is None else f"{row.started:5.2f} s"
+        lines.append(f"{row.process:<{max(width, 7)}}  {started}  {max(row.ready, 0.0):5.2f} s")
+    return [*lines, f"all ready after {notice.seconds:.2f} s"]
+
+
+class StatusLine:
+    """The line below the log on a terminal: how many processes run, how many edges are live, and what is missing.
+
+    It counts what notices say. ``columns`` gives the terminal's width.
+    """
+
+    def __init__(self, plan: Plan, columns: Callable[[], int], clock: Callable[[], float] = time.monotonic) -> None:
+        self._owned = {process.name: len(process.owns) for process in plan.processes}
+        self._edges = len(plan.edges)
+        self._columns = columns
+        self._clock = clock
+        self._begun = clock()
+        self._states: dict[str, str] = {}
+        self._live: dict[str, int] = {}
+        self._findings = {"error": 0, "warning": 0}
+        self._stopping = self._ready = self._ended = self._drawn = False
+        self._shown = ""
+        self._at = 0.0
+
+    def take(self, notice: Notice) -> None:
+        """Count what the notice says."""
+        if isinstance(notice, ProcessState):
+            self._states[notice.process] = notice.state
+            if notice.state not in ("RUNNING", "EXPECTED", "STOPPING"):
+                self._live.pop(notice.process, None)
+        elif isinstance(notice, OwnerLive):
+            self._live[notice.owner] = len(notice.edges)
+        elif isinstance(notice, FindingShown):
+            self._findings[notice.found.severity] += 1
+        elif isinstance(notice, (AllReady, TreeComplete)):
+            self._ready = True
+        elif isinstance(notice, Stopping):
+            self._stopping = True
+        elif isinstance(notice, Ended):
+            self._ended = True
+
+    def cleared(self) -> str:
+        """Return what takes the line away, so that others can be written in its place."""
+        self._shown = ""
+        return _CLEAR_LINE if self._drawn else ""
+
+    def drawn(self) -> str:
+        """Return what draws the line anew; nothing where that would change nothing, or was done a moment ago."""
+        text = "" if self._ended else self._fitting(max(self._columns() - STATUS_FREE_COLUMNS, 1))
+        now = self._clock()
+        if text == self._shown or (self._shown and now - self._at < STATUS_EVERY_S):
+            return ""
+        before, self._shown, self._at, self._drawn = self._shown, text, now, True
+        return f"{_CLEAR_LINE}{text}" if before else text
+
+    def _fitting(self, columns: int) -> str:
+        """Return the longest way to say it that fits."""
+        seconds = int(self._clock() - self._begun)
+        clock = f"[{seconds // 60:02d}:{seconds % 60:02d}]"
+        long, short = self._parts("processes", "edges live", " of "), self._parts("proc", "edges", "/")
+        for parts in (long, long[:-1], short, short[:-1]):
+            text = f"{clock} {' · '.join(part for part in parts if part)}"
+            if len(text) <= columns:
+                return text
+        return text if len(text) <= columns else f"{text[: columns - 1]}…"
+
+    def _parts(self, processes: str, edges: str, of: str) -> list[str]:
+        """Return what is wrong, how many processes run, how many edges are live, and what is missing."""
+        wrong = [f"{count} {what}{'s' * (count > 1)}" for what, count in self._findings.items() if count]
+        running = sum(self._runs(name) for name in self._owned)
+        shown = [f"{running}{of}{len(self._owned)} {processes}"]
+        shown += [f"{sum(self._live.values())}{of}{self._edges} {edges}"] if self._edges else []
+        return [*wrong, *shown, self._missing()]
+
+    def _runs(self, name: str) -> bool:
+        """Return whether the process runs; one that others start does when its edges are live, as far as is known."""
+        state = self._states.get(name)
+        return state in ("RUNNING", "STOPPING") or (
+            state == "EXPECTED" and (not self._owned[name] or name in self._live)
+        )
+
+    def _missing(self) -> str:
+        if self._stopping:
+            alive = [name for name, state in self._states.items() if state in ("RUNNING", "STOPPING")]
+            return f"stopping {listed(alive, STATUS_NAMED_AT_MOST)}" if alive else "stopping"
+        waits = [name for name, owned in self._owned.items() if owned and name not in self._live]
+        return f"waiting for {listed(waits, STATUS_NAMED_AT_MOST)}" if waits and not self._ready else ""

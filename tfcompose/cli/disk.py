@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.cli.terminal import read_text
+from tfcompose.cli.reading import read_text
 from tfcompose.urdf.inertia import UnmeasurableError
 from tfcompose.urdf.packages import FETCH, Disk
 

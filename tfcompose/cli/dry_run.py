@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.built_plan import PLAN, as_asked, plan_in
+from tfcompose.cli.plans import PLAN, built_plan, is_plan, plan_to_start
+from tfcompose.cli.terminal import counted
 from tfcompose.plan.file import read_plan
 from tfcompose.ros.environment import FASTDDS_PROFILE, child_environment
 from tfcompose.run.fenced import partition_of, private_topics
@@ -23,27 +22,28 @@ if TYPE_CHECKING:
 
 def dry_run(arguments: Namespace) -> int:
     """Print the processes of a robot or a built plan; exit code as for ``build``. Nothing is written."""
-    if arguments.file.endswith(".json"):
-        read = plan_in(Path(arguments.file))
-        if isinstance(read, int):
-            return read
-        plan, files = read, _files_beside(read, Path(arguments.file).parent)
+    if is_plan(arguments.file):
+        file = Path(arguments.file)
+        plan = built_plan(file)
+        files = _parameter_files(plan, file.parent)
     else:
-        compiled = import_module("tfcompose.cli.compiling").robot_or_code(arguments.file, arguments)
-        if isinstance(compiled, int):
-            return compiled
-        _, target = import_module("tfcompose.cli.building").destination(arguments, compiled)
-        files = {file.path: file.text for file in import_module("tfcompose.emit").emit(compiled, target) if file.text}
+        files = _compiled_files(arguments)
         plan = read_plan(files[PLAN], PLAN)
-    share = as_asked(plan, arguments)
-    if isinstance(share, int):
-        return share
-    plan = share
-    sys.stdout.write("\n".join(_lines(plan, files)) + "\n")
+    print("\n".join(_lines(plan_to_start(plan, arguments), files)))
     return 0
 
 
-def _files_beside(plan: Plan, folder: Path) -> dict[str, str]:
+def _compiled_files(arguments: Namespace) -> dict[str, str]:
+    from tfcompose.cli.building import destination
+    from tfcompose.cli.compiling import compiled_robot
+    from tfcompose.emit import emit
+
+    robot = compiled_robot(arguments.file, arguments)
+    _, target = destination(arguments, robot)
+    return {file.path: file.text for file in emit(robot, target) if file.text}
+
+
+def _parameter_files(plan: Plan, folder: Path) -> dict[str, str]:
     files = {}
     for process in plan.processes:
         if process.params_file is not None:
@@ -57,9 +57,8 @@ def _files_beside(plan: Plan, folder: Path) -> dict[str, str]:
 def _lines(plan: Plan, files: dict[str, str]) -> Iterator[str]:
     ros = plan.ros
     domain = "the environment's" if ros.domain_id is None else ros.domain_id
-    processes, edges = len(plan.processes), len(plan.edges)
-    counted = f"{processes} process{'es' * (processes != 1)}, {edges} edge{'s' * (edges != 1)}"
-    yield f"robot {plan.robot}: {counted}, domain: {domain}"
+    processes = f"{len(plan.processes)} process{'es' * (len(plan.processes) != 1)}"
+    yield f"robot {plan.robot}: {processes}, {counted(len(plan.edges), 'edge')}, domain: {domain}"
     yield from told(plan)
     for process in plan.processes:
         yield ""

@@ -6,7 +6,7 @@ import json
 from collections import Counter
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.observe.seen import counted
+from tfcompose.cli.terminal import counted, printable
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -112,11 +112,6 @@ def _line(row: Sequence[str], widths: dict[int, int]) -> str:
         text = cell if len(cell) <= width else f"{cell[: width - 1]}…"
         cells.append(f"{text:>{width}}" if _HEADS[column] in _RIGHT else f"{text:<{width}}")
     return "  ".join(cells).rstrip()
-
-
-def printable(text: str) -> str:
-    """Return the text without what would move a terminal's cursor."""
-    return "".join(character if character.isprintable() else "?" for character in text)
 
 
 def objects_of(edges: Sequence[EdgeSeen], census: Census, now_ns: int) -> str:

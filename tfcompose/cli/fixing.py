@@ -6,18 +6,16 @@ Edits are tried in memory first. Only those are kept that take away their findin
 from __future__ import annotations
 
 import codecs
-import contextlib
 import os
 import re
-import stat
-import tempfile
 from collections import Counter
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.terminal import read_text
+from tfcompose.cli.reading import read_text
+from tfcompose.cli.writing import replace_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -70,14 +68,14 @@ class Fixer:
 
     def read(self, file: str) -> str:
         """Return the file's text as it will be; a file is read once."""
-        path = os.path.realpath(file)
+        path = _path(file)
         if path not in self._read:
             self._read[path] = read_text(file)
         return self.texts.get(path, self._read[path])
 
     def _may_edit(self, file: str) -> bool:
-        path = os.path.realpath(file)
-        return path in map(os.path.realpath, self.files) and Path(path).is_file()
+        path = _path(file)
+        return path in map(_path, self.files) and Path(path).is_file()
 
     def _findings(self, files: Iterable[str]) -> list[Finding]:
         return [one for file in files for one in self.lint(file, self.read)]
@@ -109,9 +107,13 @@ class Fixer:
         by_file: dict[str, dict[Edit, None]] = {}
         for edit in (edit for one in fixed for edit in one.edits):
             by_file.setdefault(edit.span.file, {})[edit] = None
-        texts = {os.path.realpath(file): edited(self.read(file), list(edits)) for file, edits in by_file.items()}
+        texts = {_path(file): edited(self.read(file), list(edits)) for file, edits in by_file.items()}
         whole = {file: text for file, text in texts.items() if text is not None}
         return whole if len(whole) == len(texts) == len(by_file) else None
+
+
+def _path(file: str) -> str:
+    return str(Path(file).resolve())
 
 
 def _counted(found: Iterable[Finding]) -> Counter[tuple[str, str]]:
@@ -149,21 +151,8 @@ def rewrite(path: Path, old: str, new: str) -> None:
     """
     if not os.access(path, os.W_OK):
         raise PermissionError(13, "Permission denied", str(path))
-    data, mode = path.read_bytes(), path.stat()
+    data = path.read_bytes()
     mark = codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b""
     if data != mark + old.encode():
         raise ChangedError(0, "it has changed meanwhile", str(path))
-    descriptor, name = tempfile.mkstemp(prefix=".tfcompose-", dir=path.parent)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(mark + new.encode())
-            file.flush()
-            os.fsync(file.fileno())
-            with contextlib.suppress(PermissionError):  # another's file, in a folder of ours
-                os.fchown(file.fileno(), mode.st_uid, mode.st_gid)
-            os.fchmod(file.fileno(), stat.S_IMODE(mode.st_mode))
-        Path(name).replace(path)
-    except OSError:
-        with contextlib.suppress(OSError):
-            Path(name).unlink()
-        raise
+    replace_file(path, mark + new.encode())

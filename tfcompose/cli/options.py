@@ -1,4 +1,4 @@
-"""Arguments that several commands have."""
+"""Arguments that several commands have, and how their values are read."""
 
 from __future__ import annotations
 
@@ -33,6 +33,45 @@ def add_variant(parser: ArgumentParser, text: str = "lay this profile over the f
     )  # fmt: skip
 
 
+def add_frames(parser: ArgumentParser) -> None:
+    """Add A and B."""
+    parser.add_argument("a", metavar="A", help="the frame in which the pose is given")
+    parser.add_argument("b", metavar="B", help="the frame whose pose it is")
+
+
+def add_robot(parser: ArgumentParser) -> None:
+    """Add --robot."""
+    parser.add_argument(
+        "--robot", metavar="NAME", help="which of several running robots: its name, or name@domain; default: the one"
+    )
+
+
+def add_processes(parser: ArgumentParser) -> None:
+    """Add NAME …, the processes of a running robot, and --robot."""
+    parser.add_argument("name", nargs="+", metavar="NAME", help="the process; tfcompose ps lists them")
+    add_robot(parser)
+
+
+def add_namespace(parser: ArgumentParser, text: str = "/NS/tf and /NS/tf_static instead") -> None:
+    """Add --namespace."""
+    parser.add_argument("--namespace", type=namespace, default="", metavar="NS", help=text)
+
+
+def add_bag(parser: ArgumentParser, text: str = "a recording instead of the running tree") -> None:
+    """Add --bag."""
+    parser.add_argument("--bag", metavar="BAG", help=f"{text}: a rosbag2 folder, .mcap or .db3")
+
+
+def add_for(parser: ArgumentParser, text: str, default: float | None = None) -> None:
+    """Add --for."""
+    parser.add_argument("--for", dest="duration", type=positive, default=default, metavar="S", help=text)
+
+
+def add_format(parser: ArgumentParser, *others: str, text: str = "default: text") -> None:
+    """Add --format: text or one of the others, json unless they are given."""
+    parser.add_argument("--format", choices=("text", *(others or ("json",))), default="text", help=text)
+
+
 def namespace(text: str) -> str:
     """Read a namespace as ROS has it, and return it without slashes around; empty for the global one.
 
@@ -59,17 +98,6 @@ def positive(text: str) -> float:
     return value
 
 
-def counted(text: str) -> int:
-    """Read a whole number of 0 or more.
-
-    Raises:
-        ArgumentTypeError: if it is none.
-    """
-    if not text.isascii() or not text.isdigit() or len(text) > 9:  # noqa: PLR2004 (a billion lines)
-        raise ArgumentTypeError(f"{text} is not a whole number of 0 or more")
-    return int(text)
-
-
 def not_negative(text: str) -> float:
     """Read a number that is 0 or more.
 
@@ -80,6 +108,17 @@ def not_negative(text: str) -> float:
     if value is None:
         raise ArgumentTypeError(f"{text} is not a number of 0 or more, below a billion")
     return value
+
+
+def count(text: str) -> int:
+    """Read a whole number of 0 or more.
+
+    Raises:
+        ArgumentTypeError: if it is none.
+    """
+    if not text.isascii() or not text.isdigit() or len(text) > 9:  # noqa: PLR2004 (a billion lines)
+        raise ArgumentTypeError(f"{text} is not a whole number of 0 or more")
+    return int(text)
 
 
 def _number(text: str) -> float | None:

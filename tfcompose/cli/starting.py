@@ -6,14 +6,17 @@ import os
 import sys
 from contextlib import ExitStack
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.built_plan import PLAN, as_asked, plan_in
-from tfcompose.cli.console import Console
-from tfcompose.cli.status import Status, columns_of
-from tfcompose.cli.terminal import UNREADABLE, coloured, complain, draws, print_findings
+from tfcompose.cli.background import detach
+from tfcompose.cli.console import Console, StatusLine, vanished
+from tfcompose.cli.plans import PLAN, built_plan, copy_plan, is_plan, plan_to_start
+from tfcompose.cli.reading import read_text
+from tfcompose.cli.runs import complain_of_leftovers, hidden_run, request, since, wait_until_ready
+from tfcompose.cli.terminal import FAILED, UNREADABLE, can_redraw, coloured, columns_of, complain, fail, reject
+from tfcompose.findings import RejectedError
+from tfcompose.ipc import PlanChange, UpdateRequest
 from tfcompose.ros.environment import child_environment, no_ros, ros_trouble
 from tfcompose.run.launcher.control import listen
 from tfcompose.run.launcher.logs import Logs
@@ -35,84 +38,85 @@ def start(arguments: Namespace) -> int:
     """Build where that is needed, look at everything, and start; return the exit code as ``up`` does."""
     missing = no_ros()
     if missing:
-        print_findings([missing], sys.stderr)
-        return 1
-    file = Path(arguments.file) if arguments.file.endswith(".json") else _built(arguments)
-    if isinstance(file, int):
-        return file
-    plan = plan_in(file)
-    if isinstance(plan, int):
-        return plan
-    plan = as_asked(plan, arguments)
-    if isinstance(plan, int):
-        return plan
+        reject([missing])
+    file = Path(arguments.file) if is_plan(arguments.file) else _build(arguments)
+    plan = plan_to_start(built_plan(file), arguments)
     if plan.guard.mode == "off" and arguments.settle is not None:
-        complain("the guard is off, so nobody looks before the start: leave out --settle")
-        return UNREADABLE
+        fail("the guard is off, so nobody looks before the start: leave out --settle", UNREADABLE)
     trouble = ros_trouble(child_environment(os.environ, plan.ros, own=True))
     found = [trouble] if trouble else commands_of(plan, started_by_us(plan), file, os.environ, child_environment)[1]
     if found:
-        print_findings([_with_profile(one, arguments) for one in found], sys.stderr)
-        return 1
-    return _start(plan, file, arguments)
-
-
-def _start(plan: Plan, file: Path, arguments: Namespace) -> int:
-    """Start the plan, or bring a robot that runs to it."""
+        reject([_with_profiles(one, arguments) for one in found])
     try:
         place = place_of(plan, os.environ)
         lock = Lock(place)
     except PlaceError as error:
-        complain(str(error))
-        return UNREADABLE
+        fail(str(error), UNREADABLE)
     except BlockingIOError:
-        code: int = import_module("tfcompose.cli.again").up_again(plan, file, place, arguments)
-        return code
+        return _update(plan, file, place, arguments)
     except OSError as error:
-        complain(f"the run cannot be written down: {error}")
-        return UNREADABLE
+        fail(f"the run cannot be written down: {error}", UNREADABLE)
     with ExitStack() as stack:
         stack.callback(lock.close)
-        keeping = import_module("tfcompose.cli.keeping")
-        if elsewhere := keeping.runs_elsewhere(place):
-            complain(elsewhere)
-            return 1
-        kept = keeping.kept(plan, file, place, alone=True)
-        if isinstance(kept, int):
-            return kept
-        session = Session(kept, lock.run, file.absolute().parent, listen(place))
+        if hidden := hidden_run(place):
+            fail(hidden)
+        copy = copy_plan(plan, file, place, alone=True)
+        session = Session(copy, lock.run, file.absolute().parent, listen(place))
         if arguments.detach or arguments.wait:
-            return _in_the_background(plan, place, lock, session, arguments)
-        output = Outlet(sys.stdout.fileno())
-        stack.callback(output.close)
-        status = Status(plan, lambda: columns_of(output.fd)) if draws(sys.stdout) else None
-        return _attached(plan, place, session, output, status, arguments.duration)
+            return detach(plan, place, lock, session, arguments)
+        session.outlet = Outlet(sys.stdout.fileno())
+        stack.callback(session.outlet.close)
+        return _run(plan, place, session, session.outlet, arguments.duration)
 
 
-def _attached(  # noqa: PLR0913, PLR0917 (called in one place)
-    plan: Plan, place: Place, session: Session, output: Outlet, status: Status | None, duration_s: float | None
-) -> int:
+def _build(arguments: Namespace) -> Path:
+    """Build the robot and return its plan's file."""
+    from tfcompose.cli.building import build  # the compiler: a built plan needs none
+
+    return build(arguments)[0] / PLAN
+
+
+def _run(plan: Plan, place: Place, session: Session, output: Outlet, duration_s: float | None) -> int:
+    """Run the plan on this terminal until it ends, and return the exit code."""
     logs = Logs(place.logs)
+    status = StatusLine(plan, lambda: columns_of(output.fd)) if can_redraw(sys.stdout) else None
     console = Console(plan, output, colour=coloured(sys.stdout), keep=logs.write, status=status)
-    session.outlet, session.refresh = output, console.refresh if status else None
-    for line in import_module("tfcompose.cli.keeping").left_behind(place, session.run_id):
-        complain(line)
+    session.refresh = console.refresh if status else None
+    complain_of_leftovers(place, session.run_id)
     try:
         return supervise(plan, session.plan_file, report=console, duration_s=duration_s, session=session)
     finally:
         logs.close()
 
 
-def _in_the_background(plan: Plan, place: Place, lock: Lock, session: Session, arguments: Namespace) -> int:
-    code: int = import_module("tfcompose.cli.detach").detach(plan, place, lock, session, arguments)
-    return code
+def _update(plan: Plan, file: Path, place: Place, arguments: Namespace) -> int:
+    """Bring the running robot to the plan; exit code 0, 1 where it runs as it is and was to be started here."""
+    holder = place.holder()
+    who = (
+        f"{place.name} runs already: pid {holder.pid}, since {since(holder)}" if holder else f"{place.name} just ended"
+    )
+    copy = copy_plan(plan, file, place, alone=False)
+    answer = request(place, UpdateRequest(str(copy), str(file.absolute().parent)), PlanChange)
+    if answer is None:
+        fail(who)
+    parts = (("restarted", answer.changed), ("started", answer.added), ("stopped", answer.removed))
+    changes = "; ".join(f"{word}: {', '.join(names)}" for word, names in parts if names)
+    if changes:
+        print(f"{who}; {changes}")
+    else:
+        complain(f"{who}; the plan is the same; tfcompose down ends it")
+    if answer.held and changes:
+        print(vanished(answer.held))
+    if arguments.wait:
+        return wait_until_ready(place, arguments.timeout)
+    return 0 if changes or arguments.detach else FAILED
 
 
-def _with_profile(found: Finding, arguments: Namespace) -> Finding:
+def _with_profiles(found: Finding, arguments: Namespace) -> Finding:
     """Return the finding; if programs are missing, with the profiles that can do without them."""
-    if found.code != "TF810" or arguments.file.endswith(".json"):
+    if found.code != "TF810" or is_plan(arguments.file):
         return found
-    profiles = import_module("tfcompose.cli.standing_in").profiles_that_start(arguments)
+    profiles = _profiles_that_start(arguments)
     if not profiles:
         return found
     words = "".join(f" --profile {name}" for name in arguments.profiles)
@@ -120,10 +124,29 @@ def _with_profile(found: Finding, arguments: Namespace) -> Finding:
     return replace(found, help="; ".join(filter(None, (found.help, advice))))
 
 
-def _built(arguments: Namespace) -> Path | int:
-    """Build the robot and return its plan's file; the compiler is loaded only here."""
-    built = import_module("tfcompose.cli.building").build(arguments)
-    if isinstance(built, int):
-        return built
-    folder: Path = built[0]
-    return folder / PLAN
+def _profiles_that_start(arguments: Namespace) -> list[str]:
+    """Return the profiles with which, laid over those that were asked for, every program is there."""
+    from tfcompose.compile import profiles_of
+    from tfcompose.language import with_includes
+    from tfcompose.load import load
+
+    try:
+        source = with_includes(load(read_text(arguments.file), arguments.file), read_text)
+        names = [name for name in profiles_of(source) if name not in arguments.profiles]
+        return [name for name in names if _starts_with(name, arguments)]
+    except RejectedError:
+        return []
+
+
+def _starts_with(profile: str, arguments: Namespace) -> bool:
+    from tfcompose.cli.compiling import library, overlays_of
+    from tfcompose.compile import compile_robot
+    from tfcompose.emit.plan import plan_of
+
+    profiles, overlays = [*arguments.profiles, profile], overlays_of(arguments)
+    file, presets = arguments.file, library()
+    compiled = compile_robot(read_text(file), file, presets, profiles, overlays=overlays, read=read_text)
+    if compiled.robot is None or compiled.errors:
+        return False
+    plan = plan_of(compiled.robot)
+    return not commands_of(plan, started_by_us(plan), Path(file), os.environ, child_environment)[1]

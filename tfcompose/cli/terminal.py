@@ -1,80 +1,63 @@
-"""What all commands share: reading files, and printing findings."""
+"""What commands write to: exit codes, findings and complaints, colours, and lines that are drawn again in place."""
 
 from __future__ import annotations
 
 import os
 import re
-import stat
+import select
 import sys
 from contextlib import suppress
-from functools import cache
-from importlib import import_module
-from typing import TYPE_CHECKING
-
-from tfcompose.findings import Finding, RejectedError, Span, finding
-from tfcompose.render.text import render_text
+from typing import TYPE_CHECKING, NoReturn
 
 if TYPE_CHECKING:
+    import socket
     from collections.abc import Sequence
     from typing import TextIO
 
-UNREADABLE = 2
-MOST_BYTES = 16_000_000
+    from tfcompose.findings import Finding
 
-#: Pipes that the shell has opened. One with a name would be waited for until somebody writes to it.
-_OPEN_ALREADY = ("/dev/fd/", "/dev/stdin", "/proc/")
+#: Exit codes: findings, or a process that failed; wrong use, or what cannot be read; and as a shell has them for a
+#: program that was ended by Ctrl-C, or by writing where nobody reads.
+FAILED, UNREADABLE, INTERRUPTED, OUTPUT_CLOSED = 1, 2, 130, 141
+
+BOLD, PLAIN = "\033[1m", "\033[0m"
+
+#: Control sequences (ECMA-48): those that end in m set colours, the others do something; and titles and links.
+_SEQUENCE = re.compile(r"(\033\[[0-?]*[ -/]*[@-~]|\033\][^\033\a]*(?:\a|\033\\)?|\033[ -/]*[0-~])")
+_COLOUR = re.compile(r"\033\[[0-9;:]*m")
 
 
-def read_text(path: str) -> str:
-    """Return the file's text.
+def complain(message: str) -> None:
+    """Print one sentence to stderr."""
+    sys.stderr.write(f"tfcompose: {message}\n")
+
+
+def fail(message: str, code: int = FAILED) -> NoReturn:
+    """Print one sentence to stderr and end the command.
 
     Raises:
-        RejectedError: with one TF001 or TF008 finding, if it cannot be read, is no text, or is too large.
+        SystemExit: with the exit code.
     """
-    try:
-        if stat.S_ISFIFO(os.stat(path).st_mode) and not path.startswith(_OPEN_ALREADY):
-            raise RejectedError([finding("TF001", "cannot be read: it is a pipe, not a file", Span(path))])
-        with open(path, "rb") as file:
-            data = file.read(MOST_BYTES + 1)
-    except OSError as error:
-        raise RejectedError([_unreadable(path, error)]) from None
-    except ValueError:
-        raise RejectedError([finding("TF001", "a file name cannot hold a NUL byte", Span("?"))]) from None
-    if len(data) > MOST_BYTES:
-        raise RejectedError([finding("TF008", f"the file is larger than {MOST_BYTES:,} bytes", Span(path))])
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        return _declared(path, data, error)
+    complain(message)
+    raise SystemExit(code)
 
 
-def _declared(path: str, data: bytes, error: UnicodeDecodeError) -> str:
-    """Return the text of a URDF in the encoding that it declares; xacro reads UTF-8 whatever a file says."""
-    is_urdf = path.endswith(".urdf")
-    said = is_urdf and re.match(rb"""<\?xml\b[^>]*\bencoding\s*=\s*["']([A-Za-z][\w.-]*)""", data)
-    if said:
-        with suppress(LookupError, UnicodeDecodeError):
-            return data.decode(said[1].decode())
-    before = data[: error.start]
-    line, column = before.count(b"\n") + 1, error.start - before.rfind(b"\n")
-    message = f"not a text file: byte 0x{data[error.start]:02x} is not UTF-8"
-    advice = "save it as UTF-8"
-    if is_urdf:
-        advice += ', or say in its first line what it is: <?xml version="1.0" encoding="ISO-8859-1"?>'
-    place = Span(path, line, column, line, column + 1)
-    raise RejectedError([finding("TF001", message, place, help=advice)]) from None
+def print_findings(found: Sequence[Finding], stream: TextIO) -> None:
+    """Print findings for people, with the lines that they are about."""
+    from tfcompose.cli.reading import line_of
+    from tfcompose.render.text import render_text
+
+    stream.write(render_text(found, line_of, colour=coloured(stream)))
 
 
-def _unreadable(path: str, error: OSError) -> Finding:
-    advice = ""
-    if isinstance(error, FileNotFoundError):
-        folder = import_module("pathlib").Path(path).parent
-        ending = next((one for one in (".urdf", ".xacro") if path.endswith(one)), ".yaml")
-        there = sorted(file.name for file in folder.glob(f"*{ending}")) if folder.is_dir() else []
-        advice = f"in {folder} there is {', '.join(there[:8])}" if there else f"there is no {ending} file in {folder}"
-    elif isinstance(error, IsADirectoryError):
-        advice = "no robot file is in it: name one"
-    return finding("TF001", f"cannot be read: {error.strerror}", Span(path), help=advice)
+def reject(found: Sequence[Finding], code: int | None = None) -> NoReturn:
+    """Print findings to stderr and end the command.
+
+    Raises:
+        SystemExit: with the exit code, unless given 2 where a file cannot be read, else 1.
+    """
+    print_findings(found, sys.stderr)
+    raise SystemExit(code or (UNREADABLE if unreadable(found) else FAILED))
 
 
 def unreadable(found: Sequence[Finding]) -> bool:
@@ -82,35 +65,123 @@ def unreadable(found: Sequence[Finding]) -> bool:
     return any(one.code == "TF001" for one in found)
 
 
-def print_findings(found: Sequence[Finding], stream: TextIO) -> None:
-    """Print findings for people, with the lines that they are about."""
-    stream.write(render_text(found, line_of, colour=coloured(stream)))
-
-
 def coloured(stream: TextIO) -> bool:
     """Return whether to colour: on a terminal, unless NO_COLOR is set (no-color.org)."""
-    return draws(stream) and not os.environ.get("NO_COLOR")
+    return can_redraw(stream) and not os.environ.get("NO_COLOR")
 
 
-def draws(stream: TextIO) -> bool:
-    """Return whether lines can be drawn again in their place: on a terminal that can do more than print."""
-    return stream.isatty() and os.environ.get("TERM") != "dumb"
+def can_redraw(stream: TextIO) -> bool:
+    """Return whether lines can be drawn again in their place: on a terminal that moves its cursor."""
+    return stream.isatty() and os.environ.get("TERM", "dumb") != "dumb"
 
 
-@cache
-def _lines(file: str) -> list[str]:
+def columns_of(fd: int) -> int:
+    """Return the width of the terminal behind the descriptor, 80 if there is none."""
+    return _size_of(fd)[0]
+
+
+def _size_of(fd: int) -> tuple[int, int]:
     try:
-        return read_text(file).splitlines()
-    except RejectedError:
-        return []
+        size = os.get_terminal_size(fd)
+    except OSError:
+        return 80, 24
+    return size.columns or 80, size.lines or 24
 
 
-def line_of(file: str, line: int) -> str | None:
-    """Return a line of a file, counted from 1, or None."""
-    lines = _lines(file)
-    return lines[line - 1] if 0 < line <= len(lines) else None
+def counted(number: int, word: str) -> str:
+    """Return the number with its word: 1 edge, 2 edges."""
+    return f"{number} {word}{'' if number == 1 else 's'}"
 
 
-def complain(message: str) -> None:
-    """Print one sentence about wrong use to stderr."""
-    sys.stderr.write(f"tfcompose: {message}\n")
+def listed(names: Sequence[str], most: int) -> str:
+    """Return the first names, and how many more there are."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return f"{', '.join(names[:most])}{more}"
+
+
+def printable(text: str) -> str:
+    """Return the text without what would move a terminal's cursor."""
+    return "".join(character if character.isprintable() else "?" for character in text)
+
+
+def plain(text: str) -> str:
+    """Return the text without control sequences; other characters that cannot be seen are marked."""
+    return "".join(map(_marked, _SEQUENCE.split(text)[::2]))
+
+
+def coloured_only(text: str) -> str:
+    """Return the text with its colours, which end with it, and without other control sequences."""
+    pieces = _SEQUENCE.split(text)
+    if len(pieces) == 1:
+        return _marked(text)
+    colours = [piece if _COLOUR.fullmatch(piece) else "" for piece in pieces[1::2]]
+    pieces[::2], pieces[1::2] = map(_marked, pieces[::2]), colours
+    last = "".join(colours).rpartition("\033")[2]
+    return "".join(pieces) + (PLAIN if last and f"\033{last}" != PLAIN else "")
+
+
+def _marked(text: str) -> str:
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c == "\t" else "\N{REPLACEMENT CHARACTER}" for c in text)
+
+
+def has_reader(stream: TextIO) -> bool:
+    """Return whether somebody can still read what is written there; ``tfcompose logs -f | head -1`` ends that."""
+    return _first_ready(stream, None, 0) != stream
+
+
+def wait_for_data(connection: socket.socket, stream: TextIO) -> bool:
+    """Wait until there is something to receive, or nobody reads the stream any more; return whether it is read.
+
+    The connection's timeout limits the wait.
+    """
+    timeout_s = connection.gettimeout()
+    return _first_ready(stream, connection, None if timeout_s is None else timeout_s * 1e3) != stream
+
+
+def _first_ready(stream: TextIO, connection: socket.socket | None, timeout_ms: float | None) -> object:
+    """Return the stream if nobody reads it; else the connection if it has something; else None."""
+    poll = select.poll()
+    with suppress(OSError):  # it has no descriptor: nobody can leave
+        poll.register(stream.fileno(), 0)
+    if connection:
+        poll.register(connection, select.POLLIN)
+    found = [fd for fd, _ in poll.poll(timeout_ms)]
+    if connection and connection.fileno() in found:
+        found.remove(connection.fileno())
+        return stream if found else connection
+    return stream if found else None
+
+
+class LiveLines:
+    """Some lines at the end of a terminal's output; each drawing replaces the last one, without flicker."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._drawn = 0
+        self._columns = 0
+
+    @property
+    def width(self) -> int:
+        """The terminal's width in characters."""
+        return columns_of(self._stream.fileno())
+
+    def draw(self, lines: Sequence[str]) -> None:
+        """Draw the lines where the last ones were; those that the terminal has no room for are counted only."""
+        columns, rows = _size_of(self._stream.fileno())
+        room = max(rows - 1, 2)
+        shown = list(lines)
+        if len(shown) > room:
+            shown = [*shown[: room - 1], f"… {len(shown) - room + 1} more; a larger window shows them, or a pipe"]
+        up = f"\r\033[{self._drawn}A" if self._drawn else ""
+        if columns < self._columns:  # what was drawn takes more lines now, and how many is the terminal's secret
+            up = "\033[H\033[2J"
+        body = "".join(f"{_shortened(line, columns - 1)}\033[K\n" for line in shown)
+        self._stream.write(f"{up}{body}\033[J")  # what was below the last line goes
+        self._stream.flush()
+        self._drawn, self._columns = len(shown), columns
+
+
+def _shortened(line: str, columns: int) -> str:
+    return line if len(line) <= columns else f"{line[: columns - 1]}…"

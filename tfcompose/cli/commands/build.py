@@ -1,4 +1,4 @@
-"""``tfcompose build``: the robot's files, all of them or nothing.
+"""Write the URDF, the plan and all other files, or none of them.
 
 Write plan.json, the URDF, xacro, tree.txt and tree.svg, and parameter files where there are any: all, or
 nothing.
@@ -6,10 +6,8 @@ nothing.
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.building import build
 from tfcompose.cli.options import add_file, add_variant
 
 if TYPE_CHECKING:
@@ -34,9 +32,8 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Build; exit code 0, 1 with errors in the robot, 2 where something cannot be read or written."""
-    built = build(arguments)
-    if isinstance(built, int):
-        return built
-    folder, names = built
-    sys.stdout.write(f"wrote {folder}: {', '.join(names)}\n")
+    from tfcompose.cli.building import build
+
+    folder, names = build(arguments)
+    print(f"wrote {folder}: {', '.join(names)}")
     return 0

@@ -1,4 +1,4 @@
-"""``tfcompose diff``: what changed between two robots.
+"""Show what moved or changed owner between two robot files.
 
 Print what moved from OLD to NEW, in millimetres and degrees, and which frames came, went, got another parent or
 another owner. Exit code 1 if anything did.
@@ -7,10 +7,8 @@ another owner. Exit code 1 if anything did.
 from __future__ import annotations
 
 import math
-import sys
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.compiling import robot_or_code
 from tfcompose.cli.options import add_variant
 from tfcompose.geometry import angle_between, norm
 
@@ -33,14 +31,10 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Print the differences; exit code 0 without any, 1 with some."""
-    robots = []
-    for file in (arguments.old, arguments.new):
-        robot = robot_or_code(file, arguments)
-        if isinstance(robot, int):
-            return robot
-        robots.append(robot)
-    lines = differences(robots[0], robots[1])
-    sys.stdout.write("".join(f"{line}\n" for line in lines) or "no difference between the two trees\n")
+    from tfcompose.cli.compiling import compiled_robot
+
+    lines = differences(compiled_robot(arguments.old, arguments), compiled_robot(arguments.new, arguments))
+    print("\n".join(lines) or "no difference between the two trees")
     return int(bool(lines))
 
 

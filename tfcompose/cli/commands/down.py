@@ -1,4 +1,4 @@
-"""``tfcompose down``: stop a running robot.
+"""Stop a running robot.
 
 Stop everything, in reverse order of the start, and wait until it has ended. --leftovers stops what an earlier run of
 the robot left behind instead, if anything did.
@@ -7,21 +7,13 @@ the robot left behind instead, if anything did.
 from __future__ import annotations
 
 import os
-import sys
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import positive
-from tfcompose.cli.running import add_robot, asked, chosen, events, told
-from tfcompose.cli.terminal import complain
-from tfcompose.ipc import Done, DownRequest, Ended
-from tfcompose.run.launcher.leftovers import end, leftovers
-from tfcompose.run.place import places
+from tfcompose.cli.options import add_robot, positive
+from tfcompose.cli.terminal import FAILED, complain, fail
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-
-    from tfcompose.run.launcher.leftovers import Leftover
-    from tfcompose.run.place import Place
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -33,38 +25,39 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Stop it; exit code 0 when it has ended, 1 where none runs or it does not end in time."""
+    from tfcompose.cli.runs import chosen_run, notices, request
+    from tfcompose.ipc import Done, DownRequest, Ended
+
     if arguments.leftovers:
-        return _leftovers(arguments.robot)
-    place = chosen(arguments.robot)
-    if isinstance(place, int):
-        return place
-    answer = asked(place, DownRequest(), Done)
-    if isinstance(answer, int):
-        return answer
+        return _stop_leftovers(arguments.robot)
+    place = chosen_run(arguments.robot)
+    if request(place, DownRequest(), Done) is None:
+        return FAILED
     try:
-        for notice, _ in events(place, arguments.timeout):
+        for notice, _ in notices(place, arguments.timeout):
             if isinstance(notice, Ended):
                 break
     except TimeoutError:
-        complain(f"{place.name} has not ended after {arguments.timeout:g} s; tfcompose ps says what still runs")
-        return 1
+        fail(f"{place.name} has not ended after {arguments.timeout:g} s; tfcompose ps says what still runs")
     except OSError:
         pass  # it has ended already
-    return told(f"{place.name} has ended")
+    print(f"{place.name} has ended")
+    return 0
 
 
-def _leftovers(robot: str | None) -> int:
-    place = chosen(robot, among=lambda: places(os.environ))
-    if isinstance(place, int):
-        return place
-    found = _left_by(place)
+def _stop_leftovers(robot: str | None) -> int:
+    from tfcompose.cli.runs import chosen_run
+    from tfcompose.run.launcher.leftovers import end, leftovers
+    from tfcompose.run.place import places
+
+    place = chosen_run(robot, among=lambda: places(os.environ))
+    found = [one for one in leftovers(f"{place.name}:") if one.launcher is None]
     for one in found:
-        sys.stdout.write(f"stopping {one.pid}: {one.command}\n")
+        print(f"stopping {one.pid}: {one.command}")
     rest = end(found)
     for one in rest:
         complain(f"{one.pid} is still there: {one.command}")
-    return 1 if rest else told(f"{len(found)} process{'' if len(found) == 1 else 'es'} of earlier runs stopped")
-
-
-def _left_by(place: Place) -> list[Leftover]:
-    return [one for one in leftovers(f"{place.name}:") if one.launcher is None]
+    if rest:
+        return FAILED
+    print(f"{len(found)} process{'' if len(found) == 1 else 'es'} of earlier runs stopped")
+    return 0

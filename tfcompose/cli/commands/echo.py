@@ -1,4 +1,4 @@
-"""``tfcompose echo``: where one frame is in another, now.
+"""Print the live pose of frame B in frame A.
 
 Print the pose of B in A from the live tree: position in metres, quaternion x y z w, roll pitch yaw about fixed axes in
 radians and degrees. Where there is none it says why, with exit code 1. Without --once it goes on until Ctrl-C. With
@@ -11,26 +11,17 @@ import re
 import sys
 import time
 from argparse import ArgumentTypeError
-from importlib import import_module
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.looking import INTERRUPTED, add_bag, add_namespace, reading, ready_for_ros
-from tfcompose.cli.options import positive
-from tfcompose.cli.terminal import complain, print_findings
-from tfcompose.findings import finding
-from tfcompose.numbers import clean
-from tfcompose.observe.asked import Asked
-from tfcompose.render.pose import pose_json, pose_text
-from tfcompose.ros.environment import RosError
-from tfcompose.ros.stop import Stop
+from tfcompose.cli.options import add_bag, add_format, add_frames, add_namespace, positive
+from tfcompose.cli.terminal import INTERRUPTED, fail, reject
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from collections.abc import Callable
 
     from tfcompose.geometry import Pose
-    from tfcompose.observe.asked import Missed
-
+    from tfcompose.observe.asked import Asked, Missed
 
 #: A stamp that is older is taken to be of another clock than the wall's.
 _CLOCKS_AGREE_S = 1e6
@@ -40,8 +31,7 @@ _MOST_DIGITS = 15
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("a", metavar="A", help="the frame in which the pose is given")
-    parser.add_argument("b", metavar="B", help="the frame whose pose it is")
+    add_frames(parser)
     parser.add_argument("--once", action="store_true", help="print one pose and end")
     parser.add_argument(
         "--timeout", type=positive, default=5.0, metavar="S", help="end after S seconds without a new pose; default: 5"
@@ -59,59 +49,68 @@ def arguments(parser: ArgumentParser) -> None:
     )
     add_bag(parser)
     add_namespace(parser)
-    parser.add_argument(
-        "--format", choices=("text", "json"), default="text", help="json: one object a line; default: text"
-    )
+    add_format(parser, text="json: one object a line; default: text")
 
 
 def run(arguments: Namespace) -> int:
     """Echo until a signal comes; exit code 1 if there was no pose."""
+    from tfcompose.cli.live import from_bag
+    from tfcompose.findings import finding
+    from tfcompose.numbers import clean
+    from tfcompose.observe.asked import Asked
+
     # tf2 takes a name with a slash before it for the name.
     arguments.a, arguments.b = (name.removeprefix("/") for name in (arguments.a, arguments.b))
     asked = Asked(
         arguments.a, arguments.b, arguments.once, arguments.rate, arguments.timeout, arguments.namespace, arguments.at
     )
 
-    def say(pose: Pose, stamp_ns: int | None) -> None:
-        sys.stdout.write(_written(arguments, clean(pose), stamp_ns))
+    def show(pose: Pose, stamp_ns: int | None) -> None:
+        sys.stdout.write(_formatted(arguments, clean(pose), stamp_ns))
         sys.stdout.flush()
 
-    missed = _of_bag(arguments.bag, asked, say) if arguments.bag else _live(asked, say)
-    if missed is None or isinstance(missed, int):
-        return missed or 0
-    message = f"no pose of {arguments.b} in {arguments.a}: {missed.reason}"
-    print_findings([finding("TF814", message, None, help=missed.help)], sys.stderr)
-    return 1
+    if arguments.bag:
+        from tfcompose.observe.replay import echo_bag
+
+        missed = from_bag(lambda: echo_bag(asked, arguments.bag, show))
+    else:
+        missed = _live(asked, show)
+    if missed is not None:
+        message = f"no pose of {arguments.b} in {arguments.a}: {missed.reason}"
+        reject([finding("TF814", message, None, help=missed.help)])
+    return 0
 
 
-def _live(asked: Asked, say: Callable[[Pose, int | None], None]) -> Missed | int | None:
-    if not ready_for_ros():
-        return 1
+def _live(asked: Asked, show: Callable[[Pose, int | None], None]) -> Missed | None:
+    from tfcompose.cli.live import set_up_ros
+    from tfcompose.findings import finding
+    from tfcompose.ros.environment import RosError
+    from tfcompose.ros.stop import Stop
+
+    set_up_ros()
+    from tfcompose.observe.echo import echo
+
     begun = time.monotonic()
-    said: list[int | None] = []
+    shown = False
 
     def note(pose: Pose, stamp_ns: int | None) -> None:
-        said[:] = [stamp_ns]
-        say(pose, stamp_ns)
+        nonlocal shown
+        shown = True
+        show(pose, stamp_ns)
 
     with Stop() as stop:
-        module = import_module("tfcompose.observe.echo")
         try:
-            missed: Missed | None = module.echo(asked, note, stop)
+            missed = echo(asked, note, stop)
         except RosError as error:
-            print_findings([finding("TF901", str(error), None)], sys.stderr)
-            return 1
-        if stop.requested and not said and missed is None:
-            complain(f"ended by a signal after {time.monotonic() - begun:.1f} s, before there was a pose")
-            return INTERRUPTED
+            reject([finding("TF901", str(error), None)])
+        if stop.requested and not shown and missed is None:
+            fail(f"ended by a signal after {time.monotonic() - begun:.1f} s, before there was a pose", INTERRUPTED)
     return missed
 
 
-def _of_bag(path: str, asked: Asked, say: Callable[[Pose, int | None], None]) -> Missed | int | None:
-    return reading(lambda: import_module("tfcompose.observe.replay").echo_bag(asked, path, say))
+def _formatted(arguments: Namespace, pose: Pose, stamp_ns: int | None) -> str:
+    from tfcompose.render.pose import pose_json, pose_text
 
-
-def _written(arguments: Namespace, pose: Pose, stamp_ns: int | None) -> str:
     if arguments.format == "json":
         return pose_json(arguments.a, arguments.b, pose, stamp_ns=stamp_ns)
     when = ", fixed"

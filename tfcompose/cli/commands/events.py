@@ -1,4 +1,4 @@
-"""``tfcompose events``: what happens in a running robot.
+"""Print past events of a running robot, then follow.
 
 Print what the launcher has told since the start, and then each event as it comes, until the robot ends.
 """
@@ -9,11 +9,8 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.console import Console
-from tfcompose.cli.running import add_robot, chosen, events
-from tfcompose.cli.terminal import coloured, complain
-from tfcompose.ipc import Ended, notice_line
-from tfcompose.plan import Plan, RosSettings
+from tfcompose.cli.options import add_format, add_robot
+from tfcompose.cli.terminal import FAILED, coloured, complain, fail
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -24,22 +21,25 @@ if TYPE_CHECKING:
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     add_robot(parser)
-    parser.add_argument("--format", choices=("text", "json"), default="text", help="json: one object a line")
+    add_format(parser, text="json: one object a line")
 
 
 def run(arguments: Namespace) -> int:
     """Print events until the robot ends; exit code 0, 1 where none runs, or it is heard no more before it ends."""
-    place = chosen(arguments.robot)
-    if isinstance(place, int):
-        return place
-    lines = _Timed()
+    from tfcompose.cli.console import Console
+    from tfcompose.cli.runs import chosen_run, notices
+    from tfcompose.ipc import Ended, notice_line
+    from tfcompose.plan import Plan, RosSettings
+
+    place = chosen_run(arguments.robot)
+    lines = _TimedLines()
     ended = False
     console = Console(Plan(place.name, "", None, RosSettings(), (), ()), lines, colour=coloured(sys.stdout))
     try:
-        for notice, at in events(place, for_whom=sys.stdout):
+        for notice, at in notices(place, for_whom=sys.stdout):
             ended = isinstance(notice, Ended)
             if arguments.format == "json":
-                sys.stdout.write(f"{notice_line(notice, at)}\n")
+                print(notice_line(notice, at))
             else:
                 lines.at = at
                 console(notice)
@@ -47,12 +47,12 @@ def run(arguments: Namespace) -> int:
     except BrokenPipeError:
         raise
     except OSError as error:
-        complain(f"{place.name} does not answer: {error}")
-        return 1
-    if not ended:
-        slow = "tells more than was read here, and did not wait; ask again"
-        complain(f"{place.name} {slow if _is_held(place) else 'was killed'}")
-    return 0 if ended else 1
+        fail(f"{place.name} does not answer: {error}")
+    if ended:
+        return 0
+    slow = "tells more than was read here, and did not wait; ask again"
+    complain(f"{place.name} {slow if _is_held(place) else 'was killed'}")
+    return FAILED
 
 
 def _is_held(place: Place) -> bool:
@@ -64,7 +64,7 @@ def _is_held(place: Place) -> bool:
     return True
 
 
-class _Timed:
+class _TimedLines:
     """Standard output, with the time before each line."""
 
     at = 0.0

@@ -1,4 +1,4 @@
-"""``tfcompose explain``: a code's page, or the chain between two frames.
+"""Explain a code, or the chain between two frames.
 
 Explain a code (TF301) or a rule's name: what is wrong, why it matters, what to do. Or, with FILE A B, show the chain
 from A to B: each edge with its owner and its pose, and where each of its values is written, and over what.
@@ -10,15 +10,8 @@ import math
 import sys
 from typing import TYPE_CHECKING
 
-from tfcompose.catalogue import CATALOGUE, FAMILIES, code_of, codes_and_names
-from tfcompose.cli.between import edges_between
-from tfcompose.cli.compiling import sources_and_robot
 from tfcompose.cli.options import add_variant
-from tfcompose.cli.provenance import written_values
-from tfcompose.cli.terminal import UNREADABLE, complain
-from tfcompose.findings import did_you_mean
-from tfcompose.pages import page, table
-from tfcompose.render.tree import edge_facts
+from tfcompose.cli.terminal import UNREADABLE, fail
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -30,6 +23,8 @@ if TYPE_CHECKING:
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
+    from tfcompose.catalogue import FAMILIES
+
     parser.add_argument(
         "what", nargs="*", metavar="CODE|FILE A B", help="a code, a rule's name, or a file and two frames"
     )
@@ -45,41 +40,48 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Print the page or the chain; exit code 1 if a frame is not there, 2 for wrong use."""
-    words = arguments.what
-    if arguments.table and not words:
-        sys.stdout.write(table(None if arguments.table == "all" else arguments.table))
-        return 0
-    if len(words) == 1:
-        return _explain_code(words[0])
-    if len(words) != 3:  # noqa: PLR2004 (FILE A B)
-        complain("explain takes a code, or FILE A B")
-        return UNREADABLE
-    made = sources_and_robot(words[0], arguments)
-    return made if isinstance(made, int) else _explain_chain(*made, words[1], words[2])
+    match arguments.what:
+        case [] if arguments.table:
+            from tfcompose.pages import table
 
+            sys.stdout.write(table(None if arguments.table == "all" else arguments.table))
+        case [word]:
+            _explain_code(word)
+        case [file, a, b]:
+            from tfcompose.cli.compiling import robot_with_sources
 
-def _explain_code(word: str) -> int:
-    code = code_of(word)
-    if code is None:
-        complain(f"no code {word}; {did_you_mean(word, codes_and_names(), 'lint prints codes: TF301')}")
-        return UNREADABLE
-    sys.stdout.write(f"{code} {CATALOGUE[code].name}\n\n{page(code)}\n")
+            _explain_chain(*robot_with_sources(file, arguments), a, b)
+        case _:
+            fail("explain takes a code, or FILE A B", UNREADABLE)
     return 0
 
 
-def _explain_chain(sources: Sequence[Source], robot: Robot, a: str, b: str) -> int:
-    edges = edges_between(robot, a, b)
-    if edges is None:
-        return 1
-    rising, falling = edges
+def _explain_code(word: str) -> None:
+    from tfcompose.catalogue import CATALOGUE, code_of, codes_and_names
+    from tfcompose.findings import did_you_mean
+    from tfcompose.pages import page
+
+    code = code_of(word)
+    if code is None:
+        advice = did_you_mean(word, codes_and_names(), "lint prints codes: TF301")
+        fail(f"no code {word}; {advice}", UNREADABLE)
+    sys.stdout.write(f"{code} {CATALOGUE[code].name}\n\n{page(code)}\n")
+
+
+def _explain_chain(robot: Robot, sources: Sequence[Source], a: str, b: str) -> None:
+    from tfcompose.cli.compiling import edges_between
+
+    rising, falling = edges_between(robot, a, b)
     lines = [f"pose of {b} in {a}\n"]
     lines += [f"  up    {_line(edge, sources)}" for edge in rising]
     lines += [f"  down  {_line(edge, sources)}" for edge in reversed(falling)]
     sys.stdout.write("".join(lines))
-    return 0
 
 
 def _line(edge: Edge, sources: Sequence[Source]) -> str:
+    from tfcompose.cli.provenance import written_values
+    from tfcompose.render.tree import edge_facts
+
     facts = edge_facts(edge)
     inside = f" (inside {edge.sensor})" if edge.sensor and not edge.given else ""
     measured = f"          {_measured(edge.calibration)}\n" if edge.calibration else ""

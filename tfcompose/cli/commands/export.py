@@ -1,4 +1,4 @@
-"""``tfcompose export``: the plan for other launchers.
+"""Export the plan for systemd, docker compose or ros2 launch.
 
 Write a built plan, or a robot that is built first, for systemd (a unit for each process and a target), docker compose
 (a service for each process) or ros2 launch (a launch file with stock nodes for what is fixed and jointed). What the
@@ -9,24 +9,17 @@ from __future__ import annotations
 
 import os
 import sys
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.built_plan import PLAN, plan_in
 from tfcompose.cli.options import DEFAULT_FILE, add_variant
-from tfcompose.cli.output import write_all
-from tfcompose.cli.terminal import UNREADABLE, complain, print_findings, read_text
-from tfcompose.emit.supervised import Machine, started
-from tfcompose.findings import RejectedError
-from tfcompose.plan import Plan
-from tfcompose.run.hosts import share_of
-from tfcompose.run.launcher.fencing import not_remapped
+from tfcompose.cli.terminal import UNREADABLE, fail, reject
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
     from tfcompose.files import File
+    from tfcompose.plan import Plan
 
 KINDS = ("systemd", "compose", "launch")
 #: What ROS's setup files set, and what people set for ROS: units start without a shell that has it.
@@ -62,62 +55,63 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Write the export; exit code as for ``build``."""
-    if arguments.file.endswith(".json"):
-        if arguments.profiles or arguments.overlays or arguments.settings:
-            complain("a built plan takes no --profile, --overlay and --set: those are for building it")
-            return UNREADABLE
+    from tfcompose.cli.plans import PLAN, built_plan, host_share, is_plan, refuse_variant
+    from tfcompose.run.launcher.fencing import not_remapped
+
+    if is_plan(arguments.file):
+        refuse_variant(arguments)
         file = Path(arguments.file)
     else:
-        built = import_module("tfcompose.cli.building").build(arguments)
-        if isinstance(built, int):
-            return built
-        file = built[0] / PLAN
-    plan = plan_in(file)
-    if isinstance(plan, int):
-        return plan
+        from tfcompose.cli.building import build
+
+        file = build(arguments)[0] / PLAN
+    plan = built_plan(file)
     if arguments.host is not None:
-        share = share_of(plan, arguments.host or None, "")
-        if not isinstance(share, Plan):
-            print_findings([share], sys.stderr)
-            return 1
-        plan = share
+        plan = host_share(plan, arguments.host or None, "")
     if plan.guard.mode == "strict" and arguments.kind == "launch":
-        complain("guard: strict needs a guard, and a launch file has none: export with --set guard.mode=watch")
-        return 1
+        fail("guard: strict needs a guard, and a launch file has none: export with --set guard.mode=watch")
     if plan.guard.mode == "strict" and (missed := not_remapped(plan)):
-        print_findings(missed, sys.stderr)
-        return 1
-    return _export(plan, file, arguments)
-
-
-def _export(plan: Plan, file: Path, arguments: Namespace) -> int:
-    folder = Path(arguments.output or file.parent) / arguments.kind
-    try:
-        files, said = _made(plan, file, folder, arguments)
-        write_all(folder, files)
-    except RejectedError as error:
-        print_findings(error.findings, sys.stderr)
-        return UNREADABLE
-    except OSError as error:
-        complain(f"nothing was written to {folder}: {error.strerror}")
-        return UNREADABLE
-    sys.stdout.write(f"wrote {folder}: {', '.join(one.path for one in files)}\n")
-    if plan.host is None:
-        said += [f"{one.name} runs on {one.host}, and is here too: --host" for one in started(plan) if one.host]
-    sys.stdout.writelines(f"not as tfcompose up: {line}\n" for line in said)
+        reject(missed)
+    _write(plan, file, arguments)
     return 0
 
 
-def _made(plan: Plan, file: Path, folder: Path, arguments: Namespace) -> tuple[tuple[File, ...], list[str]]:
-    emit = getattr(import_module(f"tfcompose.emit.{arguments.kind}"), arguments.kind)
+def _write(plan: Plan, file: Path, arguments: Namespace) -> None:
+    from tfcompose.cli.writing import write_all
+    from tfcompose.emit.supervised import started
+    from tfcompose.findings import RejectedError
+
+    folder = Path(arguments.output or file.parent) / arguments.kind
+    try:
+        files, differences = _exported(plan, file, folder, arguments)
+        write_all(folder, files)
+    except RejectedError as error:
+        reject(error.findings, UNREADABLE)
+    except OSError as error:
+        fail(f"nothing was written to {folder}: {error.strerror}", UNREADABLE)
+    print(f"wrote {folder}: {', '.join(one.path for one in files)}")
+    if plan.host is None:
+        differences += [f"{one.name} runs on {one.host}, and is here too: --host" for one in started(plan) if one.host]
+    for line in differences:
+        print(f"not as tfcompose up: {line}")
+
+
+def _exported(plan: Plan, file: Path, folder: Path, arguments: Namespace) -> tuple[tuple[File, ...], list[str]]:
+    """Return the files, and what is not as with ``up``."""
+    from tfcompose.emit.supervised import Machine
+
     beside = Path(os.path.relpath(file.parent, folder)).as_posix()
-    made: tuple[tuple[File, ...], list[str]]
     if arguments.kind == "launch":
-        made = emit(plan, Machine(beside), read_text(str(file.parent / "robot.urdf")))
-    elif arguments.kind == "compose":
-        made = emit(plan, Machine(beside, image=arguments.image))
-    else:
-        own = {} if arguments.setup else {name: os.environ[name] for name in ROS_VARIABLES if os.environ.get(name)}
-        at = Path(arguments.at or file.parent).absolute().as_posix()
-        made = emit(plan, Machine(at, arguments.python, tuple(arguments.setup), own))
-    return made
+        from tfcompose.cli.reading import read_text
+        from tfcompose.emit.launch import launch
+
+        return launch(plan, Machine(beside), read_text(str(file.parent / "robot.urdf")))
+    if arguments.kind == "compose":
+        from tfcompose.emit.compose import compose
+
+        return compose(plan, Machine(beside, image=arguments.image))
+    from tfcompose.emit.systemd import systemd
+
+    own = {} if arguments.setup else {name: os.environ[name] for name in ROS_VARIABLES if os.environ.get(name)}
+    at = Path(arguments.at or file.parent).absolute().as_posix()
+    return systemd(plan, Machine(at, arguments.python, tuple(arguments.setup), own))

@@ -1,4 +1,4 @@
-"""``tfcompose graph``: the tree as a picture.
+"""Draw the tree as SVG, PDF, PNG, DOT or Mermaid.
 
 Draw the tree: frames coloured by owner, fixed and moving edges, sensors in frames of their own. The ending of the file
 says how: .svg, .pdf, .png, .dot (Graphviz) or .mmd (Mermaid). With --live or --bag it is the published tree, coloured
@@ -7,29 +7,25 @@ by publisher; second parents and loops are drawn as they are, and with FILE what
 
 from __future__ import annotations
 
-import os
-import sys
-import tempfile
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from tfcompose.cli.compiling import robot_or_code
-from tfcompose.cli.looking import add_for
-from tfcompose.cli.options import DEFAULT_FILE, add_variant, namespace
-from tfcompose.cli.terminal import UNREADABLE, complain
-from tfcompose.render.tree import graph_of
+from tfcompose.cli.options import DEFAULT_FILE, add_bag, add_for, add_namespace, add_variant
+from tfcompose.cli.terminal import UNREADABLE, fail, printable
+from tfcompose.geometry import Pose, norm, normalised
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
+    from collections.abc import Sequence
 
-    from tfcompose.draw import Graph
+    from tfcompose.draw import Arrow, Graph
+    from tfcompose.draw.graph import Kind
+    from tfcompose.observe.census import Census, EdgeSeen
+    from tfcompose.plan import Plan
 
-#: By the file's ending: the module of ``tfcompose.draw`` that writes it, and whether it writes a drawing.
-FORMATS = {".svg": ("svg", True), ".pdf": ("pdf", True), ".png": ("png", True), ".dot": ("dot", False)}
-FORMATS |= {".gv": ("dot", False), ".mmd": ("mermaid", False)}
-NAMED = "svg, pdf, png, dot or mmd"
+FORMATS = (".svg", ".pdf", ".png", ".dot", ".gv", ".mmd")
+FORMAT_NAMES = "svg, pdf, png, dot or mmd"
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -37,86 +33,132 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument("file", nargs="?", metavar="FILE", help="default: robot.yaml; with --live or --bag: none")
     add_variant(parser)
     parser.add_argument(
-        "-o", "--output", default="tree.svg", metavar="PICTURE", help=f"a file that ends in {NAMED}; default: tree.svg"
+        "-o",
+        "--output",
+        default="tree.svg",
+        metavar="PICTURE",
+        help=f"a file that ends in {FORMAT_NAMES}; default: tree.svg",
     )
     parser.add_argument(
         "--live", action="store_true", help="the tree that is published now; with FILE what is missing too"
     )
-    parser.add_argument("--bag", metavar="BAG", help="the tree of a recording: a rosbag2 folder, .mcap or .db3")
+    add_bag(parser, "the tree of a recording")
     add_for(parser, "with --live: look so long; default: 3", 3.0)
-    parser.add_argument(
-        "--namespace", type=namespace, default="", metavar="NS", help="/NS/tf and /NS/tf_static instead, without FILE"
-    )
+    add_namespace(parser, "/NS/tf and /NS/tf_static instead, without FILE")
     parser.add_argument("--poses", action="store_true", help="write each frame's pose in its parent, in m and degrees")
 
 
 def run(arguments: Namespace) -> int:
     """Draw; exit code 0, 1 with errors in the robot, 2 for another ending or what cannot be read or written."""
     path = Path(arguments.output)
-    refused = _refused(path)
-    if refused:
-        complain(refused)
-        return UNREADABLE
-    graph = _graph(arguments)
-    if isinstance(graph, int):
-        return graph
+    _check_output(path)
+    if arguments.live or arguments.bag:
+        graph = _published_graph(arguments)
+    else:
+        from tfcompose.cli.compiling import compiled_robot
+        from tfcompose.render.tree import graph_of
+
+        robot = compiled_robot(arguments.file or DEFAULT_FILE, arguments)
+        graph = graph_of(robot.with_final_names(), poses=arguments.poses)
+    from tfcompose.cli.writing import replace_file
+
     try:
-        _write(path, picture(graph, path.suffix.lower()))
+        replace_file(path, picture(graph, path.suffix.lower()))
     except OSError as error:
-        complain(f"{path} was not written: {error.strerror}")
-        return UNREADABLE
-    sys.stdout.write(f"wrote {path}\n")
+        fail(f"{path} was not written: {error.strerror}", UNREADABLE)
+    print(f"wrote {path}")
     return 0
 
 
-def _graph(arguments: Namespace) -> Graph | int:
-    """Return what is to be drawn, or the exit code after saying what is wrong."""
-    if arguments.live or arguments.bag:
-        published: Graph | int = import_module("tfcompose.cli.live_graph").seen(arguments)
-        return published
-    robot = robot_or_code(arguments.file or DEFAULT_FILE, arguments)
-    return robot if isinstance(robot, int) else graph_of(robot.with_final_names(), poses=arguments.poses)
+def _check_output(path: Path) -> None:
+    """Refuse a picture that cannot be written, before anything is done for it.
 
-
-def _refused(path: Path) -> str:
-    """Return why the picture cannot be written, before anything is done for it; empty if it can."""
+    Raises:
+        SystemExit: after saying why.
+    """
     ending = path.suffix.lower()
     if ending not in FORMATS:
-        said = f"{path.suffix} is no kind of picture that graph writes" if ending else f"{path} has no ending"
-        return f"{said}; -o takes a file that ends in {NAMED}"
+        what = f"{path.suffix} is no kind of picture that graph writes" if ending else f"{path} has no ending"
+        fail(f"{what}; -o takes a file that ends in {FORMAT_NAMES}", UNREADABLE)
     if not path.parent.is_dir():
-        return f"{path} cannot be written: there is no folder {path.parent}"
+        fail(f"{path} cannot be written: there is no folder {path.parent}", UNREADABLE)
     if ending == ".png" and find_spec("pypdfium2") is None:
-        return "PNG needs the package pypdfium2: pip install 'tfcompose[pictures]'; svg and pdf need nothing"
-    return ""
-
-
-def _write(path: Path, data: bytes) -> None:
-    """Write the file whole; who looks at it meanwhile sees the one before."""
-    if path.is_symlink() or (path.exists() and not path.is_file()):  # a device, a pipe, or somebody's arrangement
-        path.write_bytes(data)
-        return
-    descriptor, name = tempfile.mkstemp(prefix=".tfcompose-", dir=path.parent)
-    try:
-        with os.fdopen(descriptor, "wb") as stream:
-            stream.write(data)
-        mode = path.stat().st_mode & 0o777 if path.exists() else 0o666 & ~_umask()
-        Path(name).chmod(mode)
-        Path(name).replace(path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+        advice = "pip install 'tfcompose[pictures]'; svg and pdf need nothing"
+        fail(f"PNG needs the package pypdfium2: {advice}", UNREADABLE)
 
 
 def picture(graph: Graph, ending: str) -> bytes:
     """Return the graph as a file with this ending; only what it needs is loaded."""
-    name, drawn = FORMATS[ending]
-    write: Any = getattr(import_module(f"tfcompose.draw.{name}"), name)
-    data: str | bytes = write(import_module("tfcompose.draw.picture").draw(graph) if drawn else graph)
-    return data.encode("utf-8") if isinstance(data, str) else data
+    if ending == ".mmd":
+        from tfcompose.draw.mermaid import mermaid
+
+        return mermaid(graph).encode()
+    if ending in {".dot", ".gv"}:
+        from tfcompose.draw.dot import dot
+
+        return dot(graph).encode()
+    from tfcompose.draw.picture import draw
+
+    drawing = draw(graph)
+    if ending == ".pdf":
+        from tfcompose.draw.pdf import pdf
+
+        return pdf(drawing)
+    if ending == ".png":
+        from tfcompose.draw.png import png
+
+        return png(drawing)
+    from tfcompose.draw.svg import svg
+
+    return svg(drawing).encode()
+
+
+def _published_graph(arguments: Namespace) -> Graph:
+    """Return the published tree as a graph."""
+    from tfcompose.cli.live import observe, observed_topics, read_bag
+    from tfcompose.observe.census import SETTLE_S, Census
+
+    plan, pairs = observed_topics(arguments)
+    censuses = {pair: Census(settle_s=0.0 if arguments.bag else SETTLE_S) for pair in pairs}
+    if arguments.bag:
+        read_bag(arguments.bag, censuses)
+    else:
+        observe("tfcompose_graph", censuses, ros=plan.ros if plan else None, duration_s=arguments.duration)
+    title = arguments.bag or (plan.robot if plan else pairs[0][0])
+    return graph_of_censuses(list(censuses.values()), title, plan, poses=arguments.poses)
+
+
+def graph_of_censuses(
+    censuses: Sequence[Census], title: str, plan: Plan | None = None, *, poses: bool = False
+) -> Graph:
+    """Return what was seen as a graph: second parents and loops as they are, publishers as owners.
+
+    What the plan expects and nobody publishes is said to be missing.
+    """
+    from tfcompose.draw import Arrow, Graph
+
+    edges = [one for census in censuses for one in census.edges(census.end_ns or census.last_ns)]
+    children = {one.strand.child for one in edges}
+    missing = [edge for edge in plan.edges if edge.child not in children] if plan else []
+    arrows = [_arrow(one, poses=poses) for one in edges]
+    arrows += [Arrow(edge.parent, edge.child, edge.kind, edge.node, "missing", "") for edge in missing]
+    return Graph(printable(title), (), tuple(arrows))
+
+
+def _arrow(one: EdgeSeen, *, poses: bool) -> Arrow:
+    from tfcompose.draw import Arrow
+
+    strand = one.strand
+    rate = "" if strand.static or one.timing.rate is None else f"{one.timing.rate:.1f} Hz"
+    owner = printable(one.publisher) or "somebody"
+    below = _pose(strand.pose) if poses else ""
+    kind: Kind = "static" if strand.static else "dynamic"
+    return Arrow(printable(strand.parent), printable(strand.child), kind, owner, rate, below)
+
+
+def _pose(pose: Pose) -> str:
+    from tfcompose.render.tree import short_pose
+
+    length = norm(pose.quat_xyzw)
+    sound = length > 0 and length < float("inf")
+    return short_pose(Pose(pose.xyz, normalised(pose.quat_xyzw))) if sound else "no rotation"

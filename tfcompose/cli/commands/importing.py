@@ -1,4 +1,4 @@
-"""``tfcompose import``: a robot file from what somebody else wrote.
+"""Convert a URDF or xacro file to a robot file.
 
 Write a robot file with the tree, bodies and joints of a URDF or xacro file; building it gives the same URDF. Sensors
 whose frames are a preset's become sensors; what has no place in a robot file is said in comments.
@@ -10,30 +10,16 @@ import os
 import posixpath
 import re
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.compiling import library
-from tfcompose.cli.disk import disk
-from tfcompose.cli.terminal import UNREADABLE, complain, print_findings, read_text, unreadable
-from tfcompose.compile import Compiled, compile_robot
-from tfcompose.emit.spec import robot_name, spec
-from tfcompose.files import Target
-from tfcompose.findings import RejectedError, Span
-from tfcompose.imported import Imported
-from tfcompose.resolve.recognise import recognised
-from tfcompose.resolve.urdf_idle import without_idle_blocks
-from tfcompose.resolve.urdf_lost import angles, lost
-from tfcompose.resolve.urdf_names import with_material_names
-from tfcompose.urdf.lint import read_urdf
-from tfcompose.urdf.packages import Packages
-from tfcompose.urdf.ros2_control import with_hardware
+from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, reject
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from collections.abc import Iterable
 
+    from tfcompose.compile import Compiled
     from tfcompose.findings import Finding
     from tfcompose.urdf.lint import Document
 
@@ -59,56 +45,74 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Import; exit code 0, 1 with errors in the source, 2 after wrong use or where something cannot be read."""
-    try:
-        given, packages = _pairs(arguments.args, ":="), _pairs(arguments.packages, "=")
-    except ValueError as error:
-        complain(str(error))
-        return 2
-    wrong = _refusal(arguments)
-    if wrong:
-        complain(wrong)
-        return 2
+    from dataclasses import replace
+
+    from tfcompose.cli.disk import disk
+    from tfcompose.findings import RejectedError, Span
+    from tfcompose.urdf.lint import read_urdf
+    from tfcompose.urdf.packages import Packages
+
+    given, packages = _pairs(arguments.args, ":="), _pairs(arguments.packages, "=")
+    _check_use(arguments)
     try:
         named = {name: (str(Path(folder).absolute()), Span(folder)) for name, folder in packages.items()}
         files = disk()
         known = Packages(files, named, otherwise="--package {name}=FOLDER, or source the workspace's setup file")
         read = read_urdf(arguments.file, known, files, given)
     except RejectedError as error:
-        print_findings(error.findings, sys.stderr)
-        return UNREADABLE if unreadable(error.findings) else 1
+        reject(error.findings)
     errors = [one for one in read.findings() if one.severity == "error"]
     print_findings(errors, sys.stderr)
     if errors and not arguments.keep_going:
-        complain("nothing was written; --keep-going writes what can be taken")
-        return 1
-    text, failed = _written(read, arguments, known.own | packages)
-    if failed and not arguments.keep_going:
-        print_findings([replace(one, span=None) for one in failed], sys.stderr)  # places in what is not written
-        complain("nothing was written: the source has what a robot file cannot; --keep-going writes it all the same")
-        return 1
-    return _write(text, arguments.output) or int(bool(errors or failed))
+        fail("nothing was written; --keep-going writes what can be taken")
+    text, more_errors = _robot_file(read, arguments, known.own | packages)
+    if more_errors and not arguments.keep_going:
+        print_findings([replace(one, span=None) for one in more_errors], sys.stderr)  # places in what is not written
+        fail("nothing was written: the source has what a robot file cannot; --keep-going writes it all the same")
+    _write(text, arguments.output)
+    return FAILED if errors or more_errors else 0
 
 
 def _pairs(words: list[str], between: str) -> dict[str, str]:
+    """Return words such as NAME:=VALUE, or NAME=VALUE, by name.
+
+    Raises:
+        SystemExit: after saying that one is not such a word.
+    """
     wrong = next((word for word in words if not word.partition(between)[0] or between not in word), None)
     if wrong is not None:
-        raise ValueError(f"{wrong} is not NAME{between}VALUE")
+        fail(f"{wrong} is not NAME{between}VALUE", UNREADABLE)
     return {name: value for name, _, value in (word.partition(between) for word in words)}
 
 
-def _refusal(arguments: Namespace) -> str:
-    """Return what is wrong with how the command is used, or an empty text."""
+def _check_use(arguments: Namespace) -> None:
+    """Refuse names that cannot be, and a file that is there.
+
+    Raises:
+        SystemExit: after saying so.
+    """
     if not arguments.file.endswith((".urdf", ".xacro")):
-        return f"{arguments.file}: a .urdf or .xacro file can be imported"
+        fail(f"{arguments.file}: a .urdf or .xacro file can be imported", UNREADABLE)
     if arguments.robot and not _ROBOT.fullmatch(arguments.robot):
-        return f"--robot {arguments.robot}: lower case letters, digits and _, a letter first"
+        fail(f"--robot {arguments.robot}: lower case letters, digits and _, a letter first", UNREADABLE)
     if arguments.output and Path(arguments.output).exists() and not arguments.force:
-        return f"{arguments.output} is there already; --force writes over it"
-    return ""
+        fail(f"{arguments.output} is there already; --force writes over it", UNREADABLE)
 
 
-def _written(read: Document, arguments: Namespace, packages: dict[str, str]) -> tuple[str, list[Finding]]:
+def _robot_file(read: Document, arguments: Namespace, packages: dict[str, str]) -> tuple[str, list[Finding]]:
     """Return the robot file, and the errors that it has where the source has none."""
+    from dataclasses import replace
+
+    from tfcompose.cli.compiling import library
+    from tfcompose.emit.spec import robot_name, spec
+    from tfcompose.files import Target
+    from tfcompose.imported import Imported
+    from tfcompose.resolve.recognise import recognised
+    from tfcompose.resolve.urdf_idle import without_idle_blocks
+    from tfcompose.resolve.urdf_lost import angles, lost
+    from tfcompose.resolve.urdf_names import with_material_names
+    from tfcompose.urdf.ros2_control import with_hardware
+
     robot, idle = without_idle_blocks(with_hardware(read.robot))
     robot, renamed = with_material_names(robot)
     folder = posixpath.dirname(arguments.output or "") or "."
@@ -141,6 +145,11 @@ def _written(read: Document, arguments: Namespace, packages: dict[str, str]) -> 
 
 
 def _compiled(text: str, output: str | None) -> Compiled:
+    from tfcompose.cli.compiling import library
+    from tfcompose.cli.disk import disk
+    from tfcompose.cli.reading import read_text
+    from tfcompose.compile import compile_robot
+
     return compile_robot(text, output or "robot.yaml", library(), read=read_text, disk=disk())
 
 
@@ -156,14 +165,12 @@ def _faults(compiled: Compiled) -> Iterable[str]:
         yield f"{code}: {found[0].message}{more}"
 
 
-def _write(text: str, output: str | None) -> int:
+def _write(text: str, output: str | None) -> None:
     if output is None:
         sys.stdout.write(text)
-        return 0
+        return
     try:
         Path(output).write_text(text, encoding="utf-8")
     except OSError as error:
-        complain(f"{output} cannot be written: {error.strerror}")
-        return UNREADABLE
-    sys.stdout.write(f"wrote {output}\n")
-    return 0
+        fail(f"{output} cannot be written: {error.strerror}", UNREADABLE)
+    print(f"wrote {output}")

@@ -1,4 +1,4 @@
-"""``tfcompose logs``: what the processes of a robot wrote.
+"""Print the logs of a robot's processes, also after it has ended.
 
 Print the logs, oldest line first, of a robot that runs or has run. They are kept on disk, and turned over when they
 grow. The launcher's own lines are those of tfcompose.
@@ -12,16 +12,8 @@ import time
 from collections import deque
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.console import COLOURS
-from tfcompose.cli.options import counted
-from tfcompose.cli.printable import head_of, width_of
-from tfcompose.cli.reader import is_read
-from tfcompose.cli.running import add_robot, chosen, running
-from tfcompose.cli.terminal import coloured, complain
-from tfcompose.findings import did_you_mean
-from tfcompose.render.text import PLAIN
-from tfcompose.run.launcher.logs import Follower, last_written, logged, read_logs
-from tfcompose.run.place import places
+from tfcompose.cli.options import add_robot, count
+from tfcompose.cli.terminal import PLAIN, coloured, fail, has_reader
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -29,30 +21,30 @@ if TYPE_CHECKING:
 
     from tfcompose.run.place import Place
 
-#: How often the files are looked at with -f, in seconds.
-LOOK_EVERY_S = 0.2
+#: How often the files are read with -f, in seconds.
+READ_EVERY_S = 0.2
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("name", nargs="*", metavar="NAME", help="only these processes; default: all")
     parser.add_argument("-f", "--follow", action="store_true", help="go on with what comes, until the robot ends")
-    parser.add_argument("-n", "--lines", type=counted, metavar="N", help="only the last N lines")
+    parser.add_argument("-n", "--lines", type=count, metavar="N", help="only the last N lines")
     parser.add_argument("-t", "--times", action="store_true", help="print the time before each line")
     add_robot(parser)
 
 
 def run(arguments: Namespace) -> int:
     """Print the logs; exit code 0, 1 where there are none."""
+    from tfcompose.findings import did_you_mean
+    from tfcompose.run.launcher.logs import Follower, logged, read_logs
+
     place = _place(arguments.robot)
-    if isinstance(place, int):
-        return place
     known = logged(place.logs)
     for name in arguments.name:
         if name not in known:
             advice = did_you_mean(name, known, f"there are logs of {', '.join(known)}")
-            complain(f"{place.name} has no log of {name}; {advice}")
-            return 1
+            fail(f"{place.name} has no log of {name}; {advice}")
     names = arguments.name or known
     follower = Follower(place.logs, names)
     printer = _Printer(known, times=arguments.times)
@@ -63,32 +55,40 @@ def run(arguments: Namespace) -> int:
         printer.print(follower.more())
         if ended:
             break
-        if not is_read(sys.stdout):
+        if not has_reader(sys.stdout):
             raise BrokenPipeError
-        time.sleep(LOOK_EVERY_S)
+        time.sleep(READ_EVERY_S)
     return 0
 
 
-def _place(robot: str | None) -> Place | int:
+def _place(robot: str | None) -> Place:
     """Return the robot that runs, or the one that has run last."""
+    from tfcompose.cli.runs import chosen_run, running
+    from tfcompose.run.launcher.logs import last_written
+    from tfcompose.run.place import places
+
     if robot is None and len(alive := running()) == 1:
         return alive[0][0]
     there = [place for place in places(os.environ) if place.logs.is_dir()]
     if robot is None and there and not alive:
         return max(there, key=lambda place: last_written(place.logs))
-    return chosen(robot, among=lambda: there)
+    return chosen_run(robot, among=lambda: there)
 
 
 class _Printer:
     def __init__(self, names: list[str], *, times: bool) -> None:
-        self._width = width_of(names)
+        from tfcompose.cli.console import COLOURS, prefix_of, prefix_width
+
+        width = prefix_width(names)
         colours = COLOURS if coloured(sys.stdout) else ("",)
-        self._colours = {name: colours[index % len(colours)] for index, name in enumerate(names)}
+        ends = PLAIN if coloured(sys.stdout) else ""
+        self._prefixes = {
+            name: f"{colours[index % len(colours)]}{prefix_of(name, width)}{ends}" for index, name in enumerate(names)
+        }
         self._times = times
 
     def print(self, lines: Iterable[tuple[str, str, str]]) -> None:
         for at, name, text in lines:
-            colour = self._colours[name]
             stamp = f"{at} " if self._times else ""
-            sys.stdout.write(f"{colour}{head_of(name, self._width)}{PLAIN if colour else ''} {stamp}{text}\n")
+            sys.stdout.write(f"{self._prefixes[name]} {stamp}{text}\n")
         sys.stdout.flush()

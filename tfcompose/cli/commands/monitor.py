@@ -1,4 +1,4 @@
-"""``tfcompose monitor``: who publishes each edge, how often, how evenly, and how late.
+"""Show who publishes each live edge, how often, how evenly and how late.
 
 Print each edge of the running tree, or of a bag, with its publisher's node, rate, jitter (the standard deviation of the
 time between two messages), longest gap, age of the newest stamp, and delay (arrival minus stamp). Rates, jitter, gaps
@@ -13,15 +13,13 @@ import time
 from functools import partial
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.edge_table import lines_of, objects_of
-from tfcompose.cli.looking import add_bag, add_for, add_namespace, from_bag, from_live, names_of
-from tfcompose.cli.options import positive
-from tfcompose.cli.redrawn import Redrawn, can_redraw
-from tfcompose.cli.terminal import UNREADABLE, complain
-from tfcompose.observe.census import SETTLE_S, Census, topics_below
+from tfcompose.cli.options import add_bag, add_for, add_format, add_namespace, positive
+from tfcompose.cli.terminal import UNREADABLE, LiveLines, can_redraw, fail
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
+
+    from tfcompose.observe.census import Census
 
 #: Of the running tree the last 5 to 10 s are told.
 WINDOW_S = 5.0
@@ -33,48 +31,46 @@ def arguments(parser: ArgumentParser) -> None:
     add_bag(parser)
     add_namespace(parser)
     parser.add_argument("--every", type=positive, default=1.0, metavar="S", help="a table each S seconds; default: 1")
-    parser.add_argument(
-        "--format", choices=("text", "json"), default="text", help="json: one object for each table; default: text"
-    )
+    add_format(parser, text="json: one object for each table; default: text")
 
 
 def run(arguments: Namespace) -> int:
     """Monitor until a signal comes; exit code 1 if no TF came at all, 2 if a bag cannot be read."""
+    from tfcompose.cli.live import observe, read_bag
+    from tfcompose.observe.census import SETTLE_S, Census, topics_below
+
     if arguments.bag and arguments.duration:
-        complain("a recording is read to its end: leave out --for")
-        return UNREADABLE
+        fail("a recording is read to its end: leave out --for", UNREADABLE)
     topics = topics_below(arguments.namespace)
     whole = arguments.bag or arguments.duration
     census = Census(0.0 if whole else WINDOW_S, 0.0 if arguments.bag else SETTLE_S)
     if arguments.bag:
-        code = from_bag(arguments.bag, {topics: census})
-        if code is None:
-            _show(arguments, census, None, census.end_ns)
-        return code or 0
-    redrawn = Redrawn(sys.stdout) if arguments.format == "text" and can_redraw(sys.stdout) else None
-    show = None if arguments.duration and not redrawn else partial(_show, arguments, census, redrawn)
-    code = from_live(
-        "tfcompose_monitor", {topics: census}, duration_s=arguments.duration, every_s=arguments.every, show=show
-    )
-    if code is not None:
-        return code
+        read_bag(arguments.bag, {topics: census})
+        _show(arguments, census, None, census.end_ns)
+        return 0
+    lines = LiveLines(sys.stdout) if arguments.format == "text" and can_redraw(sys.stdout) else None
+    show = None if arguments.duration and not lines else partial(_show, arguments, census, lines)
+    observe("tfcompose_monitor", {topics: census}, duration_s=arguments.duration, every_s=arguments.every, show=show)
     if arguments.duration:
-        _show(arguments, census, redrawn, time.time_ns())
+        _show(arguments, census, lines, time.time_ns())
     return 0
 
 
-def _show(arguments: Namespace, census: Census, redrawn: Redrawn | None, now_ns: int) -> None:
+def _show(arguments: Namespace, census: Census, live: LiveLines | None, now_ns: int) -> None:
+    from tfcompose.cli.edge_table import lines_of, objects_of
+    from tfcompose.cli.live import names_of
+    from tfcompose.observe.census import topics_below
+
     edges = sorted(census.edges(now_ns), key=lambda seen: seen.strand.static)  # what moves first
     if arguments.format == "json":
         sys.stdout.write(objects_of(edges, census, now_ns))
         sys.stdout.flush()
         return
-    width = redrawn.width if redrawn else None
-    lines = lines_of(edges, census, now_ns, width=width)
+    lines = lines_of(edges, census, now_ns, width=live.width if live else None)
     if not census.heard:
         lines = [f"no TF yet on {names_of([topics_below(arguments.namespace)])}"]
-    if redrawn is not None:
-        redrawn.draw(lines)
+    if live is not None:
+        live.draw(lines)
         return
     sys.stdout.write("".join(f"{line}\n" for line in lines))
     sys.stdout.flush()

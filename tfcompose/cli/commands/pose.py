@@ -1,4 +1,4 @@
-"""``tfcompose pose``: the pose of B in A, from the spec alone.
+"""Print the pose of frame B in frame A, from the robot file alone.
 
 Print the pose of B in A from the spec alone. What moves is taken at its nominal pose, a joint at 0.
 """
@@ -9,12 +9,8 @@ import sys
 from functools import reduce
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.between import edges_between
-from tfcompose.cli.compiling import robot_or_code
-from tfcompose.cli.options import add_variant
+from tfcompose.cli.options import add_format, add_frames, add_variant
 from tfcompose.geometry import Pose
-from tfcompose.numbers import clean
-from tfcompose.render.pose import pose_json, pose_text
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -25,29 +21,27 @@ if TYPE_CHECKING:
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("file", metavar="FILE", help="the robot file")
-    parser.add_argument("a", metavar="A", help="the frame in which the pose is given")
-    parser.add_argument("b", metavar="B", help="the frame whose pose it is")
+    add_frames(parser)
     add_variant(parser)
-    parser.add_argument("--format", choices=("text", "json"), default="text", help="default: text")
+    add_format(parser)
 
 
 def run(arguments: Namespace) -> int:
     """Print the pose; exit code 1 if a frame is not there."""
-    robot = robot_or_code(arguments.file, arguments)
-    if isinstance(robot, int):
-        return robot
-    edges = edges_between(robot, arguments.a, arguments.b)
-    if edges is None:
-        return 1
-    pose = clean(_in_top(edges[0]).inverse() @ _in_top(edges[1]))
+    from tfcompose.cli.compiling import compiled_robot, edges_between
+    from tfcompose.numbers import clean
+    from tfcompose.render.pose import pose_json, pose_text
+
+    rising, falling = edges_between(compiled_robot(arguments.file, arguments), arguments.a, arguments.b)
+    pose = clean(_pose_in_top(rising).inverse() @ _pose_in_top(falling))
     if arguments.format == "json":
         sys.stdout.write(pose_json(arguments.a, arguments.b, pose))
     else:
-        sys.stdout.write(pose_text(arguments.a, arguments.b, pose) + _moving([*edges[0], *reversed(edges[1])]))
+        sys.stdout.write(pose_text(arguments.a, arguments.b, pose) + _moving([*rising, *reversed(falling)]))
     return 0
 
 
-def _in_top(chain: list[Edge]) -> Pose:
+def _pose_in_top(chain: list[Edge]) -> Pose:
     """Return the pose of the chain's first frame in its last edge's parent, nominal where it moves."""
     return reduce(lambda pose, edge: edge.pose @ pose, chain, Pose())
 

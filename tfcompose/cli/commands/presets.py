@@ -1,4 +1,4 @@
-"""``tfcompose presets``: the sensors and nodes that are known, and one of them in full.
+"""List the known sensors and nodes, or show one in full.
 
 List the presets of sensors by vendor, and of nodes that publish TF by package; or show one. Of a sensor: its frames
 with their values, which of them its driver publishes and the switch for that, the frame of each message. Of a node:
@@ -9,15 +9,10 @@ from __future__ import annotations
 
 import json
 import sys
-from importlib import import_module
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.cli import node_page as _nodes
-from tfcompose.cli.shelves import library
 from tfcompose.cli.terminal import complain, print_findings
-from tfcompose.findings import RejectedError, did_you_mean
-from tfcompose.resolve.presets import node_preset_names
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -39,13 +34,18 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Print the list or the page; exit code 1 if there is no such preset, or one that is wrong."""
+    from tfcompose.cli import node_page, preset_page
+    from tfcompose.cli.compiling import library
+    from tfcompose.findings import RejectedError
+    from tfcompose.resolve.presets import node_preset_names
+
     known = library().over(arguments.preset_path)
     name = arguments.name
     try:
         if name and known.file(name) and "/_" not in name:
-            return _show(import_module("tfcompose.cli.preset_page").facts(name, known), arguments.format)
+            return _show(preset_page.facts(name, known), arguments.format)
         if name in node_preset_names():
-            return _show(_nodes.facts(name), arguments.format)
+            return _show(node_page.facts(name), arguments.format)
         return _list(name, known, arguments.format)
     except RejectedError as error:
         print_findings(error.findings, sys.stderr)
@@ -53,19 +53,24 @@ def run(arguments: Namespace) -> int:
 
 
 def _show(facts: dict[str, Any], form: str) -> int:
-    page = _nodes if facts["kind"] == "node" else import_module("tfcompose.cli.preset_page")
+    from tfcompose.cli import node_page, preset_page
+
+    page: Any = node_page if facts["kind"] == "node" else preset_page
     sys.stdout.write(json.dumps(facts, indent=2, ensure_ascii=False) + "\n" if form == "json" else page.text(facts))
     return 0
 
 
 def _list(only: str | None, known: Library, form: str) -> int:
+    from tfcompose.cli import node_page
+    from tfcompose.findings import did_you_mean
+
     presets = {name: known.get(name) for name in known.names}
     rows: list[dict[str, str]] = [
         {"name": name, "vendor": preset.vendor, "model": preset.model, "kind": preset.kind, "about": preset.about}
         | _likeness(preset, known)
         for name, preset in presets.items()
     ]
-    rows += _nodes.rows()
+    rows += node_page.rows()
     words = sorted({word for row in rows for word in _words(row)})
     rows = [row for row in rows if not only or only in _words(row)]
     if not rows:

@@ -1,4 +1,4 @@
-"""``tfcompose ps``: the processes of running robots.
+"""List the processes of running robots.
 
 Print each process with its state, number, time, restarts, use of the processor and of memory (proportional, with
 everything in its group), and how many of the edges that it owns are live.
@@ -10,17 +10,13 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.cli.running import add_robot, asked, is_meant, running
-from tfcompose.cli.terminal import UNREADABLE, complain
-from tfcompose.ipc import RobotStatus, StatusRequest
-from tfcompose.plan.codec import encode
-from tfcompose.run.launcher.usage import usage_of
-from tfcompose.run.place import PlaceError
+from tfcompose.cli.options import add_format, add_robot
+from tfcompose.cli.terminal import FAILED, UNREADABLE, fail
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.ipc import ProcessStatus
+    from tfcompose.ipc import ProcessStatus, RobotStatus
 
     #: (cores, bytes) by process number.
     Usage = dict[int, tuple[float, int]]
@@ -33,45 +29,47 @@ HEAD = ("PROCESS", "STATE", "PID", "UPTIME", "RESTARTS", "CPU", "MEMORY", "EDGES
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     add_robot(parser)
-    parser.add_argument("--format", choices=("text", "json"), default="text", help="default: text")
+    add_format(parser)
 
 
 def run(arguments: Namespace) -> int:
     """Print the table; exit code 0, 1 where no robot runs."""
-    try:
-        robots, code = _robots(arguments.robot)
-    except PlaceError as error:
-        complain(str(error))
-        return UNREADABLE
+    from tfcompose.run.launcher.usage import usage_of
+
+    robots, code = _robots(arguments.robot)
     used = usage_of([process.pid for status in robots.values() for process in status.processes if process.pid])
     if arguments.format == "json":
-        sys.stdout.write(json.dumps([_as_json(name, status, used) for name, status in robots.items()], indent=1) + "\n")
-        return code if robots else 1
+        print(json.dumps([_as_json(name, status, used) for name, status in robots.items()], indent=1))
+        return code if robots else FAILED
     if not robots and not code:
-        complain("no robot is running" if arguments.robot is None else f"{arguments.robot} is not running")
-        return 1
+        fail("no robot is running" if arguments.robot is None else f"{arguments.robot} is not running")
     for name, status in robots.items():
         state = "stopping" if status.stopping else "tree complete" if status.complete else "tree not complete"
         failed = [process.name for process in status.processes if process.failed]
         state += f", without {', '.join(failed)}" if failed else ""
-        sys.stdout.write(f"{name}: {state}, launcher {status.launcher}, since {_time(status.uptime)}\n")
-        _table([_row(process, used) for process in status.processes])
+        print(f"{name}: {state}, launcher {status.launcher}, since {_time(status.uptime)}")
+        _print_table([HEAD, *(_row(process, used) for process in status.processes)])
     return code
 
 
 def _robots(name: str | None) -> tuple[dict[str, RobotStatus], int]:
     """Return those that answer, by their names, and the exit code: 1 after saying who does not."""
-    found, code = {}, 0
-    for place, _ in running():
-        answer = asked(place, StatusRequest(), RobotStatus) if is_meant(place, name) else 0
-        if isinstance(answer, int):
-            code = code or answer
-        else:
-            found[place.name] = answer
-    return found, code
+    from tfcompose.cli.runs import is_meant, request, running
+    from tfcompose.ipc import RobotStatus, StatusRequest
+    from tfcompose.run.place import PlaceError
+
+    try:
+        places = [place for place, _ in running() if is_meant(place, name)]
+    except PlaceError as error:
+        fail(str(error), UNREADABLE)
+    answers = {place.name: request(place, StatusRequest(), RobotStatus) for place in places}
+    found = {name: status for name, status in answers.items() if status is not None}
+    return found, 0 if len(found) == len(answers) else FAILED
 
 
 def _as_json(name: str, status: RobotStatus, used: Usage) -> dict[str, Any]:
+    from tfcompose.plan.codec import encode
+
     data: dict[str, Any] = {"name": name} | encode(status)
     for process in data["processes"]:
         cpu, memory = used.get(process["pid"], (None, None))
@@ -106,9 +104,9 @@ def _state(process: ProcessStatus) -> str:
     return f"{state}{why}{', failed' if process.failed and state != 'fatal' else ''}"
 
 
-def _table(rows: list[tuple[str, ...]]) -> None:
-    widths = [max(map(len, column)) for column in zip(HEAD, *rows, strict=True)]
-    for row in (HEAD, *rows):
+def _print_table(rows: list[tuple[str, ...]]) -> None:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
         line = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
         sys.stdout.write(f"  {line.rstrip()}\n")
 

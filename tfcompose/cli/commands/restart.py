@@ -1,4 +1,4 @@
-"""``tfcompose restart``: restart one process of a running robot.
+"""Restart processes of a running robot.
 
 Stop one process as the plan says, and start it again. The others go on.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.running import add_robot, ask_of_each
+from tfcompose.cli.options import add_processes
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -15,10 +15,11 @@ if TYPE_CHECKING:
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("name", nargs="+", metavar="NAME", help="the process; tfcompose ps lists them")
-    add_robot(parser)
+    add_processes(parser)
 
 
 def run(arguments: Namespace) -> int:
     """Ask the launcher; exit code 0, 1 where it refuses or none runs, 2 where several robots run and none is named."""
-    return ask_of_each(arguments, "restart", "restarting")
+    from tfcompose.cli.runs import control_processes
+
+    return control_processes(arguments, "restart", "restarting")

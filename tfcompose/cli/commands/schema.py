@@ -1,4 +1,4 @@
-"""``tfcompose schema``: the language as JSON Schema, or as a reference for people.
+"""Print the language as JSON Schema, or as a reference.
 
 Print the JSON Schema that editors and CI use: of robot files, of presets of sensors and nodes, or of plan.json. With
 --reference print every key of the language as Markdown instead.
@@ -10,11 +10,7 @@ import json
 import sys
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.shelves import library
-from tfcompose.language.json_schema import json_schema
-from tfcompose.language.reference import reference
-from tfcompose.plan.schema import plan_schema
-from tfcompose.resolve.presets import node_preset_names
+from tfcompose.cli.terminal import UNREADABLE, fail
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -34,8 +30,9 @@ def run(arguments: Namespace) -> int:
         sys.stdout.write(schema_text(arguments.language))
         return 0
     if arguments.language == "plan":
-        sys.stderr.write("tfcompose schema: plan.json is written by build, and has a schema only\n")
-        return 2
+        fail("plan.json has a schema only; build writes it", UNREADABLE)
+    from tfcompose.language.reference import reference
+
     sys.stdout.write(reference(arguments.language))
     return 0
 
@@ -47,7 +44,13 @@ def schema_text(language: str) -> str:
 
 def _schema(language: str) -> dict[str, object]:
     if language == "plan":
+        from tfcompose.plan.schema import plan_schema
+
         return plan_schema()
+    from tfcompose.cli.compiling import library
+    from tfcompose.language.json_schema import json_schema
+    from tfcompose.resolve.presets import node_preset_names
+
     known = library()
     presets = {name: known.get(name) for name in known.names}
     return json_schema(language, presets, node_preset_names())

@@ -1,4 +1,4 @@
-"""``tfcompose stop``: stop one process of a running robot.
+"""Stop processes of a running robot.
 
 Stop one process as the plan says; it stays stopped until it is started. The others go on, and the guard does
 not miss its edges.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.running import add_robot, ask_of_each
+from tfcompose.cli.options import add_processes
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -16,10 +16,11 @@ if TYPE_CHECKING:
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("name", nargs="+", metavar="NAME", help="the process; tfcompose ps lists them")
-    add_robot(parser)
+    add_processes(parser)
 
 
 def run(arguments: Namespace) -> int:
     """Ask the launcher; exit code 0, 1 where it refuses or none runs, 2 where several robots run and none is named."""
-    return ask_of_each(arguments, "stop", "stopping")
+    from tfcompose.cli.runs import control_processes
+
+    return control_processes(arguments, "stop", "stopping")

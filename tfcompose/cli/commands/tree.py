@@ -1,4 +1,4 @@
-"""``tfcompose tree``: the tree of a robot file, on the terminal, or the one that is published.
+"""Print the tree with kinds, owners and poses, or as it is published.
 
 Print the tree: each frame with the kind, owner, rate and pose of its edge. With --live or --bag it is the published
 one: each frame with the kind, the publishing node, rate and age of the newest stamp; with FILE the owner, and what is
@@ -7,16 +7,22 @@ expected, unexpected or missing. Trees that do not hang together are shown one a
 
 from __future__ import annotations
 
+import json
 import sys
-from importlib import import_module
-from typing import TYPE_CHECKING
+import time
+from typing import TYPE_CHECKING, Any
 
-from tfcompose.cli.compiling import robot_or_code
-from tfcompose.cli.options import DEFAULT_FILE, add_variant, namespace, positive
-from tfcompose.render.tree import tree
+from tfcompose.cli.options import DEFAULT_FILE, add_bag, add_for, add_format, add_namespace, add_variant
+from tfcompose.cli.terminal import printable
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
+
+    from tfcompose.model import Robot
+    from tfcompose.observe.forest import Branch, Tree
+    from tfcompose.plan import Plan, PlanEdge
+
+    Topics = tuple[str, str]
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -24,27 +30,172 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument("file", nargs="?", metavar="FILE", help="default: robot.yaml; with --live or --bag: none")
     add_variant(parser)
     parser.add_argument("--live", action="store_true", help="the tree that is published now")
-    parser.add_argument("--bag", metavar="BAG", help="the tree of a recording: a rosbag2 folder, .mcap or .db3")
-    parser.add_argument(
-        "--for", dest="duration", type=positive, default=3.0, metavar="S", help="look so long; default: 3"
-    )
-    parser.add_argument(
-        "--namespace", type=namespace, default="", metavar="NS", help="/NS/tf and /NS/tf_static instead, without FILE"
-    )
-    parser.add_argument("--format", choices=("text", "json"), default="text", help="default: text")
+    add_bag(parser, "the tree of a recording")
+    add_for(parser, "look so long; default: 3", 3.0)
+    add_namespace(parser, "/NS/tf and /NS/tf_static instead, without FILE")
+    add_format(parser)
 
 
 def run(arguments: Namespace) -> int:
-    """Print the tree; exit code as for build."""
+    """Print the tree; exit code as for build; of a published one 1 if there is none, 2 if a bag cannot be read."""
     if arguments.live or arguments.bag:
-        code: int = import_module("tfcompose.cli.live_tree").live_tree(arguments)
-        return code
-    robot = robot_or_code(arguments.file or DEFAULT_FILE, arguments)
-    if isinstance(robot, int):
-        return robot
-    final = robot.with_final_names()
-    if arguments.format == "json":
-        sys.stdout.write(import_module("tfcompose.cli.tree_json").planned_json(final))
+        _print_published(arguments)
         return 0
-    sys.stdout.write(tree(final))
+    from tfcompose.cli.compiling import compiled_robot
+    from tfcompose.render.tree import tree
+
+    robot = compiled_robot(arguments.file or DEFAULT_FILE, arguments).with_final_names()
+    sys.stdout.write(_planned_json(robot) if arguments.format == "json" else tree(robot))
     return 0
+
+
+def _planned_json(robot: Robot) -> str:
+    """Return one line of JSON, in the shape of --live: the trees with their roots, and what the robot says of edges."""
+    from tfcompose.emit.plan import plan_of
+    from tfcompose.observe.forest import forest
+
+    trees = [
+        _tree_object(tree, [_planned_edge(branch.planned) for branch in tree.branches if branch.planned is not None])
+        for tree in forest((), {edge.child: edge for edge in plan_of(robot).edges})
+    ]
+    return json.dumps({"robot": robot.name, "trees": trees}, ensure_ascii=False) + "\n"
+
+
+def _tree_object(tree: Tree, edges: list[dict[str, Any]]) -> dict[str, Any]:
+    return {"root": None if tree.loop else tree.branches[0].frame, "loop": list(tree.loop), "edges": edges}
+
+
+def _planned_edge(edge: PlanEdge) -> dict[str, Any]:
+    return {
+        "parent": edge.parent,
+        "child": edge.child,
+        "kind": edge.kind,
+        "owner": edge.owner,
+        "node": edge.node,
+        "rate": edge.rate,
+        "xyz": list(edge.pose.xyz),
+        "quat_xyzw": list(edge.pose.quat_xyzw),
+    }
+
+
+def _print_published(arguments: Namespace) -> None:
+    from tfcompose.cli.live import observe, observed_topics, read_bag
+    from tfcompose.observe.census import SETTLE_S, Census
+    from tfcompose.observe.forest import forest
+    from tfcompose.ros.topics import parts_of
+
+    plan, pairs = observed_topics(arguments)
+    parts = parts_of(plan) if plan else {}
+    censuses = {pair: Census(settle_s=0.0 if arguments.bag else SETTLE_S) for pair in pairs}
+    if arguments.bag:
+        read_bag(arguments.bag, censuses)
+    else:
+        observe("tfcompose_tree", censuses, ros=plan.ros if plan else None, duration_s=arguments.duration)
+    for pair, census in censuses.items():
+        now_ns = census.end_ns if arguments.bag else time.time_ns()
+        planned = {edge.child: edge for edge in parts[pair].edges} if pair in parts else None
+        trees = forest(census.edges(now_ns), planned)
+        if arguments.format == "json":
+            sys.stdout.write(_published_json(pair, trees, plan=plan))
+        else:
+            heading = f"on {pair[0]} and {pair[1]}:\n" if len(pairs) > 1 else ""
+            sys.stdout.write(heading + _drawn(trees, plan=plan))
+
+
+def _drawn(trees: list[Tree], *, plan: Plan | None) -> str:
+    rows = [[_row(branch, plan=plan) for branch in tree.branches] for tree in trees]
+    widths = [max((len(row[column]) for some in rows for row in some), default=0) for column in range(5)]
+    parts = []
+    if len(trees) > 1:
+        parts.append(f"{len(trees)} trees that do not hang together:\n\n")
+    for tree, some in zip(trees, rows, strict=True):
+        if tree.loop:
+            parts.append(f"a loop, in which tf2 finds no way: {printable(' → '.join(tree.loop))}\n")
+        parts += [_line(row, widths) for row in some]
+        parts.append("\n")
+    return "".join(parts[:-1])
+
+
+def _line(row: tuple[str, ...], widths: list[int]) -> str:
+    cells = [
+        f"{cell:>{width}}" if column in {3, 4} else f"{cell:<{width}}"
+        for column, (cell, width) in enumerate(zip(row, widths, strict=False))
+    ]
+    return "  ".join([*cells, row[5]]).rstrip() + "\n"
+
+
+def _row(branch: Branch, *, plan: Plan | None) -> tuple[str, ...]:
+    """Return the columns: frame, kind, node, rate, age, and what there is to say."""
+    from tfcompose.cli.edge_table import duration
+
+    name = branch.indent + printable(branch.frame)
+    if not branch.seen:
+        planned = branch.planned
+        if planned is None:
+            return (name, "", "", "", "", "")
+        return (name, planned.kind, "", "", "", f"missing: owner {planned.owner} ({planned.node})")
+    one = branch.seen[0]
+    others = [
+        f"also {printable(other.name)} from {printable(other.publisher) or 'somebody'}" for other in branch.seen[1:]
+    ]
+    remarks = [_status(branch, plan)] if plan else []
+    rate = "" if one.strand.static else f"{one.timing.rate:.1f} Hz" if one.timing.rate is not None else "–"
+    age = "" if one.data_age_s is None else duration(one.data_age_s)
+    kind = "static" if one.strand.static else "dynamic"
+    return (name, kind, printable(_owner(branch, plan)) or "–", rate, age, "; ".join([*remarks, *others]))
+
+
+def _owner(branch: Branch, plan: Plan | None) -> str:
+    """Return who publishes the frame: the owner with its node where it is the owner, else the node."""
+    from tfcompose.verdict.offence import may_be_owners, relays_of
+
+    planned, one = branch.planned, branch.seen[0]
+    if plan is None or planned is None or not may_be_owners(planned, one.nodes, relays_of(plan)):
+        return one.publisher
+    through = "" if planned.node in one.nodes else "through "
+    return f"{planned.owner} ({through}{one.publisher})"
+
+
+def _status(branch: Branch, plan: Plan) -> str:
+    from tfcompose.verdict.offence import code_of, may_be_owners, relays_of
+
+    planned, one = branch.planned, branch.seen[0] if branch.seen else None
+    if one is None:
+        return "missing"
+    if planned is None:
+        allowed = plan.may_be_undeclared(one.strand.parent, one.strand.child)
+        return "allowed" if allowed else "unexpected"
+    owner = not one.nodes or may_be_owners(planned, one.nodes, relays_of(plan))
+    code = code_of(planned, one.strand.parent, static=one.strand.static, owner=owner, sure=len(one.nodes) < 2)  # noqa: PLR2004 (one, or a recording)
+    match code:
+        case "TF802":
+            return f"expected in {planned.parent}"
+        case "TF801":
+            return f"expected from {planned.node}"
+        case "TF809":
+            return f"expected on {plan.process(planned.owner).topics[planned.kind == 'static']}"
+        case _:
+            return "expected"
+
+
+def _published_json(pair: Topics, trees: list[Tree], *, plan: Plan | None) -> str:
+    data = {
+        "topics": list(pair),
+        "trees": [
+            _tree_object(tree, [_edge_object(branch, plan) for branch in tree.branches if branch.parent is not None])
+            for tree in trees
+        ],
+    }
+    return json.dumps(data, ensure_ascii=False) + "\n"
+
+
+def _edge_object(branch: Branch, plan: Plan | None) -> dict[str, Any]:
+    from tfcompose.cli.edge_table import object_of
+
+    status = {"status": _status(branch, plan), "owner": branch.planned and branch.planned.owner} if plan else {}
+    return {
+        "parent": branch.parent,
+        "child": branch.frame,
+        **status,
+        "seen": [object_of(one) for one in branch.seen],
+    }

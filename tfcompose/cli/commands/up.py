@@ -1,4 +1,4 @@
-"""``tfcompose up``: a robot, or a built plan, as running processes.
+"""Start a robot, or a built plan, and guard its TF tree.
 
 Build a robot and start it, or start a built plan. It prints which edges are live, owned by whom, and when the tree is
 complete. Ctrl-C, SIGTERM and SIGHUP end everything. An edge that somebody publishes already is refused, with that
@@ -7,11 +7,9 @@ node's name. Where the robot runs already, a changed plan is followed: only what
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import DEFAULT_FILE, add_variant, not_negative, positive
-from tfcompose.cli.terminal import UNREADABLE, complain
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -55,10 +53,14 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Start the plan and return the exit code: 0 after a clean end, 1 after a failure or a finding, 2 unreadable."""
-    is_plan = arguments.file.endswith(".json")
-    if is_plan and (arguments.profiles or arguments.overlays or arguments.settings or arguments.output):
-        complain("a built plan takes no --profile, --overlay, --set and --output: those are for building it")
-        return UNREADABLE
-    part, name = ("dry_run", "dry_run") if arguments.dry_run else ("starting", "start")
-    code: int = getattr(import_module(f"tfcompose.cli.{part}"), name)(arguments)
-    return code
+    from tfcompose.cli.plans import is_plan, refuse_variant
+
+    if is_plan(arguments.file):
+        refuse_variant(arguments, "output")
+    if arguments.dry_run:
+        from tfcompose.cli.dry_run import dry_run
+
+        return dry_run(arguments)
+    from tfcompose.cli.starting import start
+
+    return start(arguments)

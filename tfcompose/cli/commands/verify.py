@@ -1,4 +1,4 @@
-"""``tfcompose verify``: what a robot file says, against what is published.
+"""Compare a robot file with what is published, live or in a bag.
 
 Compare each edge of FILE (a robot, or a built plan.json) with the running tree, or with a bag: missing, not declared,
 under another parent, with another value, on the wrong topic, silent, too slow, from another publisher. Exit code 0 if
@@ -13,23 +13,17 @@ import re
 import sys
 import time
 from argparse import ArgumentTypeError
-from importlib import import_module
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.expected import BOTH, expected
-from tfcompose.cli.looking import add_bag, add_for, from_bag, from_live
-from tfcompose.cli.options import add_file, add_variant
-from tfcompose.cli.terminal import complain, print_findings
-from tfcompose.observe.census import SETTLE_S, Census
-from tfcompose.observe.verify import summary, verify
-from tfcompose.ros.topics import parts_of
-from tfcompose.verdict.offset import DEFAULT_TOLERANCE, Offset
+from tfcompose.cli.options import add_bag, add_file, add_for, add_format, add_variant
+from tfcompose.cli.terminal import print_findings
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
     from tfcompose.observe.verify import Verdict
     from tfcompose.plan import Plan
+    from tfcompose.verdict.offset import Offset
 
 _UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "deg": math.pi / 180, "rad": 1.0}
 _ANGLES = frozenset({"deg", "rad"})
@@ -44,10 +38,10 @@ def arguments(parser: ArgumentParser) -> None:
     add_bag(parser)
     add_for(parser, "look at the running tree for S seconds; default: 5", 5.0)
     parser.add_argument(
-        "--tolerance", type=tolerance, default=DEFAULT_TOLERANCE, metavar="T",
+        "--tolerance", type=tolerance, default="1mm,0.1deg", metavar="T",
         help="how far a pose may be off: 2mm, 0.5deg, or both as 2mm,0.5deg; default: 1mm,0.1deg",
     )  # fmt: skip
-    parser.add_argument("--format", choices=("text", "json", "junit"), default="text", help="default: text")
+    add_format(parser, "json", "junit")
     parser.add_argument(
         "--fail-on", choices=("error", "warning"), default="error", help="exit code 1 from there on; default: error"
     )
@@ -55,43 +49,45 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Verify; exit code 0 if all is as expected, 1 if not, 2 if something cannot be read."""
-    if arguments.live and arguments.bag:
-        complain(BOTH)
-        return 2
-    known = expected(arguments.file, arguments)
-    if isinstance(known, int):
-        return known
-    plan, places = known
+    from tfcompose.cli.live import observe, read_bag, refuse_live_bag
+    from tfcompose.cli.plans import expected_plan
+    from tfcompose.observe.census import SETTLE_S, Census
+    from tfcompose.observe.verify import verify
+    from tfcompose.ros.topics import parts_of
+
+    refuse_live_bag(arguments)
+    plan, places = expected_plan(arguments.file, arguments)
     censuses = {topics: Census(settle_s=0.0 if arguments.bag else SETTLE_S) for topics in parts_of(plan)}
     # Programs are told of each edge that it is missing; a robot without edges misses none.
     may_be_silent = arguments.format != "text" or not plan.edges
     begun = time.monotonic()
     if arguments.bag:
-        code = from_bag(arguments.bag, censuses, may_be_silent=may_be_silent)
+        read_bag(arguments.bag, censuses, may_be_silent=may_be_silent)
     else:
-        code = from_live(
-            "tfcompose_verify", censuses, ros=plan.ros, duration_s=arguments.duration, may_be_silent=may_be_silent
-        )
-    if code is not None:
-        return code
+        observe("tfcompose_verify", censuses, ros=plan.ros, duration_s=arguments.duration, may_be_silent=may_be_silent)
     seconds = time.monotonic() - begun
     now_ns = max(census.end_ns for census in censuses.values()) if arguments.bag else time.time_ns()
-    return _told(arguments, plan, verify(plan, censuses, now_ns, arguments.tolerance, places), seconds)
+    return _report(arguments, plan, verify(plan, censuses, now_ns, arguments.tolerance, places), seconds)
 
 
-def _told(arguments: Namespace, plan: Plan, verdicts: list[Verdict], seconds: float) -> int:
+def _report(arguments: Namespace, plan: Plan, verdicts: list[Verdict], seconds: float) -> int:
+    """Print the verdicts and return the exit code."""
     failing = frozenset({"error"} if arguments.fail_on == "error" else {"error", "warning"})
     found = [one for verdict in verdicts for one in verdict.found]
     if arguments.format == "junit":
-        render = import_module("tfcompose.render.junit").render_junit
+        from tfcompose.render.junit import render_junit
+
         cases = [(verdict.owner or "undeclared", verdict.edge, verdict.found) for verdict in verdicts]
-        sys.stdout.write(render(plan.robot, cases, failing=failing, seconds=seconds))
+        sys.stdout.write(render_junit(plan.robot, cases, failing=failing, seconds=seconds))
     elif arguments.format == "json":
-        sys.stdout.write(import_module("tfcompose.render.json").render_json(found))
+        from tfcompose.render.json import render_json
+
+        sys.stdout.write(render_json(found))
     else:
+        from tfcompose.observe.verify import summary
+
         print_findings(found, sys.stdout)
-        where = arguments.bag or "the running tree"
-        sys.stdout.write(f"{plan.robot}: {summary(verdicts)}, in {where}\n")
+        print(f"{plan.robot}: {summary(verdicts)}, in {arguments.bag or 'the running tree'}")
     return int(any(one.severity in failing for one in found))
 
 
@@ -101,6 +97,8 @@ def tolerance(text: str) -> Offset:
     Raises:
         ArgumentTypeError: if it is neither.
     """
+    from tfcompose.verdict.offset import DEFAULT_TOLERANCE, Offset
+
     given: dict[bool, float] = {}
     for part in text.split(","):
         match = _QUANTITY.fullmatch(part.strip())

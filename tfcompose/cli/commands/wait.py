@@ -1,4 +1,4 @@
-"""``tfcompose wait``: wait until a running robot has ended.
+"""Wait until a running robot has ended, or is ready.
 
 Wait until the robot has ended, and return its exit code; --ready waits until every process is ready and every edge
 live instead, and says what is missing when the time is over.
@@ -8,16 +8,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.missing import until_ready
-from tfcompose.cli.options import positive
-from tfcompose.cli.running import add_robot, chosen, events
-from tfcompose.cli.terminal import complain
-from tfcompose.ipc import Ended
+from tfcompose.cli.options import add_robot, positive
+from tfcompose.cli.terminal import FAILED, complain
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-
-    from tfcompose.run.place import Place
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -29,23 +24,20 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Wait; exit code of the robot, or 0 when it is ready; 1 when the time is over or none runs."""
-    place = chosen(arguments.robot)
-    if isinstance(place, int):
-        return place
+    from tfcompose.cli.runs import chosen_run, notices, wait_until_ready
+    from tfcompose.ipc import Ended
+
+    place = chosen_run(arguments.robot)
     if arguments.ready:
-        return until_ready(place, arguments.timeout)
+        return wait_until_ready(place, arguments.timeout)
     try:
-        return _ended(place, arguments.timeout)
+        for notice, _ in notices(place, arguments.timeout):
+            if isinstance(notice, Ended):
+                return notice.exit_code
     except TimeoutError:
         complain(f"{place.name} still runs after {arguments.timeout:g} s")
     except OSError as error:
         complain(f"{place.name} does not answer: {error}")
-    return 1
-
-
-def _ended(place: Place, timeout_s: float | None) -> int:
-    for notice, _ in events(place, timeout_s):
-        if isinstance(notice, Ended):
-            return notice.exit_code
-    complain(f"{place.name} was killed")
-    return 1
+    else:
+        complain(f"{place.name} was killed")
+    return FAILED

@@ -10,7 +10,7 @@ import pytest
 
 from tests.support.plans import compiled_plan
 from tests.support.robots import ROVER
-from tfcompose.cli.keeping import kept
+from tfcompose.cli.plans import copy_plan
 from tfcompose.run.place import Place, place_of
 
 
@@ -32,9 +32,8 @@ def test_the_loser_copies_again_what_the_winner_takes_for_an_earlier_runs(
         return written(file, data)
 
     monkeypatch.setattr(Path, "write_bytes", late)
-    copy = kept(plan, tmp_path / "plan.json", place, alone=False)
+    copy = copy_plan(plan, tmp_path / "plan.json", place, alone=False)
     assert removed
-    assert isinstance(copy, Path)
     assert copy.read_text("utf-8")
 
 
@@ -42,8 +41,7 @@ def test_a_copy_is_never_half_written_and_stays_while_its_plan_is_the_one(
     place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan, written = compiled_plan(ROVER), Path.write_bytes
-    copy = kept(plan, tmp_path / "plan.json", place, alone=False)
-    assert isinstance(copy, Path)
+    copy = copy_plan(plan, tmp_path / "plan.json", place, alone=False)
     whole = copy.read_bytes()
     seen: list[bytes] = []
 
@@ -52,9 +50,10 @@ def test_a_copy_is_never_half_written_and_stays_while_its_plan_is_the_one(
         seen.append(copy.read_bytes())
         return written(file, data)
 
-    monkeypatch.setattr(Path, "write_bytes", slow)
-    assert kept(plan, tmp_path / "plan.json", place, alone=True) == copy
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_bytes", slow)
+        assert copy_plan(plan, tmp_path / "plan.json", place, alone=True) == copy
     assert seen == [whole]
     assert [file.name for file in copy.parent.iterdir()] == ["plan.json"]
-    assert kept(compiled_plan(ROVER.replace("lidar", "lamp")), tmp_path / "plan.json", place, alone=True) != copy
+    assert copy_plan(compiled_plan(ROVER.replace("lidar", "lamp")), tmp_path / "plan.json", place, alone=True) != copy
     assert not copy.exists()

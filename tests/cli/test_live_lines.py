@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tfcompose.cli.redrawn import Redrawn, can_redraw
+from tfcompose.cli.terminal import LiveLines, can_redraw
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -53,15 +53,15 @@ def terminal() -> Iterator[Terminal]:
 
 
 def test_each_drawing_replaces_the_last_one_and_what_was_below_it_goes(terminal: Terminal) -> None:
-    redrawn = Redrawn(terminal.stream)
-    redrawn.draw(["one", "two", "three"])
+    lines = LiveLines(terminal.stream)
+    lines.draw(["one", "two", "three"])
     assert terminal.shown() == "one\033[K\ntwo\033[K\nthree\033[K\n\033[J"
-    redrawn.draw(["four"])
+    lines.draw(["four"])
     assert terminal.shown() == "\r\033[3Afour\033[K\n\033[J"
 
 
 def test_no_line_is_longer_than_the_terminal_and_there_are_no_more_than_it_shows(terminal: Terminal) -> None:
-    Redrawn(terminal.stream).draw(["x" * 100, *map(str, range(50))])
+    LiveLines(terminal.stream).draw(["x" * 100, *map(str, range(50))])
     lines = terminal.shown().replace("\033[K", "").split("\n")
     assert lines[0] == "x" * 38 + "…"
     assert lines[8] == "… 43 more; a larger window shows them, "[:38] + "…"
@@ -70,11 +70,11 @@ def test_no_line_is_longer_than_the_terminal_and_there_are_no_more_than_it_shows
 
 def test_after_the_window_shrank_the_screen_is_drawn_anew(terminal: Terminal) -> None:
     """Lines that were drawn have wrapped, so that nobody knows how many there are."""
-    redrawn = Redrawn(terminal.stream)
-    redrawn.draw(["x" * 30])
+    lines = LiveLines(terminal.stream)
+    lines.draw(["x" * 30])
     terminal.shown()
     terminal.resize(20, 10)
-    redrawn.draw(["y" * 30])
+    lines.draw(["y" * 30])
     assert terminal.shown() == "\033[H\033[2J" + "y" * 18 + "…\033[K\n\033[J"
 
 

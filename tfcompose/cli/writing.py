@@ -1,4 +1,4 @@
-"""Writing a build: every file whole, and all of them or none."""
+"""Files that are written whole or not at all: one, or all of a build."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import contextlib
 import errno
 import json
 import os
-from importlib import import_module
+import shutil
+import stat
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,8 +18,44 @@ if TYPE_CHECKING:
     from tfcompose.files import File
 
 
+def replace_file(path: Path, data: bytes) -> None:
+    """Write the file, whole or not at all; who reads it meanwhile sees the one before, whose mode and owner stay.
+
+    A device, a pipe or a symbolic link is written through.
+
+    Raises:
+        OSError: if it cannot be written; it is as it was.
+    """
+    before = path.stat() if path.exists() else None
+    if path.is_symlink() or (before and not stat.S_ISREG(before.st_mode)):
+        path.write_bytes(data)
+        return
+    descriptor, name = tempfile.mkstemp(prefix=".tfcompose-", dir=path.parent)
+    new = Path(name)
+    try:
+        with os.fdopen(descriptor, "wb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())
+            if before:
+                with contextlib.suppress(PermissionError):  # another's file, in a folder of ours
+                    os.fchown(stream.fileno(), before.st_uid, before.st_gid)
+            os.fchmod(stream.fileno(), stat.S_IMODE(before.st_mode) if before else 0o666 & ~_umask())
+        new.replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            new.unlink()
+        raise
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
 def write_all(folder: Path, files: Sequence[File]) -> None:
-    """Write the files below ``folder``; a reader sees each file as it was or as it is, never half.
+    """Write the files of a build below ``folder``; a reader sees each as it was or as it is, never half.
 
     All of them are written to a folder beside first. Only when the last byte is on the disk are they moved into place,
     which needs no more space; if one cannot be moved, those before it are put back. Parameter files of an earlier build
@@ -30,14 +68,13 @@ def write_all(folder: Path, files: Sequence[File]) -> None:
     before, now = _parameter_files(folder), {file.path for file in files}
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        staging = folder / f".tfcompose-{os.urandom(6).hex()}"  # tempfile and shutil cost more than what they do here
-        staging.mkdir(mode=0o700)
+        staging = Path(tempfile.mkdtemp(prefix=".tfcompose-", dir=folder))
         try:
             for file in files:
-                _write(staging / "new" / file.path, file.text)
+                _write_to_disk(staging / "new" / file.path, file.text)
             _move(staging, folder, [file.path for file in files])
         finally:
-            _remove(staging)
+            shutil.rmtree(staging, ignore_errors=True)
     except OSError:
         for parent in made:
             _remove_if_empty(parent)
@@ -57,7 +94,7 @@ def _move(staging: Path, folder: Path, paths: list[str]) -> None:
             target.parent.mkdir(parents=True, exist_ok=True)
             if target.exists():
                 old.parent.mkdir(parents=True, exist_ok=True)
-                _keep(target, old)
+                _back_up(target, old)
         for path in paths:
             (staging / "new" / path).replace(folder / path)
             done.append(path)
@@ -69,22 +106,13 @@ def _move(staging: Path, folder: Path, paths: list[str]) -> None:
         raise
 
 
-def _keep(target: Path, old: Path) -> None:
+def _back_up(target: Path, old: Path) -> None:
     """Keep the file under another name: what takes its place does not change it. A copy where that cannot be."""
     with contextlib.suppress(OSError):
         if not target.is_symlink():
             os.link(target, old)
             return
-    import_module("shutil").copy2(target, old)
-
-
-def _remove(top: Path) -> None:
-    """Remove a folder with all that is in it, as far as that can be done."""
-    for folder, _, files in os.walk(top, topdown=False):
-        for name in files:
-            with contextlib.suppress(OSError):
-                (Path(folder) / name).unlink()
-        _remove_if_empty(Path(folder))
+    shutil.copy2(target, old)
 
 
 def _put_back(old: Path, target: Path) -> None:
@@ -100,12 +128,12 @@ def _remove_if_empty(folder: Path) -> None:
         folder.rmdir()
 
 
-def _write(path: Path, text: str) -> None:
+def _write_to_disk(path: Path, text: str) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
+    with path.open("w", encoding="utf-8", newline="\n") as stream:
+        stream.write(text)
+        stream.flush()
+        os.fsync(stream.fileno())
 
 
 def _parameter_files(folder: Path) -> list[str]:

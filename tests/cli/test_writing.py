@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.support import processes
-from tfcompose.cli.output import write_all
+from tfcompose.cli.writing import write_all
 from tfcompose.files import File
 
 ROBOTS = Path(__file__).parents[2] / "robots"

@@ -5,14 +5,12 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-from importlib import import_module
+import traceback
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.console import Console
-from tfcompose.cli.keeping import left_behind
-from tfcompose.cli.missing import say_missing
-from tfcompose.cli.running import events
-from tfcompose.cli.terminal import coloured, complain
+from tfcompose.cli.runs import complain_of_leftovers, notices, print_missing
+from tfcompose.cli.terminal import FAILED, INTERRUPTED, coloured, complain
 from tfcompose.ipc import AllReady, AllStarted, Ended
 from tfcompose.run.launcher.logs import Logs
 from tfcompose.run.launcher.supervisor import supervise
@@ -27,18 +25,17 @@ if TYPE_CHECKING:
 
 def detach(plan: Plan, place: Place, lock: Lock, session: Session, arguments: Namespace) -> int:
     """Start the launcher as a process of its own; return 0 when all is started, or ready; 1 when it is not."""
-    for line in left_behind(place, session.run_id):
-        complain(line)
+    complain_of_leftovers(place, session.run_id)
     sys.stdout.flush()
     sys.stderr.flush()
     pid = os.fork()
     if pid == 0:
-        code = 1
+        code = FAILED
         try:
             lock.signed()
-            code = _launcher(plan, place, session, arguments.duration)
+            code = _launch(plan, place, session, arguments.duration)
         except BaseException:  # noqa: BLE001 (nobody further out says what it was)
-            import_module("traceback").print_exc()
+            traceback.print_exc()
         finally:
             sys.stderr.flush()
             os._exit(code)
@@ -47,7 +44,7 @@ def detach(plan: Plan, place: Place, lock: Lock, session: Session, arguments: Na
     return _follow(plan, place, pid, arguments)
 
 
-def _launcher(plan: Plan, place: Place, session: Session, duration_s: float | None) -> int:
+def _launch(plan: Plan, place: Place, session: Session, duration_s: float | None) -> int:
     """Run as a process without a terminal; what Python itself says goes beside the logs."""
     os.setsid()
     nowhere = said = os.open(os.devnull, os.O_RDWR)
@@ -71,36 +68,31 @@ class _Nowhere:
         """Do nothing: the logs have it."""
 
 
-class _Here:
+class _StandardOutput:
     def write(self, text: str, *, log: bool = False) -> None:
-        """Write to standard output."""
+        """Write at once."""
         del log
         sys.stdout.write(text)
         sys.stdout.flush()
 
 
 def _follow(plan: Plan, place: Place, pid: int, arguments: Namespace) -> int:
-    console = Console(plan, _Here(), colour=coloured(sys.stdout))
+    console = Console(plan, _StandardOutput(), colour=coloured(sys.stdout))
     goal = AllReady if arguments.wait else AllStarted
     with contextlib.suppress(OSError):
         try:
-            for notice, _ in events(place, arguments.timeout if arguments.wait else None):
+            for notice, _ in notices(place, arguments.timeout if arguments.wait else None):
                 console(notice)
                 if isinstance(notice, Ended):
-                    return _ended(pid)
+                    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
                 if isinstance(notice, goal):
-                    sys.stdout.write(f"{place.name} runs in the background: pid {pid}; tfcompose ps, logs -f, down\n")
+                    print(f"{place.name} runs in the background: pid {pid}; tfcompose ps, logs -f, down")
                     return 0
         except TimeoutError:
-            say_missing(place, arguments.timeout)
-            return 1
+            print_missing(place, arguments.timeout)
+            return FAILED
         except KeyboardInterrupt:
             complain(f"{place.name} goes on in the background: pid {pid}; tfcompose down ends it")
-            return 130
+            return INTERRUPTED
     complain(f"the launcher has ended: {place.logs / 'launcher.err'} may say why")
-    return 1
-
-
-def _ended(pid: int) -> int:
-    """Return the exit code of the launcher, which has ended."""
-    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+    return FAILED

@@ -1,0 +1,156 @@
+"""What the commands share that observe a running tree, or read a recording: the topics, and what can be in the way."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, TypeVar
+
+from tfcompose.cli.plans import expected_plan
+from tfcompose.cli.terminal import INTERRUPTED, UNREADABLE, complain, fail, reject
+from tfcompose.findings import Note, finding
+from tfcompose.observe.bag import missing_rosbags, take_bag
+from tfcompose.observe.bag_files import BagError
+from tfcompose.observe.census import topics_below
+from tfcompose.observe.elsewhere import advice, said
+from tfcompose.plan import RosSettings
+from tfcompose.ros.environment import RosError, child_environment, ros_trouble
+from tfcompose.ros.stop import Stop
+from tfcompose.ros.topics import parts_of
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+
+    from tfcompose.observe.census import Census
+    from tfcompose.plan import Plan
+
+    Topics = tuple[str, str]
+
+T = TypeVar("T")
+
+#: Publishers that were there before are found within this time, or almost always.
+SURE_S = 2.0
+
+
+def refuse_live_bag(arguments: Namespace) -> None:
+    """Refuse --live together with --bag.
+
+    Raises:
+        SystemExit: after saying so.
+    """
+    if arguments.live and arguments.bag:
+        fail("--live looks at the running tree and --bag at a recording: give one of them", UNREADABLE)
+
+
+def observed_topics(arguments: Namespace) -> tuple[Plan | None, list[Topics]]:
+    """Return the plan of FILE, if one is given, and the topics (moving, fixed) to observe: its own, or --namespace's.
+
+    Raises:
+        SystemExit: after saying what cannot be read, or cannot be asked for together.
+    """
+    refuse_live_bag(arguments)
+    if arguments.file is None:
+        return None, [topics_below(arguments.namespace)]
+    plan, _ = expected_plan(arguments.file, arguments)
+    return plan, list(parts_of(plan)) or [topics_below(plan.ros.namespace)]
+
+
+def read_bag(path: str, censuses: Mapping[Topics, Census], *, may_be_silent: bool = False) -> None:
+    """Put a bag into the censuses of these topics (moving, fixed).
+
+    Raises:
+        SystemExit: after saying why not: nothing came is a reason, unless it ``may_be_silent``.
+    """
+    from_bag(lambda: take_bag(path, censuses))
+    if not may_be_silent and not any(census.heard for census in censuses.values()):
+        message = f"no message was recorded on {names_of(censuses)} in {path}"
+        help_ = "was the robot running? /tf_static comes once: who records it must ask for durability transient_local"
+        reject([finding("TF811", message, None, help=help_)])
+
+
+def from_bag(read: Callable[[], T]) -> T:
+    """Return what is read from a bag.
+
+    Raises:
+        SystemExit: after saying why it cannot be.
+    """
+    missing = missing_rosbags()
+    if missing:
+        message, _, help_ = missing.partition(": ")
+        reject([finding("TF906", message, None, help=help_)])
+    try:
+        return read()
+    except BagError as error:
+        reject([finding("TF907", str(error), None, help=error.help)], UNREADABLE)
+
+
+def observe(  # noqa: PLR0913 (all but two are named)
+    name: str,
+    censuses: Mapping[Topics, Census],
+    *,
+    ros: RosSettings | None = None,
+    duration_s: float | None,
+    every_s: float = 1.0,
+    show: Callable[[int], None] | None = None,
+    may_be_silent: bool = False,
+) -> None:
+    """Fill the censuses from the running system, until the time is over or a signal comes.
+
+    ``show`` is called as by ``watch``.
+
+    Raises:
+        SystemExit: after saying why not: nothing came is a reason, unless it ``may_be_silent``.
+    """
+    set_up_ros(ros)
+    from tfcompose.observe.watching import watch  # rclpy reads the environment when it is loaded
+
+    with Stop() as stop:
+        try:
+            seconds, elsewhere = watch(name, censuses, stop, duration_s=duration_s, every_s=every_s, show=show)
+        except RosError as error:
+            reject([finding("TF901", str(error), None)])
+        heard = any(census.heard for census in censuses.values())
+        if stop.requested:
+            check_early_end(seconds, duration_s, heard=heard)
+    if not heard and not may_be_silent:
+        _reject_silence(list(censuses), seconds, elsewhere)
+
+
+def set_up_ros(ros: RosSettings | None = None) -> None:
+    """Set this process up as the plan says.
+
+    Raises:
+        SystemExit: after saying why ROS cannot be started so.
+    """
+    os.environ.update(child_environment(os.environ, ros or RosSettings(), own=True))
+    trouble = ros_trouble(os.environ)
+    if trouble:
+        reject([trouble])
+
+
+def check_early_end(seconds: float, duration_s: float | None, *, heard: bool) -> None:
+    """Say that a signal ended an observation before all publishers can be found.
+
+    ``duration_s`` is how long it was to last, None: until the signal.
+
+    Raises:
+        SystemExit: if it saw nothing.
+    """
+    if seconds >= min(SURE_S, duration_s or SURE_S):
+        return
+    if not heard:
+        fail(f"ended by a signal after {seconds:.1f} s, before anything came", INTERRUPTED)
+    if duration_s is not None:
+        complain(f"looked for {seconds:.1f} s only, in which not every publisher is found")
+
+
+def _reject_silence(topics: Sequence[Topics], seconds: float, elsewhere: Sequence[str]) -> None:
+    """Say that there was no TF at all."""
+    message = f"no TF message came on {names_of(topics)} for {seconds:.1f} s"
+    notes = [Note(f"looked with {said(os.environ)}")]
+    reject([finding("TF811", message, None, notes=notes, help=advice(elsewhere))])
+
+
+def names_of(topics: Iterable[Topics]) -> str:
+    """Return the topics as people read them."""
+    return " and ".join(topic for pair in topics for topic in pair)

@@ -1,0 +1,155 @@
+"""Plans: read from a built file, compiled from a robot file, and the copy that a run is made from."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.reading import read_text
+from tfcompose.cli.terminal import UNREADABLE, fail, reject
+from tfcompose.findings import RejectedError
+from tfcompose.ipc import SETTLE
+from tfcompose.plan import Plan
+from tfcompose.plan.file import read_plan, write_plan
+from tfcompose.run.hosts import share_of
+from tfcompose.run.publishing.addresses import with_whole_addresses
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+    from tfcompose.findings import Span
+    from tfcompose.run.place import Place
+
+PLAN = "plan.json"
+
+
+def is_plan(file: str) -> bool:
+    """Return whether the file that a command was given is a built plan; else it is a robot file."""
+    return file.endswith(".json")
+
+
+def built_plan(file: Path) -> Plan:
+    """Return the plan in the file.
+
+    Raises:
+        SystemExit: after saying what is wrong with it.
+    """
+    try:
+        return read_plan(read_text(str(file)), str(file))
+    except RejectedError as error:
+        reject(error.findings)
+
+
+def refuse_variant(arguments: Namespace, *more: str) -> None:
+    """Refuse --profile, --overlay and --set, and further options, with a plan that is built already.
+
+    Raises:
+        SystemExit: after saying so.
+    """
+    if arguments.profiles or arguments.overlays or arguments.settings or any(getattr(arguments, one) for one in more):
+        *options, last = ["--profile", "--overlay", "--set", *(f"--{one}" for one in more)]
+        fail(f"a built plan takes no {', '.join(options)} and {last}: those are for building it", UNREADABLE)
+
+
+def expected_plan(file: str, arguments: Namespace) -> tuple[Plan, dict[str, Span]]:
+    """Return the plan of a robot file, a plan.json or a folder with one, and where edges are in the robot's file.
+
+    Places are by child; a built plan has none.
+
+    Raises:
+        SystemExit: after saying what cannot be read, or is wrong.
+    """
+    path = Path(file)
+    if path.is_dir() and (path / PLAN).is_file():
+        path /= PLAN
+    if is_plan(path.name):
+        refuse_variant(arguments)
+        return built_plan(path), {}
+    from tfcompose.cli.compiling import compiled_robot
+    from tfcompose.emit.plan import plan_of
+
+    robot = compiled_robot(file, arguments).with_final_names()
+    return plan_of(robot), {edge.child: edge.at for edge in robot.edges}
+
+
+def plan_to_start(plan: Plan, arguments: Namespace) -> Plan:
+    """Return this machine's share of the plan, with what the command line says about the guard.
+
+    Raises:
+        SystemExit: after saying that there is no such share.
+    """
+    if arguments.guard:
+        plan = replace(plan, guard=replace(plan.guard, mode=arguments.guard))
+    plan = host_share(plan, arguments.host, os.uname().nodename)
+    if arguments.settle is None:
+        return plan
+    env = {SETTLE: str(arguments.settle)}
+    processes = tuple(
+        replace(process, env=process.env | env) if process.kind == "guard" else process for process in plan.processes
+    )
+    return replace(plan, processes=processes)
+
+
+def host_share(plan: Plan, host: str | None, here: str) -> Plan:
+    """Return the share of the host that is named, or of ``here``.
+
+    Raises:
+        SystemExit: after saying that there is none.
+    """
+    share = share_of(plan, host, here)
+    if not isinstance(share, Plan):
+        reject([share])
+    return share
+
+
+def copy_plan(plan: Plan, file: Path, place: Place, *, alone: bool) -> Path:
+    """Copy the plan, and what stands beside it, to where the run is; return the copy.
+
+    A build then does not reach into a run. Meshes stay where they are: descriptions address them from the copy too.
+    ``alone`` removes the copies of earlier runs.
+
+    Raises:
+        SystemExit: after saying that it cannot be copied.
+    """
+    parts = {PLAN: write_plan(plan).encode()}
+    descriptions = {plan.description, *(one.description for one in plan.processes if one.description is not None)}
+    try:
+        for name in (*descriptions, *(process.params_file for process in plan.processes)):
+            if name is not None and (file.parent / name).is_file():
+                parts[name] = (file.parent / name).read_bytes()
+        for name in descriptions & parts.keys():
+            parts[name] = _with_whole_addresses(parts[name], (file.parent / name).parent)
+        digest = hashlib.sha256(repr(sorted(parts.items())).encode()).hexdigest()[:16]
+        folder = place.folder / f"plan-{digest}"
+        if alone:
+            for old in set(place.folder.glob("plan-*")) - {folder}:
+                shutil.rmtree(old, ignore_errors=True)
+        try:
+            _write_copy(parts, folder)
+        except FileNotFoundError:  # who has won the race for the run removed it as an earlier one's
+            _write_copy(parts, folder)
+    except OSError as error:
+        fail(f"the plan cannot be copied to {place.folder}: {error.strerror}", UNREADABLE)
+    return folder / PLAN
+
+
+def _write_copy(parts: dict[str, bytes], folder: Path) -> None:
+    """Write the files, each at once: another ``up`` may write the same, and the run's processes read them."""
+    for name, data in parts.items():
+        file = folder / name
+        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        new = file.with_name(f".{file.name}.{os.getpid()}")
+        new.write_bytes(data)
+        new.replace(file)
+
+
+def _with_whole_addresses(urdf: bytes, folder: Path) -> bytes:
+    """Return a description with whole addresses; bytes that are no text stay, for their reader to refuse."""
+    try:
+        return with_whole_addresses(urdf.decode("utf-8"), folder).encode()
+    except UnicodeDecodeError:
+        return urdf

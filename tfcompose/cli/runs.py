@@ -1,0 +1,205 @@
+"""Running robots: which one is meant, what its launcher is asked, and what it reports."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from typing import TYPE_CHECKING, TypeVar
+
+from tfcompose.cli.terminal import FAILED, UNREADABLE, complain, fail, listed, wait_for_data
+from tfcompose.ipc import (
+    REQUESTS,
+    Done,
+    EventsRequest,
+    ProcessRequest,
+    RobotStatus,
+    StatusRequest,
+    read_notice,
+)
+from tfcompose.run.launcher.control import RefusedError, ask, connect
+from tfcompose.run.launcher.leftovers import leftovers, variables_of
+from tfcompose.run.place import PlaceError, places
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Callable, Iterator
+    from typing import TextIO
+
+    from tfcompose.ipc import Notice, ProcessStatus, Request, Verb
+    from tfcompose.run.place import Holder, Place
+
+A = TypeVar("A")
+
+NAMED_AT_MOST = 12
+ASK_EVERY_S = 0.1
+
+
+def running() -> list[tuple[Place, Holder]]:
+    """Return the robots that run, and who runs each.
+
+    Raises:
+        PlaceError: if there is no folder that only this user can open.
+    """
+    found = [(place, place.holder()) for place in places(os.environ)]
+    return [(place, holder) for place, holder in found if holder]
+
+
+def is_meant(place: Place, name: str | None) -> bool:
+    """Return whether this name means the robot: its own, one without the domain, or without a host's name too."""
+    share = place.name.rpartition("@")[0]
+    return name is None or name in {place.name, share, share.partition(".")[0]}
+
+
+def chosen_run(name: str | None, *, among: Callable[[], list[Place]] | None = None) -> Place:
+    """Return the place of the robot that is meant: of those that run, or ``among`` others.
+
+    Raises:
+        SystemExit: after saying that there is none, or which there are.
+    """
+    try:
+        known = among() if among else [place for place, _ in running()]
+    except PlaceError as error:
+        fail(str(error), UNREADABLE)
+    what = "robot has run here" if among else "robot is running"
+    found = [place for place in known if is_meant(place, name)]
+    if not known:
+        fail(f"no {what}")
+    if not found:
+        fail(f"no {what} by the name {name}: there is {', '.join(place.name for place in known)}")
+    if len(found) > 1:
+        names = ", ".join(place.name for place in found)
+        fail(f"several robots are there: {names}; choose one with --robot", UNREADABLE)
+    return found[0]
+
+
+def request(place: Place, question: Request, answer: type[A]) -> A | None:
+    """Return the launcher's answer, or None after saying why there is none, or that it refuses."""
+    try:
+        return ask(place, question, answer)
+    except RefusedError as error:
+        complain(str(error))
+    except OSError as error:
+        complain(f"{place.name} does not answer: {error}")
+    return None
+
+
+def control_processes(arguments: Namespace, verb: Verb, doing: str) -> int:
+    """Have the launcher do it with each of the named processes; return the exit code."""
+    place = chosen_run(arguments.robot)
+    code = 0
+    for name in arguments.name:
+        answer = request(place, ProcessRequest(verb, name), Done)
+        if answer is None:
+            code = FAILED
+            continue
+        later = f", and waits for {answer.waits}" if answer.waits else ""
+        print(f"{name}: {doing}{later}")
+    return code
+
+
+def notices(
+    place: Place, timeout_s: float | None = None, for_whom: TextIO | None = None
+) -> Iterator[tuple[Notice, float]]:
+    """Yield what the launcher has reported and reports, with when, until it ends.
+
+    ``for_whom`` is where this is written: when nobody reads there any more, it is over, also while nothing comes.
+
+    Raises:
+        OSError: if it cannot be heard; TimeoutError if the time is over; BrokenPipeError if nobody reads.
+    """
+    end = None if timeout_s is None else time.monotonic() + timeout_s
+    with connect(place) as connection:
+        connection.sendall(REQUESTS.line(EventsRequest()).encode())
+        rest = b""
+        while True:
+            left = None if end is None else end - time.monotonic()
+            if left is not None and left <= 0:
+                raise TimeoutError
+            connection.settimeout(left)
+            if for_whom and not wait_for_data(connection, for_whom):
+                raise BrokenPipeError
+            data = connection.recv(64 * 1024)
+            if not data:
+                return
+            *lines, rest = (rest + data).split(b"\n")
+            for line in lines:
+                yield read_notice(line)
+
+
+def wait_until_ready(place: Place, timeout_s: float | None) -> int:
+    """Wait until every process is ready and every edge live; 0 then, and 1 after saying why that did not come."""
+    end = None if timeout_s is None else time.monotonic() + timeout_s
+    while True:
+        try:
+            status = ask(place, StatusRequest(), RobotStatus)
+        except OSError:
+            complain(f"{place.name} has ended; tfcompose logs says why")
+            return FAILED
+        if status.ready:
+            return 0
+        if timeout_s is not None and end is not None and time.monotonic() >= end:
+            print_missing(place, timeout_s)
+            return FAILED
+        time.sleep(ASK_EVERY_S)
+
+
+def print_missing(place: Place, timeout_s: float) -> None:
+    """Complain about each process that is not ready, and each edge that is not live."""
+    try:
+        status = ask(place, StatusRequest(), RobotStatus)
+    except OSError as error:
+        complain(f"{place.name} does not answer: {error}")
+        return
+    missing = status.missing
+    complain(f"{place.name} is not ready after {timeout_s:g} s; it goes on: tfcompose logs, tfcompose down")
+    for process in status.processes:
+        if process.failed:
+            complain(f"  failed: {process.name} ({process.state.lower()}, {process.detail})")
+        elif not process.ready and process.state != "EXITED":
+            complain(f"  not ready: {process.name} ({_why_not_ready(process)})")
+    if missing:
+        complain(f"  not live: {listed(missing, NAMED_AT_MOST)}")
+
+
+def _why_not_ready(process: ProcessStatus) -> str:
+    """Return what it waits for before its start; else its state, what it is without, and what is seen there."""
+    if process.state == "STOPPED" and process.waits:
+        return process.waits
+    parts = [process.state.lower()]
+    if process.edges:
+        parts.append(f"{process.live} of {process.edges} edges live")
+    elif process.waits:
+        parts.append(process.waits)
+    if process.seen:
+        parts.append(f"seen instead: {process.seen}")
+    return ", ".join(parts)
+
+
+def since(holder: Holder) -> str:
+    """Return since when, in local time: 14:03:27, with the date if that is not today."""
+    at, today = time.localtime(holder.since), time.localtime()
+    form = "%H:%M:%S" if at[:3] == today[:3] else "%Y-%m-%d %H:%M:%S"
+    return time.strftime(form, at)
+
+
+def hidden_run(place: Place) -> str | None:
+    """Return what there is to say if the robot runs already, where this runtime folder does not show it."""
+    led = [one for one in leftovers(f"{place.name}:") if one.launcher not in (None, os.getpid())]
+    if not led or led[0].launcher is None:
+        return None
+    with contextlib.suppress(OSError):
+        folder = variables_of(led[0].launcher).get("XDG_RUNTIME_DIR")
+        where = f"XDG_RUNTIME_DIR={folder}" if folder else "no XDG_RUNTIME_DIR"
+        return f"{place.name} runs already: pid {led[0].launcher}, with {where}; ps and down find it there"
+    return None
+
+
+def complain_of_leftovers(place: Place, run_id: str) -> None:
+    """Complain about processes of earlier runs that are still there."""
+    found = [one for one in leftovers(f"{place.name}:") if one.run != run_id and one.launcher is None]
+    for one in found:
+        complain(f"an earlier run left {one.pid} behind: {one.command}")
+    if found:
+        them = "it" if len(found) == 1 else "them"
+        complain(f"tfcompose down --leftovers --robot {place.name} stops {them}")

@@ -168,15 +168,13 @@ def test_up_on_a_running_robot_restarts_what_changed_and_says_what_listeners_kee
 def _change(tfc: Callable[..., Any], tmp_path: Path) -> None:
     same = tfc("up")
     assert same.returncode == 1
-    assert "rover@" in same.stderr
-    assert "runs already: pid " in same.stderr
-    assert "tfcompose down ends it" in same.stderr
+    assert re.search(rf"rover@.* pid {launcher_of(tmp_path)}, .*tfcompose down", same.stderr)
     assert tfc("up", "-d").returncode == 0
     (tmp_path / "robot.yaml").write_text(ROVER.replace("lidar:", "laser:"))
     changed = tfc("up", "--wait")
     assert changed.returncode == 0, changed.stderr
     assert "restarted: static, guard" in changed.stdout
-    assert "listeners that run keep base_link → lidar" in changed.stdout
+    assert "base_link → lidar" in changed.stdout, "what running listeners keep"
 
 
 def test_a_robot_whose_folder_was_removed_goes_on_and_refuses_what_cannot_be_started_there(
@@ -214,7 +212,7 @@ sys.exit(main(["up", "-d"]))
     up = processes.run([sys.executable, "-c", code])
     assert up.returncode == 1
     (said,) = (tmp_path / "log").rglob("launcher.err")
-    assert f"{said} may say why" in up.stderr
+    assert str(said) in up.stderr
     assert "ZeroDivisionError: of a launcher" in said.read_text()
 
 
@@ -227,7 +225,7 @@ def test_of_two_that_start_at_the_same_moment_one_wins_and_the_other_says_who() 
     loser, winner = sorted(both, key=lambda one: one.poll() is None)
     output, errors = loser.communicate()
     assert loser.returncode == 1, output + errors
-    assert f"runs already: pid {winner.pid}, since " in errors
+    assert f" pid {winner.pid}, since " in errors
     assert "started" not in output
     assert winner.stdout
     assert any("tree complete" in line for line in winner.stdout)
@@ -245,7 +243,7 @@ def test_a_run_with_another_runtime_folder_is_found_and_is_nobodys_leftover(
         elsewhere.setenv("XDG_RUNTIME_DIR", str(tmp_path / "other"))
         second = tfc("up", "--for", "3")
         assert (second.returncode, second.stdout) == (1, "")
-        assert f"runs already: pid {launcher_of(tmp_path)}, with XDG_RUNTIME_DIR={tmp_path}/runtime" in second.stderr
+        assert f" pid {launcher_of(tmp_path)}, with XDG_RUNTIME_DIR={tmp_path}/runtime" in second.stderr
         down = tfc("down", "--leftovers")
         assert (down.returncode, down.stdout) == (0, "0 processes of earlier runs stopped\n")
     assert {process["state"] for process in ps(tfc).values()} == {"RUNNING"}

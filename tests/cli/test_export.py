@@ -72,7 +72,7 @@ def test_a_strict_plan_is_exported_where_a_guard_runs_and_every_owner_can_be_fen
     robot: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["export", "compose", *STRICT]) == 0
-    assert "not as tfcompose up: the fence is one of remappings" in capsys.readouterr().out
+    assert ": the fence is one of remappings" in capsys.readouterr().out
     file = robot / "robot.yaml"
     text = file.read_text("utf-8").replace("run: [slam, --now]", "run: slam | tee log, shell: true")
     file.write_text(text, "utf-8")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -49,20 +50,14 @@ def test_poses_are_written_where_they_are_asked_for(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        (
-            "tree.jpg",
-            "tfcompose: .jpg is no kind of picture that graph writes; -o takes a file that ends in svg, pdf, ",
-        ),
-        ("tree", "tfcompose: tree has no ending; -o takes a file that ends in svg, pdf, png, dot or mmd\n"),
-        ("no/folder/tree.svg", "tfcompose: no/folder/tree.svg cannot be written: there is no folder no/folder\n"),
-    ],
+    ("name", "named"),
+    [("tree.jpg", {".jpg", *BEGIN}), ("tree", {"tree", *BEGIN}), ("no/folder/tree.svg", {"no/folder"})],
 )
-def test_what_cannot_be_written_is_said_in_one_sentence(name: str, said: str, tmp_path: Path) -> None:
+def test_what_cannot_be_written_is_refused_in_one_line(name: str, named: set[str], tmp_path: Path) -> None:
     done = graph(ROBOT, "-o", name, cwd=tmp_path)
     assert done.returncode == 2
-    assert done.stderr.startswith(said)
+    assert done.stderr.count("\n") == 1
+    assert named <= set(re.split(r"[ ,;:\n]+", done.stderr))
     assert not list(tmp_path.iterdir())
 
 

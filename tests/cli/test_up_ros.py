@@ -381,4 +381,4 @@ def test_what_is_missing_is_named_once_with_the_profile_that_needs_none_of_it(up
     assert robot.ends() == 1
     assert robot.text.startswith("error[TF810] 2 executables were not found: no_drive of drive, no_more of more\n")
     assert robot.text.count("looked in the PATH") == 1
-    assert robot.text.endswith("help: without them: tfcompose up rover.yaml --profile demo\n")
+    assert robot.text.endswith(": tfcompose up rover.yaml --profile demo\n")

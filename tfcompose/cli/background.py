@@ -45,15 +45,15 @@ def detach(plan: Plan, place: Place, lock: Lock, session: Session, arguments: Na
 
 
 def _launch(plan: Plan, place: Place, session: Session, duration_s: float | None) -> int:
-    """Run as a process without a terminal; what Python itself says goes beside the logs."""
+    """Run as a process without a terminal; Python's own errors go to a file next to the logs."""
     os.setsid()
-    nowhere = said = os.open(os.devnull, os.O_RDWR)
+    nowhere = errors = os.open(os.devnull, os.O_RDWR)
     with contextlib.suppress(OSError):  # a full disk stops no robot
         place.logs.mkdir(parents=True, exist_ok=True)
-        said = os.open(place.logs / "launcher.err", os.O_CREAT | os.O_WRONLY | os.O_TRUNC, 0o640)
-    for fd, to in ((0, nowhere), (1, said), (2, said)):
+        errors = os.open(place.logs / "launcher.err", os.O_CREAT | os.O_WRONLY | os.O_TRUNC, 0o640)
+    for fd, to in ((0, nowhere), (1, errors), (2, errors)):
         os.dup2(to, fd)
-    for fd in {nowhere, said}:
+    for fd in {nowhere, errors}:
         os.close(fd)
     logs = Logs(place.logs)
     console = Console(plan, _Nowhere(), colour=False, keep=logs.write)
@@ -86,13 +86,13 @@ def _follow(plan: Plan, place: Place, pid: int, arguments: Namespace) -> int:
                 if isinstance(notice, Ended):
                     return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
                 if isinstance(notice, goal):
-                    print(f"{place.name} runs in the background: pid {pid}; tfcompose ps, logs -f, down")
+                    print(f"{place.name} runs in the background: pid {pid}; see tfcompose ps, logs -f and down")
                     return 0
         except TimeoutError:
             print_missing(place, arguments.timeout)
             return FAILED
         except KeyboardInterrupt:
-            complain(f"{place.name} goes on in the background: pid {pid}; tfcompose down ends it")
+            complain(f"{place.name} keeps running in the background: pid {pid}; tfcompose down stops it")
             return INTERRUPTED
-    complain(f"the launcher has ended: {place.logs / 'launcher.err'} may say why")
+    complain(f"the launcher has ended; see {place.logs / 'launcher.err'}")
     return FAILED

@@ -77,6 +77,6 @@ def _differences(robot: Robot, files: Iterable[File], target: Target) -> list[Fi
 def _without_address(asset: Asset, form: Form) -> Finding:
     """Return the finding that a file cannot be addressed as the command line asks for."""
     if form != "package":
-        return finding("TF724", f"{asset.uri} was not found, and has no path", asset.at, help="build without --mesh")
+        return finding("TF724", f"{asset.uri} was not found and has no path", asset.at, help="build without --mesh")
     advice = "a folder with a package.xml above it, packages: {name: FOLDER} and package://name/…, or no --mesh"
     return finding("TF726", f"{asset.uri} is in no package", asset.at, help=advice)

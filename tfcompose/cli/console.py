@@ -73,7 +73,7 @@ class Output(Protocol):
 class Console:
     """Writes notices as lines: ``name | text``, coloured on a terminal.
 
-    ``keep`` is given each line without colours, and what it returns is said; ``status`` is kept below the lines.
+    ``keep`` gets each line without colours, and may return a complaint to print; ``status`` stays below the lines.
     """
 
     def __init__(
@@ -165,8 +165,8 @@ class Console:
     @_write.register
     def _(self, notice: Replanned) -> None:
         parts = (("changed", notice.changed), ("new", notice.added), ("gone", notice.removed))
-        said = "; ".join(f"{word}: {', '.join(names)}" for word, names in parts if names)
-        self._say(f"another plan: {said or 'nothing to restart'}")
+        changes = "; ".join(f"{word}: {', '.join(names)}" for word, names in parts if names)
+        self._say(f"another plan: {changes or 'nothing to restart'}")
         if notice.held:
             self._say(self._paint(vanished(notice.held), YELLOW))
 
@@ -222,7 +222,7 @@ class Console:
 def vanished(edges: tuple[str, ...]) -> str:
     """Return what is to be said of fixed edges that vanished."""
     named = listed(edges, NAMED_AT_MOST)
-    return f"listeners that run keep {named}: tf2 forgets no fixed frame; restart RViz and whoever looks them up"
+    return f"running listeners keep {named}: tf2 never forgets a fixed frame; restart RViz and other listeners"
 
 
 def _start_table(notice: AllReady) -> list[str]:

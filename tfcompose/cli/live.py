@@ -39,7 +39,7 @@ def refuse_live_bag(arguments: Namespace) -> None:
         SystemExit: after saying so.
     """
     if arguments.live and arguments.bag:
-        fail("--live looks at the running tree and --bag at a recording: give one of them", UNREADABLE)
+        fail("--live uses the running tree and --bag a recording: give one of them", UNREADABLE)
 
 
 def observed_topics(arguments: Namespace) -> tuple[Plan | None, list[Topics]]:
@@ -64,7 +64,7 @@ def read_bag(path: str, censuses: Mapping[Topics, Census], *, may_be_silent: boo
     from_bag(lambda: take_bag(path, censuses))
     if not may_be_silent and not any(census.heard for census in censuses.values()):
         message = f"no message was recorded on {names_of(censuses)} in {path}"
-        help_ = "was the robot running? /tf_static comes once: who records it must ask for durability transient_local"
+        help_ = "was the robot running? /tf_static is sent once: record it with durability transient_local"
         reject([finding("TF811", message, None, help=help_)])
 
 
@@ -139,9 +139,9 @@ def check_early_end(seconds: float, duration_s: float | None, *, heard: bool) ->
     if seconds >= min(SURE_S, duration_s or SURE_S):
         return
     if not heard:
-        fail(f"ended by a signal after {seconds:.1f} s, before anything came", INTERRUPTED)
+        fail(f"ended by a signal after {seconds:.1f} s, before any message came", INTERRUPTED)
     if duration_s is not None:
-        complain(f"looked for {seconds:.1f} s only, in which not every publisher is found")
+        complain(f"listened for only {seconds:.1f} s, too short to find every publisher")
 
 
 def _reject_silence(topics: Sequence[Topics], seconds: float, elsewhere: Sequence[str]) -> None:

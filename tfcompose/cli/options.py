@@ -18,18 +18,18 @@ def add_file(parser: ArgumentParser) -> None:
     parser.add_argument("file", nargs="?", default=DEFAULT_FILE, metavar="FILE", help="default: robot.yaml")
 
 
-def add_variant(parser: ArgumentParser, text: str = "lay this profile over the file") -> None:
-    """Add what is laid over a robot file: --profile, then --overlay, then --set; each repeatable."""
+def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> None:
+    """Add what is merged over a robot file: --profile, then --overlay, then --set; each repeatable."""
     parser.add_argument(
         "-p", "--profile", action="append", default=[], metavar="NAME", dest="profiles", help=f"{text}; repeatable"
     )
     parser.add_argument(
         "-f", "--overlay", action="append", default=[], metavar="FILE", dest="overlays",
-        help="lay this file over it, after the profiles; repeatable",
+        help="merge this file over it, after the profiles; repeatable",
     )  # fmt: skip
     parser.add_argument(
         "--set", action="append", default=[], metavar="PATH=VALUE", dest="settings",
-        help="set one value, last of all: sensors.camera.tf=driver; repeatable",
+        help="set one value, applied last: sensors.camera.tf=driver; repeatable",
     )  # fmt: skip
 
 
@@ -41,23 +41,21 @@ def add_frames(parser: ArgumentParser) -> None:
 
 def add_robot(parser: ArgumentParser) -> None:
     """Add --robot."""
-    parser.add_argument(
-        "--robot", metavar="NAME", help="which of several running robots: its name, or name@domain; default: the one"
-    )
+    parser.add_argument("--robot", metavar="NAME", help="the robot, as NAME or NAME@DOMAIN; default: the only one")
 
 
 def add_processes(parser: ArgumentParser) -> None:
     """Add NAME …, the processes of a running robot, and --robot."""
-    parser.add_argument("name", nargs="+", metavar="NAME", help="the process; tfcompose ps lists them")
+    parser.add_argument("name", nargs="+", metavar="NAME", help="a process, as listed by tfcompose ps")
     add_robot(parser)
 
 
-def add_namespace(parser: ArgumentParser, text: str = "/NS/tf and /NS/tf_static instead") -> None:
+def add_namespace(parser: ArgumentParser, text: str = "use /NS/tf and /NS/tf_static") -> None:
     """Add --namespace."""
     parser.add_argument("--namespace", type=namespace, default="", metavar="NS", help=text)
 
 
-def add_bag(parser: ArgumentParser, text: str = "a recording instead of the running tree") -> None:
+def add_bag(parser: ArgumentParser, text: str = "read a recording instead of the running tree") -> None:
     """Add --bag."""
     parser.add_argument("--bag", metavar="BAG", help=f"{text}: a rosbag2 folder, .mcap or .db3")
 
@@ -80,9 +78,9 @@ def namespace(text: str) -> str:
     """
     name = text.strip("/")
     if name in TF_TOPICS or name.endswith(tuple(f"/{topic}" for topic in TF_TOPICS)):
-        raise ArgumentTypeError(f"{text} is a topic; the namespace is what stands before it")
+        raise ArgumentTypeError(f"{text} is a topic; give only the namespace before it")
     if name and not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*", name):
-        raise ArgumentTypeError(f"{text} is no namespace, such as robot1: letters, digits and _, with / between")
+        raise ArgumentTypeError(f"{text} is not a namespace, such as robot1: letters, digits and _, separated by /")
     return name
 
 

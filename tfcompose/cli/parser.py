@@ -1,7 +1,7 @@
 """The command ``tfcompose``: its commands, how their options are read, and the exit code.
 
-All commands' modules are loaded to tell what there is, so at their top they load little; what a command needs for its
-work it loads when it runs.
+The parser loads the modules of all commands, which therefore import little at the top; a command imports what it needs
+when it runs.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def main(argv: list[str] | None = None) -> int:
         return OUTPUT_CLOSED
     except OSError as error:
         if error.errno == errno.ENOENT and not _has_working_folder():
-            sys.stderr.write("tfcompose: the folder that this is typed in was removed; cd to one that is there\n")
+            sys.stderr.write("tfcompose: the current folder was removed; cd to an existing one\n")
             return UNREADABLE
         if error.errno != errno.ENOSPC:
             raise
@@ -168,10 +168,10 @@ def help_text() -> str:
     return (
         "usage: tfcompose COMMAND [OPTION …]\n\n"
         "One YAML file says which frames a robot has and who publishes each TF edge.\n"
-        "tfcompose checks it, builds it, starts it, and names whoever publishes an edge\n"
-        "that is not theirs.\n\n"
+        "tfcompose checks it, builds it, starts it, and names any node that publishes\n"
+        "an edge owned by another.\n\n"
         f"commands:\n{rows}\n"
-        "options:\n  --version  print the version\n  --help     this text; after a command: its options\n"
+        "options:\n  --version  print the version\n  --help     print this help; after a command: its options\n"
     )
 
 
@@ -184,7 +184,7 @@ def _unknown(command: str) -> int:
     near = difflib.get_close_matches(command, COMMANDS, 1)
     advice = f"did you mean {near[0]}?" if near else "tfcompose --help lists them"
     kind = "option" if command.startswith("-") else "command"
-    sys.stderr.write(f"tfcompose: there is no {kind} {command}; {advice}\n")
+    sys.stderr.write(f"tfcompose: unknown {kind} {command}; {advice}\n")
     return UNREADABLE
 
 

@@ -52,7 +52,7 @@ def refuse_variant(arguments: Namespace, *more: str) -> None:
     """
     if arguments.profiles or arguments.overlays or arguments.settings or any(getattr(arguments, one) for one in more):
         *options, last = ["--profile", "--overlay", "--set", *(f"--{one}" for one in more)]
-        fail(f"a built plan takes no {', '.join(options)} and {last}: those are for building it", UNREADABLE)
+        fail(f"a built plan takes no {', '.join(options)} and {last}: these options are for building it", UNREADABLE)
 
 
 def expected_plan(file: str, arguments: Namespace) -> tuple[Plan, dict[str, Span]]:

@@ -51,7 +51,7 @@ def _decode_as_declared(path: str, data: bytes, error: UnicodeDecodeError) -> st
     message = f"not a text file: byte 0x{data[error.start]:02x} is not UTF-8"
     advice = "save it as UTF-8"
     if is_urdf:
-        advice += ', or say in its first line what it is: <?xml version="1.0" encoding="ISO-8859-1"?>'
+        advice += ', or declare its encoding in the first line: <?xml version="1.0" encoding="ISO-8859-1"?>'
     place = Span(path, line, column, line, column + 1)
     raise RejectedError([finding("TF001", message, place, help=advice)]) from None
 
@@ -64,7 +64,7 @@ def _unreadable(path: str, error: OSError) -> Finding:
         there = sorted(file.name for file in folder.glob(f"*{ending}")) if folder.is_dir() else []
         advice = f"in {folder} there is {', '.join(there[:8])}" if there else f"there is no {ending} file in {folder}"
     elif isinstance(error, IsADirectoryError):
-        advice = "no robot file is in it: name one"
+        advice = "name a robot file in it"
     return finding("TF001", f"cannot be read: {error.strerror}", Span(path), help=advice)
 
 

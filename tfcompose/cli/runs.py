@@ -66,10 +66,10 @@ def chosen_run(name: str | None, *, among: Callable[[], list[Place]] | None = No
     if not known:
         fail(f"no {what}")
     if not found:
-        fail(f"no {what} by the name {name}: there is {', '.join(place.name for place in known)}")
+        fail(f"no {what} by the name {name}; there are {', '.join(place.name for place in known)}")
     if len(found) > 1:
         names = ", ".join(place.name for place in found)
-        fail(f"several robots are there: {names}; choose one with --robot", UNREADABLE)
+        fail(f"several robots: {names}; choose one with --robot", UNREADABLE)
     return found[0]
 
 
@@ -99,11 +99,11 @@ def control_processes(arguments: Namespace, verb: Verb, doing: str) -> int:
 
 
 def notices(
-    place: Place, timeout_s: float | None = None, for_whom: TextIO | None = None
+    place: Place, timeout_s: float | None = None, output: TextIO | None = None
 ) -> Iterator[tuple[Notice, float]]:
     """Yield what the launcher has reported and reports, with when, until it ends.
 
-    ``for_whom`` is where this is written: when nobody reads there any more, it is over, also while nothing comes.
+    ``output`` is where the caller prints them: once nobody reads it any more, the notices end, even if none comes.
 
     Raises:
         OSError: if it cannot be heard; TimeoutError if the time is over; BrokenPipeError if nobody reads.
@@ -117,7 +117,7 @@ def notices(
             if left is not None and left <= 0:
                 raise TimeoutError
             connection.settimeout(left)
-            if for_whom and not wait_for_data(connection, for_whom):
+            if output and not wait_for_data(connection, output):
                 raise BrokenPipeError
             data = connection.recv(64 * 1024)
             if not data:
@@ -134,7 +134,7 @@ def wait_until_ready(place: Place, timeout_s: float | None) -> int:
         try:
             status = ask(place, StatusRequest(), RobotStatus)
         except OSError:
-            complain(f"{place.name} has ended; tfcompose logs says why")
+            complain(f"{place.name} has ended; see tfcompose logs")
             return FAILED
         if status.ready:
             return 0
@@ -152,7 +152,7 @@ def print_missing(place: Place, timeout_s: float) -> None:
         complain(f"{place.name} does not answer: {error}")
         return
     missing = status.missing
-    complain(f"{place.name} is not ready after {timeout_s:g} s; it goes on: tfcompose logs, tfcompose down")
+    complain(f"{place.name} is not ready after {timeout_s:g} s and keeps running; see tfcompose logs and down")
     for process in status.processes:
         if process.failed:
             complain(f"  failed: {process.name} ({process.state.lower()}, {process.detail})")
@@ -191,7 +191,7 @@ def hidden_run(place: Place) -> str | None:
     with contextlib.suppress(OSError):
         folder = variables_of(led[0].launcher).get("XDG_RUNTIME_DIR")
         where = f"XDG_RUNTIME_DIR={folder}" if folder else "no XDG_RUNTIME_DIR"
-        return f"{place.name} runs already: pid {led[0].launcher}, with {where}; ps and down find it there"
+        return f"{place.name} runs already: pid {led[0].launcher}, with {where}; set it for ps and down"
     return None
 
 

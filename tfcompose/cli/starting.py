@@ -42,7 +42,7 @@ def start(arguments: Namespace) -> int:
     file = Path(arguments.file) if is_plan(arguments.file) else _build(arguments)
     plan = plan_to_start(built_plan(file), arguments)
     if plan.guard.mode == "off" and arguments.settle is not None:
-        fail("the guard is off, so nobody looks before the start: leave out --settle", UNREADABLE)
+        fail("the guard is off, so --settle has no effect: leave it out", UNREADABLE)
     trouble = ros_trouble(child_environment(os.environ, plan.ros, own=True))
     found = [trouble] if trouble else commands_of(plan, started_by_us(plan), file, os.environ, child_environment)[1]
     if found:
@@ -55,7 +55,7 @@ def start(arguments: Namespace) -> int:
     except BlockingIOError:
         return _update(plan, file, place, arguments)
     except OSError as error:
-        fail(f"the run cannot be written down: {error}", UNREADABLE)
+        fail(f"the run cannot be recorded: {error}", UNREADABLE)
     with ExitStack() as stack:
         stack.callback(lock.close)
         if hidden := hidden_run(place):
@@ -104,7 +104,7 @@ def _update(plan: Plan, file: Path, place: Place, arguments: Namespace) -> int:
     if changes:
         print(f"{who}; {changes}")
     else:
-        complain(f"{who}; the plan is the same; tfcompose down ends it")
+        complain(f"{who}; the plan is the same; tfcompose down stops it")
     if answer.held and changes:
         print(vanished(answer.held))
     if arguments.wait:
@@ -120,7 +120,7 @@ def _with_profiles(found: Finding, arguments: Namespace) -> Finding:
     if not profiles:
         return found
     words = "".join(f" --profile {name}" for name in arguments.profiles)
-    advice = f"without them: tfcompose up {arguments.file}{words} --profile {' or '.join(profiles)}"
+    advice = f"to start without them: tfcompose up {arguments.file}{words} --profile {' or '.join(profiles)}"
     return replace(found, help="; ".join(filter(None, (found.help, advice))))
 
 

@@ -1,7 +1,7 @@
 """Write the URDF, the plan and all other files, or none of them.
 
-Write plan.json, the URDF, xacro, tree.txt and tree.svg, and parameter files where there are any: all, or
-nothing.
+Write plan.json, URDF and xacro files, tree.txt, tree.svg and the parameter files of drivers and nodes. If one of them
+cannot be written, none is.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument("-o", "--output", metavar="DIR", help="default: build/ROBOT")
     parser.add_argument(
         "--mesh", choices=("package", "file", "relative"), default="as-written",
-        help="how meshes are addressed: package://…, file:///…, or relative to DIR; default: as they are written",
+        help="how to address meshes: package://…, file:///…, or relative to DIR; default: as written",
     )  # fmt: skip
     parser.add_argument(
         "--read-back", action="store_true",
-        help="read the URDF again with yourdfpy, and write it only if links, joints, poses, limits, masses, shapes and "
-        "materials are the robot's; needs tfcompose[view]",
+        help="parse the URDF again with yourdfpy, and write nothing if links, joints, poses, limits, masses, shapes or "
+        "materials differ from the robot's; needs tfcompose[view]",
     )  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """Show what moved or changed owner between two robot files.
 
-Print what moved from OLD to NEW, in millimetres and degrees, and which frames came, went, got another parent or
-another owner. Exit code 1 if anything did.
+Print what moved from OLD to NEW, in millimetres and degrees, and which frames were added or removed, or got another
+parent or owner. Exit code 1 if anything differs.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("old", metavar="OLD", help="a robot file")
     parser.add_argument("new", metavar="NEW", help="the same robot, changed")
-    add_variant(parser, "lay this profile over both")
+    add_variant(parser, "apply this profile to both")
 
 
 def run(arguments: Namespace) -> int:

@@ -1,9 +1,9 @@
 """Diagnose the running tree: what is wrong, and what to do.
 
-Listen to the running system for some seconds and say what is wrong: trees that nothing connects, loops, two publishers
-of one edge, stamps that no lookup can bring together, low rates, frames that no listener can receive, a silent /clock,
-missing joint states, settings by which nothing is heard. Each finding names the node and the numbers. It needs no robot
-file; with one, or with a built plan, it knows also what is expected. Ctrl-C ends the look, and what was found is said.
+Listen to the running system for a few seconds and report what is wrong: disconnected trees, loops, two publishers of
+one edge, stamps that no lookup can match, low rates, frames that no listener receives, a silent /clock, missing joint
+states, settings that prevent discovery. Each finding names the node and the numbers. No robot file is needed; given
+one, or a built plan, it also checks what to expect. Ctrl-C ends it early and prints what was found.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ MOST_ROOTS = 6
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("file", nargs="?", metavar="FILE|PLAN", help="what is expected; default: nothing is")
+    parser.add_argument("file", nargs="?", metavar="FILE|PLAN", help="expected tree; default: none")
     add_variant(parser)
-    add_for(parser, "look for S seconds; default: 5", 5.0)
-    parser.add_argument("--namespace", type=namespace, metavar="NS", help="look at /NS/tf and /NS/tf_static")
+    add_for(parser, "listen for S seconds; default: 5", 5.0)
+    parser.add_argument("--namespace", type=namespace, metavar="NS", help="use /NS/tf and /NS/tf_static")
     add_format(parser)
 
 
@@ -99,7 +99,7 @@ def _plan(arguments: Namespace) -> Plan | None:
     if arguments.file is not None:
         return expected_plan(arguments.file, arguments)[0]
     if arguments.profiles or arguments.overlays or arguments.settings:
-        fail("--profile, --overlay and --set are laid over a robot file: name one", UNREADABLE)
+        fail("--profile, --overlay and --set need a robot file", UNREADABLE)
     return None
 
 

@@ -1,7 +1,7 @@
 """Stop a running robot.
 
-Stop everything, in reverse order of the start, and wait until it has ended. --leftovers stops what an earlier run of
-the robot left behind instead, if anything did.
+Stop everything in reverse order of the start, and wait until it has ended. --leftovers instead stops processes that an
+earlier run of the robot left behind.
 """
 
 from __future__ import annotations
@@ -19,8 +19,10 @@ if TYPE_CHECKING:
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     add_robot(parser)
-    parser.add_argument("--timeout", type=positive, default=60.0, metavar="S", help="wait so long; default: 60")
-    parser.add_argument("--leftovers", action="store_true", help="stop what earlier runs left behind")
+    parser.add_argument(
+        "--timeout", type=positive, default=60.0, metavar="S", help="wait at most S seconds; default: 60"
+    )
+    parser.add_argument("--leftovers", action="store_true", help="stop processes that earlier runs left behind")
 
 
 def run(arguments: Namespace) -> int:
@@ -38,7 +40,7 @@ def run(arguments: Namespace) -> int:
             if isinstance(notice, Ended):
                 break
     except TimeoutError:
-        fail(f"{place.name} has not ended after {arguments.timeout:g} s; tfcompose ps says what still runs")
+        fail(f"{place.name} has not ended after {arguments.timeout:g} s; tfcompose ps lists what still runs")
     except OSError:
         pass  # it has ended already
     print(f"{place.name} has ended")
@@ -56,7 +58,7 @@ def _stop_leftovers(robot: str | None) -> int:
         print(f"stopping {one.pid}: {one.command}")
     rest = end(found)
     for one in rest:
-        complain(f"{one.pid} is still there: {one.command}")
+        complain(f"{one.pid} is still running: {one.command}")
     if rest:
         return FAILED
     print(f"{len(found)} process{'' if len(found) == 1 else 'es'} of earlier runs stopped")

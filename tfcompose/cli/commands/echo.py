@@ -1,8 +1,8 @@
 """Print the live pose of frame B in frame A.
 
 Print the pose of B in A from the live tree: position in metres, quaternion x y z w, roll pitch yaw about fixed axes in
-radians and degrees. Where there is none it says why, with exit code 1. Without --once it goes on until Ctrl-C. With
---bag it is where it was in a recording: with --once the first pose, with --at the one at that time.
+radians and degrees. If there is none, say why and exit 1. Without --once it repeats until Ctrl-C. With --bag it reads a
+recording: with --once the first pose, with --at the one at that time.
 """
 
 from __future__ import annotations
@@ -32,24 +32,28 @@ _MOST_DIGITS = 15
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     add_frames(parser)
-    parser.add_argument("--once", action="store_true", help="print one pose and end")
+    parser.add_argument("--once", action="store_true", help="print one pose and exit")
     parser.add_argument(
-        "--timeout", type=positive, default=5.0, metavar="S", help="end after S seconds without a new pose; default: 5"
+        "--timeout", type=positive, default=5.0, metavar="S", help="exit after S seconds without a new pose; default: 5"
     )
-    parser.add_argument("--rate", type=positive, default=1.0, metavar="HZ", help="poses a second; default: 1")
+    parser.add_argument("--rate", type=positive, default=1.0, metavar="HZ", help="poses per second; default: 1")
     parser.add_argument(
         "--at",
         type=_time,
         default=0,
         metavar="TIME",
-        help="the pose at that time, in seconds since the epoch (once), or so many seconds before the newest: -0.5",
+        help="the pose at this time: seconds since the epoch (once), or relative to the newest: -0.5",
     )
     parser.add_argument(
-        "--precision", type=_digits, default=4, metavar="N", help="decimals of metres and radians in text; default: 4"
+        "--precision",
+        type=_digits,
+        default=4,
+        metavar="N",
+        help="decimals of metres and radians in text output; default: 4",
     )
     add_bag(parser)
     add_namespace(parser)
-    add_format(parser, text="json: one object a line; default: text")
+    add_format(parser, text="json: one object per line; default: text")
 
 
 def run(arguments: Namespace) -> int:
@@ -129,7 +133,7 @@ def _time(text: str) -> int:
     """
     match = re.fullmatch(r"(-?)(\d{1,10})(?:\.(\d{1,9}))?", text)
     if match is None or int(match[2]) >= 1 << 31:
-        raise ArgumentTypeError(f"{text} is no time in seconds, such as 1713000000.25 or -0.5")
+        raise ArgumentTypeError(f"{text} is not a time in seconds, such as 1713000000.25 or -0.5")
     stamp_ns = int(match[2]) * 10**9 + int((match[3] or "").ljust(9, "0"))
     return -stamp_ns if match[1] else stamp_ns
 
@@ -141,5 +145,5 @@ def _digits(text: str) -> int:
         ArgumentTypeError: if it is not from 0 to 15.
     """
     if not text.isdecimal() or int(text) > _MOST_DIGITS:
-        raise ArgumentTypeError(f"{text} is no number of decimals, 0 to {_MOST_DIGITS}")
+        raise ArgumentTypeError(f"{text} is not a number of decimals from 0 to {_MOST_DIGITS}")
     return int(text)

@@ -1,6 +1,6 @@
 """Print past events of a running robot, then follow.
 
-Print what the launcher has told since the start, and then each event as it comes, until the robot ends.
+Print all events since the start, then each new one as it comes, until the robot ends.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     add_robot(parser)
-    add_format(parser, text="json: one object a line")
+    add_format(parser, text="json: one object per line; default: text")
 
 
 def run(arguments: Namespace) -> int:
@@ -36,7 +36,7 @@ def run(arguments: Namespace) -> int:
     ended = False
     console = Console(Plan(place.name, "", None, RosSettings(), (), ()), lines, colour=coloured(sys.stdout))
     try:
-        for notice, at in notices(place, for_whom=sys.stdout):
+        for notice, at in notices(place, output=sys.stdout):
             ended = isinstance(notice, Ended)
             if arguments.format == "json":
                 print(notice_line(notice, at))
@@ -50,7 +50,7 @@ def run(arguments: Namespace) -> int:
         fail(f"{place.name} does not answer: {error}")
     if ended:
         return 0
-    slow = "tells more than was read here, and did not wait; ask again"
+    slow = "reports faster than this terminal reads; run events again"
     complain(f"{place.name} {slow if _is_held(place) else 'was killed'}")
     return FAILED
 

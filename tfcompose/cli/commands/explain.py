@@ -1,7 +1,7 @@
 """Explain a code, or the chain between two frames.
 
-Explain a code (TF301) or a rule's name: what is wrong, why it matters, what to do. Or, with FILE A B, show the chain
-from A to B: each edge with its owner and its pose, and where each of its values is written, and over what.
+Explain a code (TF301) or a rule's name: what is wrong, why it matters, what to do. Or, given FILE A B, show the chain
+from A to B: each edge with its owner and pose, where each of its values comes from, and what it replaced.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def arguments(parser: ArgumentParser) -> None:
         nargs="?",
         const="all",
         choices=("all", *FAMILIES),
-        help="print a table in Markdown of all codes, or of those of a family",
+        help="print all codes, or those of one family, as a Markdown table",
     )
     add_variant(parser)
 

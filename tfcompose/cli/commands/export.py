@@ -1,8 +1,8 @@
 """Export the plan for systemd, docker compose or ros2 launch.
 
-Write a built plan, or a robot that is built first, for systemd (a unit for each process and a target), docker compose
-(a service for each process) or ros2 launch (a launch file with stock nodes for what is fixed and jointed). What the
-other launcher cannot do is said.
+Write a built plan, or a robot that is built first, for systemd (a unit per process and a target), docker compose (a
+service per process) or ros2 launch (a launch file with stock nodes for fixed edges and joints). What the other launcher
+cannot do is listed.
 """
 
 from __future__ import annotations
@@ -32,25 +32,27 @@ ROS_VARIABLES = (
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("kind", choices=KINDS, help="for which launcher")
+    parser.add_argument("kind", choices=KINDS, help="the launcher to export to")
     parser.add_argument("file", nargs="?", default=DEFAULT_FILE, metavar="FILE|PLAN", help="default: robot.yaml")
     add_variant(parser)
     parser.add_argument(
         "-o", "--output", metavar="DIR",
-        help="where to build FILE; the export is in a folder there; default: build/ROBOT, or PLAN's folder",
+        help="where to build FILE; the export is a folder in it; default: build/ROBOT, or PLAN's folder",
     )  # fmt: skip
-    parser.add_argument("--host", metavar="NAME", help="only this host's share; '': what has no host; default: all")
     parser.add_argument(
-        "--at", metavar="DIR", help="systemd: where the plan's folder is on the robot; default: where it is here"
+        "--host", metavar="NAME", help="export only this host's share; '': processes without a host; default: all"
     )
+    parser.add_argument("--at", metavar="DIR", help="systemd: the plan's folder on the robot; default: as here")
     parser.add_argument(
-        "--python", metavar="FILE", default=sys.executable, help="systemd: the robot's Python; default: this one"
+        "--python", metavar="FILE", default=sys.executable, help="systemd: Python on the robot; default: this one"
     )
     parser.add_argument(
         "--setup", action="append", default=[], metavar="FILE",
-        help="systemd: source this first, as /opt/ros/jazzy/setup.bash; repeatable; default: this shell's variables",
+        help="systemd: source it first, as /opt/ros/jazzy/setup.bash; repeatable; default: this shell's variables",
     )  # fmt: skip
-    parser.add_argument("--image", default="", metavar="NAME", help="compose: default: $TFCOMPOSE_IMAGE at the start")
+    parser.add_argument(
+        "--image", default="", metavar="NAME", help="compose: the image; default: $TFCOMPOSE_IMAGE at start"
+    )
 
 
 def run(arguments: Namespace) -> int:
@@ -69,7 +71,7 @@ def run(arguments: Namespace) -> int:
     if arguments.host is not None:
         plan = host_share(plan, arguments.host or None, "")
     if plan.guard.mode == "strict" and arguments.kind == "launch":
-        fail("guard: strict needs a guard, and a launch file has none: export with --set guard.mode=watch")
+        fail("a strict plan needs a guard, and a launch file has none: export with --set guard.mode=watch")
     if plan.guard.mode == "strict" and (missed := not_remapped(plan)):
         reject(missed)
     _write(plan, file, arguments)
@@ -93,7 +95,7 @@ def _write(plan: Plan, file: Path, arguments: Namespace) -> None:
     if plan.host is None:
         differences += [f"{one.name} runs on {one.host}, and is here too: --host" for one in started(plan) if one.host]
     for line in differences:
-        print(f"not as tfcompose up: {line}")
+        print(f"differs from tfcompose up: {line}")
 
 
 def _exported(plan: Plan, file: Path, folder: Path, arguments: Namespace) -> tuple[tuple[File, ...], list[str]]:

@@ -1,8 +1,8 @@
 """Draw the tree as SVG, PDF, PNG, DOT or Mermaid.
 
-Draw the tree: frames coloured by owner, fixed and moving edges, sensors in frames of their own. The ending of the file
-says how: .svg, .pdf, .png, .dot (Graphviz) or .mmd (Mermaid). With --live or --bag it is the published tree, coloured
-by publisher; second parents and loops are drawn as they are, and with FILE what is missing.
+Draw the tree: frames coloured by owner, fixed and moving edges, each sensor in a box. The suffix of the file selects
+the format: .svg, .pdf, .png, .dot (Graphviz) or .mmd (Mermaid). With --live or --bag, draw the published tree, coloured
+by publisher, with second parents and loops as they are, and with FILE also what is missing.
 """
 
 from __future__ import annotations
@@ -30,22 +30,24 @@ FORMAT_NAMES = "svg, pdf, png, dot or mmd"
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("file", nargs="?", metavar="FILE", help="default: robot.yaml; with --live or --bag: none")
+    parser.add_argument("file", nargs="?", metavar="FILE", help="default: robot.yaml, or none with --live or --bag")
     add_variant(parser)
     parser.add_argument(
         "-o",
         "--output",
         default="tree.svg",
         metavar="PICTURE",
-        help=f"a file that ends in {FORMAT_NAMES}; default: tree.svg",
+        help=f"a file ending in {FORMAT_NAMES}; default: tree.svg",
     )
     parser.add_argument(
-        "--live", action="store_true", help="the tree that is published now; with FILE what is missing too"
+        "--live", action="store_true", help="draw the tree that is published now, with FILE also what is missing"
     )
-    add_bag(parser, "the tree of a recording")
-    add_for(parser, "with --live: look so long; default: 3", 3.0)
-    add_namespace(parser, "/NS/tf and /NS/tf_static instead, without FILE")
-    parser.add_argument("--poses", action="store_true", help="write each frame's pose in its parent, in m and degrees")
+    add_bag(parser, "draw the tree of a recording")
+    add_for(parser, "with --live: observe for S seconds; default: 3", 3.0)
+    add_namespace(parser, "use /NS/tf and /NS/tf_static, without FILE")
+    parser.add_argument(
+        "--poses", action="store_true", help="show each frame's pose in its parent, in metres and degrees"
+    )
 
 
 def run(arguments: Namespace) -> int:
@@ -78,10 +80,10 @@ def _check_output(path: Path) -> None:
     """
     ending = path.suffix.lower()
     if ending not in FORMATS:
-        what = f"{path.suffix} is no kind of picture that graph writes" if ending else f"{path} has no ending"
-        fail(f"{what}; -o takes a file that ends in {FORMAT_NAMES}", UNREADABLE)
+        what = f"{path.suffix} is not a format that graph writes" if ending else f"{path} has no suffix"
+        fail(f"{what}; -o takes a file ending in {FORMAT_NAMES}", UNREADABLE)
     if not path.parent.is_dir():
-        fail(f"{path} cannot be written: there is no folder {path.parent}", UNREADABLE)
+        fail(f"{path} cannot be written: no folder {path.parent}", UNREADABLE)
     if ending == ".png" and find_spec("pypdfium2") is None:
         advice = "pip install 'tfcompose[pictures]'; svg and pdf need nothing"
         fail(f"PNG needs the package pypdfium2: {advice}", UNREADABLE)

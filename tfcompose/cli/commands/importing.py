@@ -1,7 +1,7 @@
 """Convert a URDF or xacro file to a robot file.
 
-Write a robot file with the tree, bodies and joints of a URDF or xacro file; building it gives the same URDF. Sensors
-whose frames are a preset's become sensors; what has no place in a robot file is said in comments.
+Write a robot file with the tree, bodies and joints of a URDF or xacro file; building it gives the same URDF. Chains of
+frames that match a preset become sensors; comments hold what a robot file cannot express.
 """
 
 from __future__ import annotations
@@ -30,17 +30,15 @@ def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("file", metavar="FILE", help="a .urdf or .xacro file")
     parser.add_argument("args", nargs="*", metavar="NAME:=VALUE", help="arguments of the xacro file")
-    parser.add_argument("-o", "--output", metavar="FILE", help="the robot file to write; default: print it")
-    parser.add_argument("--force", action="store_true", help="write over a file that is there")
-    parser.add_argument("--robot", metavar="NAME", help="the robot's name; default: as the source says")
+    parser.add_argument("-o", "--output", metavar="FILE", help="write the robot file here; default: print it")
+    parser.add_argument("--force", action="store_true", help="overwrite an existing file")
+    parser.add_argument("--robot", metavar="NAME", help="the robot's name; default: the source's")
     parser.add_argument(
         "--package", action="append", default=[], metavar="NAME=FOLDER", dest="packages",
-        help="where a package is that is not installed; repeatable",
+        help="folder of a package that is not installed; repeatable",
     )  # fmt: skip
-    parser.add_argument("--no-sensors", action="store_true", help="leave frames frames, do not look for presets")
-    parser.add_argument(
-        "--keep-going", action="store_true", help="write what can be taken of a source with errors in it"
-    )
+    parser.add_argument("--no-sensors", action="store_true", help="keep frames as frames, do not match presets")
+    parser.add_argument("--keep-going", action="store_true", help="write as much as possible of a source with errors")
 
 
 def run(arguments: Namespace) -> int:
@@ -64,11 +62,11 @@ def run(arguments: Namespace) -> int:
     errors = [one for one in read.findings() if one.severity == "error"]
     print_findings(errors, sys.stderr)
     if errors and not arguments.keep_going:
-        fail("nothing was written; --keep-going writes what can be taken")
+        fail("nothing was written; --keep-going writes as much as possible")
     text, more_errors = _robot_file(read, arguments, known.own | packages)
     if more_errors and not arguments.keep_going:
         print_findings([replace(one, span=None) for one in more_errors], sys.stderr)  # places in what is not written
-        fail("nothing was written: the source has what a robot file cannot; --keep-going writes it all the same")
+        fail("nothing was written: a robot file cannot express all of the source; --keep-going writes it anyway")
     _write(text, arguments.output)
     return FAILED if errors or more_errors else 0
 
@@ -92,11 +90,11 @@ def _check_use(arguments: Namespace) -> None:
         SystemExit: after saying so.
     """
     if not arguments.file.endswith((".urdf", ".xacro")):
-        fail(f"{arguments.file}: a .urdf or .xacro file can be imported", UNREADABLE)
+        fail(f"{arguments.file}: only .urdf and .xacro files can be imported", UNREADABLE)
     if arguments.robot and not _ROBOT.fullmatch(arguments.robot):
-        fail(f"--robot {arguments.robot}: lower case letters, digits and _, a letter first", UNREADABLE)
+        fail(f"--robot {arguments.robot}: use lower case letters, digits and _, beginning with a letter", UNREADABLE)
     if arguments.output and Path(arguments.output).exists() and not arguments.force:
-        fail(f"{arguments.output} is there already; --force writes over it", UNREADABLE)
+        fail(f"{arguments.output} exists already; --force overwrites it", UNREADABLE)
 
 
 def _robot_file(read: Document, arguments: Namespace, packages: dict[str, str]) -> tuple[str, list[Finding]]:

@@ -1,6 +1,6 @@
 """Check robot files and report every problem; needs no ROS.
 
-Find everything that is wrong with robot files, with places. Each file is checked alone and with each of its profiles.
+Report every problem in robot files, with its place. Each file is checked alone and with each of its profiles.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ def arguments(parser: ArgumentParser) -> None:
         nargs="*",
         metavar="FILE",
         default=[],
-        help="files, or folders of robot files, or .urdf and .xacro files; default: robot.yaml",
+        help="robot files, folders of them, or .urdf and .xacro files; default: robot.yaml",
     )
     parser.add_argument(
         "--urdf", action="append", default=[], metavar="FILE", dest="urdfs",
-        help="a URDF or xacro file that somebody else wrote, whatever its name; repeatable",
+        help="check FILE as a URDF or xacro file, whatever its suffix; repeatable",
     )  # fmt: skip
-    add_variant(parser, "check this combination only")
+    add_variant(parser, "check only this combination")
     add_format(parser, "json", "sarif", "github")
-    parser.add_argument("--fix", action="store_true", help="mend what has one safe answer, in the files that are named")
+    parser.add_argument("--fix", action="store_true", help="apply unambiguous fixes to the named files")
     parser.add_argument(
-        "--fail-on", choices=("error", "warning"), default="error", help="what makes the exit code 1; default: error"
+        "--fail-on", choices=("error", "warning"), default="error", help="lowest severity that exits 1; default: error"
     )
 
 

@@ -1,7 +1,7 @@
 """Print the logs of a robot's processes, also after it has ended.
 
-Print the logs, oldest line first, of a robot that runs or has run. They are kept on disk, and turned over when they
-grow. The launcher's own lines are those of tfcompose.
+Print the logs of a running or ended robot, oldest line first. Logs are kept on disk and rotated. Lines of the launcher
+itself are those of tfcompose.
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ READ_EVERY_S = 0.2
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("name", nargs="*", metavar="NAME", help="only these processes; default: all")
-    parser.add_argument("-f", "--follow", action="store_true", help="go on with what comes, until the robot ends")
+    parser.add_argument(
+        "-f", "--follow", action="store_true", help="print new lines as they come, until the robot ends"
+    )
     parser.add_argument("-n", "--lines", type=count, metavar="N", help="only the last N lines")
     parser.add_argument("-t", "--times", action="store_true", help="print the time before each line")
     add_robot(parser)

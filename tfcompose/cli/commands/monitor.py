@@ -1,9 +1,9 @@
 """Show who publishes each live edge, how often, how evenly and how late.
 
 Print each edge of the running tree, or of a bag, with its publisher's node, rate, jitter (the standard deviation of the
-time between two messages), longest gap, age of the newest stamp, and delay (arrival minus stamp). Rates, jitter, gaps
-and delays are those of the last 5 to 10 s; with --for or --bag of all. On a terminal the table is drawn again and again
-until Ctrl-C; into a pipe each table follows the last.
+time between messages), longest gap, age of the newest stamp, and delay (arrival minus stamp), over the last 5 to 10 s,
+or over everything with --for or --bag. On a terminal the table refreshes in place until Ctrl-C; into a pipe each table
+follows the last.
 """
 
 from __future__ import annotations
@@ -27,11 +27,13 @@ WINDOW_S = 5.0
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    add_for(parser, "end after S seconds, with one table of all of them; default: until Ctrl-C")
+    add_for(parser, "print one table of S seconds and exit; default: until Ctrl-C")
     add_bag(parser)
     add_namespace(parser)
-    parser.add_argument("--every", type=positive, default=1.0, metavar="S", help="a table each S seconds; default: 1")
-    add_format(parser, text="json: one object for each table; default: text")
+    parser.add_argument(
+        "--every", type=positive, default=1.0, metavar="S", help="print a table every S seconds; default: 1"
+    )
+    add_format(parser, text="json: one object per table; default: text")
 
 
 def run(arguments: Namespace) -> int:
@@ -40,7 +42,7 @@ def run(arguments: Namespace) -> int:
     from tfcompose.observe.census import SETTLE_S, Census, topics_below
 
     if arguments.bag and arguments.duration:
-        fail("a recording is read to its end: leave out --for", UNREADABLE)
+        fail("a recording is always read to its end: leave out --for", UNREADABLE)
     topics = topics_below(arguments.namespace)
     whole = arguments.bag or arguments.duration
     census = Census(0.0 if whole else WINDOW_S, 0.0 if arguments.bag else SETTLE_S)

@@ -1,6 +1,6 @@
 """Print the pose of frame B in frame A, from the robot file alone.
 
-Print the pose of B in A from the spec alone. What moves is taken at its nominal pose, a joint at 0.
+Print the pose of B in A from the robot file alone. Moving frames are taken at their nominal pose, joints at 0.
 """
 
 from __future__ import annotations

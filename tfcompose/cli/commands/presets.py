@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument(
-        "name", nargs="?", metavar="NAME", help="a preset; or a vendor, a package or a kind, to list only those"
+        "name", nargs="?", metavar="NAME", help="a preset, or a vendor, package or kind to list only those"
     )
     parser.add_argument(
-        "--preset-path", action="append", default=[], metavar="DIR", help="a folder of your own before them; repeatable"
+        "--preset-path", action="append", default=[], metavar="DIR", help="search this folder first; repeatable"
     )
     parser.add_argument("--format", choices=("text", "json"), default="text", help="default: text")
 

@@ -1,7 +1,7 @@
 """List the processes of running robots.
 
-Print each process with its state, number, time, restarts, use of the processor and of memory (proportional, with
-everything in its group), and how many of the edges that it owns are live.
+Show state, PID, uptime, restarts, CPU and memory (PSS of the process group) of each process, and how many of its edges
+are live.
 """
 
 from __future__ import annotations

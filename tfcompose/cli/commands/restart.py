@@ -1,6 +1,6 @@
 """Restart processes of a running robot.
 
-Stop one process as the plan says, and start it again. The others go on.
+Stop processes as the plan says and start them again. The others keep running.
 """
 
 from __future__ import annotations

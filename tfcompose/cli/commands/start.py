@@ -1,6 +1,6 @@
 """Start processes that were stopped or have ended.
 
-Start one process of a running robot that was stopped, has ended, or waits for its restart.
+Start processes of a running robot that were stopped, have ended, or wait for their restart.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Stop processes of a running robot.
 
-Stop one process as the plan says; it stays stopped until it is started. The others go on, and the guard does
-not miss its edges.
+Stop processes as the plan says; they stay stopped until started again. The others keep running, and the guard does not
+complain about the missing edges.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Print the tree with kinds, owners and poses, or as it is published.
 
-Print the tree: each frame with the kind, owner, rate and pose of its edge. With --live or --bag it is the published
-one: each frame with the kind, the publishing node, rate and age of the newest stamp; with FILE the owner, and what is
-expected, unexpected or missing. Trees that do not hang together are shown one after the other.
+Print each frame with the kind, owner, rate and pose of its edge. With --live or --bag, print the published tree: each
+frame with the kind, the publishing node, rate and age of the newest stamp, and with FILE also the owner and whether the
+frame is expected, unexpected or missing. Disconnected trees follow each other.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("file", nargs="?", metavar="FILE", help="default: robot.yaml; with --live or --bag: none")
+    parser.add_argument("file", nargs="?", metavar="FILE", help="default: robot.yaml, or none with --live or --bag")
     add_variant(parser)
-    parser.add_argument("--live", action="store_true", help="the tree that is published now")
-    add_bag(parser, "the tree of a recording")
-    add_for(parser, "look so long; default: 3", 3.0)
-    add_namespace(parser, "/NS/tf and /NS/tf_static instead, without FILE")
+    parser.add_argument("--live", action="store_true", help="print the tree that is published now")
+    add_bag(parser, "print the tree of a recording")
+    add_for(parser, "with --live: observe for S seconds; default: 3", 3.0)
+    add_namespace(parser, "use /NS/tf and /NS/tf_static, without FILE")
     add_format(parser)
 
 
@@ -107,10 +107,10 @@ def _drawn(trees: list[Tree], *, plan: Plan | None) -> str:
     widths = [max((len(row[column]) for some in rows for row in some), default=0) for column in range(5)]
     parts = []
     if len(trees) > 1:
-        parts.append(f"{len(trees)} trees that do not hang together:\n\n")
+        parts.append(f"{len(trees)} disconnected trees:\n\n")
     for tree, some in zip(trees, rows, strict=True):
         if tree.loop:
-            parts.append(f"a loop, in which tf2 finds no way: {printable(' → '.join(tree.loop))}\n")
+            parts.append(f"a loop, which breaks tf2 lookups: {printable(' → '.join(tree.loop))}\n")
         parts += [_line(row, widths) for row in some]
         parts.append("\n")
     return "".join(parts[:-1])

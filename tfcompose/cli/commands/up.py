@@ -1,8 +1,8 @@
 """Start a robot, or a built plan, and guard its TF tree.
 
-Build a robot and start it, or start a built plan. It prints which edges are live, owned by whom, and when the tree is
-complete. Ctrl-C, SIGTERM and SIGHUP end everything. An edge that somebody publishes already is refused, with that
-node's name. Where the robot runs already, a changed plan is followed: only what is different is restarted.
+Build a robot and start it, or start a built plan. Print which edges are live, who owns them, and when the tree is
+complete. Ctrl-C, SIGTERM and SIGHUP end everything. If a node already publishes an edge, refuse and name it. If the
+robot runs already, restart only what differs in the new plan.
 """
 
 from __future__ import annotations
@@ -20,34 +20,35 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument("file", nargs="?", default=DEFAULT_FILE, metavar="FILE|PLAN", help="default: robot.yaml")
     add_variant(parser)
     parser.add_argument("-o", "--output", metavar="DIR", help="where to build; default: build/ROBOT")
-    parser.add_argument("-d", "--detach", action="store_true", help="go on in the background; tfcompose ps, logs, down")
+    parser.add_argument(
+        "-d", "--detach", action="store_true", help="run in the background; see tfcompose ps, logs and down"
+    )
     parser.add_argument(
         "--wait", action="store_true",
-        help="in the background, and return when every process is ready and every edge live",
+        help="run in the background, and return once every process is ready and every edge live",
     )  # fmt: skip
     parser.add_argument(
         "--timeout", type=positive, default=60.0, metavar="S",
-        help="how long --wait waits; then exit code 1, and the robot goes on; default: 60",
+        help="with --wait: exit 1 after S seconds, while the robot keeps running; default: 60",
     )  # fmt: skip
     parser.add_argument(
         "--host", metavar="NAME",
-        help="start the share of this host, and expect the others'; default: this machine's name, if the robot has it",
+        help="start this host's share and expect the rest elsewhere; default: this machine, if the robot names it",
     )  # fmt: skip
-    parser.add_argument("--dry-run", action="store_true", help="print what would be started, and start nothing")
+    parser.add_argument("--dry-run", action="store_true", help="print what would be started and exit")
     parser.add_argument(
         "--guard", choices=("off", "watch", "strict"),
-        help="off: say which edges are live, and judge nobody; strict: hold back what a process does not own; "
-        "default: what the robot says",
+        help="off: report live edges, no checks; strict: hold back what a process does not own; default: the file's",
     )  # fmt: skip
     parser.add_argument(
         "--settle",
         type=not_negative,
         metavar="S",
-        help="look for other publishers so long before the start; default: 0.5",
+        help="how long to look for conflicting publishers first; default: 0.5",
     )
     parser.add_argument(
         "--for", dest="duration", type=positive, metavar="S",
-        help="end S seconds after the look before the start; exit 1 if the tree was not complete or an error was found",
+        help="end S seconds after the settle time; exit 1 if the tree was not complete or an error was found",
     )  # fmt: skip
 
 

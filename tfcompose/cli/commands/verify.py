@@ -1,9 +1,9 @@
 """Compare a robot file with what is published, live or in a bag.
 
-Compare each edge of FILE (a robot, or a built plan.json) with the running tree, or with a bag: missing, not declared,
-under another parent, with another value, on the wrong topic, silent, too slow, from another publisher. Exit code 0 if
-all is as expected, 1 if not, 2 if a file or a bag cannot be read. Frames inside a sensor that its driver publishes may
-be as far off as a calibration moves them; more is a warning.
+Compare each edge of FILE (a robot, or a built plan.json) with the running tree or a bag: missing, not declared, under
+another parent, with another value, on the wrong topic, silent, too slow, from another publisher. Exit code 0 if all is
+as expected, 1 if not, 2 if a file or a bag cannot be read. Frames inside a sensor that its driver publishes may be off
+by as much as a calibration moves them; more is a warning.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     add_file(parser)
     add_variant(parser)
-    parser.add_argument("--live", action="store_true", help="look at the running tree; so it is unless --bag is given")
+    parser.add_argument("--live", action="store_true", help="use the running tree (default unless --bag is given)")
     add_bag(parser)
-    add_for(parser, "look at the running tree for S seconds; default: 5", 5.0)
+    add_for(parser, "observe the running tree for S seconds; default: 5", 5.0)
     parser.add_argument(
         "--tolerance", type=tolerance, default="1mm,0.1deg", metavar="T",
         help="how far a pose may be off: 2mm, 0.5deg, or both as 2mm,0.5deg; default: 1mm,0.1deg",
     )  # fmt: skip
     add_format(parser, "json", "junit")
     parser.add_argument(
-        "--fail-on", choices=("error", "warning"), default="error", help="exit code 1 from there on; default: error"
+        "--fail-on", choices=("error", "warning"), default="error", help="lowest severity that exits 1; default: error"
     )
 
 
@@ -103,6 +103,6 @@ def tolerance(text: str) -> Offset:
     for part in text.split(","):
         match = _QUANTITY.fullmatch(part.strip())
         if match is None or match[2] not in _UNITS or (match[2] in _ANGLES) in given:
-            raise ArgumentTypeError(f"{text} is no tolerance, such as 2mm or 2mm,0.5deg")
+            raise ArgumentTypeError(f"{text} is not a tolerance, such as 2mm or 2mm,0.5deg")
         given[match[2] in _ANGLES] = float(match[1]) * _UNITS[match[2]]
     return Offset(given.get(False, DEFAULT_TOLERANCE.xyz_m), given.get(True, DEFAULT_TOLERANCE.rot_rad))

@@ -1,7 +1,7 @@
 """Wait until a running robot has ended, or is ready.
 
-Wait until the robot has ended, and return its exit code; --ready waits until every process is ready and every edge
-live instead, and says what is missing when the time is over.
+Wait until the robot has ended, and return its exit code. With --ready, wait instead until every process is ready and
+every edge live, and report what is missing after the timeout.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     add_robot(parser)
-    parser.add_argument("--ready", action="store_true", help="until every process is ready and every edge live")
-    parser.add_argument("--timeout", type=positive, metavar="S", help="wait so long at most; then exit code 1")
+    parser.add_argument("--ready", action="store_true", help="wait until every process is ready and every edge live")
+    parser.add_argument("--timeout", type=positive, metavar="S", help="exit 1 after S seconds")
 
 
 def run(arguments: Namespace) -> int:

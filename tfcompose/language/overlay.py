@@ -134,7 +134,7 @@ class _Merger:
         """Say so if nothing was removed."""
         if not was_there:
             message = f"{'.'.join(map(str, path))} is removed here, but nothing is there"
-            self.found.append(finding("TF010", message, key.span, severity="warning"))
+            self.found.append(finding("TF010", message, key.span))
 
     def remember(self, path: Path, old: Place) -> None:
         """Remember that the value at the path was laid over the old one."""
@@ -150,7 +150,7 @@ class _Merger:
 
 def _idle(message: str, place: Place, old: Place | None = None) -> Finding:
     notes = [Note("here", old.span)] if old else []
-    return finding("TF014", message, place.span, notes=notes, help="remove it", severity="warning")
+    return finding("TF014", message, place.span, notes=notes, help="remove it")
 
 
 def is_for_later(path: Path) -> bool:

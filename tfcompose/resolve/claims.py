@@ -67,12 +67,12 @@ class _Work:
             advice = (
                 f"processes: {{{owner.name}: {{publishes: [{{parent: {edge.parent}, child: {edge.child}, off: …}}]}}}}"
             )
-            self.found.append(finding("TF332", message, at, help=advice, severity="warning"))
+            self.found.append(finding("TF332", message, at, help=advice))
         elif len(owner.nodes) > 1:
             message = f"{owner.name} has {len(owner.nodes)} nodes, and none is said to publish {edge.name}"
             entry = f"publishes: [{{parent: {edge.parent}, child: {edge.child}, off: …}}]"
             advice = f"write at the node that does: {entry}"
-            self.found.append(finding("TF332", message, at, help=advice, severity="warning"))
+            self.found.append(finding("TF332", message, at, help=advice))
         return edge
 
     def _node(self, process: Process, node: Node) -> Told | None:
@@ -212,7 +212,7 @@ class _Work:
         if claim.off:
             advice += f"; or params: {{{switch_text(claim.off)}}}"
         message = f"{told.process.name} publishes {parent} → {child} by default, which nobody declared"
-        self.found.append(finding("TF331", message, told.node.at, help=advice, severity="warning"))
+        self.found.append(finding("TF331", message, told.node.at, help=advice))
 
     def _settle_pattern(self, told: Told, claim: ClaimSpec, parent: str, child: str) -> None:
         self.claims.append(Claim(told.node.name, parent, child, claim.off))
@@ -223,7 +223,7 @@ class _Work:
             return
         message = f"{told.process.name} publishes {parent} → {child} by default, which the guard does not allow"
         advice = f'guard: {{allow: [{{child: "{child}"}}]}}'
-        self.found.append(finding("TF331", message, told.node.at, help=advice, severity="warning"))
+        self.found.append(finding("TF331", message, told.node.at, help=advice))
 
     def _at(self, told: Told, key: str) -> Span:
         return self.source.at((*told.node.path, "params", *key.split(".")))

@@ -243,7 +243,7 @@ def idle_keys(name: str, joint: JointSpec, source: Source) -> Iterator[Finding]:
         advice = "leave it out; if there is an end, type: revolute"
     if idle:
         message = f"the joint {name} is {joint.type}: {', '.join(idle)} {'have' if idle[1:] else 'has'} no effect"
-        yield finding("TF727", message, source.at_key((*at, idle[0])), help=advice, severity="warning")
+        yield finding("TF727", message, source.at_key((*at, idle[0])), help=advice)
 
 
 _SECTIONS = ("frames", "links", "joints", "sensors", "parts", "processes")

@@ -99,7 +99,7 @@ def sensor_of(name: str, spec: SensorSpec, library: Library, source: Source) -> 
     if hidden:
         message = f"{spec.preset} is {library.file(spec.preset)}, which stands before tfcompose's own preset"
         notes = [Note("its own", Span(hidden))]
-        found.append(finding("TF607", message, span, notes=notes, help="give it another name", severity="warning"))
+        found.append(finding("TF607", message, span, notes=notes, help="give it another name"))
     sensor = Sensor(name, spec, preset, options, DRIVER)
     if _publisher(sensor) == TFCOMPOSE:
         sensor = Sensor(name, spec, preset, options, TFCOMPOSE)

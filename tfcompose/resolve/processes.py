@@ -279,7 +279,7 @@ def _idle(path: Path, name: str, process: Started, source: Source) -> Iterator[F
     read, how, whom = _READ[way]
     for key in process.model_fields_set - read:
         message, advice = f"{name} is {how}: {key} does nothing there", f"remove it: it is for {whom}"
-        yield finding("TF851", message, source.at_key((*path, key)), help=advice, severity="warning")
+        yield finding("TF851", message, source.at_key((*path, key)), help=advice)
 
 
 #: The key among a process's parameters that names files with more of them.

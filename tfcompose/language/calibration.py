@@ -19,7 +19,7 @@ import re
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args
 
-from pydantic import AfterValidator, BeforeValidator, ConfigDict
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, model_validator
 
 from tfcompose.findings import Finding, Span, finding
 from tfcompose.geometry import Pose, Quaternion, normalised, quat_from_matrix, quat_from_rpy
@@ -143,8 +143,8 @@ class TransformStamped(FileEntry):
     transform: Transform
 
 
-class AutowareEntry(FileEntry):
-    """One sensor of a kit: metres, and radians about fixed axes."""
+class PoseXyzRpy(FileEntry):
+    """A position, and angles about fixed axes: as Autoware writes them, and as arguments."""
 
     x: CalibrationNumber
     y: CalibrationNumber
@@ -159,8 +159,8 @@ class AutowareEntry(FileEntry):
         return Pose((self.x, self.y, self.z), quat_from_rpy(self.roll, self.pitch, self.yaw))
 
 
-class FlatTransform(FileEntry):
-    """A transform as easy_handeye wrote it."""
+class PoseXyzQuat(FileEntry):
+    """A position and a unit quaternion: as easy_handeye wrote them, and as arguments."""
 
     x: CalibrationNumber
     y: CalibrationNumber
@@ -171,19 +171,14 @@ class FlatTransform(FileEntry):
     qw: CalibrationNumber
 
     @property
-    def quat_xyzw(self) -> Quaternion:
-        """The quaternion x, y, z, w, as it stands there."""
-        return (self.qx, self.qy, self.qz, self.qw)
-
-    @property
     def pose(self) -> Pose:
         """The pose that it is."""
-        return Pose((self.x, self.y, self.z), normalised(self.quat_xyzw))
+        return Pose((self.x, self.y, self.z), normalised((self.qx, self.qy, self.qz, self.qw)))
 
-
-def _flat_unit(transform: FlatTransform) -> FlatTransform:
-    has_unit_length(transform.quat_xyzw)
-    return transform
+    @model_validator(mode="after")
+    def _has_unit_length(self) -> PoseXyzQuat:
+        has_unit_length((self.qx, self.qy, self.qz, self.qw))
+        return self
 
 
 class HandeyeTransform(FileEntry):
@@ -195,7 +190,7 @@ class HandeyeTransform(FileEntry):
 class HandeyeTransformation(FileEntry):
     """The same as its first version, and easy_handeye, wrote it."""
 
-    transformation: Annotated[FlatTransform, AfterValidator(_flat_unit)]
+    transformation: PoseXyzQuat
 
 
 class EyeInHand(FileEntry):
@@ -231,27 +226,11 @@ class MatrixFile(FileEntry):
     matrix: MatrixRows
 
 
-class QuaternionArguments(FileEntry):
-    """Arguments of a static_transform_publisher with a quaternion."""
-
-    x: CalibrationNumber = 0.0
-    y: CalibrationNumber = 0.0
-    z: CalibrationNumber = 0.0
-    qx: CalibrationNumber = 0.0
-    qy: CalibrationNumber = 0.0
-    qz: CalibrationNumber = 0.0
-    qw: CalibrationNumber = 1.0
-
-
-class AngleArguments(FileEntry):
-    """Arguments of a static_transform_publisher with angles about fixed axes."""
-
-    x: CalibrationNumber = 0.0
-    y: CalibrationNumber = 0.0
-    z: CalibrationNumber = 0.0
-    roll: CalibrationNumber = 0.0
-    pitch: CalibrationNumber = 0.0
-    yaw: CalibrationNumber = 0.0
+#: What a static_transform_publisher takes for a flag that is not given.
+_DEFAULTS: dict[type[PoseXyzQuat | PoseXyzRpy], dict[str, str]] = {
+    PoseXyzQuat: dict.fromkeys(PoseXyzQuat.model_fields, "0") | {"qw": "1"},
+    PoseXyzRpy: dict.fromkeys(PoseXyzRpy.model_fields, "0"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -314,7 +293,7 @@ def read_calibration(text: str, file: str, form: str = "auto") -> CalibrationFil
     return CalibrationFile(file, chosen, tuple(reader.entries), tuple(reader.found))
 
 
-_AUTOWARE_KEYS = frozenset(AutowareEntry.model_fields)
+_AUTOWARE_KEYS = frozenset(PoseXyzRpy.model_fields)
 _CAMERA = re.compile(r"cam(\d+)\Z")
 
 
@@ -377,7 +356,7 @@ class _Reader:
         """Yield the entries of a sensor kit."""
         for parent, children in data.items() if isinstance(data, dict) else ():
             for child, values in children.items() if isinstance(children, dict) else ():
-                one = self.model(AutowareEntry, values, (parent, child))
+                one = self.model(PoseXyzRpy, values, (parent, child))
                 if one:
                     yield self.entry((parent, child), one.pose, parent.lstrip("/"), child.lstrip("/"))
 
@@ -458,9 +437,9 @@ class _Reader:
         elif len(words) != 9:  # noqa: PLR2004 (x y z, quaternion, two names)
             self.refuse((index,), f"expected x y z qx qy qz qw parent child, got {len(words)} arguments")
         else:
-            names = dict(zip(QuaternionArguments.model_fields, words[:7], strict=True))
+            names = dict(zip(PoseXyzQuat.model_fields, words[:7], strict=True))
             where = {name: at for at, name in enumerate(names)}
-            pose = self._arguments(QuaternionArguments, names, index, where)
+            pose = self._arguments(PoseXyzQuat, names, index, where)
             if pose:
                 yield self.entry((index,), pose, words[7].lstrip("/"), words[8].lstrip("/"))
 
@@ -472,32 +451,25 @@ class _Reader:
             self.refuse((index,), f"--{missing[0]} is missing", "it must be a string, not a variable")
             return
         where = {word[2:]: 2 * at + 1 for at, word in enumerate(words[::2])}
-        model = QuaternionArguments if {"qx", "qy", "qz", "qw"} & set(given) else AngleArguments
+        model = PoseXyzQuat if {"qx", "qy", "qz", "qw"} & set(given) else PoseXyzRpy
         pose = self._arguments(model, given, index, where)
         if pose:
             yield self.entry((index,), pose, given["frame-id"].lstrip("/"), given["child-frame-id"].lstrip("/"))
 
     def _arguments(
         self,
-        model: type[QuaternionArguments | AngleArguments],
+        model: type[PoseXyzQuat | PoseXyzRpy],
         given: dict[str, str],
         index: int,
         where: dict[str, int],
     ) -> Pose | None:
         """Return the pose that arguments are; ``where`` is each argument's place among the words."""
-        made, refusals = read(model, given)
+        made, refusals = read(model, _DEFAULTS[model] | given)
         for one in refusals:
-            self.refuse((index, where[str(one.path[0])]) if one.path else (index,), one.message, one.help)
-        if refusals or made is None:
-            return None
-        if isinstance(made, AngleArguments):
-            return Pose((made.x, made.y, made.z), quat_from_rpy(made.roll, made.pitch, made.yaw))
-        quat_xyzw = (made.qx, made.qy, made.qz, made.qw)
-        try:
-            return Pose((made.x, made.y, made.z), normalised(has_unit_length(quat_xyzw)))
-        except ValueError as error:
-            self.found.append(finding("TF614", str(error), self.source.at((index,))))
-            return None
+            path = (index, where[str(one.path[0])]) if one.path and str(one.path[0]) in where else (index,)
+            code = "TF614" if one.code in _NO_ROTATION else "TF610"
+            self.found.append(replace(one, path=path, on_key=False).finding(self.source, code))
+        return made.pose if made and not refusals else None
 
 
 def _pose_of(rows: _Rows) -> Pose:

@@ -10,6 +10,8 @@ import weakref
 import pytest
 
 from tfcompose import interrupt
+from tfcompose.cli import main
+from tfcompose.cli.parser import COMMANDS
 from tfcompose.ros.stop import Stop
 from tfcompose.run.launcher.signals import Signals
 
@@ -57,6 +59,31 @@ def test_who_waits_in_ros_takes_it_once(lost: list[object]) -> None:
         with Stop() as stop:
             assert not stop.requested
     assert lost == [KeyboardInterrupt]
+
+
+@pytest.mark.parametrize("error", [RuntimeError("Error calling __set_name__"), BaseException("a panic of Rust")])
+def test_an_interrupt_that_became_another_error_while_a_command_loads_ends_it(
+    error: BaseException, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def load_and_run(_: object) -> int:
+        try:
+            send_an_interrupt()
+        except KeyboardInterrupt:
+            raise error from None
+        return 0
+
+    monkeypatch.setattr(COMMANDS["ps"], "run", load_and_run)
+    assert main(["ps"]) == 130
+    assert capsys.readouterr() == ("", "")
+
+
+def test_another_error_of_a_command_is_none_of_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(_: object) -> int:
+        raise ValueError("of the program")
+
+    monkeypatch.setattr(COMMANDS["ps"], "run", run)
+    with pytest.raises(ValueError, match="of the program"):
+        main(["ps"])
 
 
 def test_elsewhere_an_interrupt_ends_the_command_as_ever() -> None:

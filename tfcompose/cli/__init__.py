@@ -1,5 +1,12 @@
 """The command line: the only part that reads, writes, prints and exits."""
 
-from tfcompose.cli.parser import main
+from __future__ import annotations
 
-__all__ = ["main"]
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command line and return the exit code."""
+    try:
+        from tfcompose.cli import parser  # here, so that Ctrl-C while it loads ends without a traceback
+    except KeyboardInterrupt:
+        return 130  # as a shell has it for a program ended by Ctrl-C
+    return parser.main(argv)

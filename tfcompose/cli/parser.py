@@ -128,7 +128,12 @@ def _main(words: list[str]) -> int:
 def _run(name: str, words: list[str]) -> int:
     gc.set_threshold(200_000, 50, 1000)  # a large build makes much, and little of it is garbage
     with interrupt.Remembered():
-        code = _run_command(name, words)
+        try:
+            code = _run_command(name, words)
+        except BaseException:
+            if interrupt.taken():  # Python's classes and pydantic's Rust make other errors of a Ctrl-C while they load
+                return INTERRUPTED
+            raise
     return INTERRUPTED if interrupt.taken() else code
 
 

@@ -16,7 +16,6 @@ from tests.support import processes
 ROOT = Path(__file__).parents[1]
 WORK = r"""
 import random, resource, sys, time
-from tests.support import processes
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.findings import RejectedError, Span, finding

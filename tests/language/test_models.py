@@ -8,11 +8,11 @@ import pytest
 from pydantic_core import core_schema
 
 from tfcompose.language import calibration
-from tfcompose.language.base import Spec, described, examples_of, fields_of, walk
 from tfcompose.language.json_schema import LANGUAGES
 from tfcompose.language.reading import UNKNOWN_KEYS, WORDS, read
 from tfcompose.language.reference import reference
 from tfcompose.language.robot import RobotSpec
+from tfcompose.language.spec import Spec, described, examples_of, fields_of, walk
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Discriminator, Tag
 
-from tfcompose.language.base import Spec, key
 from tfcompose.language.pose import MountKeys, Posed, Rotated
+from tfcompose.language.spec import Spec, key
 from tfcompose.language.values import Name, Rgba, Scale, Sizes, Text, Xyz, listed, short
 from tfcompose.units import Density, Inertia, Mass, Size, refused
 

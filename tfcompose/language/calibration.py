@@ -23,9 +23,9 @@ from pydantic import AfterValidator, BeforeValidator, ConfigDict, model_validato
 
 from tfcompose.findings import Finding, Span, finding
 from tfcompose.geometry import Pose, Quaternion, normalised, quat_from_matrix, quat_from_rpy
-from tfcompose.language.base import Spec
 from tfcompose.language.pose import CalibrationFormat, has_unit_length, is_rotation
 from tfcompose.language.reading import Refusal, read
+from tfcompose.language.spec import Spec
 from tfcompose.language.values import InARow, Text
 from tfcompose.load.calibration import load_calibration
 from tfcompose.units import Number, refused, shown

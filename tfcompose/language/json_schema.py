@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 from pydantic.json_schema import GenerateJsonSchema
 
 from tfcompose.catalogue import CATALOGUE
-from tfcompose.language.base import described, examples_of, fields_of, walk
 from tfcompose.language.node_preset import NodePresetSpec
 from tfcompose.language.preset import PresetSpec
 from tfcompose.language.robot import RobotSpec
+from tfcompose.language.spec import described, examples_of, fields_of, walk
 from tfcompose.load.scalars import plain
 
 if TYPE_CHECKING:
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from pydantic.fields import FieldInfo
 
-    from tfcompose.language.base import Spec
     from tfcompose.language.preset import Option
+    from tfcompose.language.spec import Spec
 
 LANGUAGES: dict[str, type[Spec]] = {"robot": RobotSpec, "preset": PresetSpec, "node": NodePresetSpec}
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator
 
-from tfcompose.language.base import Spec, key
+from tfcompose.language.spec import Spec, key
 from tfcompose.language.values import Boolean, Parameters, Text
 
 NO_SWITCH = "none"

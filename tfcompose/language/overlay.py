@@ -11,8 +11,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, finding
-from tfcompose.language.base import Spec, choices
 from tfcompose.language.robot import RobotSpec
+from tfcompose.language.spec import Spec, choices
 from tfcompose.load import Path, Place, Source
 
 if TYPE_CHECKING:

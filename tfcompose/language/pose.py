@@ -20,7 +20,7 @@ from tfcompose.geometry import (
     quat_from_matrix,
     quat_from_rpy,
 )
-from tfcompose.language.base import Checked, Spec, key, several
+from tfcompose.language.spec import Checked, Spec, key, several
 from tfcompose.language.values import Axis, Boolean, InARow, Numbers, OneOrMore, Text, Texts, Xyz, short
 from tfcompose.units import Angle, Length, Number, Rate, refused
 

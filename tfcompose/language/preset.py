@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BeforeValidator, Discriminator, Tag
 
 from tfcompose.findings import did_you_mean
-from tfcompose.language.base import Spec, key
 from tfcompose.language.bodies import Shape
 from tfcompose.language.node_preset import Fact
 from tfcompose.language.pose import Rotated
 from tfcompose.language.reading import Refusal
+from tfcompose.language.spec import Spec, key
 from tfcompose.language.values import Anything, Boolean, Matches, NoMapping, Parameters, Text, Xyz
 from tfcompose.plan import SensorPublisher
 from tfcompose.units import Mass, Rate

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag
 
-from tfcompose.language.base import Checked, Spec, key, several
 from tfcompose.language.expressions import inserted
 from tfcompose.language.node_preset import ClaimSpec
 from tfcompose.language.pose import Posed
+from tfcompose.language.spec import Checked, Spec, key, several
 from tfcompose.language.values import (
     Boolean,
     Matches,

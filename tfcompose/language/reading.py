@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin
 from pydantic import ValidationError
 
 from tfcompose.findings import Edit, Finding, Note, did_you_mean, finding, slip_of
-from tfcompose.language.base import FIRST, at, fields_of, kinds_of, mapping_at
+from tfcompose.language.spec import FIRST, at, fields_of, kinds_of, mapping_at
 from tfcompose.units import shown
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from pydantic_core import ErrorDetails
 
-    from tfcompose.language.base import Spec
+    from tfcompose.language.spec import Spec
     from tfcompose.load import Path, Source
 
 M = TypeVar("M", bound="Spec")

@@ -7,8 +7,8 @@ import json
 import types
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
-from tfcompose.language.base import described, examples_of, fields_of, is_mapping, measure_of, walk
 from tfcompose.language.json_schema import LANGUAGES
+from tfcompose.language.spec import described, examples_of, fields_of, is_mapping, measure_of, walk
 from tfcompose.language.values import InARow
 from tfcompose.units import Measure
 

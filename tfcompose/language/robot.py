@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
 
-from tfcompose.language.base import Checked, Spec, below, key, measure_of, several
 from tfcompose.language.bodies import LinkSpec
 from tfcompose.language.pose import EdgeKeys, MountKeys, Parents, Posed, Rotated
 from tfcompose.language.process import Driver, ProcessSpec
+from tfcompose.language.spec import Checked, Spec, below, key, measure_of, several
 from tfcompose.language.values import (
     Axis,
     Boolean,

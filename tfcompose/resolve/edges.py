@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, Span, finding
 from tfcompose.geometry import norm
-from tfcompose.language.base import Spec
+from tfcompose.language.spec import Spec
 from tfcompose.model import (
     FREE,
     JOINTS,

@@ -6,7 +6,6 @@ frames that match a preset become sensors; comments hold what a robot file canno
 
 from __future__ import annotations
 
-import os
 import posixpath
 import re
 import sys
@@ -17,9 +16,7 @@ from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, rej
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-    from collections.abc import Iterable
 
-    from tfcompose.compile import Compiled
     from tfcompose.findings import Finding
     from tfcompose.urdf.lint import Document
 
@@ -56,14 +53,14 @@ def run(arguments: Namespace) -> int:
         named = {name: (str(Path(folder).absolute()), Span(folder)) for name, folder in packages.items()}
         files = disk()
         known = Packages(files, named, otherwise="--package {name}=FOLDER, or source the workspace's setup file")
-        read = read_urdf(arguments.file, known, files, given)
+        document = read_urdf(arguments.file, known, files, given)
     except RejectedError as error:
         reject(error.findings)
-    errors = [one for one in read.findings() if one.severity == "error"]
+    errors = [one for one in document.findings() if one.severity == "error"]
     print_findings(errors, sys.stderr)
     if errors and not arguments.keep_going:
         fail("nothing was written; --keep-going writes as much as possible")
-    text, more_errors = _robot_file(read, arguments, known.own | packages)
+    text, more_errors = _robot_file(document, arguments, known.own | packages)
     if more_errors and not arguments.keep_going:
         print_findings([replace(one, span=None) for one in more_errors], sys.stderr)  # places in what is not written
         fail("nothing was written: a robot file cannot express all of the source; --keep-going writes it anyway")
@@ -97,70 +94,22 @@ def _check_use(arguments: Namespace) -> None:
         fail(f"{arguments.output} exists already; --force overwrites it", UNREADABLE)
 
 
-def _robot_file(read: Document, arguments: Namespace, packages: dict[str, str]) -> tuple[str, list[Finding]]:
+def _robot_file(document: Document, arguments: Namespace, packages: dict[str, str]) -> tuple[str, list[Finding]]:
     """Return the robot file, and the errors that it has where the source has none."""
-    from dataclasses import replace
-
-    from tfcompose.cli.compiling import library
-    from tfcompose.emit.spec import robot_name, spec
-    from tfcompose.files import Target
-    from tfcompose.imported import Imported
-    from tfcompose.resolve.recognise import recognised
-    from tfcompose.resolve.urdf_idle import without_idle_blocks
-    from tfcompose.resolve.urdf_lost import angles, lost
-    from tfcompose.resolve.urdf_names import with_material_names
-    from tfcompose.urdf.ros2_control import with_hardware
-
-    robot, idle = without_idle_blocks(with_hardware(read.robot))
-    robot, renamed = with_material_names(robot)
-    folder = posixpath.dirname(arguments.output or "") or "."
-    words = frozenset(re.findall(r"[^\s<>\"'=]+", " ".join(block.text for block in robot.blocks)))
-    sensors, undecided = ([], {}) if arguments.no_sensors else recognised(robot, library(), words)
-    notes = lost(read.root, read.robot, read.found)
-    for mount, said in undecided.items():
-        notes.setdefault(("frames", mount), []).append(said)
-    notes.setdefault(("", ""), []).extend([*renamed, *idle])
-    name = arguments.robot or robot_name(robot.name)
-    if name != robot.name:
-        notes.setdefault(("", ""), []).append(f"the source calls it {robot.name}")
-    given = Imported(
-        robot,
-        arguments.file,
-        tuple(sensors),
-        {at: tuple(said) for at, said in notes.items()},
-        angles(read.root),
-        {name: os.path.relpath(where, folder) for name, where in packages.items()},
-    )
-    target = Target("as-written", folder, Path.cwd().as_posix())
-    head = [f"imported from {posixpath.basename(arguments.file)} by tfcompose"]
-    text = spec(given, name, target, head)
-    compiled = _compiled(text, arguments.output)
-    errors = [one for one in compiled.errors if one.code != "TF501"]  # such names the source would not have had
-    if errors != list(compiled.errors):
-        why = ("the source has such names",)
-        given = replace(given, rules={"TF501": "warning"}, notes=given.notes | {("rules", "TF501"): why})
-    return spec(given, name, target, [*head, *_faults(compiled)]), errors
-
-
-def _compiled(text: str, output: str | None) -> Compiled:
     from tfcompose.cli.compiling import library
     from tfcompose.cli.disk import disk
     from tfcompose.cli.reading import read_text
-    from tfcompose.compile import compile_robot
+    from tfcompose.compile import Compiled, compile_robot
+    from tfcompose.files import Target
+    from tfcompose.importing.convert import imported, with_findings
 
-    return compile_robot(text, output or "robot.yaml", library(), read=read_text, disk=disk())
+    def lint(text: str) -> Compiled:
+        return compile_robot(text, arguments.output or "robot.yaml", library(), read=read_text, disk=disk())
 
-
-def _faults(compiled: Compiled) -> Iterable[str]:
-    """Yield what lint says of the result, each rule once: these are faults of the source."""
-    several: dict[str, list[Finding]] = {}
-    for one in compiled.found:
-        several.setdefault(one.code, []).append(one)
-    if several:
-        yield "what lint says of this file is true of the source:"
-    for code, found in several.items():
-        more = f" (and {len(found) - 1} more)" if found[1:] else ""
-        yield f"{code}: {found[0].message}{more}"
+    target = Target("as-written", posixpath.dirname(arguments.output or "") or ".", Path.cwd().as_posix())
+    presets = None if arguments.no_sensors else library()
+    robot = imported(document, target, arguments.robot or "", packages, presets)
+    return with_findings(robot, arguments.file, lint)
 
 
 def _write(text: str, output: str | None) -> None:

@@ -16,7 +16,7 @@ WIDTH = 120
 #: What needs no quotes: a name, a path, an address.
 _PLAIN = re.compile(r"(?:[a-z]+://)?[A-Za-z_][A-Za-z0-9_./+-]*")
 #: What readers of other versions of YAML take for something else than a text.
-_WORDS = frozenset({"true", "false", "null", "yes", "no", "on", "off", "y", "n", "nan", "inf"})
+_RESERVED = frozenset({"true", "false", "null", "yes", "no", "on", "off", "y", "n", "nan", "inf"})
 _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
 
@@ -48,7 +48,7 @@ def entry(key: str, value: Any, depth: int = 0) -> list[str]:
         return [line]
     if isinstance(value, list):
         return [head, *(one for item in value for one in _item(item, depth + 1))]
-    return [head, *(one for inner, said in value.items() for one in entry(inner, said, depth + 1))]
+    return [head, *(one for inner, item in value.items() for one in entry(inner, item, depth + 1))]
 
 
 def _splits(value: Any) -> bool:
@@ -61,7 +61,7 @@ def _item(value: Any, depth: int) -> list[str]:
     line = f"{before}- {flow(value)}"
     if len(line) <= WIDTH or not isinstance(value, dict):
         return [line]
-    lines = [one for key, said in value.items() for one in entry(key, said, depth + 1)]
+    lines = [one for key, item in value.items() for one in entry(key, item, depth + 1)]
     return [f"{before}- {lines[0].lstrip()}", *lines[1:]]
 
 
@@ -82,7 +82,7 @@ def text(value: str) -> str:
     """Return a text, in quotes where YAML would take it for something else."""
     if isinstance(value, Bare):
         return str(value)
-    if _PLAIN.fullmatch(value) and value.lower() not in _WORDS:
+    if _PLAIN.fullmatch(value) and value.lower() not in _RESERVED:
         return value
     return '"' + "".join(_ESCAPES.get(letter) or _printed(letter) for letter in value) + '"'
 
@@ -100,22 +100,22 @@ def _literal(value: str) -> list[str] | None:
     return lines
 
 
-def leaned(block: str) -> Literal:
+def dedented(block: str) -> Literal:
     """Return an element as it stands in a file, without what its lines are indented by."""
     first, _, rest = block.strip().partition("\n")
     below = dedent(rest.expandtabs(2)) if rest else ""
     return Literal("\n".join(line.rstrip() for line in [first, *below.splitlines()]))
 
 
-def comment(said: Iterable[str], depth: int = 0) -> list[str]:
+def comment(texts: Iterable[str], depth: int = 0) -> list[str]:
     """Return texts as lines of comment, folded where they are long."""
     before = "  " * depth + "# "
-    return [before + line for one in said for line in _folded(" ".join(one.split()), WIDTH - len(before))]
+    return [before + line for one in texts for line in _folded(" ".join(one.split()), WIDTH - len(before))]
 
 
-def _folded(said: str, width: int) -> list[str]:
+def _folded(line: str, width: int) -> list[str]:
     lines = [""]
-    for word in said.split(" "):
+    for word in line.split(" "):
         if lines[-1] and len(lines[-1]) + 1 + len(word) > width:
             lines.append("  " + word)
         else:

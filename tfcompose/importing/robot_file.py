@@ -1,0 +1,234 @@
+"""The text of the robot file that says what an imported robot is.
+
+Its sections and keys stand in the order of the language; what could not be taken is said in comments, at its place.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.importing.values import Values, rotation
+from tfcompose.importing.yaml_text import comment, dedented, entry, section
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from tfcompose.files import Target
+    from tfcompose.geometry import Quaternion, Vector
+    from tfcompose.importing.omitted import Entry
+    from tfcompose.importing.sensors import Recognised
+    from tfcompose.model import Edge, Hardware, Interface, Robot
+
+#: Who publishes planar and floating joints: a URDF does not say it.
+MOVER = "mover"
+
+
+@dataclass(frozen=True, slots=True)
+class Imported:
+    """A robot on its way into a robot file.
+
+    ``name`` is its name there, ``target`` where that file will be. ``reserved`` are words that raw blocks use: joints
+    of these names stay joints. ``notes`` say of each entry what of it is left out, and why. ``rpy`` has the angles
+    (rad) by which the source has rotations; ``packages`` are folders of packages, as the robot file is to name them;
+    ``rules`` are the levels of findings that the source gives reason for.
+    """
+
+    robot: Robot
+    name: str
+    target: Target
+    reserved: frozenset[str] = frozenset()
+    sensors: tuple[Recognised, ...] = ()
+    notes: Mapping[Entry, Iterable[str]] = field(default_factory=dict)
+    rpy: Mapping[Quaternion, Vector] = field(default_factory=dict)
+    packages: Mapping[str, str] = field(default_factory=dict)
+    rules: Mapping[str, str] = field(default_factory=dict)
+
+
+def robot_file(imported: Imported, head: Iterable[str]) -> str:
+    """Return the robot file of an imported robot; ``head`` are comments above everything."""
+    return "\n".join([*_Writer(imported).lines(head), ""])
+
+
+class _Writer:
+    """Writes one robot; each section is a mapping, in the order of the source."""
+
+    def __init__(self, imported: Imported) -> None:
+        self.imported, self.robot = imported, imported.robot
+        self.values = Values(imported.rpy, imported.robot, imported.target)
+        self.notes: dict[Entry, list[str]] = {at: list(notes) for at, notes in imported.notes.items()}
+        self.brought = {edge.child for sensor in imported.sensors for edge in sensor.edges}
+        self.bare = [edge for edge in self.robot.edges if self._is_bare(edge)]
+
+    def lines(self, head: Iterable[str]) -> list[str]:
+        imported, robot, links, joints = self.imported, self.robot, self._links(), self._joints()
+        lines = [*comment(head), *entry("tfcompose", 1), *comment(self._of("", "")), *entry("robot", imported.name)]
+        base = self._base()
+        lines += entry("base", base) if base else []
+        sections: dict[str, dict[str, Any]] = {
+            "packages": dict(imported.packages),
+            "links": links,
+            "joints": joints,
+            "ros2_control": {one.name: _hardware(one) for one in robot.hardware},
+            "xml": {block.name: dedented(block.text) for block in robot.blocks},
+            "frames": {edge.child: self._frame(edge) for edge in self.bare},
+            "sensors": {sensor.name: self._sensor(sensor) for sensor in imported.sensors},
+            "processes": self._processes(),
+            "rules": dict(imported.rules),
+        }
+        if any("${" in value for value in _texts(sections)):
+            lines += entry("vars", {"dollar": "$"})
+            sections = _without_expressions(sections)
+        lines += comment(self._homeless(sections))
+        for title, entries in sections.items():
+            lines += section(title, entries, {key: self._of(title, key) for key in entries})
+        return lines
+
+    def _of(self, title: str, name: str) -> list[str]:
+        return self.notes.get((title, name), [])
+
+    def _homeless(self, sections: dict[str, dict[str, Any]]) -> list[str]:
+        """Return the notes of what has no entry of its own; a frame with a body has its notes there."""
+        homeless = []
+        for (title, name), notes in list(self.notes.items()):
+            if title == "frames" and name not in sections["frames"] and name in sections["links"]:
+                self.notes["links", name] = self._of("links", name) + notes
+            elif title and name not in sections[title]:
+                homeless += [f"{name}: {note}" for note in notes]
+        return homeless
+
+    def _note(self, title: str, name: str, *notes: str) -> None:
+        if notes:
+            self.notes.setdefault((title, name), []).extend(notes)
+
+    def _is_bare(self, edge: Edge) -> bool:
+        """Whether the edge can be a frame's: it does not move, has no body, and nothing names its joint."""
+        link = self.robot.links.get(edge.child)
+        body = link and (link.visuals or link.collisions or link.inertial)
+        free = edge.joint or edge.free or edge.child in self.brought
+        return not (body or free or link is None or edge.joint_name in self.imported.reserved)
+
+    def _base(self) -> str | None:
+        """Return where the URDF begins, if that has to be said."""
+        roots = self.robot.roots()
+        root = roots[0] if len(roots) == 1 else None
+        above = self.robot.parent_edge("base_link") if "base_link" in self.robot.frames else None
+        if root is None or above is None:
+            return None
+        usual = "base_footprint" if above.kind == "static" and above.parent == "base_footprint" else "base_link"
+        return None if root == usual else root
+
+    def _links(self) -> dict[str, Any]:
+        frames = {edge.child for edge in self.bare}
+        bodies_of_presets = {sensor.body for sensor in self.imported.sensors}
+        entries = {}
+        for name, link in self.robot.links.items():
+            body = self.values.link(link)
+            if name in frames or (name in self.brought and name not in bodies_of_presets and not body):
+                self._note("frames" if name in frames else "links", name, *self.notes.pop(("links", name), ()))
+                continue
+            entries[name] = body
+        return entries
+
+    def _joints(self) -> dict[str, Any]:
+        return {
+            edge.joint_name: self.values.joint(edge, MOVER if edge.free else None)
+            for edge in self.robot.edges
+            if not self._is_bare(edge) and edge.child not in self.brought
+        }
+
+    def _frame(self, edge: Edge) -> dict[str, Any]:
+        self._note("frames", edge.child, *self.notes.pop(("joints", edge.joint_name), ()))
+        self._note_joint_names([edge], "frames", edge.child)
+        return {"parent": edge.parent, **self.values.pose(edge.pose)}
+
+    def _note_joint_names(self, edges: Iterable[Edge], title: str, name: str) -> None:
+        """Note the names of joints that are not what ``build`` will call them."""
+        own = [edge.joint_name for edge in edges if edge.joint_name not in {"", f"{edge.parent}_to_{edge.child}"}]
+        if own:
+            self._note(title, name, f"joints {', '.join(own)}" if len(own) > 1 else f"joint {own[0]}")
+
+    def _sensor(self, sensor: Recognised) -> dict[str, Any]:
+        frames: dict[str, Any] = {}
+        for edge in sensor.inside:
+            values: dict[str, Any] = {}
+            if edge.child in sensor.own_xyz:
+                values["xyz"] = list(edge.pose.xyz)
+            if edge.child in sensor.own_rotation:
+                quat_xyzw = edge.pose.quat_xyzw
+                values["rpy"] = rotation(quat_xyzw, self.imported.rpy.get(quat_xyzw)) or [0, 0, 0]
+            if values:
+                frames[edge.child] = values
+        for edge in sensor.edges:
+            self._note("sensors", sensor.name, *self.notes.pop(("joints", edge.joint_name), ()))
+            if not self.values.link(self.robot.links[edge.child]):
+                self._note("sensors", sensor.name, *self.notes.pop(("links", edge.child), ()))
+        self._note_joint_names(sensor.edges, "sensors", sensor.name)
+        keys: dict[str, Any] = {"preset": sensor.preset, "parent": sensor.mount.parent}
+        keys |= self.values.pose(sensor.mount.pose)
+        keys |= {"options": sensor.options} if sensor.options else {}
+        return keys | ({"driver": "none"} if sensor.driven else {}) | ({"frames": frames} if frames else {})
+
+    def _processes(self) -> dict[str, Any]:
+        free = [edge.joint_name for edge in self.robot.edges if edge.free]
+        if not free:
+            return {}
+        several = ", ".join(free)
+        self._note("processes", MOVER, f"the source does not say who publishes {several}: name that process here")
+        return {MOVER: {"external": True}}
+
+
+def _texts(value: Any) -> list[str]:
+    """Return the texts in which expressions are looked for: in a key none is."""
+    if isinstance(value, dict):
+        return [one for item in value.values() for one in _texts(item)]
+    if isinstance(value, (list, tuple)):
+        return [one for item in value for one in _texts(item)]
+    return [value] if isinstance(value, str) else []
+
+
+def _without_expressions(value: Any) -> Any:
+    """Return the data in which no text is taken for an expression."""
+    if isinstance(value, dict):
+        return {key: _without_expressions(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_without_expressions(item) for item in value]
+    return type(value)(value.replace("${", "${dollar}{")) if isinstance(value, str) else value
+
+
+def _hardware(hardware: Hardware) -> dict[str, Any]:
+    keys: dict[str, Any] = {"plugin": hardware.plugin}
+    keys |= {"type": hardware.type} if hardware.type != "system" else {}
+    keys |= {"params": _params(hardware.params)} if hardware.params else {}
+    keys |= {"rw_rate": hardware.rw_rate} if hardware.rw_rate is not None else {}
+    keys |= {"is_async": hardware.is_async} if hardware.is_async is not None else {}
+    for kind in ("joint", "sensor", "gpio"):
+        components = {}
+        for one in hardware.components:
+            if one.kind == kind:
+                values = {"command": _interfaces(one.command), "state": _interfaces(one.state)}
+                values["params"] = _params(one.params)
+                components[one.name] = {key: value for key, value in values.items() if value}
+        keys |= {f"{kind}s": components} if components else {}
+    return keys
+
+
+def _interfaces(several: tuple[Interface, ...]) -> Any:
+    if any(one.params for one in several):
+        return {one.name: _params(one.params) for one in several}
+    return [one.name for one in several]
+
+
+def _params(params: dict[str, str]) -> dict[str, Any]:
+    return {name: _value(text) for name, text in params.items()}
+
+
+def _value(text: str) -> Any:
+    """Return the text as a number or a truth where that comes out as the same text again."""
+    if text in {"true", "false"}:
+        return text == "true"
+    if re.fullmatch(r"-?(0|[1-9][0-9]{0,14})(\.[0-9]*[1-9])?", text) and text != "-0":
+        value = float(text)
+        return value if (str(int(value)) if value.is_integer() else repr(value)) == text else text
+    return text

@@ -38,6 +38,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "check": {"catalogue", "findings", "load", "model", "geometry", "tree"},
     "draw": set(),
     "urdf": {"catalogue", "check", "files", "findings", "geometry", "load", "model", "numbers"},
+    "export": {"emit", "files", "numbers", "plan"},
     "emit": {"draw", "files", "geometry", "model", "numbers", "plan", "render", "urdf"},
     "ros": {"findings", "interrupt", "plan", "geometry"},
     "verdict": {"catalogue", "findings", "plan", "geometry"},

@@ -17,10 +17,10 @@ import yaml
 
 from tests.support import processes
 from tests.support.plans import built, compiled_plan
-from tfcompose.emit.compose import compose
-from tfcompose.emit.launch import launch
-from tfcompose.emit.supervised import Machine
-from tfcompose.emit.systemd import systemd
+from tfcompose.export.compose import compose
+from tfcompose.export.launch import launch
+from tfcompose.export.supervisors import Machine
+from tfcompose.export.systemd import systemd
 from tfcompose.plan import Plan, PlanProcess, StopRule
 from tfcompose.plan.file import read_plan
 

@@ -80,7 +80,7 @@ def run(arguments: Namespace) -> int:
 
 def _write(plan: Plan, file: Path, arguments: Namespace) -> None:
     from tfcompose.cli.writing import write_all
-    from tfcompose.emit.supervised import started
+    from tfcompose.export.supervisors import started
     from tfcompose.findings import RejectedError
 
     folder = Path(arguments.output or file.parent) / arguments.kind
@@ -100,19 +100,19 @@ def _write(plan: Plan, file: Path, arguments: Namespace) -> None:
 
 def _exported(plan: Plan, file: Path, folder: Path, arguments: Namespace) -> tuple[tuple[File, ...], list[str]]:
     """Return the files, and what is not as with ``up``."""
-    from tfcompose.emit.supervised import Machine
+    from tfcompose.export.supervisors import Machine
 
     beside = Path(os.path.relpath(file.parent, folder)).as_posix()
     if arguments.kind == "launch":
         from tfcompose.cli.reading import read_text
-        from tfcompose.emit.launch import launch
+        from tfcompose.export.launch import launch
 
         return launch(plan, Machine(beside), read_text(str(file.parent / "robot.urdf")))
     if arguments.kind == "compose":
-        from tfcompose.emit.compose import compose
+        from tfcompose.export.compose import compose
 
         return compose(plan, Machine(beside, image=arguments.image))
-    from tfcompose.emit.systemd import systemd
+    from tfcompose.export.systemd import systemd
 
     own = {} if arguments.setup else {name: os.environ[name] for name in ROS_VARIABLES if os.environ.get(name)}
     at = Path(arguments.at or file.parent).absolute().as_posix()

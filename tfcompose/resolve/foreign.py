@@ -63,7 +63,7 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
     robot, found = robot_of(read_xml(text, name), name, packages.asset)
     if not robot.frames:
         macros = macros_in(read(file))
-        advice = f"it defines macros; name one, as xacro: and macro: {', '.join(macros)}" if macros else ""
+        advice = f"it defines macros; call one with xacro: and macro: {', '.join(macros)}" if macros else ""
         raise RejectedError([finding("TF206", f"{file} has no links", at, help=advice)])
     robot = with_hardware(robot)
     parents = {edge.parent for edge in robot.edges}
@@ -116,10 +116,10 @@ def _in_call(part: PartEntry, file: str, found: Finding, read: Callable[[str], s
     macros = macros_in(read(file))
     if macro in macros:
         advice = f"{macro} takes {macros[macro] or 'nothing'}"
-        advice += "; what begins with * is {xyz, rpy}, or XML" if "*" in macros[macro] else ""
+        advice += "; parameters with * take {xyz, rpy} or XML" if "*" in macros[macro] else ""
         place = part.source.at_key((*part.at, "params", named[-1])) if named else place
     else:
-        advice = did_you_mean(macro, macros, f"{file} has {', '.join(macros)}" if macros else "")
+        advice = did_you_mean(macro, macros, f"{file} defines {', '.join(macros)}" if macros else "")
     return replace(_at(place, found), help=advice)
 
 
@@ -127,7 +127,7 @@ def _at(place: Span, found: Finding) -> Finding:
     """Return the finding about a file that has no better place in it, at the place that names the file."""
     if found.span is None or found.code == "TF001":
         return found
-    exact = () if found.span == Span(found.span.file) else (Note("it stands here", found.span),)
+    exact = () if found.span == Span(found.span.file) else (Note("reported here", found.span),)
     return replace(found, span=place, message=f"{found.span.file}: {found.message}", notes=(*exact, *found.notes))
 
 
@@ -158,7 +158,7 @@ def _refuse_broken(name: str, text: str, at: Span) -> None:
     try:
         read_block(text, at.file)
     except RejectedError as error:
-        found = (replace(one, span=at, message=f"the block {name}: {one.message}") for one in error.findings)
+        found = (replace(one, span=at, message=f"block {name}: {one.message}") for one in error.findings)
         raise RejectedError(found) from None
 
 

@@ -39,12 +39,12 @@ def read_block(text: str, file: str, *, with_text: bool = False) -> Element:
 def faults_of(root: Element, frames: Collection[str], joints: Collection[str]) -> Iterator[Finding]:
     """Yield what is wrong with the elements of a block."""
     if not root.children:
-        yield finding("TF719", "a block without an element", root.at, help="remove it")
+        yield finding("TF719", "the block has no element", root.at, help="remove it")
     for element in root.children:
         if element.tag in _SECTIONS or element.tag in _INNER:
-            message = f"<{element.tag}> cannot stand in a block"
+            message = f"<{element.tag}> is not allowed in a block"
             section = _SECTIONS.get(element.tag)
-            advice = f"write it under {section}:" if section else "it belongs into <gazebo>, a link or a joint"
+            advice = f"write it under {section}:" if section else "put it into <gazebo>, a link or a joint"
             yield finding("TF719", message, element.at, help=advice)
         elif element.tag not in _ALLOWED and ":" not in element.tag and nearest(element.tag, _ALLOWED):
             advice = did_you_mean(element.tag, _ALLOWED)
@@ -63,7 +63,7 @@ def _undeclared_prefixes(top: Element) -> Iterator[Finding]:
             prefix, colon, _ = name.partition(":")
             if colon and prefix not in known:
                 advice = f'<{element.tag} xmlns:{prefix}="http://…">'
-                yield finding("TF719", f"nothing declares the prefix {prefix} of {name}", element.at, help=advice)
+                yield finding("TF719", f"undeclared namespace prefix {prefix} in {name}", element.at, help=advice)
         waiting += [(child, known) for child in element.children]
 
 
@@ -72,8 +72,10 @@ def unexpanded(text: str, file: str) -> Iterator[Finding]:
     for found in _SUBSTITUTION.finditer(_COMMENT.sub(_blank, text)):
         before = text[: found.start()]
         line, column = before.count("\n") + 2, found.start() - before.rfind("\n")
-        message = f"{found[0]} stays as it is: nobody expands it in a URDF"
-        advice = "the path itself; with vars: {config: /opt/…}, ${config}/x.yaml and --set vars.config=… elsewhere"
+        message = f"{found[0]} is not expanded in a URDF"
+        advice = (
+            "write the path itself, or ${config}/x.yaml with vars: {config: /opt/…}, and --set vars.config=… elsewhere"
+        )
         at = Span(file, line, column, line, column + len(found[0]))
         yield finding("TF729", message, at, help=advice, severity="warning")
 
@@ -87,7 +89,7 @@ def unknown_references(element: Element, frames: Collection[str], joints: Collec
     reference = element.attributes.get("reference")
     if element.tag == "gazebo" and reference is not None and reference not in frames and reference not in joints:
         advice = did_you_mean(reference, [*frames, *joints])
-        yield finding("TF203", f"no link or joint {reference}", element.at_value("reference"), help=advice)
+        yield finding("TF203", f"unknown link or joint {reference}", element.at_value("reference"), help=advice)
     if element.tag in {"transmission", "ros2_control"}:
         for joint in element.all("joint"):
             name = joint.attributes.get("name", "")
@@ -98,8 +100,8 @@ def unknown_references(element: Element, frames: Collection[str], joints: Collec
 def unknown_joint(name: str, at: Span, joints: Collection[str]) -> Finding:
     """Return the finding that none of the ``joints``, the moving ones, has this name."""
     more = f" and {len(joints) - _MOST_NAMED} more" if len(joints) > _MOST_NAMED else ""
-    there = f"there is {', '.join(list(joints)[:_MOST_NAMED])}{more}"
-    advice = did_you_mean(name, joints, there if joints else "no joint moves")
+    there = f"the robot has {', '.join(list(joints)[:_MOST_NAMED])}{more}"
+    advice = did_you_mean(name, joints, there if joints else "no joint of the robot moves")
     return finding("TF703", f"no moving joint {name}", at, help=advice)
 
 

@@ -63,7 +63,7 @@ def robot_of(root: Element, file: str, find: Finder) -> tuple[Robot, tuple[Findi
         RejectedError: if it is no URDF.
     """
     if root.tag != "robot":
-        message = f"the document is <{root.tag}>, not <robot>"
+        message = f"the root element is <{root.tag}>, not <robot>"
         raise RejectedError([finding("TF018", message, root.at, help="a URDF begins with <robot name=…>")])
     values = Values()
     values.has_quaternions = version_of(root, values) >= (1, 1)
@@ -99,10 +99,10 @@ def _by_name(elements: list[Element], values: Values, severity: Severity = "erro
     for element in elements:
         name = values.text(element, "name", f'<{element.tag} name="…">')
         if name in known:
-            note = Note("it stands here first", known[name].at_value("name"))
-            message = f"two {element.tag}s have the name {name}"
-            advice = "remove it: readers of ROS refuse the robot"
-            advice = "another name for one of them" if severity == "error" else advice
+            note = Note("first defined here", known[name].at_value("name"))
+            message = f"duplicate {element.tag} name {name}"
+            advice = "remove it: ROS parsers reject the robot"
+            advice = "rename one of them" if severity == "error" else advice
             at = element.at_value("name")
             values.found.append(finding("TF722", message, at, notes=[note], help=advice, severity=severity))
         elif name:
@@ -135,7 +135,7 @@ def _edge(element: Element, values: Values) -> Edge | None:
     name, kind = element.attributes.get("name", ""), values.text(element, "type", 'type="fixed"')
     if kind and kind not in JOINT_TYPES:
         advice = did_you_mean(kind, JOINT_TYPES, f"one of: {', '.join(JOINT_TYPES)}")
-        values.refuse(f"there is no joint type {kind}", element.at_value("type"), advice)
+        values.refuse(f"unknown joint type {kind}", element.at_value("type"), advice)
     ends = {}
     for tag in ("parent", "child"):
         end = element.first(tag)
@@ -230,7 +230,7 @@ class _Bodies:
         geometry = element.first("geometry")
         if geometry is None or not geometry.children:
             advice = '<geometry><box size="1 1 1"/></geometry>'
-            self.values.refuse(f"a {element.tag} without a geometry", (geometry or element).at, advice)
+            self.values.refuse(f"the {element.tag} has no geometry", (geometry or element).at, advice)
             return []
         shapes = []
         for form in geometry.children:
@@ -253,12 +253,12 @@ class _Bodies:
         if not all(0 < value < HUGE for value in size):
             at = form.at_value(SIZES[form.tag][0][0])
             severity: Severity = "warning" if min(size) == 0 and max(size) < HUGE else "error"
-            advice = "give it a size, or remove it: some readers see nothing, others refuse the robot"
-            message = f"a {form.tag} of size {' '.join(f'{value:g}' for value in size)}"
+            advice = "give it a size or remove it: some parsers ignore it, others reject the robot"
+            message = f"<{form.tag}> has the size {' '.join(f'{value:g}' for value in size)}"
             self.values.refuse(message, at, advice, severity)
             return []
         if form.tag == "capsule":
-            message, advice = "readers of ROS 2 Jazzy refuse a robot with a <capsule>", "a cylinder and two spheres"
+            message, advice = "parsers of ROS 2 Jazzy reject <capsule>", "use a cylinder and two spheres"
             self.values.refuse(message, form.at, advice, "warning")
         kind: Any = form.tag
         return [Shape(kind, tuple(size), self.values.pose(element), self._material(element))]
@@ -315,7 +315,7 @@ class _Bodies:
         mass = self.values.number(weight, "value", 0.0)
         if not 0 < mass < HUGE:
             severity: Severity = "warning" if mass == 0 else "error"
-            advice = "in kg, greater than 0; a link without a body has no inertial"
+            advice = "give a mass in kg, greater than 0, or remove <inertial>"
             self.values.refuse(f"the mass of {name} is {mass:g} kg", weight.at_value("value"), advice, severity)
             return None
         xx, xy, xz, yy, yz, zz = (self.values.number(tensor, key, 0.0) for key in MOMENTS)

@@ -102,8 +102,8 @@ def _refuse_unknown(given: Mapping[str, str], files: list[str], file: str) -> No
 
 
 def _no_argument(name: str, known: Collection[str], file: str) -> Finding:
-    there = f"there is {', '.join(known)}" if known else "it takes none"
-    return finding("TF106", f"no argument {name}", Span(file), help=did_you_mean(name, known, there))
+    there = f"known: {', '.join(known)}" if known else "the file takes no arguments"
+    return finding("TF106", f"unknown argument {name}", Span(file), help=did_you_mean(name, known, there))
 
 
 def _raise_comments(node: Any) -> None:
@@ -130,8 +130,8 @@ def _refused(error: Exception, file: str) -> Finding:
     if isinstance(root, _MissingError):
         return replace(root.found, severity="error", span=Span(file))
     if type(root).__name__ == "ArgException":
-        message = f"the argument {root} has no value: the file gives it none"
-        return finding("TF106", message, Span(file), help=f"{root}:=…; of a part, args: {{{root}: …}}")
+        message = f"the argument {root} has no value and no default"
+        return finding("TF106", message, Span(file), help=f"give it: {root}:=…, or in a part args: {{{root}: …}}")
     reason = _reason(chain) or type(error).__name__
     found = finding("TF018", f"xacro: {reason}", Span(file))
     files, macros = list(xacro.filestack or ()), list(xacro.macrostack or ())

@@ -59,14 +59,14 @@ def read_urdf(file: str, packages: Packages, disk: Disk, arguments: Mapping[str,
     raw = disk.read(file)
     is_xacro = file.endswith(".xacro") or "<xacro:" in raw
     if arguments and not is_xacro:
-        advice = "xacro files take arguments"
-        raise RejectedError([finding("TF106", f"no argument {next(iter(arguments))}", Span(file), help=advice)])
+        advice = "only xacro files take arguments"
+        raise RejectedError([finding("TF106", f"unknown argument {next(iter(arguments))}", Span(file), help=advice)])
     name, text = (f"{file} (expanded)", disk.expand(file, packages, arguments or {}, None)) if is_xacro else (file, raw)
     root = read_xml(text, name)
     robot, found = robot_of(root, name, packages.asset)
     macros = list(macros_in(raw)) if is_xacro and not robot.frames else []
     if macros:
         advice = f"a part can call one: parts: {{NAME: {{xacro: {file}, macro: {macros[0]}, …}}}}"
-        message = f"{file} defines macros, and no links: {', '.join(macros)}"
+        message = f"{file} defines macros but no links: {', '.join(macros)}"
         raise RejectedError([finding("TF206", message, Span(file), help=advice)])
     return Document(name, text, root, robot, found)

@@ -43,9 +43,11 @@ def moments(path: str, scale: Vector) -> Moments:
             volume = 0.0 if why else float(mesh.volume)
     except Exception as error:  # noqa: BLE001 (readers of a dozen formats: anything can come out of them)
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise UnmeasurableError("TF725", f"it cannot be read: {reason}", "STL, OBJ, PLY, or give inertia") from None
+        raise UnmeasurableError(
+            "TF725", f"it cannot be read: {reason}", "use STL, OBJ or PLY, or give inertia"
+        ) from None
     if not 0 < abs(volume) < math.inf:
-        advice = "mend it, give a closed collision shape, or give mass and inertia"
+        advice = "fix it, give a closed collision shape, or give mass and inertia"
         raise UnmeasurableError("TF725", why or "it has no volume", advice)
     mesh.density = math.copysign(1.0, volume)  # where all its triangles face inwards
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = mesh.moment_inertia.tolist()
@@ -58,14 +60,14 @@ def _why_open(mesh: Any) -> str:
     if not len(mesh.faces):
         return "it has no triangles"
     if not mesh.is_watertight:
-        return "it is not closed, and has no volume"
+        return "it is not closed, so it has no volume"
     if not mesh.is_winding_consistent:
-        return "some of its triangles face inwards and others outwards, so that it has no volume"
+        return "some of its triangles face inwards and others outwards, so it has no volume"
     return ""
 
 
 def _why_flat(mesh: Any) -> str:
-    return "" if abs(mesh.volume) > _FLAT * mesh.scale**3 else "it is flat, and has no volume"
+    return "" if abs(mesh.volume) > _FLAT * mesh.scale**3 else "it is flat, so it has no volume"
 
 
 def _collada_unit(path: str) -> float:

@@ -26,7 +26,7 @@ _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://")
 #: What others write for a file in a package: xacro and launch files, and those who forget a slash.
 _MEANT = re.compile(r"(?:(?:file://)?\$\(find(?:-pkg-share)?\s+([\w.-]+)\s*\)|package:/?([\w.-]+))/+(.+)")
 _NEAR = 0.8  # many packages end in _description
-FETCH = "git lfs pull fetches the file itself"
+FETCH = "run git lfs pull to fetch the file"
 _HIGHEST = 12  # so many folders above a file its package.xml is looked for
 
 
@@ -63,7 +63,7 @@ class Packages:
 
     disk: Disk | None = None
     named: Mapping[str, tuple[str, Span]] = field(default_factory=dict)
-    otherwise: str = "packages: {{{name}: FOLDER}}, or source the workspace's setup file"
+    otherwise: str = "add packages: {{{name}: FOLDER}}, or source the workspace's setup file"
     own: dict[str, str] = field(default_factory=dict)
     _above: dict[str, tuple[str, str]] = field(default_factory=dict)
     _missed: set[tuple[str, str]] = field(default_factory=set)
@@ -87,7 +87,7 @@ class Packages:
         looked = f"looked in {', '.join(places)}" if places else "AMENT_PREFIX_PATH is empty"
         near = slip_of(name, self.named) or nearest(name, self.named, _NEAR)
         advice = f"{looked}; {f'did you mean {near}?' if near else self.otherwise.format(name=name)}"
-        return finding("TF724", f"no package {name}", at, help=advice, severity="warning")
+        return finding("TF724", f"package {name} not found", at, help=advice, severity="warning")
 
     def asset(self, uri: str, at: Span) -> tuple[Asset, Finding | None]:
         """Return the file that is addressed at a place, and what is wrong with the address, if anything is.
@@ -97,8 +97,8 @@ class Packages:
         """
         meant = _MEANT.fullmatch(uri)
         if meant or not uri:
-            advice = f"package://{meant[1] or meant[2]}/{meant[3]}" if meant else "package://NAME/PATH, or a path"
-            return Asset(uri, at), finding("TF723", f"{uri or repr(uri)} is no address of a file", at, help=advice)
+            advice = f"package://{meant[1] or meant[2]}/{meant[3]}" if meant else "write package://NAME/PATH or a path"
+            return Asset(uri, at), finding("TF723", f"{uri or repr(uri)} is not a valid file address", at, help=advice)
         scheme = _SCHEME.match(uri)
         if scheme and scheme[1] == "package":
             return self._in_package(uri, at)
@@ -106,17 +106,17 @@ class Packages:
             return Asset(uri, at), None
         path = unquote(uri[scheme.end() :]) if scheme else uri
         if scheme and not path.startswith("/"):
-            wrong = f"{uri} is no address of a file"
-            return Asset(uri, at), finding("TF723", wrong, at, help="file:// and an absolute path have three slashes")
+            wrong = f"{uri} is not a valid file address"
+            return Asset(uri, at), finding("TF723", wrong, at, help="file:// with an absolute path has three slashes")
         path = posixpath.normpath(path) if path.startswith("/") else path_named(path, at)
         package, inside = self._package_above(path)
-        return Asset(uri, at, path, package, inside), self._missing(path, f"no file {uri}", at)
+        return Asset(uri, at, path, package, inside), self._missing(path, f"file {uri} not found", at)
 
     def _in_package(self, uri: str, at: Span) -> tuple[Asset, Finding | None]:
         name, _, inside = unquote(uri.partition("://")[2]).partition("/")
         if not name or not inside:
-            advice = f"a slash too many: package://{inside}" if "/" in inside else "package://NAME/PATH"
-            return Asset(uri, at), finding("TF723", f"{uri} is no address of a file", at, help=advice)
+            advice = f"one slash too many: package://{inside}" if "/" in inside else "package://NAME/PATH"
+            return Asset(uri, at), finding("TF723", f"{uri} is not a valid file address", at, help=advice)
         folder = self.folder(name, at.file)
         if folder is None:
             is_new = self.disk is not None and (name, at.file) not in self._missed
@@ -125,7 +125,7 @@ class Packages:
         if folder not in self.places(name):
             self.own[name] = folder
         path = posixpath.join(folder, inside)
-        return Asset(uri, at, path, name, inside), self._missing(path, f"no file {inside} in {name}", at)
+        return Asset(uri, at, path, name, inside), self._missing(path, f"file {inside} not found in {name}", at)
 
     def _missing(self, path: str, message: str, at: Span) -> Finding | None:
         if self.disk is None:

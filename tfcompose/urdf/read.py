@@ -161,7 +161,7 @@ class _Reader:
         except expat.ExpatError as error:
             at = self._at(self.parser.ErrorByteIndex, 1)
             reason = expat.ErrorString(error.code) or "not XML"
-            raise RejectedError([finding("TF018", reason, at, help="mend it; other readers stop here too")]) from None
+            raise RejectedError([finding("TF018", reason, at, help="fix it; other parsers stop here too")]) from None
         if self.root is None:
             raise RejectedError([finding("TF018", "no element", Span(self.source.file))])
         return self.root
@@ -175,13 +175,19 @@ class _Reader:
 
     def _refuse_type(self, *_: object) -> None:
         at = self._at(self.parser.CurrentByteIndex, 9)
-        raise RejectedError([finding("TF018", "a document type, which can declare entities", at, help="remove it")])
+        raise RejectedError(
+            [finding("TF018", "a document type is not allowed: it can declare entities", at, help="remove it")]
+        )
 
     def _open(self, tag: str, attributes: dict[str, str]) -> None:
         self.elements += 1
         element = Element(tag, attributes, self.source, self.parser.CurrentByteIndex)
         if self.elements > MOST_VALUES or len(self.stack) >= DEEPEST:
-            what = f"more than {MOST_VALUES:,} elements" if self.elements > MOST_VALUES else f"deeper than {DEEPEST}"
+            what = (
+                f"more than {MOST_VALUES:,} elements"
+                if self.elements > MOST_VALUES
+                else f"nested deeper than {DEEPEST} elements"
+            )
             raise RejectedError([finding("TF008", what, element.at)])
         if self.stack:
             self.stack[-1].children.append(element)

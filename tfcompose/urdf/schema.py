@@ -92,15 +92,17 @@ def unknown_words(root: Element) -> Iterator[Finding]:
 def _unexpanded(element: Element) -> Finding:
     """Return the finding about an element that xacro should have replaced: readers of URDF ignore it."""
     if element.tag in _XACRO:
-        message = f"<{element.tag}> is xacro's, and without its prefix nobody expands it"
+        message = f"<{element.tag}> is a tag of xacro, not expanded without its prefix"
         return finding("TF720", message, element.at, help=f"<xacro:{element.tag} …>")
-    advice = "as a part: xacro: instead of urdf:"
+    advice = "in a part, use xacro: instead of urdf:"
     return finding("TF720", f"<{element.tag}> was not expanded", element.at, help=advice)
 
 
 def _unknown(what: str, word: str, known: list[str], element: Element, attribute: str = "") -> Finding:
     near = nearest(word, known)
-    advice = f"did you mean {near}?" if near else f"known here: {', '.join(known)}" if known else "nothing stands here"
+    advice = (
+        f"did you mean {near}?" if near else f"allowed here: {', '.join(known)}" if known else "nothing is allowed here"
+    )
     at = element.at_value(attribute) if attribute else element.at
     wrong = near and (slip_of(word, known) or nearest(word, known, _MISSPELT))
     return finding("TF720", f"unknown {what}", at, help=advice, severity="error" if wrong else "warning")

@@ -57,11 +57,11 @@ class Values:
             self.refuse(f"{name}={text!r} is not {count}", element.at_value(name), _advice(text, len(default)))
             return default
         if max(map(abs, values)) > HUGE:
-            self.refuse(f"{name} is beyond what can be computed with", element.at_value(name))
+            self.refuse(f"{name} is too large", element.at_value(name))
             return default
         if element.has_broken_values and re.search(r"[\t\r\n]", element.raw_value(name).lstrip()):
-            message = f"a tab or a line break in the numbers of {name}"
-            self.refuse(message, element.at_value(name), "a space: readers of ROS refuse the robot for it", "warning")
+            message = f"tab or line break between the numbers of {name}"
+            self.refuse(message, element.at_value(name), "use spaces: ROS parsers reject the robot for it", "warning")
         return values
 
     def number(self, element: Element | None, name: str, default: Any = None) -> Any:
@@ -79,8 +79,8 @@ class Values:
         if not HUGE < abs(value) < math.inf:
             return self.number(element, name)  # type: ignore[no-any-return]  # a number, or None
         taken = math.copysign(HUGE, value)
-        message = f"{name} is beyond what can be computed with: {taken:g} is taken"
-        self.refuse(message, element.at_value(name), "such a limit is none", "warning")
+        message = f"{name} is too large: {taken:g} is used"
+        self.refuse(message, element.at_value(name), "such a limit limits nothing", "warning")
         return taken
 
     def pose(self, parent: Element) -> Pose:
@@ -91,7 +91,7 @@ class Values:
             return Pose((x, y, z), self._quaternion(origin))
         roll, pitch, yaw = self.numbers(origin, "rpy", (0.0, 0.0, 0.0))
         if max(map(abs, (roll, pitch, yaw))) > 1e9:  # noqa: PLR2004 (no angle has so many turns, and none is left of it)
-            self.refuse("this rpy is no angle", origin.at_value("rpy") if origin else parent.at)
+            self.refuse("rpy is out of range", origin.at_value("rpy") if origin else parent.at)
             return Pose((x, y, z))
         return Pose((x, y, z), normalised(quat_from_rpy(roll, pitch, yaw)))
 
@@ -100,36 +100,36 @@ class Values:
         before, at = self.refused, origin.at_value("quat_xyzw")
         x, y, z, w = self.numbers(origin, "quat_xyzw", (0.0, 0.0, 0.0, 1.0))
         if not any((x, y, z, w)):
-            self.refuse("this quaternion is no rotation", at, "no rotation at all is 0 0 0 1")
+            self.refuse("the quaternion has no length", at, "no rotation is 0 0 0 1")
         if self.refused > before:
             return (0.0, 0.0, 0.0, 1.0)
         turned = normalised((x, y, z, w))
         angles = " ".join(f"{angle + 0.0:.17g}" for angle in rpy_from_quat(turned))
         if "rpy" in origin.attributes:
-            self.refuse("rpy and quat_xyzw in one origin: readers refuse the robot", at, "leave one of them out")
+            self.refuse("the origin has both rpy and quat_xyzw: parsers reject the robot", at, "remove one of them")
         elif not self.has_quaternions:
-            self.refuse("quat_xyzw is passed over by readers", at, f'write rpy="{angles}"')
+            self.refuse("parsers ignore quat_xyzw", at, f'write rpy="{angles}"')
         return turned
 
 
 def version_of(root: Element, values: Values) -> tuple[int, ...]:
-    """Return the version of URDF that the document declares; a finding where readers of ROS 2 Jazzy refuse it."""
+    """Return the version of URDF that the document declares; a finding where parsers of ROS 2 Jazzy reject it."""
     text = root.attributes.get("version", "1.0")
     version = tuple(map(int, text.split("."))) if re.fullmatch(r"\d{1,4}\.\d{1,4}", text) else ()
     if version != (1, 0):
         at = root.at_value("version")
         if version:
-            message = f"readers of ROS 2 Jazzy refuse version {text}: they know 1.0 only"
-            values.refuse(message, at, "leave it out, if nothing here needs it", "warning")
+            message = f"parsers of ROS 2 Jazzy reject version {text}: they support 1.0 only"
+            values.refuse(message, at, "remove it, unless something here needs it", "warning")
         else:
-            values.refuse(f"{text!r} is no version", at, 'version="1.0"')
+            values.refuse(f"invalid version {text!r}", at, 'version="1.0"')
     return version
 
 
 def _advice(text: str, count: int) -> str:
     """Return what to write for what is not so many numbers."""
     if "${" in text or "$(" in text:
-        return "this is xacro that was not expanded: take the .xacro file"
+        return "xacro was not expanded here: use the .xacro file"
     if "," in text:
-        return "no commas: numbers stand apart by spaces"
-    return f"{count} finite numbers with spaces between them" if count > 1 else ""
+        return "separate numbers by spaces, not commas"
+    return f"write {count} finite numbers, separated by spaces" if count > 1 else ""

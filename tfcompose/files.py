@@ -25,7 +25,7 @@ class File:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Where the files are written, seen from where the robot's paths begin, and how they address others.
+    """Where the files are written, relative to where the robot's paths begin, and how they address others.
 
     ``as-written`` keeps addresses; a relative path becomes relative to ``folder``, so that readers of the written URDF
     find the file. ``package`` writes ``package://``, ``file`` absolute ``file://`` (``top`` is the absolute folder that
@@ -80,8 +80,8 @@ def unaddressed(robot: Robot, form: Form) -> list[Asset]:
     """Return the files that have no address of this form: in no package, or of unknown place; each once."""
     if form == "as-written":
         return []
-    lost = [one for one in assets(robot) if not (one.package if form == "package" else one.path)]
-    return list(dict.fromkeys(one for one in lost if not _elsewhere(one)))
+    without = [one for one in assets(robot) if not (one.package if form == "package" else one.path)]
+    return list(dict.fromkeys(one for one in without if not _elsewhere(one)))
 
 
 def _elsewhere(asset: Asset) -> bool:

@@ -53,12 +53,12 @@ def clean_quat(quat_xyzw: Quaternion) -> Quaternion:
 
 
 def clean(pose: Pose) -> Pose:
-    """Return the pose as it is written everywhere."""
+    """Return the pose as every file has it."""
     return Pose(clean_xyz(pose.xyz), clean_quat(pose.quat_xyzw))
 
 
 def clean_rpy(quat_xyzw: Quaternion) -> Vector:
-    """Return roll, pitch, yaw in radians; a whole degree within the noise of computing is written as just that.
+    """Return roll, pitch, yaw in radians; a whole degree within the noise of computing is exactly that.
 
     Near pitch ±π/2 the yaw is known to few digits only, and the roll is what then remains to be turned.
     """

@@ -54,7 +54,7 @@ def moments(path: str, scale: Vector) -> Moments:
 
 
 def _expanded(file: str, packages: Packages, arguments: Mapping[str, Any], text: str | None) -> str:
-    """Return the URDF that xacro makes of a file, or of a text that stands for it; xacro is loaded only here."""
+    """Return the URDF that xacro makes of a file, or of a text in place of it; xacro is loaded only here."""
     if text is None:
         read_text(file)  # a file that cannot be read is refused as everywhere
     from tfcompose.urdf.expand import expand

@@ -123,7 +123,7 @@ def published_by(urdf: str, prefix: str) -> set[tuple[str, str]]:
 
 
 def _stock(plan: Plan, urdf: str) -> list[tuple[PlanEdge, str]] | None:
-    """Return the fixed edges beside the URDF, each with a node's name; None where own publishers must send all."""
+    """Return the fixed edges outside the URDF, each with a node's name; None where own publishers must send all."""
     own = {process.name for process in started(plan) if process.kind in _OWN}
     if not own or len(own) > len(_OWN) or any(plan.process(name).description for name in own):
         return None

@@ -27,7 +27,7 @@ _NO_NAME = re.compile(r"[^a-z0-9_]+")
 def imported(
     document: Document, target: Target, name: str, packages: Mapping[str, str], library: Library | None
 ) -> Imported:
-    """Return what a robot file at the target says of the document.
+    """Return what a robot file at the target holds of the document.
 
     An empty ``name`` is the source's; ``packages`` are the folders of packages that are not installed. Sensors are
     looked for in the ``library``, if there is one.
@@ -53,7 +53,7 @@ def _robot_name(name: str) -> str:
 
 
 def with_findings(robot: Imported, source: str, lint: Callable[[str], Compiled]) -> tuple[str, list[Finding]]:
-    """Return the robot file with what ``lint`` says of it in comments, and the errors that only a robot file has.
+    """Return the robot file with what ``lint`` finds in it as comments, and the errors that only a robot file has.
 
     ``source`` is the file that the robot was imported from. Names that the source has are no errors.
     """
@@ -67,7 +67,7 @@ def with_findings(robot: Imported, source: str, lint: Callable[[str], Compiled])
 
 
 def _faults(compiled: Compiled) -> Iterable[str]:
-    """Yield what lint says of the result, each rule once: these are faults of the source."""
+    """Yield what lint finds in the result, each rule once: these are faults of the source."""
     several: dict[str, list[Finding]] = {}
     for one in compiled.found:
         several.setdefault(one.code, []).append(one)

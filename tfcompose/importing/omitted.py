@@ -1,4 +1,4 @@
-"""What a URDF says that a robot file has no place for: left out or written otherwise, with notes that say so."""
+"""What a robot file cannot hold of a URDF: it is left out or changed, with a note."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tfcompose.urdf.lint import Document
     from tfcompose.urdf.read import Element
 
-    #: A section of the robot file and the name of an entry in it; of the whole file both are empty.
+    #: A section of the robot file and the name of an entry in it; both are empty for the file itself.
     Entry = tuple[str, str]
     Notes = dict[Entry, list[str]]
 
@@ -36,13 +36,13 @@ _NOT_HELD = {
 _NOTED_ELSEWHERE = frozenset({"TF203", "TF703", "TF723", "TF724"})
 #: What has no effect in a joint that does not move.
 _OF_MOTION = ("axis", "limit", "mimic", "dynamics", "calibration", "safety_controller")
-#: Blocks that nobody reads if they are about nothing. With a joint that is not there ros2_control does not start.
+#: Blocks that are ignored if they refer to nothing; ros2_control does not start with an unknown joint.
 _UNUSED = ("<gazebo", "<transmission")
 _MATERIAL = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
 def omitted(document: Document) -> Notes:
-    """Return what is left out of each link and joint, by reading or by import; of the whole under no name."""
+    """Return what is left out of each link and joint, by reading or by import; of the robot itself under no name."""
     notes: Notes = {}
     entries: list[tuple[Span, Entry]] = []
     colours = _described_materials(document.root)
@@ -59,9 +59,9 @@ def omitted(document: Document) -> Notes:
     for one in document.found:
         if one.span and one.code not in _NOTED_ELSEWHERE:
             notes.setdefault(_entry_at(one.span, entries), []).append(f"{one.code} in the source: {one.message}")
-    whole = list(_in_whole(document.root, document.robot))
-    if whole:
-        notes.setdefault(("", ""), []).append(f"left out: {', '.join(whole)}")
+    of_robot = list(_in_robot(document.root, document.robot))
+    if of_robot:
+        notes.setdefault(("", ""), []).append(f"left out: {', '.join(of_robot)}")
     return notes
 
 
@@ -75,7 +75,7 @@ def _entry_at(span: Span, entries: list[tuple[Span, Entry]]) -> Entry:
     return before[-1] if before else ("", "")
 
 
-def _in_whole(root: Element, robot: Robot) -> Iterator[str]:
+def _in_robot(root: Element, robot: Robot) -> Iterator[str]:
     for name in root.attributes:
         if name != "name" and not name.startswith("xmlns"):
             yield f'{name}="{root.attributes[name]}"'

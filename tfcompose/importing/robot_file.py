@@ -1,6 +1,6 @@
-"""The text of the robot file that says what an imported robot is.
+"""The text of the robot file of an imported robot.
 
-Its sections and keys stand in the order of the language; what could not be taken is said in comments, at its place.
+Its sections and keys are in the order of the language; what could not be imported is noted in comments, at its place.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ class _Writer:
         return not (body or free or link is None or edge.joint_name in self.imported.reserved)
 
     def _base(self) -> str | None:
-        """Return where the URDF begins, if that has to be said."""
+        """Return the base, if it is not what a robot file without one has."""
         roots = self.robot.roots()
         root = roots[0] if len(roots) == 1 else None
         above = self.robot.parent_edge("base_link") if "base_link" in self.robot.frames else None

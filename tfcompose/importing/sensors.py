@@ -1,8 +1,8 @@
 """Sensors in somebody else's robot: chains of fixed frames whose names and poses are those of a preset.
 
 A preset is recognised by frames inside of it: by one at least whose position, which is not 0, is the vendor's. Where
-several presets fit equally well, a generic one is taken, or the one whose name is in the sensor's; else none is, and a
-note says so.
+several presets fit equally well, a generic one is taken, or the one whose name is in the sensor's; else none is, with a
+note.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 #: As near (m, rad) as a pose must be to a preset's to be taken for it.
 NEAR = 1e-6
-#: As near as it must be for the preset's to be written in its stead.
+#: As near as it must be to be left to the preset.
 EQUAL = 1e-13
 #: Every camera has frames that are turned as optical ones are: that alone names no vendor.
 GENERIC = "generic"
@@ -39,8 +39,8 @@ class Recognised:
     """A sensor that a preset describes: ``mount`` is its edge, ``inside`` the edges to the frames that it brings.
 
     ``own_xyz`` and ``own_rotation`` are those of its frames whose position, or rotation, is not the preset's to the
-    last digit. ``body`` is the frame on which the preset has a body, empty without one; ``driven`` says that the preset
-    starts a driver.
+    last digit. ``body`` is the frame on which the preset has a body, empty without one; ``driven`` tells whether the
+    preset starts a driver.
     """
 
     name: str
@@ -77,7 +77,7 @@ class _Fit:
 class _Match:
     """A frame of a preset in the robot: its edge, and whether its position and rotation are its own.
 
-    ``tells`` says that it has a pose that not every sensor has.
+    ``tells`` is whether its pose is one that not every sensor has.
     """
 
     edge: Edge
@@ -87,7 +87,7 @@ class _Match:
 
 
 def recognised(robot: Robot, library: Library, reserved: frozenset[str]) -> tuple[list[Recognised], dict[str, str]]:
-    """Return the sensors of the robot, and for each mount where none could be decided on a note that says why.
+    """Return the sensors of the robot, and for each mount where none could be decided on a note with the reason.
 
     ``reserved`` are words that something else in the source uses: a joint of that name stays a joint.
     """
@@ -122,7 +122,7 @@ def _chosen(rivals: list[_Fit], best: _Fit) -> Recognised | None:
 
 
 def _names_model(sensor: Recognised) -> bool:
-    """Whether the sensor's name says which model it is."""
+    """Whether the sensor's name contains the model's."""
     name = re.sub("[^a-z0-9]", "", sensor.name.lower())
     return re.sub("[^a-z0-9]", "", sensor.preset.partition("/")[2].lower()) in name
 
@@ -144,7 +144,7 @@ class _Search:
                 for choices in _choices(plain):
                     yield from self._of_preset(name, self.library.get(name, choices), choices)
             except RejectedError:
-                continue  # its own lint says what is wrong with it
+                continue  # lint reports what is wrong with it
 
     def _of_preset(self, name: str, preset: PresetSpec, choices: Mapping[str, str]) -> Iterator[_Fit]:
         if not preset.frames:

@@ -111,15 +111,15 @@ def rotation(quat_xyzw: Quaternion, source_rpy: Vector | None = None) -> list[Ba
     if quat_xyzw == Pose().quat_xyzw:
         return None
     rpy = source_rpy or clean_rpy(quat_xyzw)
-    written = [angle(value) for value in rpy]
-    roll, pitch, yaw = map(_radians, written)
+    angles = [angle(value) for value in rpy]
+    roll, pitch, yaw = map(_radians, angles)
     if angle_between(quat_from_rpy(roll, pitch, yaw), quat_xyzw) > _SAME_RAD:
         return list(rpy)
-    return written if any(written) else None
+    return angles if any(angles) else None
 
 
-def _radians(written: Bare | float) -> float:
-    return math.radians(float(written.removesuffix(" deg"))) if isinstance(written, Bare) else written
+def _radians(value: Bare | float) -> float:
+    return math.radians(float(value.removesuffix(" deg"))) if isinstance(value, Bare) else value
 
 
 def _clashing(robot: Robot) -> frozenset[str]:
@@ -132,7 +132,7 @@ def _clashing(robot: Robot) -> frozenset[str]:
 
 def _axis(joint: Joint) -> list[float]:
     """Return the axis at the length that it has in the source, if that is nearly 1: its digits are fewer."""
-    near = 0.98 < joint.axis_length < 1.02  # noqa: PLR2004 (of another length it is a finding, and nothing is lost)
+    near = 0.98 < joint.axis_length < 1.02  # noqa: PLR2004 (another length is a finding of its own)
     return [float(f"{part * joint.axis_length:.15g}") if near else part for part in joint.axis]
 
 

@@ -21,7 +21,7 @@ _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
 
 class Bare(str):
-    """A text that stands in YAML as it is: a quantity with its unit."""
+    """A text that YAML needs no quotes for: a quantity with its unit."""
 
     __slots__ = ()
 
@@ -52,7 +52,7 @@ def entry(key: str, value: Any, depth: int = 0) -> list[str]:
 
 
 def _splits(value: Any) -> bool:
-    """Whether the value can stand in lines of its own: a list of numbers stays as it is, and ``{}`` has none."""
+    """Whether the value can be split into lines: a list of numbers and ``{}`` cannot."""
     return bool(value) if isinstance(value, dict) else any(isinstance(item, dict) for item in value)
 
 
@@ -101,7 +101,7 @@ def _literal(value: str) -> list[str] | None:
 
 
 def dedented(block: str) -> Literal:
-    """Return an element as it stands in a file, without what its lines are indented by."""
+    """Return an element's source text without its indentation."""
     first, _, rest = block.strip().partition("\n")
     below = dedent(rest.expandtabs(2)) if rest else ""
     return Literal("\n".join(line.rstrip() for line in [first, *below.splitlines()]))

@@ -61,7 +61,7 @@ def short_pose(pose: Pose) -> str:
 
 
 def graph_of(robot: Robot, *, poses: bool = False) -> Graph:
-    """Return the tree of a robot with final names: sensors are groups, owners stand in the order of the tree."""
+    """Return the tree of a robot with final names: sensors are groups, owners are in the order of the tree."""
     presets = {sensor.name: sensor.preset for sensor in robot.sensors}
     groups: dict[str, list[str]] = {}
     for edge in robot.edges:

@@ -1,6 +1,6 @@
-"""``ros2_control`` and ``xml``: what stands beside links and joints in a URDF, checked against the robot.
+"""``ros2_control`` and ``xml``: what a URDF holds next to links and joints, checked against the robot.
 
-A raw block is text of the user's; its places are lines of the robot file.
+The places of a raw block are lines of the robot file.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Parts that somebody else describes: a URDF, a xacro file, or what one macro of such a file makes."""
+"""Parts that are a URDF or a xacro file, or what one macro of such a file makes."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _PACKAGE = re.compile(r"(?:package://|\$\(find(?:-pkg-share)?\s+)([A-Za-z][A-Za-
 
 @dataclass(frozen=True, slots=True)
 class Foreign:
-    """A robot that somebody else describes. ``file`` is as places name it; ``found`` is what was wrong with it.
+    """The robot of a URDF or xacro file. ``file`` is its name in places; ``found`` is what is wrong with it.
 
     ``implied`` are the frames that its joints hang on and that it does not have: the holder's, where a macro makes it.
     """
@@ -82,7 +82,7 @@ def _with_base(robot: Robot) -> Robot:
 
 
 def _address(named: str, at: Span, packages: Packages) -> str:
-    """Return the path of a file beside the robot file, or in a package."""
+    """Return the path of a file, relative to the robot file or in a package."""
     found = _PACKAGE.fullmatch(named)
     if found is None:
         return path_named(named, at)

@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 def subtree(robot: Robot, root: str) -> Robot:
     """Return what is below ``root``, one of the robot's frames, which becomes the base.
 
-    Joints that are gone are no longer in hardware, and what stands beside links and joints is gone with what it is
-    about; so are the drivers of the sensors that are gone.
+    Hardware, raw blocks and drivers of sensors are left out with the joints, links and sensors that they belong to.
     """
     frames = robot.below(root)
     edges = tuple(edge for edge in robot.edges if edge.child in frames and edge.child != root)

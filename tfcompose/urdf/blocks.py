@@ -1,4 +1,4 @@
-"""Raw blocks: elements beside links and joints that stay as somebody wrote them, and what of the robot they name.
+"""Raw blocks: elements next to links and joints that are kept verbatim, and what of the robot they name.
 
 A block is read as the content of a ``<robot>`` that has the first line to itself: places are those in that document.
 """
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 #: Elements that name links or joints of the robot.
 REFERRING = frozenset({"gazebo", "transmission", "ros2_control"})
-#: What may stand in a block, beside extensions with a prefix of their own.
+#: What a block may hold, besides extensions with a prefix of their own.
 _ALLOWED = ("transmission", "gazebo", "ros2_control", "sensor", "material")
 #: What belongs into a section of the robot file, and what into another element.
 _SECTIONS = {"link": "links", "joint": "joints", "robot": "include"}

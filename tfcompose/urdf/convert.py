@@ -46,11 +46,11 @@ if TYPE_CHECKING:
     #: Takes the address of a file and its place; returns the file, and what is wrong with the address, if anything is.
     Finder = Callable[[str, Span], tuple[Asset, Finding | None]]
 
-#: What links and joints are made of; everything else beside them is kept as it stands.
+#: The elements that become links and joints; all others below <robot> are kept verbatim.
 _CONVERTED = frozenset({"link", "joint", "material"})
 
 T = TypeVar("T", Dynamics, Limit, ReferencePositions, SafetyController)
-#: Their numbers say how far or how much at the most: one that is endless only says nothing.
+#: Their numbers are upper or lower bounds: an infinite one is no error, it bounds nothing.
 _BOUNDS = (Limit, SafetyController)
 
 
@@ -111,7 +111,7 @@ def _by_name(elements: list[Element], values: Values, severity: Severity = "erro
 
 
 def _blocks(root: Element) -> Iterator[Block]:
-    """Yield what stands beside links and joints, each element by its tag and number."""
+    """Yield the elements that are kept verbatim, named by tag and number."""
     counts: dict[str, int] = {}
     for element in root.children:
         if element.tag not in _CONVERTED:
@@ -121,7 +121,7 @@ def _blocks(root: Element) -> Iterator[Block]:
 
 
 def _with_namespaces(element: Element, root: Element) -> str:
-    """Return the element as it stands in the text, with the namespaces that it takes from the root."""
+    """Return the element's source text, with the namespaces that it takes from the root."""
     raw = element.raw
     spaces = {name: value for name, value in root.attributes.items() if name.startswith("xmlns:")}
     used = [name for name in spaces if re.search(rf"[<\s]{re.escape(name[6:])}:", raw)]

@@ -34,7 +34,7 @@ _MOST_MACROS = 5
 
 
 def expand(file: str, packages: Packages, arguments: Mapping[str, Any], text: str | None = None) -> str:
-    """Return the URDF that xacro makes of a file, or of a ``text`` that stands for it; ``packages`` answer $(find …).
+    """Return the URDF that xacro makes of a file, or of ``text`` in place of it; ``packages`` answer $(find …).
 
     Raises:
         RejectedError: if xacro refuses the file.
@@ -59,13 +59,13 @@ def _processed(file: str, text: str | None, arguments: dict[str, str]) -> Any:
     if text is None:
         return xacro.process_file(file, mappings=arguments)
     document = xacro.parse(text, file)
-    xacro.init_stacks(file)  # relative includes begin beside the file
+    xacro.init_stacks(file)  # relative includes begin in the file's folder
     xacro.process_doc(document, mappings=arguments)
     return document
 
 
 class _MissingError(LookupError):
-    """A package is not to be found; ``found`` says where it was looked for."""
+    """A package is not found; ``found`` is the finding about it."""
 
     def __init__(self, found: Finding) -> None:
         super().__init__(found.message)
@@ -107,7 +107,7 @@ def _no_argument(name: str, known: Collection[str], file: str) -> Finding:
 
 
 def _raise_comments(node: Any) -> None:
-    """Put comments that allow findings above the tag on whose line they stood: printing gives each its own line."""
+    """Move comments that allow findings above the tag on their line: printing gives each a line of its own."""
     for child in list(node.childNodes):
         _raise_comments(child)
         before = child.previousSibling
@@ -143,7 +143,7 @@ def _refused(error: Exception, file: str) -> Finding:
 
 
 def _reason(chain: list[Any]) -> str:
-    """Return in one line what a chain of exceptions says; the last one is what the others are about."""
+    """Return the message of a chain of exceptions in one line; the last one is the cause of the others."""
     root = chain[-1]
     if isinstance(root, OSError):
         words = [f"{root.strerror}: {root.filename}"]

@@ -16,7 +16,7 @@ from tfcompose.urdf.inertia import Moments, UnmeasurableError
 if TYPE_CHECKING:
     from tfcompose.geometry import Vector
 
-#: A COLLADA file says its unit in its head, before the first geometry.
+#: A COLLADA file declares its unit in its head, before the first geometry.
 _HEAD = 65_536
 _UNIT = re.compile(rb"""<unit\b[^>]*\bmeter\s*=\s*["']\s*([0-9.eE+-]+)""")
 #: The part of its size cubed below which a volume is what rounding leaves of a plane.
@@ -26,7 +26,7 @@ _FLAT = 1e-12
 def moments(path: str, scale: Vector) -> Moments:
     """Return volume, centre and tensor of a closed mesh at a scale.
 
-    A COLLADA file is in the unit that it says, as RViz and Gazebo read it; its up_axis is ignored, as they do.
+    A COLLADA file is in the unit that it declares, as RViz and Gazebo read it; its up_axis is ignored, as they do.
 
     Raises:
         UnmeasurableError: if the file is no mesh, or the mesh is not closed or has faces turned both ways.
@@ -71,7 +71,7 @@ def _why_flat(mesh: Any) -> str:
 
 
 def _collada_unit(path: str) -> float:
-    """Return the metres in the unit of a COLLADA file; 1 where it says none, and for other files."""
+    """Return the metres in the unit of a COLLADA file; 1 where it declares none, and for other files."""
     if not path.lower().endswith(".dae"):
         return 1.0
     with Path(path).open("rb") as file:
@@ -83,8 +83,8 @@ def _collada_unit(path: str) -> float:
 def _facing_alike(mesh: Any) -> Any:
     """Return the mesh with every body facing as its largest one does, and every cavity the other way.
 
-    A body that stands apart and faces inwards is no hole: integrated as it is, it would have a negative mass. A cavity
-    faces the other way too, and is within a body. The mesh has to be closed and wound consistently.
+    A separate body that faces inwards is no hole: integrated as it is, it would have a negative mass. A cavity faces
+    the other way too, but lies within a body. The mesh has to be closed and wound consistently.
     """
     corners = mesh.vertices[mesh.faces] - mesh.bounds.mean(axis=0)
     signed = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
@@ -116,7 +116,7 @@ def _bodies(faces: Any, count: int) -> Any:
 
 
 def _is_within(point: Any, corners: Any) -> bool:
-    """Return whether the triangles go round the point: the angles under which it sees them are a whole sphere.
+    """Return whether the triangles enclose the point: the solid angles at which it sees them sum up to a sphere.
 
     Van Oosterom and Strackee, The Solid Angle of a Plane Triangle, 1983.
     """

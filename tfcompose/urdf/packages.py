@@ -38,9 +38,9 @@ def _not_expanded(file: str, *_: object) -> str:
 class Disk:
     """What a compiler may ask about files. ``prefixes`` are those of AMENT_PREFIX_PATH, in order.
 
-    ``expand`` gives the URDF that xacro makes of a file, with arguments, or of a text that stands for it.
+    ``expand`` gives the URDF that xacro makes of a file, with arguments, or of a text in place of it.
     ``moments`` gives those of a mesh file at a scale, and raises ``UnmeasurableError`` with the finding's parts.
-    ``is_pointer`` says of a file that is there whether Git LFS has yet to put the file itself in its place.
+    ``is_pointer`` tells whether a file is a pointer that Git LFS has yet to replace by the file itself.
     """
 
     read: Callable[[str], str]
@@ -55,45 +55,45 @@ class Disk:
 
 @dataclass(slots=True)
 class Packages:
-    """Finds packages and addressed files. ``named`` are the robot's own: name → folder and its place.
+    """Finds packages and addressed files. ``named`` are those that the robot names: name → folder and its place.
 
-    ``otherwise`` is what to do where a package is nowhere. ``own`` are the packages, with their folders, that were
+    ``advice`` says what to do where a package is not found. ``local`` are the packages, with their folders, that were
     found nowhere else than around the file that addresses something in them, as in a source tree that is not built.
     """
 
     disk: Disk | None = None
     named: Mapping[str, tuple[str, Span]] = field(default_factory=dict)
-    otherwise: str = "add packages: {{{name}: FOLDER}}, or source the workspace's setup file"
-    own: dict[str, str] = field(default_factory=dict)
+    advice: str = "add packages: {{{name}: FOLDER}}, or source the workspace's setup file"
+    local: dict[str, str] = field(default_factory=dict)
     _above: dict[str, tuple[str, str]] = field(default_factory=dict)
     _missed: set[tuple[str, str]] = field(default_factory=set)
 
-    def places(self, name: str) -> list[str]:
-        """Return where a package of that name would be, in the order of looking."""
+    def candidates(self, name: str) -> list[str]:
+        """Return the folders that a package of that name may be in, in the order of looking."""
         own = [path_named(*self.named[name])] if name in self.named else []
         return own + [posixpath.join(prefix, "share", name) for prefix in (self.disk.prefixes if self.disk else ())]
 
     def folder(self, name: str, file: str) -> str | None:
-        """Return the package's folder, or None where there is none; the last one looked at is that around ``file``."""
+        """Return the package's folder, or None where there is none; the last candidate is the package of ``file``."""
         if self.disk is None:
             return None
-        there = next((place for place in self.places(name) if self.disk.is_folder(place)), None)
-        around, folder = ("", "") if there is not None else self._around(posixpath.dirname(file))
-        return (folder or ".") if around == name else there
+        found = next((folder for folder in self.candidates(name) if self.disk.is_folder(folder)), None)
+        around, folder = ("", "") if found is not None else self._around(posixpath.dirname(file))
+        return (folder or ".") if around == name else found
 
     def not_found(self, name: str, at: Span | None) -> Finding:
-        """Return the finding that a package is nowhere, with the list of where it was looked for."""
-        places = self.places(name)
-        looked = f"looked in {', '.join(places)}" if places else "AMENT_PREFIX_PATH is empty"
+        """Return the finding that a package is not found, with the list of where it was looked for."""
+        folders = self.candidates(name)
+        looked = f"looked in {', '.join(folders)}" if folders else "AMENT_PREFIX_PATH is empty"
         near = slip_of(name, self.named) or nearest(name, self.named, _NEAR)
-        advice = f"{looked}; {f'did you mean {near}?' if near else self.otherwise.format(name=name)}"
+        advice = f"{looked}; {f'did you mean {near}?' if near else self.advice.format(name=name)}"
         return finding("TF724", f"package {name} not found", at, help=advice, severity="warning")
 
     def asset(self, uri: str, at: Span) -> tuple[Asset, Finding | None]:
         """Return the file that is addressed at a place, and what is wrong with the address, if anything is.
 
-        ``package://NAME/PATH`` is in a package, ``file:///PATH`` and plain paths are files, the relative ones beside
-        the file that writes them. Other schemes (``http``, ``model``) are for others to resolve.
+        ``package://NAME/PATH`` is in a package, ``file:///PATH`` and plain paths are files; relative ones begin in
+        the folder of the file that names them. Other schemes (``http``, ``model``) are for others to resolve.
         """
         meant = _MEANT.fullmatch(uri)
         if meant or not uri:
@@ -120,10 +120,10 @@ class Packages:
         folder = self.folder(name, at.file)
         if folder is None:
             is_new = self.disk is not None and (name, at.file) not in self._missed
-            self._missed.add((name, at.file))  # that a package is missing is said once of a file
+            self._missed.add((name, at.file))  # a missing package is reported once for each file
             return Asset(uri, at, "", name, inside), self.not_found(name, at) if is_new else None
-        if folder not in self.places(name):
-            self.own[name] = folder
+        if folder not in self.candidates(name):
+            self.local[name] = folder
         path = posixpath.join(folder, inside)
         return Asset(uri, at, path, name, inside), self._missing(path, f"file {inside} not found in {name}", at)
 

@@ -32,7 +32,7 @@ _BLOCK = 4096
 
 
 class _Text:
-    """A file's text, with the places of its bytes: a place is computed when somebody asks for it, and few do."""
+    """A file's text, with the places of its bytes: few are asked for, and they are computed only then."""
 
     def __init__(self, text: str, file: str) -> None:
         self.text, self.file = text, file
@@ -63,7 +63,7 @@ def _characters(data: bytes) -> int:
 
 
 class Element:
-    """A tag with its attributes and the elements in it; ``text`` is what stands directly in it, where asked for.
+    """A tag with its attributes and child elements; ``text`` is its own text, if it was asked for.
 
     ``begin`` and ``end`` are the bytes at which its first and its last tag begin.
     """
@@ -84,7 +84,7 @@ class Element:
 
     @property
     def raw(self) -> str:
-        """The element as it stands in the text."""
+        """The element's source text."""
         text, begin = self._source.text, self._source.position(self.begin)
         after = max((attribute.end() for attribute in self._raw_attributes()), default=begin)
         end = text.find(">", after)
@@ -112,7 +112,7 @@ class Element:
         return self.at
 
     def raw_value(self, name: str) -> str:
-        """Return an attribute's value as it stands in the text: XML turns tabs and line breaks in it into spaces."""
+        """Return an attribute's value as in the source: XML turns tabs and line breaks in it into spaces."""
         return next((found[2] or found[3] or "" for found in self._raw_attributes() if found[1] == name), "")
 
     @property
@@ -121,7 +121,7 @@ class Element:
         return self._source.has_broken_values
 
     def _raw_attributes(self) -> Iterator[re.Match[str]]:
-        """Yield the attributes as they stand in the text."""
+        """Yield the attributes as they are in the source."""
         position = self._source.position(self.begin) + 1 + len(self.tag)
         for _ in self.attributes:
             attribute = _ATTRIBUTE.search(self._source.text, position)
@@ -132,7 +132,7 @@ class Element:
 
 
 def read_xml(text: str, file: str, *, with_text: bool = False) -> Element:
-    """Return the document's root; ``with_text``, elements have the text that stands in them too.
+    """Return the document's root; ``with_text``, elements have their own text too.
 
     Raises:
         RejectedError: if the text is not XML, declares entities, or is too large or too deep.

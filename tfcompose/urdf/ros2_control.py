@@ -28,7 +28,7 @@ class _UnsupportedError(Exception):
 
 
 def with_hardware(robot: Robot) -> Robot:
-    """Return the robot of a URDF with its ros2_control blocks as hardware, where nothing is lost by that."""
+    """Return the robot of a URDF with its ros2_control blocks as hardware, where that keeps all of them."""
     hardware: dict[str, Hardware] = {}
     blocks = []
     for block in robot.blocks:

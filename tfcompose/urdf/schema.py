@@ -1,7 +1,7 @@
 """The words of URDF: its elements, attributes, shapes and types of joints; and a finding for each word that is none.
 
-Source: the URDF XML specification of ROS (link, joint, robot). What stands in transmissions, Gazebo and ros2_control
-blocks is not looked at.
+Source: the URDF XML specification of ROS (link, joint, robot). What transmissions, Gazebo and ros2_control
+blocks hold is not checked.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ SIZES: dict[str, tuple[tuple[str, int], ...]] = {
     "capsule": (("radius", 1), ("length", 1)),
 }
 
-#: What may stand beside links, joints and materials, and is other programs' business.
+#: Elements next to links, joints and materials that are other programs' business.
 OPAQUE = frozenset({"transmission", "gazebo", "ros2_control", "sensor"})
 
 #: Elements of xacro that URDF does not have.
@@ -71,7 +71,7 @@ _MISSPELT = 0.8
 def unknown_words(root: Element) -> Iterator[Finding]:
     """Yield a finding for each element and attribute that URDF does not have: an error where a known one is misspelt.
 
-    Others may be somebody's extension, and are warnings; beside links and joints they are let through.
+    Others may be somebody's extension, and are warnings; directly below <robot> they are accepted.
     """
     waiting = [root]
     while waiting:

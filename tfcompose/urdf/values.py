@@ -84,7 +84,7 @@ class Values:
         return taken
 
     def pose(self, parent: Element) -> Pose:
-        """Return what the element's origin says."""
+        """Return the pose that the element's origin gives."""
         origin = parent.first("origin")
         x, y, z = self.numbers(origin, "xyz", (0.0, 0.0, 0.0))
         if origin is not None and "quat_xyzw" in origin.attributes:

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
         Shape,
     )
 
-_HOME = Pose()
+_IDENTITY = Pose()
 #: The value of an attribute, in quotes. Names repeat, in one file and from file to file.
 quoted = lru_cache(maxsize=1 << 16)(quoteattr)
 
@@ -57,7 +57,7 @@ def urdf(robot: Robot, target: Target = AS_WRITTEN) -> tuple[str, str]:
 
 
 def block_lines(blocks: Iterable[Block]) -> list[str]:
-    """Return raw blocks as they were written, but for what they are indented by."""
+    """Return raw blocks verbatim, but for their indentation."""
     return [indent(dedent(block.text).strip("\n"), "  ") for block in blocks]
 
 
@@ -130,7 +130,7 @@ class Writer:
     def _geometries(self, shape: Shape) -> list[tuple[str, Pose]]:
         """Return the solids that the shape consists of, each with its pose.
 
-        URDF has no capsule in the versions that ROS 2 Jazzy reads, and a reader refuses the whole robot for one: it is
+        URDF has no capsule in the versions that ROS 2 Jazzy reads, and parsers reject the whole robot for one: it is
         written as the cylinder and the two spheres that together are the same solid.
         """
         if shape.kind == "box":
@@ -255,8 +255,8 @@ def joint_type(edge: Edge) -> str:
 
 
 def _origin(pose: Pose, before: str) -> list[str]:
-    """Return the element that says where something is, or none where it is at home."""
-    if pose == _HOME:
+    """Return the origin element, or none for the identity."""
+    if pose == _IDENTITY:
         return []
     return [f'{before}<origin xyz="{numbers(clean_xyz(pose.xyz))}" rpy="{numbers(clean_rpy(pose.quat_xyzw))}"/>']
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 MACRO = "robot.macro.xacro"
 _NAMESPACE = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
 _EVALUATED = re.compile(r"(\$+[{(])")
-#: Addresses that do not begin at the written file.
+#: Addresses that are not relative to the written file.
 _ABSOLUTE = re.compile(r"/|[A-Za-z][A-Za-z0-9+.-]*://")
 #: Tags of xacro's own, which no macro can be called.
 _TAGS = frozenset(
@@ -105,7 +105,7 @@ def _blocks(robot: Robot) -> list[str]:
     if not robot.blocks:
         return []
     names = [*_names(robot), *(name for block in robot.blocks for name in block.own_names())]
-    again = {name: f"${{prefix}}{name}" for name in map(_literal, names)}  # as they stand in the text below
+    again = {name: f"${{prefix}}{name}" for name in map(_literal, names)}  # as in the text below
     return block_lines(replace(block, text=_literal(block.text)).renamed(again) for block in robot.blocks)
 
 

@@ -52,7 +52,7 @@ def run(arguments: Namespace) -> int:
     try:
         named = {name: (str(Path(folder).absolute()), Span(folder)) for name, folder in packages.items()}
         files = disk()
-        known = Packages(files, named, otherwise="--package {name}=FOLDER, or source the workspace's setup file")
+        known = Packages(files, named, advice="--package {name}=FOLDER, or source the workspace's setup file")
         document = read_urdf(arguments.file, known, files, given)
     except RejectedError as error:
         reject(error.findings)
@@ -60,7 +60,7 @@ def run(arguments: Namespace) -> int:
     print_findings(errors, sys.stderr)
     if errors and not arguments.keep_going:
         fail("nothing was written; --keep-going writes as much as possible")
-    text, more_errors = _robot_file(document, arguments, known.own | packages)
+    text, more_errors = _robot_file(document, arguments, known.local | packages)
     if more_errors and not arguments.keep_going:
         print_findings([replace(one, span=None) for one in more_errors], sys.stderr)  # places in what is not written
         fail("nothing was written: a robot file cannot express all of the source; --keep-going writes it anyway")

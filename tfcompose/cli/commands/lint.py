@@ -80,7 +80,7 @@ def _lint_urdf(file: str) -> list[Finding]:
     from tfcompose.urdf.packages import Packages
 
     files = disk()
-    return lint_urdf(file, Packages(files, otherwise="source the workspace's setup file"), files)
+    return lint_urdf(file, Packages(files, advice="source the workspace's setup file"), files)
 
 
 def _fix(fixer: Fixer, form: str) -> list[Finding]:

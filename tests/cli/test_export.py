@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tests.emit.test_exports import DRIVEN
-from tests.support.robots import ON_TWO_HOSTS
+from tests.support.robots import DRIVEN, ON_TWO_HOSTS
 from tfcompose.cli import main
 
 

@@ -30,7 +30,7 @@ GOLDEN = Path(__file__).parent / "wording"
 WRITTEN = ("robots", "specs", "bad_input", "values")
 #: What marked specs leave out: parts, sweeps, claims of nodes.
 TEXTS = [GOLDEN / "texts" / f"{name}.yaml" for name in ("claims", "fleet", "parts", "same_names", "sweeps")]
-URDFS = sorted((ROOT / "tests/cli/urdfs").glob("*.urdf"))
+URDFS = sorted((ROOT / "tests/urdf/urdfs").glob("*.urdf"))
 FAMILIES = ("TF0", "TF1", "TF2", "TF3", "TF4", "TF5", "TF6", "TF7", "TF8")
 
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.emit.test_xacro import EVERYTHING
 from tests.support.random_robot import spec
+from tests.support.robots import EVERYTHING
 from tfcompose.cli import main
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import sys
 from pathlib import Path
@@ -10,19 +9,13 @@ from typing import Any
 
 import pytest
 
+from tests.support.importing import PRESETS, built, imported, urdf_of
 from tests.support.random_robot import spec as family
 from tests.support.same_urdf import same
 from tfcompose.cli import compiling, main
-from tfcompose.cli.compiling import library
-from tfcompose.cli.disk import disk
-from tfcompose.cli.reading import read_text
-from tfcompose.compile import compile_robot
-from tfcompose.emit import emit
-from tfcompose.files import Target
 from tfcompose.load import load
 from tfcompose.resolve.presets import holds
 
-PRESETS = library()
 #: Folders of installed packages that hold URDFs; nothing of them is kept here.
 PACKAGES = ("cmeel.prefix/share/example-robot-data/robots", "pybullet_data", "pydrake/share/drake/examples", "mujoco")
 
@@ -31,14 +24,6 @@ def shipped() -> list[Path]:
     """Return the URDFs that installed packages bring, but for the many of one kind."""
     folders = [Path(entry) / package for entry in sys.path for package in PACKAGES]
     return sorted(file for folder in folders for file in folder.rglob("*.urdf") if "random_urdfs" not in file.parts)
-
-
-def built(file: Path) -> str:
-    compiled = compile_robot(read_text(str(file)), str(file), PRESETS, read=read_text, disk=disk())
-    assert compiled.robot, compiled.found
-    assert not compiled.errors, [str(one) for one in compiled.errors][:3]
-    files = {one.path: one.text for one in emit(compiled.robot, Target(folder=str(file.parent)))}
-    return files["robot.full.urdf"]
 
 
 #: The robots among them that are refused, by the packages that ship them, with the codes and the reason; everything
@@ -98,20 +83,6 @@ def test_every_robot_that_is_listed_as_refused_is_shipped(package: str) -> None:
     if not names:
         pytest.skip(f"{package} is not installed: it has no wheel for every Python")
     assert [end for end in REFUSED[package] if not any(name.endswith(f"/{end}") for name in names)] == []
-
-
-def imported(urdf: str, folder: Path, *words: str) -> str:
-    """Return the robot file that import writes for a URDF that it takes."""
-    source, out = folder / "source.urdf", folder / "robot.yaml"
-    source.write_text(urdf, encoding="utf-8")
-    assert main(["import", str(source), "-o", str(out), "--force", *words]) == 0
-    return out.read_text("utf-8")
-
-
-def urdf_of(spec: dict[str, Any], folder: Path) -> str:
-    file = folder / "spec.yaml"
-    file.write_text(json.dumps(spec), encoding="utf-8")
-    return built(file)
 
 
 @pytest.mark.parametrize("seed", range(12))

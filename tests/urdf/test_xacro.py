@@ -13,6 +13,7 @@ import xacro
 from scipy.spatial.transform import Rotation
 
 from tests.support.random_robot import spec
+from tests.support.robots import EVERYTHING
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
@@ -22,30 +23,6 @@ if TYPE_CHECKING:
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 PRESETS = library()
-
-EVERYTHING = """tfcompose: 1
-robot: class
-links:
-  base_link:
-    visual: {mesh: meshes/a.stl, material: {name: paint, rgba: [1, 0, 0, 1]}}
-    inertial: {mass: 1, inertia: {ixx: 1, iyy: 1, izz: 1}}
-  link: {visual: {mesh: "package://x/$(y)/$$(z).stl"}}
-  hand: {}
-joints:
-  joint: {type: continuous, parent: base_link, child: link}
-  hand_joint: {type: continuous, parent: link, child: hand, mimic: {joint: joint, multiplier: 2}}
-frames: {tool: {parent: hand, xyz: [0, 0, 1]}}
-ros2_control:
-  motors:
-    {plugin: x/Y, params: {path: "$HOME/$(cwd)", tip: hand}, joints:
-      {joint: {command: {effort: {min: joint}}, params: {mimic: joint}}}, gpios: {lamp: {state: [on]}}}
-xml:
-  all: |
-    <!-- $(find here) stays -->
-    <gazebo reference="hand"><plugin name="p" filename='q'><frame> base_link </frame><joint>joint</joint>
-      <text>base_link of joint $(eval 1)</text><cost>$5 $$(x)</cost></plugin></gazebo>
-    <transmission name="drive"><joint name="joint"/><actuator name="motor"/></transmission>
-"""
 
 
 def files_of(text: str, folder: Path) -> dict[str, str]:

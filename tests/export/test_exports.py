@@ -17,6 +17,7 @@ import yaml
 
 from tests.support import processes
 from tests.support.plans import built, compiled_plan
+from tests.support.robots import DRIVEN
 from tfcompose.export.compose import compose
 from tfcompose.export.launch import launch
 from tfcompose.export.supervisors import Machine
@@ -25,30 +26,6 @@ from tfcompose.plan import Plan, PlanProcess, StopRule
 from tfcompose.plan.file import read_plan
 
 ROBOT = (Path(__file__).parents[2] / "robots" / "autonomous_robot.yaml").read_text("utf-8")
-DRIVEN = """
-tfcompose: 1
-robot: rover
-ros: {discovery: localhost, namespace: r1, domain_id: 7}
-frames:
-  map: {}
-  dock: {parent: map, xyz: [1, -2, 0.5], rpy: [0, 0, 30 deg]}
-  odom: {parent: map, owner: slam, rate: 10 Hz}
-  base_link: {parent: odom, owner: drive, rate: 20 Hz}
-links:
-  lidar: {parent: base_link, xyz: [0, 0, 0.3], visual: {box: [0.1, 0.1, 0.1]}}
-processes:
-  drive:
-    run: {package: base, executable: drive_node, args: [--fast]}
-    node: drive
-    params: {wheel: 0.1}
-    remap: {cmd: cmd_vel}
-    env: {GREETING: "100 % \\"sure\\" $HOME"}
-    restart: always
-    lifecycle: active
-    stop: {signal: SIGTERM, timeout: 2 s}
-  slam: {run: [slam, --now], node: slam, restart: on-failure, max_restarts: 3, after: {drive: started, static: ready}}
-  other: {external: true}
-"""
 
 
 # systemd

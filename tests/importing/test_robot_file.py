@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.cli.test_importing import PRESETS, built, imported, urdf_of
+from tests.support.importing import PRESETS, built, imported, urdf_of
 from tfcompose.cli import compiling, main
 from tfcompose.load import load
 

@@ -1,0 +1,41 @@
+"""Importing a URDF with ``tfcompose import``, and building what it writes."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.cli import main
+from tfcompose.cli.compiling import library
+from tfcompose.cli.disk import disk
+from tfcompose.cli.reading import read_text
+from tfcompose.compile import compile_robot
+from tfcompose.emit import emit
+from tfcompose.files import Target
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+PRESETS = library()
+
+
+def built(file: Path) -> str:
+    compiled = compile_robot(read_text(str(file)), str(file), PRESETS, read=read_text, disk=disk())
+    assert compiled.robot, compiled.found
+    assert not compiled.errors, [str(one) for one in compiled.errors][:3]
+    files = {one.path: one.text for one in emit(compiled.robot, Target(folder=str(file.parent)))}
+    return files["robot.full.urdf"]
+
+
+def imported(urdf: str, folder: Path, *words: str) -> str:
+    """Return the robot file that import writes for a URDF that it takes."""
+    source, out = folder / "source.urdf", folder / "robot.yaml"
+    source.write_text(urdf, encoding="utf-8")
+    assert main(["import", str(source), "-o", str(out), "--force", *words]) == 0
+    return out.read_text("utf-8")
+
+
+def urdf_of(spec: dict[str, Any], folder: Path) -> str:
+    file = folder / "spec.yaml"
+    file.write_text(json.dumps(spec), encoding="utf-8")
+    return built(file)

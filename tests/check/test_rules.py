@@ -33,9 +33,9 @@ MARK = re.compile(r"# expect(?:-with (?P<profile>\w+))?: (?P<codes>TF\d{3}(?: TF
 
 #: Codes that no line of a robot file can provoke; each has a test of its own elsewhere.
 NOT_OF_A_LINE = {"TF001", "TF002", "TF008", "TF009", "TF015", "TF016", "TF606", "TF607", "TF903"}
-#: Codes of a URDF that somebody else wrote: tests/cli/test_lint_urdf.py.
+#: Codes of a URDF that somebody else wrote: tests/urdf/test_lint.py.
 NOT_OF_A_LINE |= {"TF720", "TF721", "TF722"}
-#: Of a command line: tests/cli/test_mesh.py.
+#: Of a command line: tests/urdf/test_mesh.py.
 NOT_OF_A_LINE |= {"TF726"}
 #: Codes of the running robot, of its plan and of its surroundings.
 OF_THE_FILE = {"TF812", "TF813", "TF818", "TF847", "TF848", "TF851"}

@@ -44,7 +44,7 @@ def findings() -> Iterator[Finding]:
             yield from refusals(lambda file=file: within(file.read_text("utf-8"), file.name))  # type: ignore[misc]
         os.chdir(ROOT)
         for file in URDFS:
-            yield from lint_urdf(file.relative_to(ROOT).as_posix(), Packages(disk()), disk())
+            yield from lint_urdf(file.relative_to(ROOT).as_posix(), Packages(disk()))
 
 
 @cache

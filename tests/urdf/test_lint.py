@@ -41,8 +41,7 @@ def marks(text: str) -> list[tuple[int, str]]:
 
 
 def lint_urdf(file: str) -> list[Finding]:
-    files = disk()
-    return lint_with(file, Packages(files), files)
+    return lint_with(file, Packages(disk()))
 
 
 def lint_text(text: str) -> tuple[Finding, ...]:

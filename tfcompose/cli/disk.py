@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tfcompose.geometry import Vector
     from tfcompose.urdf.inertia import Moments
     from tfcompose.urdf.packages import Packages
+    from tfcompose.urdf.xacro import Call
 
 _POINTER = b"version https://git-lfs.github.com/spec/"
 
@@ -25,7 +26,7 @@ _POINTER = b"version https://git-lfs.github.com/spec/"
 def disk() -> Disk:
     """Return this machine's files, with the packages of the workspaces that are sourced."""
     prefixes = tuple(prefix for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix)
-    return Disk(read_text, os.path.isfile, os.path.isdir, prefixes, moments, _expanded, os.path.abspath, _is_pointer)
+    return Disk(read_text, os.path.isfile, os.path.isdir, prefixes, moments, _expanded, _is_pointer)
 
 
 @cache
@@ -53,10 +54,10 @@ def moments(path: str, scale: Vector) -> Moments:
     return mesh.moments(path, scale)
 
 
-def _expanded(file: str, packages: Packages, arguments: Mapping[str, Any], text: str | None) -> str:
-    """Return the URDF that xacro makes of a file, or of a text in place of it; xacro is loaded only here."""
-    if text is None:
+def _expanded(file: str, packages: Packages, arguments: Mapping[str, Any], call: Call | None) -> str:
+    """Return the URDF that xacro makes of a file, or of a call of one of its macros; xacro is loaded only here."""
+    if call is None:
         read_text(file)  # a file that cannot be read is refused as everywhere
     from tfcompose.urdf.expand import expand
 
-    return expand(file, packages, arguments, text)
+    return expand(file, packages, arguments, call)

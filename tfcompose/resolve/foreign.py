@@ -20,7 +20,7 @@ from tfcompose.urdf.blocks import read_block
 from tfcompose.urdf.convert import robot_of
 from tfcompose.urdf.read import read_xml
 from tfcompose.urdf.ros2_control import with_hardware
-from tfcompose.urdf.xacro import calling, macros_in
+from tfcompose.urdf.xacro import Call, macros_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -96,9 +96,9 @@ def _expanded(part: PartEntry, file: str, at: Span, packages: Packages) -> str:
     disk, spec = packages.disk, part.said
     if disk is None:
         raise RejectedError([finding("TF001", f"{file}: files cannot be read here", at)])
-    document = _document(part, file, packages, disk.absolute)
+    call = _call(part, file, packages)
     try:
-        return disk.expand(file, packages, spec.args, document)
+        return disk.expand(file, packages, spec.args, call)
     except RejectedError as error:
         if spec.macro is None:
             place = part.source.at((*part.at, "xacro"))
@@ -131,23 +131,23 @@ def _at(place: Span, found: Finding) -> Finding:
     return replace(found, span=place, message=f"{found.span.file}: {found.message}", notes=(*exact, *found.notes))
 
 
-def _document(part: PartEntry, file: str, packages: Packages, absolute: Callable[[str], str]) -> str | None:
-    """Return the document that calls the part's macro; None where the file itself is the robot."""
+def _call(part: PartEntry, file: str, packages: Packages) -> Call | None:
+    """Return the call of the part's macro; None where the file itself is the robot."""
     spec = part.said
     if spec.macro is None:
         return None
     places = (part.source.at((*part.at, "include", index)) for index in range(len(spec.include)))
-    files = [*(_address(one, place, packages) for one, place in zip(spec.include, places, strict=True)), file]
-    attributes, blocks = {}, []
+    files = (*(_address(one, place, packages) for one, place in zip(spec.include, places, strict=True)), file)
+    words, blocks = {}, []
     for name, value in spec.params.items():
         if _is_markup(value):
             _refuse_broken(name, value, part.source.at((*part.at, "params", name)))
         block = _block(value)
         if block is None:
-            attributes[name] = _word(value)
+            words[name] = _word(value)
         else:
             blocks.append(block)
-    return calling(spec.macro, attributes, blocks, map(absolute, files))
+    return Call(spec.macro, words, tuple(blocks), files)
 
 
 def _is_markup(value: Any) -> TypeGuard[str]:

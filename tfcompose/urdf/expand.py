@@ -11,16 +11,19 @@ import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import quoteattr
 
 import xacro
 from xacro import substitution_args
 
 from tfcompose.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
+from tfcompose.urdf.xacro import NAMESPACE
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
 
     from tfcompose.urdf.packages import Packages
+    from tfcompose.urdf.xacro import Call
 
 #: How a file declares an argument, and how it asks for one.
 _ARGUMENT = re.compile(r"""<xacro:arg\b[^>]*?\bname\s*=\s*["']([^"']+)["']|\$\(arg\s+(\w+)\s*\)""")
@@ -33,8 +36,8 @@ _NAMED = (
 _MOST_MACROS = 5
 
 
-def expand(file: str, packages: Packages, arguments: Mapping[str, Any], text: str | None = None) -> str:
-    """Return the URDF that xacro makes of a file, or of ``text`` in place of it; ``packages`` answer $(find …).
+def expand(file: str, packages: Packages, arguments: Mapping[str, Any], call: Call | None = None) -> str:
+    """Return the URDF that xacro makes of a file, or of a call of one of its macros; ``packages`` answer $(find …).
 
     Raises:
         RejectedError: if xacro refuses the file.
@@ -43,7 +46,7 @@ def expand(file: str, packages: Packages, arguments: Mapping[str, Any], text: st
     try:
         xacro.all_includes.clear()
         with _finding_in(packages, file):
-            document = _processed(file, text, given)
+            document = _processed(file, call, given)
         _refuse_unknown(given, [file, *xacro.all_includes], file)
         _raise_comments(document)
         result: str = document.toprettyxml(indent="  ")
@@ -54,14 +57,23 @@ def expand(file: str, packages: Packages, arguments: Mapping[str, Any], text: st
     return result
 
 
-def _processed(file: str, text: str | None, arguments: dict[str, str]) -> Any:
+def _processed(file: str, call: Call | None, arguments: dict[str, str]) -> Any:
     """Return the DOM document that xacro makes."""
-    if text is None:
+    if call is None:
         return xacro.process_file(file, mappings=arguments)
-    document = xacro.parse(text, file)
+    document = xacro.parse(_document(call), file)
     xacro.init_stacks(file)  # relative includes begin in the file's folder
     xacro.process_doc(document, mappings=arguments)
     return document
+
+
+def _document(call: Call) -> str:
+    words = "".join(f" {name}={quoteattr(value)}" for name, value in call.words.items())
+    includes = "".join(
+        f"<xacro:include filename={quoteattr(os.path.normpath(Path(file).absolute()))}/>" for file in call.files
+    )
+    macro = f"<xacro:{call.macro}{words}>{''.join(call.blocks)}</xacro:{call.macro}>"
+    return f'<robot name="part" {NAMESPACE}>{includes}{macro}</robot>'
 
 
 class _MissingError(LookupError):

@@ -17,16 +17,16 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from tfcompose.model import Robot
-    from tfcompose.urdf.packages import Disk, Packages
+    from tfcompose.urdf.packages import Packages
     from tfcompose.urdf.read import Element
 
 _RULES = tuple(rule for rule in RULES.values() if rule.of_urdf)
 
 
-def lint_urdf(file: str, packages: Packages, disk: Disk) -> list[Finding]:
+def lint_urdf(file: str, packages: Packages) -> list[Finding]:
     """Return what is wrong with the file, by place. A xacro file is expanded, and places are those of the result."""
     try:
-        document = read_urdf(file, packages, disk)
+        document = read_urdf(file, packages)
     except RejectedError as error:
         return list(error.findings)
     return document.findings()
@@ -50,12 +50,16 @@ class Document:
         return sorted([*kept, *unused_allows(allows, used)], key=lambda one: one.sort_key)
 
 
-def read_urdf(file: str, packages: Packages, disk: Disk, arguments: Mapping[str, str] | None = None) -> Document:
+def read_urdf(file: str, packages: Packages, arguments: Mapping[str, str] | None = None) -> Document:
     """Return what the file holds; a xacro file, by its name or by what is in it, is expanded, with arguments.
 
     Raises:
         RejectedError: if it cannot be read, or is no URDF; or takes no arguments, and is given some.
+        ValueError: if the packages have no disk to read from.
     """
+    disk = packages.disk
+    if disk is None:
+        raise ValueError("packages without a disk")
     raw = disk.read(file)
     is_xacro = file.endswith(".xacro") or "<xacro:" in raw
     if arguments and not is_xacro:

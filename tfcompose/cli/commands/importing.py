@@ -51,9 +51,8 @@ def run(arguments: Namespace) -> int:
     _check_use(arguments)
     try:
         named = {name: (str(Path(folder).absolute()), Span(folder)) for name, folder in packages.items()}
-        files = disk()
-        known = Packages(files, named, advice="--package {name}=FOLDER, or source the workspace's setup file")
-        document = read_urdf(arguments.file, known, files, given)
+        known = Packages(disk(), named, advice="--package {name}=FOLDER, or source the workspace's setup file")
+        document = read_urdf(arguments.file, known, given)
     except RejectedError as error:
         reject(error.findings)
     errors = [one for one in document.findings() if one.severity == "error"]

@@ -79,8 +79,7 @@ def _lint_urdf(file: str) -> list[Finding]:
     from tfcompose.urdf.lint import lint_urdf
     from tfcompose.urdf.packages import Packages
 
-    files = disk()
-    return lint_urdf(file, Packages(files, advice="source the workspace's setup file"), files)
+    return lint_urdf(file, Packages(disk(), advice="source the workspace's setup file"))
 
 
 def _fix(fixer: Fixer, form: str) -> list[Finding]:

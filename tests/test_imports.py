@@ -42,7 +42,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "emit": {"draw", "files", "geometry", "model", "numbers", "plan", "render", "urdf"},
     "ros": {"findings", "interrupt", "plan", "geometry"},
     "verdict": {"catalogue", "findings", "plan", "geometry"},
-    "run": {"findings", "ipc", "interrupt", "plan", "geometry", "ros", "tree", "verdict"},
+    "launcher": {"findings", "interrupt", "ipc", "plan", "ros"},
+    "run": {"findings", "ipc", "plan", "geometry", "launcher", "ros", "tree", "verdict"},
     "tf2": {"geometry", "ros"},
     "observe": {"catalogue", "findings", "model", "plan", "geometry", "ros", "tf2", "tree", "verdict"},
     "compile": FOUNDATIONS | STAGES,
@@ -70,8 +71,8 @@ ONLY_IN: dict[str, set[str]] = {
     "nav_msgs": {"ros"},
     "lifecycle_msgs": {"ros"},
     "rcl_interfaces": {"ros"},
-    "launch": {"run"},
-    "launch_ros": {"run"},
+    "launch": {"launcher"},
+    "launch_ros": {"launcher"},
     "std_msgs": {"ros"},
     "builtin_interfaces": {"ros"},
     "rosgraph_msgs": {"ros"},
@@ -140,13 +141,14 @@ def test_a_stage_is_imported_by_its_own_name_from_outside(file: Path) -> None:
 
 
 def test_launcher_guard_and_publishers_do_not_know_each_other() -> None:
-    """They are processes of their own: what they share stands in ``run`` itself."""
-    groups = {folder.name for folder in (PACKAGE / "run").iterdir() if (folder / "__init__.py").exists()}
-    assert groups == {"guard", "launcher", "publishing"}
-    for group in groups:
-        for file in (PACKAGE / "run" / group).rglob("*.py"):
-            others = {name.split(".")[2] for name in imports_of(file) if name.startswith("tfcompose.run.")}
-            assert not others & (groups - {group}), file
+    """They are processes of their own: what they tell each other stands in ``ipc``."""
+    rooms = ("tfcompose.launcher", "tfcompose.run.guard", "tfcompose.run.publishing")
+    for room in rooms:
+        files = list((PACKAGE.parent / room.replace(".", "/")).rglob("*.py"))
+        assert files
+        for file in files:
+            others = [other for other in rooms if other != room]
+            assert not [name for name in imports_of(file) if name.startswith(tuple(others))], file
 
 
 def test_a_command_is_imported_by_the_parser_alone() -> None:
@@ -235,7 +237,7 @@ def test_commands_before_the_plan_load_yaml_and_pydantic_and_nothing_else_from_e
 
 
 def test_reading_and_supervising_a_plan_loads_nothing_from_elsewhere_and_no_compiler(bare: set[str]) -> None:
-    loaded = loaded_by("import tfcompose.plan.file, tfcompose.run.launcher.supervisor")
+    loaded = loaded_by("import tfcompose.plan.file, tfcompose.launcher.supervisor")
     assert not foreign(loaded, bare)
     assert not {name for name in loaded for stage in (*STAGES, "emit") if name.startswith(f"tfcompose.{stage}")}
 

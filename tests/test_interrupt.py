@@ -12,8 +12,8 @@ import pytest
 from tfcompose import interrupt
 from tfcompose.cli import main
 from tfcompose.cli.parser import COMMANDS
+from tfcompose.launcher.supervisor import Signals
 from tfcompose.ros.stop import Stop
-from tfcompose.run.launcher.signals import Signals
 
 
 class Loaded:

@@ -20,7 +20,7 @@ from tests.support import processes
 from tests.support.edge_listener import EdgeListener
 from tests.support.robots import EXTERNAL, ROVER
 from tests.support.waiting import gone, until
-from tfcompose.run.launcher.control import ANSWER_S
+from tfcompose.launcher.control import ANSWER_S
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -38,14 +38,13 @@ from pathlib import Path
 from tfcompose.cli.console import Console, StatusLine
 from tfcompose.cli.terminal import columns_of
 from tfcompose.plan.file import read_plan
-from tfcompose.run.launcher.outlet import Outlet
-from tfcompose.run.launcher.session import Session
-from tfcompose.run.launcher.supervisor import supervise
+from tfcompose.launcher.output import NonBlockingOutput
+from tfcompose.launcher.supervisor import Session, supervise
 file = Path(sys.argv[1])
 plan = read_plan(file.read_text(), str(file))
-output = Outlet(1)
+output = NonBlockingOutput(1)
 console = Console(plan, output, colour=True, status=StatusLine(plan, lambda: columns_of(1)))
-code = supervise(plan, file, report=console, session=Session(file, outlet=output, refresh=console.refresh))
+code = supervise(plan, file, report=console, session=Session(file, output=output, refresh=console.refresh))
 output.close()
 sys.exit(code)
 """

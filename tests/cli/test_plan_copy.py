@@ -11,16 +11,16 @@ import pytest
 from tests.support.plans import compiled_plan
 from tests.support.robots import ROVER
 from tfcompose.cli.plans import copy_plan
-from tfcompose.run.place import Place, place_of
+from tfcompose.launcher.runtime_dir import RuntimeDir, runtime_dir_of
 
 
 @pytest.fixture
-def place(tmp_path: Path) -> Place:
-    return place_of(compiled_plan(ROVER), {"XDG_RUNTIME_DIR": str(tmp_path)})
+def place(tmp_path: Path) -> RuntimeDir:
+    return runtime_dir_of(compiled_plan(ROVER), {"XDG_RUNTIME_DIR": str(tmp_path)})
 
 
 def test_the_loser_copies_again_what_the_winner_takes_for_an_earlier_runs(
-    place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    place: RuntimeDir, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan, written = compiled_plan(ROVER), Path.write_bytes
     removed: list[Path] = []
@@ -38,7 +38,7 @@ def test_the_loser_copies_again_what_the_winner_takes_for_an_earlier_runs(
 
 
 def test_a_copy_is_never_half_written_and_stays_while_its_plan_is_the_one(
-    place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    place: RuntimeDir, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan, written = compiled_plan(ROVER), Path.write_bytes
     copy = copy_plan(plan, tmp_path / "plan.json", place, alone=False)

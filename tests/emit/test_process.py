@@ -16,9 +16,9 @@ from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
 from tfcompose.files import Target
 from tfcompose.findings import RejectedError
+from tfcompose.launcher.preflight import filled_in, folder_of, own_env
 from tfcompose.plan import PlanProcess, Ready, StopRule
 from tfcompose.plan.file import read_plan, write_plan
-from tfcompose.run.launcher.executable import filled_in, folder_of, own_env
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -15,7 +15,7 @@ from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.observe.census import Census, Publisher
 from tfcompose.observe.verify import verify
 from tfcompose.plan import Driven, EdgePattern, GuardPolicy, Joint, Plan, PlanEdge, PlanProcess, RosSettings
-from tfcompose.ros.topics import parts_of
+from tfcompose.plan.topics import parts_of
 from tfcompose.verdict.offset import Offset, offset_of
 
 if TYPE_CHECKING:

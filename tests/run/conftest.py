@@ -1,19 +1,10 @@
-"""What tests of the launcher and the guard begin with."""
+"""What tests of the guard begin with."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.support.guard_history import History
-from tests.support.launcher import Launcher, launched
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
-    from tfcompose.plan import PlanProcess
 
 
 @pytest.fixture
@@ -26,17 +17,3 @@ def history() -> History:
 def running() -> History:
     """The plan has been started."""
     return History().clear()
-
-
-@pytest.fixture
-def launch(tmp_path: Path) -> Iterator[Callable[..., Launcher]]:
-    """Start a launcher of these processes in a folder of the test's own."""
-    launchers: list[Launcher] = []
-
-    def start(*planned: PlanProcess) -> Launcher:
-        launchers.append(launched(tmp_path, *planned))
-        return launchers[-1]
-
-    yield start
-    for launcher in launchers:
-        launcher.kill()

@@ -30,7 +30,7 @@ LAUNCHER = """
 import signal, sys
 from pathlib import Path
 from tfcompose.plan.file import read_plan
-from tfcompose.run.launcher.supervisor import supervise
+from tfcompose.launcher.supervisor import supervise
 file = Path(sys.argv[1])
 plan = read_plan(file.read_text(), str(file))
 sys.exit(supervise(plan, file, report=lambda notice: print(notice, flush=True)))

@@ -7,12 +7,22 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from tfcompose.geometry import Pose
 from tfcompose.ipc import FindingShown, Notice, ProcessState
+from tfcompose.launcher.events import (
+    Action,
+    Begin,
+    Event,
+    Finish,
+    Kill,
+    Notify,
+    NotifyLate,
+    Order,
+    Start,
+    Started,
+    Tick,
+)
+from tfcompose.launcher.machine import step, wake_time
+from tfcompose.launcher.state import State, initial
 from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
-from tfcompose.run.launcher.action import Action, Finish, Kill, Order, Start, Tell, TellLate
-from tfcompose.run.launcher.happening import Begin, Event, Started, Tick
-from tfcompose.run.launcher.machine import step
-from tfcompose.run.launcher.state import State, initial
-from tfcompose.run.launcher.timing import wake_time
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -76,11 +86,11 @@ class History:
                     self.feed(Started(name, 1000 + len(self.started)))
             case Kill(name, number):
                 self.killed.append((name, number))
-            case Tell(notice):
+            case Notify(notice):
                 self.told.append(notice)
             case Order(order):
                 self.orders.append(order)
-            case TellLate(_, found):
+            case NotifyLate(_, found):
                 self.late.append(found)
             case Finish(code):
                 self.exit_code = code

@@ -12,18 +12,18 @@ from tfcompose.cli.console import Console
 from tfcompose.cli.runs import complain_of_leftovers, notices, print_missing
 from tfcompose.cli.terminal import FAILED, INTERRUPTED, coloured, complain
 from tfcompose.ipc import AllReady, AllStarted, Ended
-from tfcompose.run.launcher.logs import Logs
-from tfcompose.run.launcher.supervisor import supervise
+from tfcompose.launcher.logs import Logs
+from tfcompose.launcher.supervisor import supervise
 
 if TYPE_CHECKING:
     from argparse import Namespace
 
+    from tfcompose.launcher.runtime_dir import Lock, RuntimeDir
+    from tfcompose.launcher.supervisor import Session
     from tfcompose.plan import Plan
-    from tfcompose.run.launcher.session import Session
-    from tfcompose.run.place import Lock, Place
 
 
-def detach(plan: Plan, place: Place, lock: Lock, session: Session, arguments: Namespace) -> int:
+def detach(plan: Plan, place: RuntimeDir, lock: Lock, session: Session, arguments: Namespace) -> int:
     """Start the launcher as a process of its own; return 0 when all is started, or ready; 1 when it is not."""
     complain_of_leftovers(place, session.run_id)
     sys.stdout.flush()
@@ -32,7 +32,7 @@ def detach(plan: Plan, place: Place, lock: Lock, session: Session, arguments: Na
     if pid == 0:
         code = FAILED
         try:
-            lock.signed()
+            lock.sign()
             code = _launch(plan, place, session, arguments.duration)
         except BaseException:  # noqa: BLE001 (nobody further out says what it was)
             traceback.print_exc()
@@ -44,7 +44,7 @@ def detach(plan: Plan, place: Place, lock: Lock, session: Session, arguments: Na
     return _follow(plan, place, pid, arguments)
 
 
-def _launch(plan: Plan, place: Place, session: Session, duration_s: float | None) -> int:
+def _launch(plan: Plan, place: RuntimeDir, session: Session, duration_s: float | None) -> int:
     """Run as a process without a terminal; Python's own errors go to a file next to the logs."""
     os.setsid()
     nowhere = errors = os.open(os.devnull, os.O_RDWR)
@@ -76,7 +76,7 @@ class _StandardOutput:
         sys.stdout.flush()
 
 
-def _follow(plan: Plan, place: Place, pid: int, arguments: Namespace) -> int:
+def _follow(plan: Plan, place: RuntimeDir, pid: int, arguments: Namespace) -> int:
     console = Console(plan, _StandardOutput(), colour=coloured(sys.stdout))
     goal = AllReady if arguments.wait else AllStarted
     with contextlib.suppress(OSError):

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.plans import PLAN, built_plan, is_plan, plan_to_start
 from tfcompose.cli.terminal import counted
+from tfcompose.launcher.state import MAX_RESTARTS
 from tfcompose.plan.file import read_plan
+from tfcompose.plan.hosts import describe_share
+from tfcompose.plan.topics import partition_of, private_topics
 from tfcompose.ros.environment import FASTDDS_PROFILE, child_environment
-from tfcompose.run.fenced import partition_of, private_topics
-from tfcompose.run.hosts import told
-from tfcompose.run.launcher.state import MAX_RESTARTS
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -59,7 +59,7 @@ def _lines(plan: Plan, files: dict[str, str]) -> Iterator[str]:
     domain = "the environment's" if ros.domain_id is None else ros.domain_id
     processes = f"{len(plan.processes)} process{'es' * (len(plan.processes) != 1)}"
     yield f"robot {plan.robot}: {processes}, {counted(len(plan.edges), 'edge')}, domain: {domain}"
-    yield from told(plan)
+    yield from describe_share(plan)
     for process in plan.processes:
         yield ""
         yield from _process(plan, process, files)

@@ -13,9 +13,9 @@ from tfcompose.observe.bag_files import BagError
 from tfcompose.observe.census import topics_below
 from tfcompose.observe.elsewhere import advice, said
 from tfcompose.plan import RosSettings
+from tfcompose.plan.topics import parts_of
 from tfcompose.ros.environment import RosError, child_environment, ros_trouble
 from tfcompose.ros.stop import Stop
-from tfcompose.ros.topics import parts_of
 
 if TYPE_CHECKING:
     from argparse import Namespace

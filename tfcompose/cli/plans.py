@@ -15,14 +15,14 @@ from tfcompose.findings import RejectedError
 from tfcompose.ipc import SETTLE
 from tfcompose.plan import Plan
 from tfcompose.plan.file import read_plan, write_plan
-from tfcompose.run.hosts import share_of
+from tfcompose.plan.hosts import share_of
 from tfcompose.run.publishing.addresses import with_whole_addresses
 
 if TYPE_CHECKING:
     from argparse import Namespace
 
     from tfcompose.findings import Span
-    from tfcompose.run.place import Place
+    from tfcompose.launcher.runtime_dir import RuntimeDir
 
 PLAN = "plan.json"
 
@@ -106,7 +106,7 @@ def host_share(plan: Plan, host: str | None, here: str) -> Plan:
     return share
 
 
-def copy_plan(plan: Plan, file: Path, place: Place, *, alone: bool) -> Path:
+def copy_plan(plan: Plan, file: Path, place: RuntimeDir, *, alone: bool) -> Path:
     """Copy the plan, and what stands beside it, to where the run is; return the copy.
 
     A build then does not reach into a run. Meshes stay where they are: descriptions address them from the copy too.

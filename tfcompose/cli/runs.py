@@ -17,9 +17,9 @@ from tfcompose.ipc import (
     StatusRequest,
     read_notice,
 )
-from tfcompose.run.launcher.control import RefusedError, ask, connect
-from tfcompose.run.launcher.leftovers import leftovers, variables_of
-from tfcompose.run.place import PlaceError, places
+from tfcompose.launcher.control import RefusedError, ask, connect
+from tfcompose.launcher.processes import environment_of, leftovers
+from tfcompose.launcher.runtime_dir import RuntimeDirError, runtime_dirs
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from typing import TextIO
 
     from tfcompose.ipc import Notice, ProcessStatus, Request, Verb
-    from tfcompose.run.place import Holder, Place
+    from tfcompose.launcher.runtime_dir import Holder, RuntimeDir
 
 A = TypeVar("A")
 
@@ -35,23 +35,23 @@ NAMED_AT_MOST = 12
 ASK_EVERY_S = 0.1
 
 
-def running() -> list[tuple[Place, Holder]]:
+def running() -> list[tuple[RuntimeDir, Holder]]:
     """Return the robots that run, and who runs each.
 
     Raises:
-        PlaceError: if there is no folder that only this user can open.
+        RuntimeDirError: if there is no folder that only this user can open.
     """
-    found = [(place, place.holder()) for place in places(os.environ)]
+    found = [(place, place.holder()) for place in runtime_dirs(os.environ)]
     return [(place, holder) for place, holder in found if holder]
 
 
-def is_meant(place: Place, name: str | None) -> bool:
+def is_meant(place: RuntimeDir, name: str | None) -> bool:
     """Return whether this name means the robot: its own, one without the domain, or without a host's name too."""
     share = place.name.rpartition("@")[0]
     return name is None or name in {place.name, share, share.partition(".")[0]}
 
 
-def chosen_run(name: str | None, *, among: Callable[[], list[Place]] | None = None) -> Place:
+def chosen_run(name: str | None, *, among: Callable[[], list[RuntimeDir]] | None = None) -> RuntimeDir:
     """Return the place of the robot that is meant: of those that run, or ``among`` others.
 
     Raises:
@@ -59,7 +59,7 @@ def chosen_run(name: str | None, *, among: Callable[[], list[Place]] | None = No
     """
     try:
         known = among() if among else [place for place, _ in running()]
-    except PlaceError as error:
+    except RuntimeDirError as error:
         fail(str(error), UNREADABLE)
     what = "robot has run here" if among else "robot is running"
     found = [place for place in known if is_meant(place, name)]
@@ -73,7 +73,7 @@ def chosen_run(name: str | None, *, among: Callable[[], list[Place]] | None = No
     return found[0]
 
 
-def request(place: Place, question: Request, answer: type[A]) -> A | None:
+def request(place: RuntimeDir, question: Request, answer: type[A]) -> A | None:
     """Return the launcher's answer, or None after saying why there is none, or that it refuses."""
     try:
         return ask(place, question, answer)
@@ -99,7 +99,7 @@ def control_processes(arguments: Namespace, verb: Verb, doing: str) -> int:
 
 
 def notices(
-    place: Place, timeout_s: float | None = None, output: TextIO | None = None
+    place: RuntimeDir, timeout_s: float | None = None, output: TextIO | None = None
 ) -> Iterator[tuple[Notice, float]]:
     """Yield what the launcher has reported and reports, with when, until it ends.
 
@@ -127,7 +127,7 @@ def notices(
                 yield read_notice(line)
 
 
-def wait_until_ready(place: Place, timeout_s: float | None) -> int:
+def wait_until_ready(place: RuntimeDir, timeout_s: float | None) -> int:
     """Wait until every process is ready and every edge live; 0 then, and 1 after saying why that did not come."""
     end = None if timeout_s is None else time.monotonic() + timeout_s
     while True:
@@ -144,7 +144,7 @@ def wait_until_ready(place: Place, timeout_s: float | None) -> int:
         time.sleep(ASK_EVERY_S)
 
 
-def print_missing(place: Place, timeout_s: float) -> None:
+def print_missing(place: RuntimeDir, timeout_s: float) -> None:
     """Complain about each process that is not ready, and each edge that is not live."""
     try:
         status = ask(place, StatusRequest(), RobotStatus)
@@ -183,19 +183,19 @@ def since(holder: Holder) -> str:
     return time.strftime(form, at)
 
 
-def hidden_run(place: Place) -> str | None:
+def hidden_run(place: RuntimeDir) -> str | None:
     """Return what there is to say if the robot runs already, where this runtime folder does not show it."""
     led = [one for one in leftovers(f"{place.name}:") if one.launcher not in (None, os.getpid())]
     if not led or led[0].launcher is None:
         return None
     with contextlib.suppress(OSError):
-        folder = variables_of(led[0].launcher).get("XDG_RUNTIME_DIR")
+        folder = environment_of(led[0].launcher).get("XDG_RUNTIME_DIR")
         where = f"XDG_RUNTIME_DIR={folder}" if folder else "no XDG_RUNTIME_DIR"
         return f"{place.name} runs already: pid {led[0].launcher}, with {where}; set it for ps and down"
     return None
 
 
-def complain_of_leftovers(place: Place, run_id: str) -> None:
+def complain_of_leftovers(place: RuntimeDir, run_id: str) -> None:
     """Complain about processes of earlier runs that are still there."""
     found = [one for one in leftovers(f"{place.name}:") if one.run != run_id and one.launcher is None]
     for one in found:

@@ -17,21 +17,20 @@ from tfcompose.cli.runs import complain_of_leftovers, hidden_run, request, since
 from tfcompose.cli.terminal import FAILED, UNREADABLE, can_redraw, coloured, columns_of, complain, fail, reject
 from tfcompose.findings import RejectedError
 from tfcompose.ipc import PlanChange, UpdateRequest
+from tfcompose.launcher.control import listen
+from tfcompose.launcher.logs import Logs
+from tfcompose.launcher.output import NonBlockingOutput
+from tfcompose.launcher.preflight import commands_of, started_by_us
+from tfcompose.launcher.runtime_dir import Lock, RuntimeDirError, runtime_dir_of
+from tfcompose.launcher.supervisor import Session, supervise
 from tfcompose.ros.environment import child_environment, no_ros, ros_trouble
-from tfcompose.run.launcher.control import listen
-from tfcompose.run.launcher.logs import Logs
-from tfcompose.run.launcher.outlet import Outlet
-from tfcompose.run.launcher.preflight import commands_of, started_by_us
-from tfcompose.run.launcher.session import Session
-from tfcompose.run.launcher.supervisor import supervise
-from tfcompose.run.place import Lock, PlaceError, place_of
 
 if TYPE_CHECKING:
     from argparse import Namespace
 
     from tfcompose.findings import Finding
+    from tfcompose.launcher.runtime_dir import RuntimeDir
     from tfcompose.plan import Plan
-    from tfcompose.run.place import Place
 
 
 def start(arguments: Namespace) -> int:
@@ -48,9 +47,9 @@ def start(arguments: Namespace) -> int:
     if found:
         reject([_with_profiles(one, arguments) for one in found])
     try:
-        place = place_of(plan, os.environ)
+        place = runtime_dir_of(plan, os.environ)
         lock = Lock(place)
-    except PlaceError as error:
+    except RuntimeDirError as error:
         fail(str(error), UNREADABLE)
     except BlockingIOError:
         return _update(plan, file, place, arguments)
@@ -64,9 +63,9 @@ def start(arguments: Namespace) -> int:
         session = Session(copy, lock.run, file.absolute().parent, listen(place))
         if arguments.detach or arguments.wait:
             return detach(plan, place, lock, session, arguments)
-        session.outlet = Outlet(sys.stdout.fileno())
-        stack.callback(session.outlet.close)
-        return _run(plan, place, session, session.outlet, arguments.duration)
+        session.output = NonBlockingOutput(sys.stdout.fileno())
+        stack.callback(session.output.close)
+        return _run(plan, place, session, session.output, arguments.duration)
 
 
 def _build(arguments: Namespace) -> Path:
@@ -76,7 +75,7 @@ def _build(arguments: Namespace) -> Path:
     return build(arguments)[0] / PLAN
 
 
-def _run(plan: Plan, place: Place, session: Session, output: Outlet, duration_s: float | None) -> int:
+def _run(plan: Plan, place: RuntimeDir, session: Session, output: NonBlockingOutput, duration_s: float | None) -> int:
     """Run the plan on this terminal until it ends, and return the exit code."""
     logs = Logs(place.logs)
     status = StatusLine(plan, lambda: columns_of(output.fd)) if can_redraw(sys.stdout) else None
@@ -89,7 +88,7 @@ def _run(plan: Plan, place: Place, session: Session, output: Outlet, duration_s:
         logs.close()
 
 
-def _update(plan: Plan, file: Path, place: Place, arguments: Namespace) -> int:
+def _update(plan: Plan, file: Path, place: RuntimeDir, arguments: Namespace) -> int:
     """Bring the running robot to the plan; exit code 0, 1 where it runs as it is and was to be started here."""
     holder = place.holder()
     who = (

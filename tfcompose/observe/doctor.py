@@ -14,12 +14,12 @@ from tfcompose.observe.elsewhere import tf_elsewhere
 from tfcompose.observe.live import Live
 from tfcompose.observe.seen import RosProcess, Seen, Topic
 from tfcompose.observe.sideline import Sideline
+from tfcompose.plan.topics import GLOBAL
 from tfcompose.ros.clock import wall_ns
 from tfcompose.ros.environment import RMW
 from tfcompose.ros.graph import ends, nodes, topics, volatile_readers
 from tfcompose.ros.node import middleware, open_node
 from tfcompose.ros.processes import ros_processes, settings_in
-from tfcompose.ros.topics import GLOBAL
 
 if TYPE_CHECKING:
     from rclpy.node import Node

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from tfcompose.ros.topics import GLOBAL
+from tfcompose.plan.topics import GLOBAL
 from tfcompose.verdict.clock import WRONG_BY_NS
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from tfcompose.observe.differences import differences
 from tfcompose.observe.refused import refused_transform
 from tfcompose.observe.seen import Seen
 from tfcompose.observe.telling import told
-from tfcompose.ros.topics import parts_of
+from tfcompose.plan.topics import parts_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING
 
 from tfcompose.findings import RejectedError
 from tfcompose.ipc import JOINS
+from tfcompose.launcher.preflight import commands_of
 from tfcompose.plan.file import read_plan
 from tfcompose.ros.environment import child_environment
-from tfcompose.run.launcher.preflight import commands_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from tfcompose.findings import Finding
-    from tfcompose.run.launcher.command import Command
+    from tfcompose.launcher.preflight import Command
 
 _ARGUMENTS = 2
 

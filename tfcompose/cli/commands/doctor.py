@@ -106,7 +106,7 @@ def _plan(arguments: Namespace) -> Plan | None:
 def _expected(plan: Plan | None, below: str | None) -> dict[tuple[str, str], Plan | None]:
     """Return the topics to look at, each pair with the part of the plan that is expected there."""
     from tfcompose.observe.census import topics_below
-    from tfcompose.ros.topics import parts_of
+    from tfcompose.plan.topics import parts_of
 
     topics = topics_below(below or "")
     if plan is None:

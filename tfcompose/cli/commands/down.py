@@ -49,10 +49,10 @@ def run(arguments: Namespace) -> int:
 
 def _stop_leftovers(robot: str | None) -> int:
     from tfcompose.cli.runs import chosen_run
-    from tfcompose.run.launcher.leftovers import end, leftovers
-    from tfcompose.run.place import places
+    from tfcompose.launcher.processes import end, leftovers
+    from tfcompose.launcher.runtime_dir import runtime_dirs
 
-    place = chosen_run(robot, among=lambda: places(os.environ))
+    place = chosen_run(robot, among=lambda: runtime_dirs(os.environ))
     found = [one for one in leftovers(f"{place.name}:") if one.launcher is None]
     for one in found:
         print(f"stopping {one.pid}: {one.command}")

@@ -15,7 +15,7 @@ from tfcompose.cli.terminal import FAILED, coloured, complain, fail
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.run.place import Place
+    from tfcompose.launcher.runtime_dir import RuntimeDir
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -55,7 +55,7 @@ def run(arguments: Namespace) -> int:
     return FAILED
 
 
-def _is_held(place: Place) -> bool:
+def _is_held(place: RuntimeDir) -> bool:
     """Return whether the robot still runs; one that ends hangs up a moment before it gives its lock back."""
     for _ in range(40):
         if place.holder() is None:

@@ -58,7 +58,7 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Write the export; exit code as for ``build``."""
     from tfcompose.cli.plans import PLAN, built_plan, host_share, is_plan, refuse_variant
-    from tfcompose.run.launcher.fencing import not_remapped
+    from tfcompose.launcher.fence import not_remapped
 
     if is_plan(arguments.file):
         refuse_variant(arguments)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from collections.abc import Iterable
 
-    from tfcompose.run.place import Place
+    from tfcompose.launcher.runtime_dir import RuntimeDir
 
 #: How often the files are read with -f, in seconds.
 READ_EVERY_S = 0.2
@@ -39,7 +39,7 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Print the logs; exit code 0, 1 where there are none."""
     from tfcompose.findings import did_you_mean
-    from tfcompose.run.launcher.logs import Follower, logged, read_logs
+    from tfcompose.launcher.logs import Follower, logged, read_logs
 
     place = _place(arguments.robot)
     known = logged(place.logs)
@@ -63,15 +63,15 @@ def run(arguments: Namespace) -> int:
     return 0
 
 
-def _place(robot: str | None) -> Place:
+def _place(robot: str | None) -> RuntimeDir:
     """Return the robot that runs, or the one that has run last."""
     from tfcompose.cli.runs import chosen_run, running
-    from tfcompose.run.launcher.logs import last_written
-    from tfcompose.run.place import places
+    from tfcompose.launcher.logs import last_written
+    from tfcompose.launcher.runtime_dir import runtime_dirs
 
     if robot is None and len(alive := running()) == 1:
         return alive[0][0]
-    there = [place for place in places(os.environ) if place.logs.is_dir()]
+    there = [place for place in runtime_dirs(os.environ) if place.logs.is_dir()]
     if robot is None and there and not alive:
         return max(there, key=lambda place: last_written(place.logs))
     return chosen_run(robot, among=lambda: there)

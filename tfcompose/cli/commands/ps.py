@@ -34,7 +34,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Print the table; exit code 0, 1 where no robot runs."""
-    from tfcompose.run.launcher.usage import usage_of
+    from tfcompose.launcher.processes import usage_of
 
     robots, code = _robots(arguments.robot)
     used = usage_of([process.pid for status in robots.values() for process in status.processes if process.pid])
@@ -56,11 +56,11 @@ def _robots(name: str | None) -> tuple[dict[str, RobotStatus], int]:
     """Return those that answer, by their names, and the exit code: 1 after saying who does not."""
     from tfcompose.cli.runs import is_meant, request, running
     from tfcompose.ipc import RobotStatus, StatusRequest
-    from tfcompose.run.place import PlaceError
+    from tfcompose.launcher.runtime_dir import RuntimeDirError
 
     try:
         places = [place for place, _ in running() if is_meant(place, name)]
-    except PlaceError as error:
+    except RuntimeDirError as error:
         fail(str(error), UNREADABLE)
     answers = {place.name: request(place, StatusRequest(), RobotStatus) for place in places}
     found = {name: status for name, status in answers.items() if status is not None}

@@ -82,7 +82,7 @@ def _print_published(arguments: Namespace) -> None:
     from tfcompose.cli.live import observe, observed_topics, read_bag
     from tfcompose.observe.census import SETTLE_S, Census
     from tfcompose.observe.forest import forest
-    from tfcompose.ros.topics import parts_of
+    from tfcompose.plan.topics import parts_of
 
     plan, pairs = observed_topics(arguments)
     parts = parts_of(plan) if plan else {}

@@ -53,7 +53,7 @@ def run(arguments: Namespace) -> int:
     from tfcompose.cli.plans import expected_plan
     from tfcompose.observe.census import SETTLE_S, Census
     from tfcompose.observe.verify import verify
-    from tfcompose.ros.topics import parts_of
+    from tfcompose.plan.topics import parts_of
 
     refuse_live_bag(arguments)
     plan, places = expected_plan(arguments.file, arguments)

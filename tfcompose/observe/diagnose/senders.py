@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, Note, finding
 from tfcompose.observe.seen import NAMELESS, counted, listed, who
+from tfcompose.plan.topics import GLOBAL
 from tfcompose.ros.misfits import best_effort_writer, leak, volatile_writer
 from tfcompose.ros.tf_codec import TF_MESSAGE
-from tfcompose.ros.topics import GLOBAL
 from tfcompose.verdict.offset import Offset, offset_of
 
 if TYPE_CHECKING:

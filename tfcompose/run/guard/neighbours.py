@@ -7,9 +7,9 @@ from hashlib import blake2b
 from typing import TYPE_CHECKING
 
 from tfcompose.ipc import PROCESS, RUN_ID
+from tfcompose.plan.topics import GLOBAL
 from tfcompose.ros.graph import UNKNOWN_NODE, ids_say_who, own_gid, writers, writers_unmapped
 from tfcompose.ros.processes import has_variable, origin, variable_of
-from tfcompose.ros.topics import GLOBAL
 from tfcompose.run.guard.senders import PARTICIPANT, Writer
 
 if TYPE_CHECKING:

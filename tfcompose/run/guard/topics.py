@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.ipc import Clear, Complete
-from tfcompose.ros.topics import parts_of
+from tfcompose.plan.topics import parts_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -7,11 +7,10 @@ import time
 from typing import TYPE_CHECKING
 
 from tfcompose.ipc import JOINS, ORDERS_FD, REMAPPED, SETTLE
+from tfcompose.plan.topics import GLOBAL, private_topics
 from tfcompose.ros.graph import ids_say_who
 from tfcompose.ros.node import open_node, wait
-from tfcompose.ros.topics import GLOBAL
 from tfcompose.run.clock_watch import ClockWatch
-from tfcompose.run.fenced import private_topics
 from tfcompose.run.guard.bulletin import Bulletin
 from tfcompose.run.guard.eyes import LOOK_EVERY_S, Eyes, held_back
 from tfcompose.run.guard.gatekeeper import Gates

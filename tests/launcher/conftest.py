@@ -1,0 +1,29 @@
+"""What tests of the launcher begin with."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.support.launcher import Launcher, launched
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from tfcompose.plan import PlanProcess
+
+
+@pytest.fixture
+def launch(tmp_path: Path) -> Iterator[Callable[..., Launcher]]:
+    """Start a launcher of these processes in a folder of the test's own."""
+    launchers: list[Launcher] = []
+
+    def start(*planned: PlanProcess) -> Launcher:
+        launchers.append(launched(tmp_path, *planned))
+        return launchers[-1]
+
+    yield start
+    for launcher in launchers:
+        launcher.kill()

@@ -1,0 +1,129 @@
+"""Bytes into lines, and signals into values."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tfcompose.launcher.child import BURST, LINE_LIMIT, Bucket, Lines, Pipe, spawn
+from tfcompose.launcher.children import Reaper
+from tfcompose.launcher.preflight import Command
+from tfcompose.launcher.supervisor import Signals
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@given(st.text(alphabet="ab\né", max_size=60), st.integers(1, 7))
+def test_lines_are_the_same_however_the_bytes_arrive(text: str, size: int) -> None:
+    data, lines = text.encode(), Lines()
+    said = [line for start in range(0, len(data), size) for line in lines.feed(data[start : start + size])]
+    expected = text.split("\n")
+    assert [*said, *lines.end()] == (expected if expected[-1] else expected[:-1])
+
+
+@given(st.lists(st.binary(max_size=40), max_size=20))
+def test_no_line_is_longer_than_the_limit_nothing_is_lost_and_little_is_kept(chunks: list[bytes]) -> None:
+    lines = Lines(8)
+    said: list[str] = []
+    for chunk in (chunk.replace(b"\r", b"").replace(b"\n", b"x") for chunk in chunks):
+        said.extend(lines.feed(chunk))
+        assert len(lines._rest) <= 8
+    said.extend(lines.end())
+    assert all(len(line) <= 8 for line in said)
+    if all(max(chunk, default=0) < 128 for chunk in chunks):
+        assert len("".join(said)) == sum(len(chunk) - chunk.count(b"\r") for chunk in chunks)
+
+
+def read_flood(written: bytes, ending: bytes) -> list[str]:
+    """Return the lines that are kept of a process that writes all at once, and then its end, and ends."""
+    said: list[str] = []
+    read_end, write_end = os.pipe()
+    with os.fdopen(write_end, "wb", buffering=0) as writer:
+        pipe = Pipe(os.fdopen(read_end, "rb", buffering=0), said.append, bucket=Bucket(lambda: 0.0))
+        for start in range(0, len(written), 4096):
+            writer.write(written[start : start + 4096])
+            pipe.read()
+        writer.write(ending)
+    pipe.drain()
+    return said
+
+
+def test_the_last_words_of_a_process_that_flooded_are_kept() -> None:
+    written = b"flood, flood\n" * (BURST // 13 + 100_000)
+    *flood, note, last = read_flood(written, b"\nValueError: the reason\n")[-330:]
+    assert last == "ValueError: the reason"
+    assert (note, set(flood[-5:])) == ("", {"flood, flood"})
+    (told,) = [line for line in flood if line.startswith("…")]
+    kept = len(flood) - flood.index(told) - 1
+    thrown = int(told.split()[1].replace(",", ""))
+    assert thrown + kept * 13 == pytest.approx(len(written) - BURST, abs=4096 + 13)
+
+
+def test_the_last_words_after_an_endless_line_are_kept() -> None:
+    said = read_flood(b"a" * (BURST + 1_000_000), b"\nlast\n")
+    assert said[-1] == "last"
+    assert max(map(len, said)) <= LINE_LIMIT
+
+
+@pytest.mark.parametrize(
+    ("data", "line"),
+    [
+        (b"a\r\n", "a"),
+        (b"a\r\r\n", "a"),
+        (b"\r 10 %\r100 %\n", "100 %"),
+        (b"\r 10 %\r100 %\r\n", "100 %"),
+        (b"\xff\n", "\ufffd"),
+        (b"\n", ""),
+    ],
+)
+def test_a_line_comes_without_its_end_and_never_fails_to_be_text(data: bytes, line: str) -> None:
+    assert list(Lines().feed(data)) == [line]
+
+
+def test_a_sighup_that_is_ignored_as_below_nohup_stays_ignored() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with Signals():
+            assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+            assert signal.getsignal(signal.SIGTERM) != signal.SIG_DFL
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("seconds", [0.0, 0.03, 0.06, 0.1])
+def test_an_own_process_that_is_told_to_end_while_it_starts_ends_by_its_own_rules(
+    number: int, seconds: float, tmp_path: Path
+) -> None:
+    argv = (sys.executable, "-m", "tfcompose.run.static", str(tmp_path / "plan.json"), "static")
+    popen = spawn(Command(argv, dict(os.environ), tmp_path, own=True), ())
+    time.sleep(seconds)
+    popen.send_signal(number)
+    _, errors = popen.communicate(timeout=60)
+    assert popen.returncode == 2  # there is no plan
+    assert errors.decode().splitlines()[1:] == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_keeper_stays_that_is_told_to_end_in_its_first_moment(number: int) -> None:
+    """As systemd tells all of a unit's processes, also one that it has just started."""
+    keeper = Reaper()
+    os.kill(keeper.pid, number)
+    keeper.close()
+    assert keeper.returncode == 0
+
+
+def test_a_process_that_is_not_our_own_is_started_with_no_signal_blocked(tmp_path: Path) -> None:
+    popen = spawn(Command((sys.executable, "-c", "import time; time.sleep(180)"), dict(os.environ), tmp_path), ())
+    popen.send_signal(signal.SIGTERM)
+    assert popen.wait(60) == -signal.SIGTERM
+    popen.communicate()

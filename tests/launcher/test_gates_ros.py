@@ -1,0 +1,167 @@
+"""Gates at real nodes: a topic, a service, and a lifecycle node that is configured and activated."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tfcompose.geometry import Pose
+from tfcompose.ipc import AllReady, FindingShown, Notice, ProcessReady
+from tfcompose.launcher.supervisor import supervise
+from tfcompose.plan import Plan, PlanEdge, PlanProcess, Ready, RosSettings, Simulation, SourceLine
+from tfcompose.plan.file import write_plan
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from tfcompose.plan import LifecycleState
+
+pytestmark = pytest.mark.ros
+
+NODE = """
+import sys, time
+import rclpy
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+class Slam(LifecycleNode):
+    def on_configure(self, state):
+        print("configured", flush=True)
+        fails = "fail" in sys.argv
+        return TransitionCallbackReturn.FAILURE if fails else TransitionCallbackReturn.SUCCESS
+    def on_activate(self, state):
+        print("activated", flush=True)
+        return super().on_activate(state)
+
+rclpy.init(args=[])
+node = Slam("slam", namespace="/robot") if "lifecycle" in sys.argv else rclpy.create_node("lidar", namespace="/robot")
+if "lifecycle" not in sys.argv:
+    time.sleep(0.5)
+    publisher = node.create_publisher(String, "scan", 1)
+    service = node.create_service(Trigger, "reset", lambda request, response: response)
+    client = node.create_client(Trigger, "asked_for")
+try:
+    rclpy.spin(node)
+except BaseException:
+    pass
+"""
+GUARD = PlanProcess("guard", "guard", ("${python}", "-m", "tfcompose.run.guard", "${plan}", "guard"), nodes=("/guard",))
+
+
+def node(
+    name: str, *words: str, ready: Ready | None = None, lifecycle: dict[str, LifecycleState] | None = None
+) -> PlanProcess:
+    argv = (sys.executable, "-c", NODE, *words)
+    return PlanProcess(name, "run", argv, ready=ready, lifecycle=lifecycle or {}, nodes=(f"/robot/{name}",))
+
+
+def script(name: str, text: str, ready: Ready | None, **more: Any) -> PlanProcess:
+    return PlanProcess(name, "run", ("sh", "-c", text), ready=ready, nodes=(f"/robot/{name}",), **more)
+
+
+def simulated(ready: Ready) -> PlanProcess:
+    """Return the owner of odom → base_link, which stands still there."""
+    argv = ("${python}", "-m", "tfcompose.run.simulate", "${plan}", "drive")
+    owns = (("odom", "base_link"),)
+    still = Simulation("fixed", 20.0, pose=Pose())
+    return PlanProcess("drive", "simulate", argv, ready=ready, nodes=("/robot/drive",), owns=owns, simulate=still)
+
+
+def run(tmp_path: Path, *processes: PlanProcess, late: int = 0) -> list[Notice]:
+    """Run the plan until all are ready, or as many gates were said to stay shut."""
+    edges = tuple(
+        PlanEdge(parent, child, "dynamic", one.name, one.nodes[0], Pose(), None, SourceLine("robot.yaml", 1))
+        for one in processes
+        for parent, child in one.owns
+    )
+    plan = Plan("rover", "", None, RosSettings(), edges, (*processes, GUARD))
+    file = tmp_path / "plan.json"
+    file.write_text(write_plan(plan))
+    told: list[Notice] = []
+
+    def report(notice: Notice) -> None:
+        told.append(notice)
+        shut = [one for one in told if isinstance(one, FindingShown) and one.found.code == "TF817"]
+        if isinstance(notice, AllReady) or (late and len(shut) == late):
+            raise BrokenPipeError  # enough was seen
+
+    supervise(plan, file, report=report, duration_s=120)
+    return told
+
+
+@pytest.mark.usefixtures("domain")
+def test_a_topic_and_a_service_open_gates_and_say_what_they_are(tmp_path: Path) -> None:
+    lidar, reset = Ready("topic", "/robot/scan"), Ready("service", "/robot/reset")
+    told = run(tmp_path, node("lidar", ready=lidar), node("reset", ready=reset))
+    seen = {notice.process: notice.seen for notice in told if isinstance(notice, ProcessReady)}
+    assert seen["lidar"].startswith("/robot/scan is published by /robot/lidar")
+    assert seen["reset"] == "the service /robot/reset is there"
+    assert isinstance(told[-1], AllReady)
+
+
+@pytest.mark.usefixtures("domain")
+def test_a_lifecycle_node_is_configured_and_activated_and_then_ready(tmp_path: Path) -> None:
+    told = run(tmp_path, node("slam", "lifecycle", lifecycle={"/robot/slam": "active"}))
+    (ready,) = [notice for notice in told if isinstance(notice, ProcessReady)]
+    assert ready.seen == "/robot/slam is active"
+    said = [getattr(notice, "text", "") for notice in told if getattr(notice, "process", "") == "slam"]
+    assert [text for text in said if text] == ["configured", "activated"]
+
+
+@pytest.mark.usefixtures("domain")
+def test_edges_a_line_an_exit_code_and_a_time_open_gates_and_what_waits_follows(tmp_path: Path) -> None:
+    drive = simulated(Ready("edges"))
+    line = script("line", "echo booting; sleep 0.3; echo ready 17; sleep 180", Ready("log", "ready [0-9]+"))
+    code = script("code", "exit 4", Ready("exit", number=4.0))
+    later = script("later", "sleep 180", Ready("time", number=0.4))
+    last = script("last", "sleep 180", None, after=dict.fromkeys(("drive", "line", "code", "later"), "ready"))
+    told = run(tmp_path, drive, line, code, later, last)
+    seen = {notice.process: notice.seen for notice in told if isinstance(notice, ProcessReady)}
+    assert seen == {"drive": "its edges are live", "line": "ready 17", "later": "0.4 s have passed"}
+    assert isinstance(told[-1], AllReady)
+    assert {row.process for row in told[-1].rows} >= {"drive", "line", "code", "later", "last"}
+
+
+@pytest.mark.usefixtures("domain")
+def test_edges_a_line_and_an_exit_code_that_do_not_come_are_told_with_what_was_seen_instead(tmp_path: Path) -> None:
+    idle = replace(simulated(Ready("edges", timeout_s=6.0)), kind="run", argv=("sleep", "180"), simulate=None)
+    line = script("line", "echo booting; sleep 180", Ready("log", "ready [0-9]+", timeout_s=5.0))
+    code = script("code", "sleep 180", Ready("exit", timeout_s=5.0))
+    told = run(tmp_path, idle, line, code, late=3)
+    found = {notice.found.message: notice.found for notice in told if isinstance(notice, FindingShown)}
+    notes = [
+        note.message for note in found["line is not ready after 5 s: no line of its output holds ready [0-9]+"].notes
+    ]
+    assert notes == ["line: booting"]
+    assert "code is not ready after 5 s: it still runs" in found
+    edges = found["drive is not ready after 6 s: nobody published odom → base_link"]
+    assert edges.notes[0].message == "seen instead: /tf is published by nobody; /tf_static is published by nobody"
+
+
+@pytest.mark.usefixtures("domain")
+def test_gates_that_stay_shut_say_what_was_seen_instead(tmp_path: Path) -> None:
+    scan = Ready("topic", "/robot/scam", timeout_s=9.0)
+    other = Ready("topic", "/front/scan", timeout_s=9.0)
+    active = Ready("lifecycle", "active", timeout_s=10.0)
+    slam = node("slam", "lifecycle", "fail", lifecycle={"/robot/slam": "active"}, ready=active)
+    asked = Ready("service", "/robot/asked_for", timeout_s=9.0)
+    told = run(
+        tmp_path,
+        *(node("lidar", ready=scan), slam, script("calm", "sleep 180", asked), script("c", "sleep 180", other)),
+        late=4,
+    )
+    found = {notice.found.message: notice.found for notice in told if isinstance(notice, FindingShown)}
+    topic = found["lidar is not ready after 9 s: nobody publishes /robot/scam"]
+    assert "/robot/scan" in topic.notes[0].message
+    lost = found["c is not ready after 9 s: nobody publishes /front/scan"].notes[0].message
+    assert lost.startswith("seen instead: topics /robot/scan, "), "the same name elsewhere comes first"
+    service = found["calm is not ready after 9 s: there is no service /robot/asked_for"].notes[0].message
+    assert service.startswith("seen instead: services /robot/reset, /robot/slam/change_state, ")
+    assert "asked_for" not in service, "nobody offers it"
+    state = found["slam is not ready after 10 s: its nodes are not in their lifecycle states"]
+    assert state.notes[0].message == "seen instead: /robot/slam is unconfigured, and does not configure"
+    assert state.notes[-1].message == "slam: configured"

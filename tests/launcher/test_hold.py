@@ -1,0 +1,103 @@
+"""Publishers that load Python while the guard looks, and join ROS only when they are started."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from typing import TYPE_CHECKING
+
+import psutil
+import pytest
+
+from tests.support.launcher import LISTEN, SLEEPER, plan_of, program
+from tests.support.waiting import TIMEOUT_S, gone, until
+from tfcompose.ipc import GO, GUARD_EVENTS, HOLD_FD, Clear, LogLine, Notice, ProcessState
+from tfcompose.launcher.supervisor import supervise
+from tfcompose.ros.stop import Stop
+from tfcompose.run.hold import wait_for_go
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from tests.support.launcher import Launcher
+    from tfcompose.plan import PlanProcess
+
+#: Says what it has loaded before it is let go, as an own process would.
+HELD = f"""
+{LISTEN}
+import os, time
+print("pids", os.getpid(), "loaded", flush=True)
+open("loaded", "w").close()
+said = os.read(int(os.environ["{HOLD_FD}"]), 9)
+print("went on" if said == {GO!r} else "was not let go", flush=True)
+time.sleep(180)
+"""
+
+
+def looking_until(file: str) -> PlanProcess:
+    """Return a guard whose look before the start ends when there is such a file."""
+    look = f"import os, time\nwhile not os.path.exists({file!r}): time.sleep(0.01)\n"
+    say = f"os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']), {GUARD_EVENTS.line(Clear()).encode()!r}); {SLEEPER}"
+    return program("guard", f"{LISTEN}; {look}{say}", kind="guard", cwd=".")
+
+
+@pytest.mark.parametrize(("sent", "ends"), [(GO, False), (b"", True), (b"no", True)])
+def test_a_held_process_goes_on_when_it_is_told_and_ends_when_nobody_is_left_to_tell_it(
+    monkeypatch: pytest.MonkeyPatch,
+    sent: bytes,
+    ends: bool,  # noqa: FBT001 (a parameter of the test)
+) -> None:
+    theirs, ours = os.pipe()
+    monkeypatch.setenv(HOLD_FD, str(theirs))
+    os.write(ours, sent)
+    os.close(ours)
+    stop = Stop()
+    wait_for_go(stop)
+    assert stop.requested is ends
+    assert HOLD_FD not in os.environ
+    wait_for_go(stop)  # nobody holds it any more
+
+
+def test_own_publishers_load_while_the_guard_looks_and_go_on_when_they_are_started(tmp_path: Path) -> None:
+    told: list[tuple[float, Notice]] = []
+
+    def report(notice: Notice) -> None:
+        told.append((time.monotonic(), notice))
+        if isinstance(notice, LogLine) and notice.text == "went on":
+            os.kill(os.getpid(), signal.SIGINT)
+
+    plan = plan_of(looking_until("loaded"), program("static", HELD, kind="static", cwd="."), program("other", SLEEPER))
+    assert supervise(plan, tmp_path / "plan.json", report=report) == 0
+    kinds = [notice for _, notice in told]
+    started = next(i for i, one in enumerate(kinds) if isinstance(one, ProcessState) and one.process == "static")
+    said = [one.text if isinstance(one, LogLine) else "" for one in kinds]
+    loaded = next(i for i, text in enumerate(said) if text.endswith("loaded"))
+    assert loaded < started < said.index("went on")
+    pids = {one.pid for one in kinds if isinstance(one, ProcessState) and one.process == "static" and one.pid}
+    assert pids == {int(said[loaded].split()[1])}
+    others = [i for i, one in enumerate(kinds) if isinstance(one, ProcessState) and one.process == "other"]
+    assert others[0] > loaded
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_one_that_is_held_when_the_launcher_ends_ends_with_it(
+    launch: Callable[..., Launcher], tmp_path: Path, number: int
+) -> None:
+    launcher = launch(looking_until("never"), program("static", HELD, kind="static", cwd="."))
+    assert until((tmp_path / "loaded").exists)
+    below = launcher.below()
+    os.kill(launcher.popen.pid, number)
+    assert launcher.popen.wait(TIMEOUT_S) == (0 if number == signal.SIGINT else -number)
+    assert until(lambda: all(map(gone, below)))
+
+
+def test_one_that_dies_while_it_is_held_has_failed_when_it_is_started(tmp_path: Path) -> None:
+    told: list[Notice] = []
+    dies = program("static", "open('dies', 'w').close(); raise SystemExit(3)", kind="static", cwd=".")
+    plan = plan_of(looking_until("dies"), dies)
+    assert supervise(plan, tmp_path / "plan.json", report=told.append) == 1
+    states = [one.state for one in told if isinstance(one, ProcessState) and one.process == "static"]
+    assert states == ["STARTING", "RUNNING", "EXITED"]
+    assert not psutil.Process().children(recursive=True)

@@ -1,0 +1,133 @@
+"""A launch file as a process; a stand-in for ``ros2 launch`` says what it would do."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tfcompose.ipc import LogLine, Notice
+from tfcompose.launcher.preflight import commands_of
+from tfcompose.launcher.supervisor import supervise
+from tfcompose.plan import Plan, PlanProcess, RosSettings
+from tfcompose.ros.environment import child_environment
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from tfcompose.findings import Finding
+    from tfcompose.launcher.preflight import Command
+
+NAV2 = PlanProcess(
+    "nav2", "run", ("${launch:nav2_bringup/navigation_launch.py}", "use_composition:=False"), remap={"/tf": "/r/tf"}
+)
+#: Runs the description of the file that it is given, and prints it; ``launch`` and ``launch_ros`` are stand-ins.
+ROS2 = """#!{python}
+import importlib.util, sys, types
+def module(name, *kinds):
+    made = sys.modules[name] = types.ModuleType(name)
+    for kind in kinds:
+        setattr(made, kind, lambda *words, _kind=kind, **named: [_kind, *words, *map(list, named.items())])
+module("launch", "LaunchDescription")
+module("launch.actions", "GroupAction", "IncludeLaunchDescription")
+module("launch.launch_description_sources", "AnyLaunchDescriptionSource")
+module("launch_ros"), module("launch_ros.actions", "PushRosNamespace", "SetRemap", "SetParameter")
+spec = importlib.util.spec_from_file_location("given", sys.argv[-1])
+given = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(given)
+import json
+print(json.dumps([sys.argv[1:-1], given.generate_launch_description()]))
+"""
+
+
+@pytest.fixture
+def env(tmp_path: Path) -> dict[str, str]:
+    launch = tmp_path / "ros" / "share" / "nav2_bringup" / "launch"
+    launch.mkdir(parents=True)
+    (launch / "navigation_launch.py").touch()
+    ros2 = tmp_path / "bin" / "ros2"
+    ros2.parent.mkdir()
+    ros2.write_text(ROS2.replace("{python}", sys.executable))
+    ros2.chmod(0o755)
+    path = f"{ros2.parent}{os.pathsep}{os.environ['PATH']}"
+    return dict(os.environ) | {"PATH": path, "AMENT_PREFIX_PATH": str(tmp_path / "ros")}
+
+
+def look(tmp_path: Path, env: dict[str, str], process: PlanProcess = NAV2) -> tuple[dict[str, Command], Finding | None]:
+    plan = Plan("rover", "", None, RosSettings(), (), (process,))
+    commands, found = commands_of(plan, [process], tmp_path / "plan.json", env, child_environment)
+    return commands, found[0] if found else None
+
+
+@pytest.mark.parametrize(("own", "namespace"), [(None, "r"), ("r/nav", "r/nav")])
+def test_the_file_is_included_with_namespace_remappings_sim_time_and_arguments(
+    tmp_path: Path, env: dict[str, str], own: str | None, namespace: str
+) -> None:
+    plan = Plan("rover", "", None, RosSettings("r", clock="sim"), (), (replace(NAV2, namespace=own),))
+    told: list[Notice] = []
+    assert supervise(plan, tmp_path / "plan.json", report=told.append, base_env=env) == 0
+    (line,) = [notice.text for notice in told if isinstance(notice, LogLine)]
+    words, description = json.loads(line)
+    file = f"{tmp_path}/ros/share/nav2_bringup/launch/navigation_launch.py"
+    assert words == ["launch", "--noninteractive"]
+    assert description == [
+        "LaunchDescription",
+        [
+            [
+                "GroupAction",
+                [
+                    ["PushRosNamespace", namespace],
+                    ["SetRemap", "/tf", "/r/tf"],
+                    ["SetParameter", "use_sim_time", ["value", True]],
+                    [
+                        "IncludeLaunchDescription",
+                        ["AnyLaunchDescriptionSource", file],
+                        ["launch_arguments", [["use_composition", "False"]]],
+                    ],
+                ],
+            ]
+        ],
+    ]
+
+
+@pytest.mark.parametrize(("theirs", "output"), [({}, "both"), ({"OVERRIDE_LAUNCH_PROCESS_OUTPUT": "log"}, "log")])
+def test_what_the_nodes_say_comes_to_the_log_unless_the_user_said_where_it_goes(
+    tmp_path: Path, env: dict[str, str], theirs: dict[str, str], output: str
+) -> None:
+    env.pop("OVERRIDE_LAUNCH_PROCESS_OUTPUT", None)
+    commands, _ = look(tmp_path, env | theirs)
+    assert commands["nav2"].env["OVERRIDE_LAUNCH_PROCESS_OUTPUT"] == output
+
+
+def test_without_ros2_it_says_what_brings_it(tmp_path: Path, env: dict[str, str]) -> None:
+    _, found = look(tmp_path, env | {"PATH": "/nowhere"})
+    assert found
+    assert found.code == "TF810"
+    assert found.message == "the executable ros2 (for launch nav2_bringup/navigation_launch.py) of nav2 was not found"
+    assert "ros2launch" in found.help
+
+
+@pytest.mark.parametrize(
+    ("word", "advice"),
+    [
+        ("nav2_bringup/navigaton_launch.py", "did you mean navigation_launch.py?"),
+        ("nav2/navigation_launch.py", "install the package nav2"),
+    ],
+)
+def test_a_launch_file_that_is_not_there_is_named_with_what_is(
+    tmp_path: Path, env: dict[str, str], word: str, advice: str
+) -> None:
+    _, found = look(tmp_path, env, PlanProcess("nav2", "run", (f"${{launch:{word}}}",)))
+    assert found
+    assert found.message == f"the executable launch file {word} of nav2 was not found"
+    assert found.help == advice
+
+
+def test_a_word_that_is_no_argument_is_refused(tmp_path: Path, env: dict[str, str]) -> None:
+    _, found = look(tmp_path, env, PlanProcess("nav2", "run", (*NAV2.argv, "--debug")))
+    assert found
+    assert found.message == "nav2: --debug is no argument of a launch file"

@@ -1,0 +1,108 @@
+"""Logs on disk: merged, turned over, followed, and lost without harm."""
+
+from __future__ import annotations
+
+import errno
+import os
+import time
+from typing import TYPE_CHECKING
+
+from tfcompose.launcher.logs import KEPT, Follower, Logs, last_written, logged, read_logs
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pytest
+
+
+def texts(folder: Path, *names: str) -> list[str]:
+    return [text for _, _, text in read_logs(folder, list(names))]
+
+
+def test_lines_of_several_processes_come_in_the_order_in_which_they_were_written(tmp_path: Path) -> None:
+    logs = Logs(tmp_path)
+    for name, text in (("a", "one"), ("b", "two "), ("a", ""), ("b", "four")):
+        assert logs.write(name, text) is None
+        while int(time.time() * 1000) == int(time.time() * 1000):
+            pass  # until the next millisecond
+    logs.close()
+    assert [(name, text) for _, name, text in read_logs(tmp_path, logged(tmp_path))] == [
+        ("a", "one"),
+        ("b", "two "),
+        ("a", ""),
+        ("b", "four"),
+    ]
+
+
+def test_processes_of_parts_have_logs_too(tmp_path: Path) -> None:
+    logs = Logs(tmp_path / "logs", file_bytes=100)
+    for number in range(10):
+        for name in ("static", "arm/static", "arm/tool/static"):
+            assert logs.write(name, f"line {number} of {name}") is None
+    logs.close()
+    assert logged(tmp_path / "logs") == ["arm/static", "arm/tool/static", "static"]
+    for name in logged(tmp_path / "logs"):
+        assert [text for _, _, text in read_logs(tmp_path / "logs", [name])][-1] == f"line 9 of {name}"
+
+
+def test_the_run_that_wrote_last_is_known_by_its_lines_and_not_by_when_its_files_were_made(tmp_path: Path) -> None:
+    begun, later = Logs(tmp_path / "a"), Logs(tmp_path / "b")
+    for logs, name, second in ((begun, "arm/static", 10), (later, "static", 20), (begun, "arm/static", 30)):
+        logs.write(name, "text")
+        os.utime(logs.folder / f"{name}.log", (second, second))
+    assert [last_written(tmp_path / name) for name in ("a", "b", "none")] == [30, 20, 0]
+    begun.close()
+    later.close()
+
+
+def test_a_file_that_is_full_is_turned_over_and_the_oldest_lines_go(tmp_path: Path) -> None:
+    logs = Logs(tmp_path, file_bytes=1000)
+    for number in range(1000):
+        logs.write("a", f"line {number}")
+    logs.close()
+    files = sorted(tmp_path.iterdir())
+    assert len(files) == KEPT + 1
+    assert all(file.stat().st_size <= 1000 for file in files)
+    kept = texts(tmp_path, "a")
+    assert kept == [f"line {number}" for number in range(1000 - len(kept), 1000)]
+    assert len(kept) > 20
+
+
+def test_a_follower_sees_each_line_once_also_when_the_file_is_turned_over(tmp_path: Path) -> None:
+    logs = Logs(tmp_path, file_bytes=1000)
+    logs.write("a", "before")
+    follower = Follower(tmp_path, ["a"])
+    seen = []
+    for number in range(200):
+        logs.write("a", f"line {number}")
+        if number % 7 == 0:
+            seen += [text for _, _, text in follower.more()]
+    seen += [text for _, _, text in follower.more()]
+    logs.close()
+    assert seen == [f"line {number}" for number in range(200)]
+
+
+def test_a_full_disk_is_said_once_costs_lines_and_stops_nobody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    logs = Logs(tmp_path)
+    logs.write("a", "before")
+    write = os.write
+
+    def full(*_: object) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "write", full)
+    said = [logs.write("a", "lost") for _ in range(100)]
+    assert said == [f"logs are not written to {tmp_path}: No space left on device", *[None] * 99]
+    monkeypatch.setattr(os, "write", write)
+    monkeypatch.setattr("tfcompose.launcher.logs.LEFT_ALONE_S", 0.0)
+    logs.write("a", "after")
+    logs.close()
+    assert texts(tmp_path, "a") == ["before", "after"]
+
+
+def test_a_log_that_is_a_link_is_not_followed(tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").touch()
+    (tmp_path / "a.log").symlink_to(tmp_path / "elsewhere")
+    logs = Logs(tmp_path)
+    assert "are not written" in (logs.write("a", "text") or "")
+    assert (tmp_path / "elsewhere").read_text() == ""

@@ -1,0 +1,148 @@
+"""Processes that the run goes on without: ``required: false``."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from signal import SIGINT
+from typing import Any
+
+import pytest
+
+from tests.support.machine_history import GUARD, SLAM, STATIC, History, begin, run_process
+from tfcompose.ipc import AllReady, AllStarted, Clear, Ended, Live, OwnerReady, ProcessRequest, Waiting
+from tfcompose.launcher.answers import status
+from tfcompose.launcher.events import Exited, Signalled, StartFailed, TimeUp
+from tfcompose.plan import PlanProcess, Ready, RestartPolicy
+
+LIVE = (Live("static", ("laser",)), OwnerReady("static"))
+
+
+def optional(name: str = "camera", **more: Any) -> PlanProcess:
+    return run_process(name, required=False, **more)
+
+
+def failed(*others: PlanProcess) -> History:
+    """Return a history in which the optional camera has failed, and the tree is live."""
+    return begin(GUARD, STATIC, optional(), *others).feed(Clear(), *LIVE, Exited("camera", 3, ("no device",)))
+
+
+@pytest.mark.parametrize("restart", ["no", "on-failure"])
+def test_an_optional_process_that_fails_is_named_with_its_last_lines_and_the_rest_goes_on(
+    restart: RestartPolicy,
+) -> None:
+    history = begin(STATIC, replace(optional(), restart=restart, max_restarts=0)).feed(
+        Exited("camera", 3, ("no device",))
+    )
+    (found,) = history.found()
+    assert (found.code, found.severity) == ("TF808", "warning")
+    assert found.message.startswith("camera ended with exit code 3")
+    assert [note.message for note in found.notes] == ["camera: no device"]
+    assert "tfcompose start camera" in (found.help or "")
+    assert (history.state.stop, history.killed, history.exit_code) == (None, [], None)
+    assert history.state.given_up == ("camera",)
+
+
+def test_it_is_first_started_again_as_often_as_the_plan_says() -> None:
+    history = begin(STATIC, replace(optional(), restart="on-failure", max_restarts=2))
+    slept = [history.feed(Exited("camera", 1)).sleep_until_due() for _ in range(2)]
+    assert slept == [1.0, 2.0]
+    assert history.feed(Exited("camera", 1)).states("camera")[-1] == "FATAL"
+    assert history.state.stop is None
+
+
+def test_one_that_the_operating_system_does_not_start_is_given_up_too() -> None:
+    history = begin(STATIC, optional()).feed(StartFailed("camera", "no such program"))
+    assert history.found()[0].message == "camera could not be started: no such program"
+    assert (history.states("camera")[-1], history.state.stop) == ("FATAL", None)
+
+
+def test_one_that_ends_as_it_should_has_not_failed() -> None:
+    history = begin(STATIC, optional()).feed(Exited("camera", 0))
+    assert (history.found(), history.state.given_up) == ([], ())
+
+
+def test_ready_does_not_wait_for_it_nor_for_its_edges_and_says_what_is_left_out() -> None:
+    camera = replace(optional(), owns=(("base_link", "camera"),), restart="always", max_restarts=0)
+    history = begin(GUARD, STATIC, camera).feed(Clear(), *LIVE, Exited("camera", 1)).wait(60)
+    (ready,) = history.all(AllReady)
+    assert ready.without == ("camera",)
+    assert [row.process for row in ready.rows] == ["guard", "static"]
+    assert history.all(Waiting) == []
+    assert (history.state.complete, [one.child for one in history.state.missing]) == (False, ["camera"])
+
+
+def test_what_else_is_missing_is_still_waited_for() -> None:
+    history = begin(GUARD, STATIC, optional()).feed(Clear(), Exited("camera", 1)).wait(6)
+    assert history.all(AllReady) == []
+    assert [one.owner for one in history.all(Waiting)[0].missing] == ["static"]
+
+
+def test_one_that_waits_for_it_fails_with_the_reason_and_ends_everything_unless_it_is_optional_too() -> None:
+    reason = "nav is not started: it waits for camera to be ready, and camera has failed"
+    gate = Ready("log", "up")
+    camera = replace(optional(), ready=gate)
+    history = begin(STATIC, camera, run_process("nav", after={"camera": "ready"})).feed(Exited("camera", 1))
+    assert history.found()[1].message == reason
+    assert history.feed(Exited("static", 0)).exit_code == 1
+    history = begin(STATIC, camera, optional("nav", after={"camera": "ready"})).feed(Exited("camera", 1))
+    assert history.found()[1].message == reason
+    assert (history.state.stop, history.state.given_up) == (None, ("camera", "nav"))
+
+
+@pytest.mark.parametrize(("what", "code", "started"), [("started", 1, 2), ("done", 1, 1), ("done", 0, 2)])
+def test_started_was_fulfilled_by_one_that_ran_and_done_is_not_by_one_that_failed(
+    what: str, code: int, started: int
+) -> None:
+    history = begin(optional(), optional("nav", after={"camera": what})).feed(Exited("camera", code))
+    assert history.started == ["camera", "nav"][:started]
+
+
+def test_one_that_never_ran_does_not_count_as_started() -> None:
+    history = begin(GUARD, optional(), optional("nav", after={"camera": "started"}))
+    history.starts = False
+    history.feed(Clear(), StartFailed("camera", "no such program")).wait(1)
+    assert history.state.tracked["nav"].state == "STOPPED"
+    assert history.state.given_up == ("camera", "nav")
+
+
+def test_it_is_started_again_on_request_and_what_waited_for_it_follows() -> None:
+    camera = replace(optional(), ready=Ready("time", number=1.0))
+    history = begin(STATIC, camera, optional("nav", after={"camera": "ready"})).feed(Exited("camera", 1))
+    history.feed(ProcessRequest("start", "camera"))
+    assert history.state.given_up == ("nav",)
+    history.wait(1)
+    assert history.started[-2:] == ["camera", "nav"]
+    assert not [one for one in history.state.tracked.values() if one.failed]
+
+
+def test_after_a_signal_the_exit_code_is_0_and_after_a_time_1_with_the_failure_at_the_end() -> None:
+    history = failed().feed(Signalled(SIGINT), Exited("static", 0), Exited("guard", 0))
+    assert history.exit_code == 0
+    history = failed().feed(TimeUp(), Exited("static", 0), Exited("guard", 0))
+    assert history.all(Ended) == [Ended(1, ("camera ended with exit code 3", "camera: no device"))]
+
+
+def test_when_all_have_ended_the_exit_code_is_1_and_the_first_that_failed_is_named() -> None:
+    history = begin(optional("a"), optional("b")).feed(Exited("b", 2)).wait(1).feed(Exited("a", 1))
+    assert history.all(Ended) == [Ended(1, ("b ended with exit code 2",))]
+
+
+def test_an_optional_process_does_not_hold_back_that_all_is_started() -> None:
+    history = begin(STATIC, replace(optional(), ready=Ready("log", "up")), optional("nav", after={"camera": "ready"}))
+    assert [one.waiting for one in history.all(AllStarted)] == [("nav",)]
+
+
+def test_ps_says_what_is_optional_why_it_ended_and_that_it_has_failed() -> None:
+    history = failed(SLAM)
+    said = {one.name: one for one in status(history.state, history.now).processes}
+    camera = said["camera"]
+    assert (camera.state, camera.detail, camera.failed) == ("EXITED", "exit code 3", True)
+    assert (camera.required, said["slam"].required) == (False, None)
+
+
+def test_what_waited_in_vain_is_not_named_as_the_first_that_failed() -> None:
+    nav = optional("nav", after={"camera": "done"})
+    history = begin(STATIC, nav, optional()).feed(Exited("camera", 3))
+    assert history.state.given_up == ("nav", "camera")
+    history.feed(TimeUp(), Exited("static", 0))
+    assert history.all(Ended) == [Ended(1, ("camera ended with exit code 3",))]

@@ -1,0 +1,66 @@
+"""Output to a reader that is slow, stopped, or gone."""
+
+from __future__ import annotations
+
+import os
+import pty
+from pathlib import Path
+
+import pytest
+
+from tfcompose.launcher.output import KEPT, NonBlockingOutput
+
+
+def test_a_reader_that_does_not_read_is_not_waited_for_costs_bounded_memory_and_learns_how_much_is_left_out() -> None:
+    reader, writer = os.pipe()
+    outlet = NonBlockingOutput(writer)
+    for number in range(20_000):
+        outlet.write(f"line {number:06d} of a process that floods a pager\n", log=True)
+    outlet.write("said by the launcher\n")
+    assert len(outlet._owed) <= KEPT + 1000
+    os.set_blocking(reader, False)
+    text = b""
+    while outlet.owes:
+        text += os.read(reader, 1 << 16)
+        outlet.push()
+    outlet.write("and on\n")
+    text += os.read(reader, 1 << 16)
+    outlet.close()
+    os.close(writer)
+    os.close(reader)
+    lines = text.decode().splitlines()
+    left_out = 20_002 - (len(lines) - 1)
+    assert left_out > 10_000
+    assert lines[-2].startswith(f"… {left_out} lines are left out")
+    assert "said by the launcher" in lines
+    assert lines[-1] == "and on"
+
+
+def test_a_terminal_that_is_stopped_is_not_waited_for_and_the_shell_keeps_its_blocking_one() -> None:
+    master, slave = pty.openpty()
+    outlet = NonBlockingOutput(slave)
+    for _ in range(5000):  # a write that waits, waits for ever
+        outlet.write("x" * 100 + "\n", log=True)
+    assert os.get_blocking(slave)
+    outlet.close(0.01)
+    os.close(slave)
+    os.close(master)
+
+
+def test_a_reader_that_is_gone_is_an_error() -> None:
+    reader, writer = os.pipe()
+    outlet = NonBlockingOutput(writer)
+    os.close(reader)
+    with pytest.raises(BrokenPipeError):
+        outlet.write("text\n")
+    outlet.close()
+    os.close(writer)
+
+
+def test_a_full_disk_behind_the_output_is_no_error() -> None:
+    with Path("/dev/full").open("wb", buffering=0) as full:
+        outlet = NonBlockingOutput(full.fileno())
+        for _ in range(10):
+            outlet.write("text\n")
+        assert outlet.left_out == 10
+        outlet.close()

@@ -1,0 +1,158 @@
+"""What is looked at before anything is started."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tfcompose.launcher.preflight import commands_of
+from tfcompose.plan import Plan, PlanProcess, RosSettings
+from tfcompose.ros.environment import child_environment
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from tfcompose.findings import Finding
+    from tfcompose.launcher.preflight import Command
+    from tfcompose.plan import StartCondition
+
+
+@pytest.fixture
+def prefix(tmp_path: Path) -> Path:
+    """Return a ROS prefix with one package that has two programs, one of which may not be executed."""
+    folder = tmp_path / "ros" / "lib" / "sllidar_ros2"
+    folder.mkdir(parents=True)
+    for name, mode in (("sllidar_node", 0o755), ("notes.txt", 0o644)):
+        (folder / name).touch()
+        (folder / name).chmod(mode)
+    return tmp_path / "ros"
+
+
+def look(
+    tmp_path: Path, *processes: PlanProcess, env: Mapping[str, str] | None = None, ros: RosSettings | None = None
+) -> tuple[dict[str, Command], list[Finding]]:
+    plan = Plan("rover", "", None, ros or RosSettings(), (), processes)
+    base = {"PATH": os.environ["PATH"]} | dict(env or {})
+    return commands_of(plan, list(processes), tmp_path / "plan.json", base, child_environment)
+
+
+def lidar(word: str) -> PlanProcess:
+    return PlanProcess("lidar", "run", argv=(word, "-x"))
+
+
+def test_a_ros_executable_is_found_below_the_prefixes_in_their_order(tmp_path: Path, prefix: Path) -> None:
+    path = f"{tmp_path}/other:{prefix}"
+    commands, found = look(tmp_path, lidar("${executable:sllidar_ros2/sllidar_node}"), env={"AMENT_PREFIX_PATH": path})
+    assert commands["lidar"].argv == (f"{prefix}/lib/sllidar_ros2/sllidar_node", "-x")
+    assert found == []
+
+
+def test_a_ros_executable_that_no_prefix_has_is_taken_from_the_path(tmp_path: Path) -> None:
+    commands, _ = look(tmp_path, lidar("${executable:coreutils/true}"))
+    assert os.path.basename(commands["lidar"].argv[0]) == "true"  # noqa: PTH119 (a text, not a place)
+
+
+def test_a_misspelt_ros_executable_is_reported_with_where_it_was_looked_for_and_the_nearest_name(
+    tmp_path: Path, prefix: Path
+) -> None:
+    _, (found,) = look(
+        tmp_path, lidar("${executable:sllidar_ros2/slidar_node}"), env={"AMENT_PREFIX_PATH": str(prefix)}
+    )
+    assert (found.code, found.help) == ("TF810", "did you mean sllidar_node?")
+    assert found.message == "the executable sllidar_ros2/slidar_node of lidar was not found"
+    assert found.notes[0].message == f"{prefix}/lib/sllidar_ros2/slidar_node is not there"
+    assert found.notes[1].message == f"looked in the PATH: {os.environ['PATH']}"
+
+
+def test_a_package_that_is_not_installed_is_to_be_installed(tmp_path: Path, prefix: Path) -> None:
+    _, (found,) = look(tmp_path, lidar("${executable:nope/no_such_node}"), env={"AMENT_PREFIX_PATH": str(prefix)})
+    assert found.help.startswith("install the package nope (")
+
+
+def test_all_that_is_missing_is_one_finding_that_says_once_where_it_was_looked_for(tmp_path: Path) -> None:
+    words = {"laser": "${executable:sllidar_ros2/sllidar_node}", "slam": "${executable:slam_toolbox/slam}", "a": "no_a"}
+    _, (found,) = look(tmp_path, *(PlanProcess(name, "run", argv=(word,)) for name, word in words.items()))
+    missing = "sllidar_ros2/sllidar_node of laser, slam_toolbox/slam of slam, no_a of a"
+    assert found.message == f"3 executables were not found: {missing}"
+    assert [note.message for note in found.notes] == [
+        "AMENT_PREFIX_PATH names no folder",
+        f"looked in the PATH: {os.environ['PATH']}",
+    ]
+    assert found.help == "source the setup file of your ROS installation first"
+
+
+def test_without_any_prefix_the_setup_file_is_to_be_sourced(tmp_path: Path) -> None:
+    _, (found,) = look(tmp_path, lidar("${executable:nope/no_such_node}"))
+    assert found.help.startswith("source the setup file")
+    assert found.notes[0].message == "AMENT_PREFIX_PATH names no folder"
+
+
+def test_a_file_that_may_not_be_executed_is_said_to_be_there(tmp_path: Path, prefix: Path) -> None:
+    notes = f"{prefix}/lib/sllidar_ros2/notes.txt"
+    _, (found,) = look(tmp_path, lidar(notes))
+    assert [note.message for note in found.notes] == [f"{notes} may not be executed"]
+
+
+def test_a_relative_program_is_looked_up_in_the_processs_folder(tmp_path: Path, prefix: Path) -> None:
+    process = PlanProcess("lidar", "run", argv=("./sllidar_node",), cwd="ros/lib/sllidar_ros2")
+    commands, _ = look(tmp_path, process)
+    assert commands["lidar"].argv == (f"{prefix}/lib/sllidar_ros2/sllidar_node",)
+
+
+@pytest.mark.parametrize("cwd", ["maps", "${build_dir}/../maps"])
+def test_a_folder_that_is_not_there_is_found_before_anything_is_started(tmp_path: Path, cwd: str) -> None:
+    process = PlanProcess("lidar", "run", argv=("true",), cwd=cwd)
+    _, (found,) = look(tmp_path, process)
+    folder = os.path.normpath(tmp_path / cwd.replace("${build_dir}/", ""))
+    assert (found.code, found.message) == ("TF810", f"the folder {folder} that lidar runs in is not there")
+    commands, found_of_optional = look(tmp_path, replace(process, required=False))
+    assert (commands["lidar"].missing, found_of_optional) == (found.message, [])
+
+
+def test_a_relative_program_that_is_not_there_can_be_named_beside_the_robot_file(tmp_path: Path) -> None:
+    _, (found,) = look(tmp_path, lidar("bin/lidar"))
+    assert found.help == "${file(bin/lidar)} is beside the robot file, wherever up is called"
+
+
+def test_a_placeholder_in_a_value_is_not_replaced_again(tmp_path: Path) -> None:
+    process = PlanProcess("lidar", "run", argv=("true", "${params_file}"), params_file="${plan}.yaml")
+    commands, _ = look(tmp_path, process)
+    assert commands["lidar"].argv[1] == f"{tmp_path}/${{plan}}.yaml"
+
+
+def test_a_process_that_the_plan_does_not_say_how_to_start_is_a_finding(tmp_path: Path) -> None:
+    _, (found,) = look(tmp_path, PlanProcess("lidar", "run"))
+    assert found.message == "the plan does not say how lidar is started"
+
+
+@pytest.mark.parametrize(
+    ("after", "code", "message"),
+    [
+        ({"nobody": "started"}, "TF902", "lidar waits for nobody, which is not in the plan"),
+        ({"static": "done"}, "TF902", "lidar waits until static is done: that never comes"),
+        ({"lidar": "ready"}, "TF812", "lidar wait for each other"),
+    ],
+)
+def test_a_process_that_waits_for_what_cannot_come_is_a_finding(
+    tmp_path: Path, after: dict[str, StartCondition], code: str, message: str
+) -> None:
+    waiting = PlanProcess("lidar", "run", argv=("true",), after=after)
+    _, found = look(tmp_path, waiting, PlanProcess("static", "static", argv=("true",)))
+    assert [(one.code, one.message) for one in found] == [(code, message)]
+
+
+def test_processes_that_wait_for_each_other_are_a_finding(tmp_path: Path) -> None:
+    a = PlanProcess("a", "run", argv=("true",), after={"b": "started"})
+    b = PlanProcess("b", "run", argv=("true",), after={"a": "started"})
+    _, (found,) = look(tmp_path, a, b, lidar("true"))
+    assert (found.code, found.message) == ("TF812", "a, b wait for each other")
+
+
+def test_a_guard_is_started_first_whatever_it_is_said_to_wait_for(tmp_path: Path) -> None:
+    guard = PlanProcess("guard", "guard", argv=("true",), after={"lidar": "started"})
+    waiting = PlanProcess("lidar", "run", argv=("true",), after={"guard": "ready"})
+    assert look(tmp_path, guard, waiting)[1] == []

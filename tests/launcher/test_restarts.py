@@ -1,0 +1,379 @@
+"""Histories of single processes: gates, restarts, requests by name, and plans that change, with a clock set by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from signal import SIGINT, SIGKILL, SIGQUIT, SIGTERM
+from typing import Any
+
+import pytest
+
+from tests.support.machine_history import GUARD, SLAM, STATIC, begin, plan_of, run_process
+from tfcompose.ipc import (
+    Absent,
+    Alive,
+    AllReady,
+    AllStarted,
+    Clear,
+    Complete,
+    DownRequest,
+    Gate,
+    GateOpen,
+    GateShut,
+    Live,
+    OwnerReady,
+    Present,
+    ProcessReady,
+    ProcessRequest,
+    RecoveredShown,
+    Remember,
+    Replanned,
+    Silent,
+    Verb,
+)
+from tfcompose.launcher.answers import status
+from tfcompose.launcher.events import Exited, LogMatched, NewPlan, Signalled
+from tfcompose.launcher.restarts import refusal
+from tfcompose.plan import GuardPolicy, Plan, PlanProcess, Ready, RestartPolicy, StopRule
+
+
+def gated(name: str = "lidar", *, kind: Any = "topic", text: str = "/scan", **more: Any) -> PlanProcess:
+    ready = Ready(kind, text, more.pop("number", 0.0), more.pop("timeout_s", None))
+    return PlanProcess(name, "run", ready=ready, nodes=(f"/{name}",), **more)
+
+
+AFTER = run_process("b", after={"lidar": "ready"})
+
+
+# Gates.
+
+
+@pytest.mark.parametrize(
+    ("kind", "gate"),
+    [
+        ("topic", Gate("lidar", topic="/scan")),
+        ("service", Gate("lidar", service="/scan")),
+        ("lifecycle", Gate("lidar", nodes={"/lidar": "active"})),
+    ],
+)
+def test_the_guard_looks_at_a_gate_and_what_waits_is_started_when_it_opens(kind: str, gate: Gate) -> None:
+    text = "active" if kind == "lifecycle" else "/scan"
+    history = begin(GUARD, gated(kind=kind, text=text), AFTER).feed(Clear())
+    assert history.orders == [gate]
+    assert history.started == ["guard", "lidar"]
+    history.wait(2).feed(GateOpen("lidar", "/scan is published by /lidar"))
+    assert history.started == ["guard", "lidar", "b"]
+    assert history.all(ProcessReady) == [ProcessReady("lidar", "/scan is published by /lidar", 2.0)]
+
+
+def test_a_gate_that_stays_shut_is_told_once_with_what_was_seen_instead_and_may_still_open() -> None:
+    history = begin(GUARD, gated(timeout_s=3.0), AFTER).feed(Clear(), GateShut("lidar", "topics /tf, /scan_raw"))
+    assert history.sleep_until_due() == pytest.approx(3)
+    (found,) = history.late
+    assert found.code == "TF817"
+    assert found.message == "lidar is not ready after 3 s: nobody publishes /scan"
+    assert [note.message for note in found.notes] == ["seen instead: topics /tf, /scan_raw"]
+    assert len(history.wait(60).late) == 1
+    assert history.started == ["guard", "lidar"]
+    history.feed(GateOpen("lidar", "/scan"))
+    assert history.started[-1] == "b"
+
+
+def test_a_gate_without_a_time_of_its_own_is_late_after_30_s_and_edges_never_are() -> None:
+    history = begin(GUARD, gated(), SLAM).feed(Clear()).wait(29.9)
+    assert history.late == []
+    assert len(history.wait(0.2).late) == 1
+
+
+def test_a_line_a_time_and_an_exit_code_open_their_gates() -> None:
+    line, time = gated("line", kind="log", text="up"), gated("time", kind="time", number=2.0)
+    code = gated("code", kind="exit", number=3.0)
+    history = begin(
+        line, time, code, *(run_process(f"after_{n}", after={n: "ready"}) for n in ("line", "time", "code"))
+    )
+    assert history.started == ["line", "time", "code"]
+    assert history.sleep_until_due() == pytest.approx(2)
+    assert history.started[3:] == ["after_time"]
+    assert history.feed(LogMatched("line", "up and running")).started[4:] == ["after_line"]
+    assert history.feed(Exited("code", 3)).started[5:] == ["after_code"]
+    assert history.found() == []
+
+
+def test_an_exit_code_that_is_not_the_one_is_a_failure() -> None:
+    history = begin(gated("code", kind="exit", number=3.0), STATIC).feed(Exited("code", 0))
+    assert [found.message for found in history.found()] == ["code ended with exit code 0"]
+
+
+def test_who_sends_on_tf_is_looked_at_while_an_edges_gate_is_shut_and_no_longer() -> None:
+    slam = replace(SLAM, ready=Ready("edges", timeout_s=3.0))
+    history = begin(GUARD, STATIC, slam).feed(Clear(), GateShut("slam", "/tf is published by nobody"))
+    assert history.orders == [Gate("slam", writers=("/tf", "/tf_static"))]
+    history.wait(3)
+    (late,) = history.late
+    assert late.message == "slam is not ready after 3 s: nobody published map → odom"
+    assert late.notes[0].message == "seen instead: /tf is published by nobody"
+    assert history.feed(OwnerReady("slam")).orders[-1] == Gate("slam")
+
+
+@pytest.mark.parametrize("restart", ["no", "on-failure"])
+def test_one_that_was_ready_and_is_done_stays_what_others_wait_for(restart: RestartPolicy) -> None:
+    both = run_process("both", after={"map": "ready", "lidar": "ready"})
+    history = begin(run_process("map", restart), gated(kind="log"), both).feed(
+        Exited("map", 0), LogMatched("lidar", "up")
+    )
+    assert history.started[-1] == "both"
+
+
+def test_who_waits_for_one_that_ended_before_it_was_ready_fails_with_the_reason() -> None:
+    history = begin(STATIC, gated(), AFTER).feed(Exited("lidar", 0))
+    assert history.started == ["static", "lidar", "b"], "without a guard nobody looks at a topic"
+    history = begin(GUARD, STATIC, gated(), AFTER).feed(Clear(), Exited("lidar", 0))
+    assert history.found()[-1].message == "b is not started: it waits for lidar to be ready, and lidar has ended"
+    assert history.state.stop
+
+
+def test_lifecycle_nodes_are_driven_and_ready_means_that_they_are_there() -> None:
+    slam = PlanProcess("lidar", "run", lifecycle={"/slam": "active"}, owns=(("map", "odom"),))
+    history = begin(GUARD, slam, AFTER).feed(Clear(), OwnerReady("lidar"))
+    assert history.orders == [Gate("lidar", nodes={"/slam": "active"}, drive=True)]
+    assert history.started == ["guard", "lidar"]
+    assert history.feed(GateOpen("lidar", "/slam is active")).started[-1] == "b"
+
+
+def test_all_ready_is_told_once_with_when_each_was_started_and_ready() -> None:
+    history = begin(GUARD, STATIC, gated()).wait(1).feed(Clear()).wait(1)
+    assert [notice.waiting for notice in history.all(AllStarted)] == [()]
+    history.feed(Live("static", ("laser",)), OwnerReady("static"), Complete(1)).wait(1)
+    assert history.all(AllReady) == []
+    history.feed(GateOpen("lidar", "x"))
+    (told,) = history.all(AllReady)
+    assert {row.process: (row.started, row.ready) for row in told.rows} == {
+        "guard": (0.0, 0.0),
+        "static": (1.0, 2.0),
+        "lidar": (1.0, 3.0),
+    }
+    assert told.seconds == pytest.approx(3)
+
+
+# Ends.
+
+
+def test_max_restarts_is_the_plans() -> None:
+    history = begin(replace(run_process("a", restart="on-failure"), max_restarts=2))
+    for _ in range(2):
+        history.feed(Exited("a", 1)).sleep_until_due()
+    assert history.feed(Exited("a", 1)).states("a")[-1] == "FATAL"
+    assert history.found()[0].message == "a ended with exit code 1, after 2 restarts"
+
+
+def test_a_required_process_that_ends_ends_everything_even_when_it_is_done() -> None:
+    history = begin(replace(run_process("a"), required=True), STATIC).feed(Exited("a", 0))
+    assert history.found()[0].message == "a ended with exit code 0, and the plan requires it"
+    assert history.killed == [("static", SIGINT)]
+
+
+@pytest.mark.parametrize(
+    ("rule", "signals", "times"),
+    [
+        (StopRule("SIGTERM", 2.0), [SIGTERM, SIGKILL], [2]),
+        (StopRule("SIGQUIT", 1.0), [SIGQUIT, SIGTERM, SIGKILL], [1, 1]),
+        (StopRule("SIGINT"), [SIGINT, SIGTERM, SIGKILL], [5, 5]),
+        (StopRule("SIGKILL"), [SIGKILL], []),
+    ],
+)
+def test_the_signals_and_times_are_the_plans(rule: StopRule, signals: list[int], times: list[float]) -> None:
+    history = begin(replace(run_process("a"), stop=rule)).feed(Signalled(SIGINT))
+    assert [history.sleep_until_due() for _ in times] == pytest.approx(times)
+    assert [number for _, number in history.wait(60).killed] == signals
+
+
+def test_everything_is_stopped_on_request_with_exit_code_0() -> None:
+    history = begin(STATIC, run_process("a")).feed(DownRequest())
+    assert history.killed == [("a", SIGINT), ("static", SIGINT)]
+    assert history.feed(Exited("a", 0), Exited("static", 0)).exit_code == 0
+
+
+# Requests.
+
+
+def test_a_process_is_restarted_and_the_guard_is_told_before_and_after() -> None:
+    history = begin(GUARD, STATIC, SLAM).feed(Clear(), Live("slam", ("odom",)), OwnerReady("slam"))
+    history.feed(ProcessRequest("restart", "slam"))
+    assert history.killed == [("slam", SIGINT)]
+    assert history.orders == [Absent("slam")]
+    assert "odom" not in history.state.live
+    history.feed(Exited("slam", -SIGINT))
+    assert history.started == ["guard", "static", "slam", "slam"]
+    assert history.orders[-1] == Present("slam")
+    assert history.state.tracked["slam"].restarts == 1
+    assert history.found() == []
+
+
+def test_a_process_that_was_stopped_stays_so_until_it_is_started() -> None:
+    history = begin(STATIC, run_process("a", restart="always"))
+    history.feed(ProcessRequest("stop", "a"), Exited("a", 1)).wait(60)
+    assert (history.states("a")[-1], history.exit_code) == ("STOPPED", None)
+    assert history.started == ["static", "a"]
+    assert history.feed(ProcessRequest("start", "a")).started == ["static", "a", "a"]
+    assert history.found() == []
+
+
+def test_a_process_that_ignores_a_request_to_stop_is_told_more_firmly() -> None:
+    history = begin(STATIC, run_process("a")).feed(ProcessRequest("stop", "a"))
+    assert [history.sleep_until_due(), history.sleep_until_due()] == pytest.approx([5, 5])
+    assert history.killed == [("a", SIGINT), ("a", SIGTERM), ("a", SIGKILL)]
+
+
+def test_a_process_that_waits_for_its_restart_can_be_started_at_once_or_stopped() -> None:
+    history = begin(STATIC, run_process("a", restart="always")).feed(Exited("a", 1))
+    assert history.feed(ProcessRequest("start", "a")).started == ["static", "a", "a"]
+    history.feed(Exited("a", 1), ProcessRequest("stop", "a")).wait(60)
+    assert len(history.started) == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "verb", "why"),
+    [
+        ("statik", "stop", "the plan has no process statik; did you mean static?"),
+        ("guard", "stop", "guard watches the others and is not stopped alone"),
+        ("static", "start", "static runs already, with pid 1002"),
+        ("drive", "restart", "somebody else starts and stops drive"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_with_the_reason(name: str, verb: Verb, why: str) -> None:
+    history = begin(GUARD, STATIC, PlanProcess("drive", "external")).feed(Clear())
+    assert (refusal(history.state, name, verb) or "").startswith(why)
+    assert refusal(history.state, "guard", "restart") is None
+
+
+def test_a_guard_that_is_restarted_is_told_who_is_absent_and_which_gates_are_shut() -> None:
+    history = begin(GUARD, STATIC, SLAM, gated()).feed(Clear(), ProcessRequest("stop", "slam"), Exited("slam", 0))
+    history.orders.clear()
+    history.feed(ProcessRequest("restart", "guard"), Exited("guard", 0))
+    assert history.started[-1] == "guard"
+    assert history.orders == [Absent("slam"), Gate("lidar", topic="/scan")]
+    assert history.found() == []
+
+
+def test_a_guard_that_dies_is_told_and_started_again_with_what_it_said_and_what_is_live_stays_so() -> None:
+    history = begin(GUARD, STATIC, SLAM).feed(Clear(), Live("slam", ("odom",)), OwnerReady("slam"))
+    history.feed(Remember({"a": 1, "b": 1}), Remember({"b": 2}))
+    history.told.clear()
+    history.feed(Exited("guard", -SIGKILL, ("last words",)))
+    (found,) = history.found()
+    assert (found.code, found.severity) == ("TF808", "warning")
+    assert found.message == "guard was ended by SIGKILL: nobody watches the tree until it is back"
+    assert [note.message for note in found.notes] == ["guard: last words"]
+    assert history.states("guard") == ["BACKOFF"]
+    assert history.state.live == {"odom"}
+    assert history.sleep_until_due() == pytest.approx(1)
+    assert (history.started[-1], history.state.memory) == ("guard", {"a": 1, "b": 2})
+    assert history.orders == [Absent("static"), Present("static")]
+    history.wait(0.5).feed(Clear())
+    (back,) = history.all(RecoveredShown)
+    assert back.text == "guard watches again after 1.5 s"
+    assert (history.state.stop, history.state.reported, history.killed) == (None, frozenset(), [])
+    assert history.state.tracked["guard"].restarts == 1
+
+
+@pytest.mark.parametrize(("mode", "did"), [("watch", "watched nothing"), ("strict", "passed nothing on")])
+def test_a_guard_that_hangs_is_told_and_ended_and_its_end_is_that_of_one_that_dies(mode: str, did: str) -> None:
+    history = begin(GUARD, STATIC, guard=GuardPolicy(mode)).feed(Clear(), Alive())  # type: ignore[arg-type]
+    history.wait(9).feed(Alive())
+    assert (history.sleep_until_due(), history.killed) == (10.0, []), "the launcher may have been kept from running"
+    assert (history.sleep_until_due(), history.killed) == (5.0, [("guard", SIGKILL)])
+    (found,) = history.found()
+    assert (found.severity, found.message) == ("warning", f"guard hangs: it has {did} for 15 s")
+    history.wait(60).feed(Exited("guard", -SIGKILL)).wait(2)
+    assert history.started[-1] == "guard"
+    history.wait(60)
+    assert len(history.killed) == 1, "the next one has not said yet that it looks"
+
+
+def test_a_guard_that_is_heard_again_before_it_is_believed_to_hang_goes_on() -> None:
+    history = begin(GUARD, STATIC).feed(Clear(), Alive())
+    for _ in range(3):
+        history.wait(3600)  # the launcher, or the whole machine, stood still
+        history.wait(1).feed(Alive())
+    assert (history.killed, history.found()) == ([], [])
+
+
+def test_edges_that_are_silent_are_not_counted_as_live_until_they_are_heard_again() -> None:
+    def counted() -> tuple[bool, tuple[str, ...], int]:
+        said = status(history.state, history.now)
+        return said.complete, said.silent, said.processes[1].live
+
+    history = begin(GUARD, STATIC).feed(Clear(), Live("static", ("laser",)), OwnerReady("static"), Complete(1))
+    assert counted() == (True, (), 1)
+    history.feed(Silent(("laser",), over=False))
+    assert counted() == (False, ("base_link → laser",), 0)
+    history.feed(Silent(("laser",), over=True))
+    assert counted() == (True, (), 1)
+    history.feed(Remember({"a": 1}), Silent(("laser",), over=False), Exited("guard", -SIGKILL)).wait(1)
+    assert counted() == (True, (), 1), "the next guard says itself what is silent"
+
+
+def test_a_strict_guard_that_dies_lets_nothing_pass_and_says_so() -> None:
+    history = begin(GUARD, STATIC)
+    history.state = replace(history.state, plan=replace(history.state.plan, guard=GuardPolicy("strict")))
+    (found,) = history.feed(Clear(), Exited("guard", 1)).found()
+    assert found.message == "guard ended with exit code 1: nothing of the plan passes to /tf until it is back"
+
+
+def test_an_owner_that_ended_while_nobody_watched_is_to_be_seen_anew() -> None:
+    slam = replace(SLAM, restart="always")
+    history = begin(GUARD, slam).feed(Clear(), Live("slam", ("odom",)), Remember({"a": 1}))
+    history.feed(Exited("guard", 1), Exited("slam", 1))
+    history.orders.clear()
+    history.wait(1)
+    assert history.started == ["guard", "slam", "guard", "slam"]
+    assert (history.orders[0], history.orders[-1]) == (Absent("slam"), Present("slam"))
+    assert history.state.missing[0].child == "odom"
+
+
+def test_a_guard_that_dies_again_and_again_ends_everything_with_1() -> None:
+    history = begin(GUARD, STATIC).feed(Clear(), Remember({"a": 1}))
+    for _ in range(5):
+        history.feed(Exited("guard", 1)).sleep_until_due()
+    history.feed(Exited("guard", 1))
+    assert history.found()[-1].message == "guard ended with exit code 1, after 5 restarts"
+    assert [found.severity for found in history.found()] == ["warning"] * 5 + ["error"]
+    assert history.feed(Exited("static", 0)).exit_code == 1
+
+
+def test_a_guard_that_is_asked_for_anew_or_follows_another_plan_begins_without_memory() -> None:
+    history = begin(GUARD, STATIC).feed(Clear(), Remember({"a": 1}), Live("static", ("laser",)))
+    history.feed(ProcessRequest("restart", "guard"), Exited("guard", 0))
+    assert (history.state.memory, history.state.live, history.found()) == ({}, frozenset(), [])
+    history.feed(Clear(), Remember({"a": 1}), Exited("guard", 1))
+    history.feed(NewPlan(plan_of(GUARD, STATIC), frozenset({"guard"})))
+    assert (history.state.memory, history.state.live, history.started[-1]) == ({}, frozenset(), "guard")
+
+
+# Other plans.
+
+
+def test_another_plan_restarts_what_changed_starts_what_is_new_and_stops_what_is_gone() -> None:
+    a, b, new = run_process("a"), run_process("b"), run_process("new")
+    history = begin(STATIC, a, b)
+    plan: Plan = plan_of(STATIC, replace(a, argv=("other",)), new)
+    history.feed(NewPlan(plan, frozenset({"a"}), ("base_link → x",)))
+    assert sorted(history.killed) == [("a", SIGINT), ("b", SIGINT)]
+    assert history.started[3:] == ["new"]
+    history.feed(Exited("a", 0), Exited("b", 0))
+    assert history.started[3:] == ["new", "a"]
+    assert list(history.state.tracked) == ["static", "a", "new"]
+    assert history.all(Replanned) == [Replanned(("a",), ("new",), ("b",), ("base_link → x",))]
+    assert history.found() == []
+
+
+def test_a_tree_stays_complete_where_another_plan_changes_nothing_of_it() -> None:
+    a = run_process("a")
+    history = begin(GUARD, STATIC, a).feed(Clear(), Live("static", ("laser",)), OwnerReady("static"), Complete(1))
+    history.feed(NewPlan(plan_of(GUARD, STATIC, replace(a, argv=("other",))), frozenset({"a"})), Exited("a", 0))
+    assert status(history.state, history.now).complete
+    history.feed(NewPlan(plan_of(GUARD, replace(STATIC, argv=("other",)), a), frozenset({"static"})))
+    assert not status(history.state, history.now).complete, "its owner is restarted"
+    history.feed(Exited("static", 0), Live("static", ("laser",)), OwnerReady("static"))
+    history.feed(NewPlan(plan_of(GUARD, STATIC, SLAM), frozenset()))
+    assert not status(history.state, history.now).complete, "an edge is new"

@@ -1,0 +1,135 @@
+"""Where a run is found: folders that nobody else can open, and a lock that ends with its holder."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.support import processes
+from tests.support.waiting import until
+from tfcompose.launcher import runtime_dir
+from tfcompose.launcher.runtime_dir import Lock, RuntimeDirError, runtime_dir_of, runtime_dirs
+from tfcompose.plan import Plan, RosSettings
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+ROVER = Plan("rover", "", None, RosSettings(domain_id=7), (), ())
+HOLD = """
+import os, sys
+from pathlib import Path
+from tfcompose.launcher import runtime_dir
+from tfcompose.launcher.runtime_dir import Lock, RuntimeDir
+lock = Lock(RuntimeDir("rover@7", Path(sys.argv[1]), Path(sys.argv[1])))
+print(lock.run, flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def env(tmp_path: Path) -> dict[str, str]:
+    folder = tmp_path / "runtime"
+    folder.mkdir(mode=0o700)
+    return {"XDG_RUNTIME_DIR": str(folder), "ROS_LOG_DIR": str(tmp_path / "log"), "ROS_DOMAIN_ID": "3"}
+
+
+def test_a_robot_is_its_name_in_its_domain_which_is_the_plans_or_else_the_environments(env: dict[str, str]) -> None:
+    place = runtime_dir_of(ROVER, env)
+    assert (place.name, place.folder.parent.stat().st_mode & 0o777) == ("rover@7", 0o700)
+    assert place.logs == runtime_dir_of(ROVER, env).logs
+    assert str(place.logs) == f"{env['ROS_LOG_DIR']}/tfcompose/rover@7"
+    assert runtime_dir_of(Plan("rover", "", None, RosSettings(), (), ()), env).name == "rover@3"
+    assert runtime_dir_of(Plan("rover", "", None, RosSettings(), (), ()), env | {"ROS_DOMAIN_ID": ""}).name == "rover@0"
+
+
+@pytest.mark.parametrize("given", ["", "relative", "/nowhere", "shared"])
+def test_without_a_safe_runtime_folder_one_of_the_users_own_is_made(
+    given: str, env: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "shared").mkdir(mode=0o777)
+    (tmp_path / "shared").chmod(0o777)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(runtime_dir, "USERS", tmp_path / "nobody")
+    place = runtime_dir_of(ROVER, env | {"XDG_RUNTIME_DIR": str(tmp_path / given) if given == "shared" else given})
+    assert place.folder.parent == tmp_path / f"tfcompose-{os.getuid()}"
+    assert place.folder.parent.stat().st_mode & 0o777 == 0o700
+
+
+def test_who_is_not_told_of_the_users_folder_uses_it_too(
+    env: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a service does, or cron: so that ``ps`` in a terminal sees what was started there."""
+    monkeypatch.setattr(runtime_dir, "USERS", tmp_path)
+    (tmp_path / str(os.getuid())).mkdir(mode=0o700)
+    told = runtime_dir_of(ROVER, env | {"XDG_RUNTIME_DIR": str(tmp_path / str(os.getuid()))})
+    del env["XDG_RUNTIME_DIR"]
+    assert runtime_dir_of(ROVER, env) == told
+
+
+@pytest.mark.parametrize("how", ["open to all", "a link"])
+def test_a_folder_that_somebody_else_may_have_prepared_is_refused(
+    how: str, env: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(runtime_dir, "USERS", tmp_path / "nobody")
+    folder = tmp_path / f"tfcompose-{os.getuid()}"
+    if how == "a link":
+        (tmp_path / "trap").mkdir(mode=0o700)
+        folder.symlink_to(tmp_path / "trap")
+    else:
+        folder.mkdir()
+        folder.chmod(0o755)
+    with pytest.raises(RuntimeDirError, match="is not a folder that only this user can open"):
+        runtime_dir_of(ROVER, env | {"XDG_RUNTIME_DIR": ""})
+
+
+def test_of_two_only_one_gets_the_lock_the_other_learns_who_has_it_and_a_killed_holder_leaves_nothing(
+    env: dict[str, str],
+) -> None:
+    place = runtime_dir_of(ROVER, env)
+    command = [sys.executable, "-c", HOLD, str(place.folder)]
+    with processes.start(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        assert other.stdout
+        run = other.stdout.readline().strip()
+        with pytest.raises(BlockingIOError):
+            Lock(place)
+        holder = place.holder()
+        assert holder
+        assert (holder.pid, holder.run) == (other.pid, run)
+        assert [one.name for one in runtime_dirs(env)] == ["rover@7"]
+        other.kill()
+    assert place.holder() is None
+    lock = Lock(place)
+    assert lock.run != run
+    lock.close()
+
+
+def test_who_only_looks_is_in_nobodys_way_and_is_taken_for_nobodys_run(env: dict[str, str]) -> None:
+    place = runtime_dir_of(ROVER, env)
+    Lock(place).close()
+    with (place.folder / "lock").open() as looker:
+        fcntl.flock(looker, fcntl.LOCK_SH)  # as holder does for a moment; this one is kept from going on
+        assert place.holder() is None, "of two who look, each took the other for a run"
+        threading.Timer(0.2, fcntl.flock, (looker, fcntl.LOCK_UN)).start()
+        lock = Lock(place)
+    assert place.holder()
+    lock.close()
+
+
+def test_a_child_that_is_started_does_not_hold_the_lock_on(env: dict[str, str]) -> None:
+    place = runtime_dir_of(ROVER, env)
+    lock = Lock(place)
+    with processes.start(["/bin/sleep", "60"], close_fds=False) as child:
+        lock.close()
+        try:
+            # The kernel gives the parent its turn a moment before it closes what the child must not have.
+            assert until(lambda: place.holder() is None)
+        finally:
+            child.kill()

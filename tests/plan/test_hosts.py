@@ -1,0 +1,158 @@
+"""A plan over several machines: what each starts, and what it expects of the others."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tests.support.plans import compiled_plan
+from tests.support.robots import ON_TWO_HOSTS
+from tfcompose.findings import Finding
+from tfcompose.launcher.runtime_dir import runtime_dir_of
+from tfcompose.plan import Plan, Ready
+from tfcompose.plan.file import read_plan, write_plan
+from tfcompose.plan.hosts import describe_share, hosts_of, share_of
+from tfcompose.plan.topics import partition_of
+from tfcompose.verdict.offence import relays_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+NAMED = ON_TWO_HOSTS + "  static: {host: main}\n"
+
+
+def started(plan: Plan | Finding) -> set[str]:
+    assert isinstance(plan, Plan), plan
+    return {process.name for process in plan.processes if process.kind != "external"}
+
+
+@pytest.mark.parametrize(
+    ("text", "machines"),
+    [
+        (ON_TWO_HOSTS, [("jetson", "x"), (None, "x")]),
+        (NAMED, [("jetson", "x"), ("main", "x")]),
+        (NAMED, [(None, "jetson.lan"), (None, "main")]),
+    ],
+)
+def test_every_process_is_started_by_exactly_one_machine_and_the_guard_by_each(
+    text: str, machines: list[tuple[str | None, str]]
+) -> None:
+    plan = compiled_plan(text)
+    shares = [started(share_of(plan, asked, machine)) for asked, machine in machines]
+    assert all("guard" in share for share in shares)
+    assert all((a & b) == {"guard"} for a, b in pairwise(shares))
+    assert set().union(*shares) == {process.name for process in plan.processes}
+
+
+def test_what_names_no_host_runs_where_static_does() -> None:
+    plan = compiled_plan(NAMED)
+    assert {process.name: process.host for process in plan.processes} == {
+        "static": "main", "drive": "main", "arm_drive": "jetson", "guard": None,
+    }  # fmt: skip
+    assert hosts_of(plan) == ("main", "jetson")
+
+
+def test_each_machine_sees_all_edges_with_their_owners() -> None:
+    plan = compiled_plan(ON_TWO_HOSTS)
+    for asked in ("jetson", None):
+        share = share_of(plan, asked, "elsewhere")
+        assert isinstance(share, Plan)
+        assert share.edges == plan.edges
+        assert [process.owns for process in share.processes] == [process.owns for process in plan.processes]
+
+
+def test_a_plan_without_hosts_is_whole_on_every_machine() -> None:
+    plan = compiled_plan(ON_TWO_HOSTS.replace(", host: jetson", ""))
+    assert share_of(plan, None, "jetson") is plan
+    assert describe_share(plan) == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "asked", "message", "advice"),
+    [
+        (ON_TWO_HOSTS, "jetsn", "no process of rover runs on a host jetsn", "did you mean jetson?"),
+        (NAMED, "zzz", "no process of rover runs on a host zzz", "the plan names main, jetson"),
+        (
+            NAMED,
+            None,
+            "this machine is desk, and every process of rover runs on another: main, jetson",
+            "--host main or --host jetson",
+        ),
+        (ON_TWO_HOSTS.replace(", host: jetson", ""), "a", "no process of rover runs on a host a", "leave out --host"),
+    ],
+)  # fmt: skip
+def test_a_host_that_the_plan_does_not_know_is_a_finding(
+    text: str, asked: str | None, message: str, advice: str
+) -> None:
+    found = share_of(compiled_plan(text), asked, "desk")
+    assert isinstance(found, Finding)
+    assert (found.code, found.message) == ("TF819", message)
+    assert advice in found.help
+
+
+STRICT = "guard: {mode: strict}\n"
+
+
+def test_behind_a_strict_guard_each_machine_hears_the_others_guard_and_has_a_fence_of_its_own() -> None:
+    plan = compiled_plan(ON_TWO_HOSTS + STRICT)
+    shares = [share for asked in ("jetson", None) if isinstance(share := share_of(plan, asked, "x"), Plan)]
+    assert [{edge.child: edge.node for edge in share.edges} for share in shares] == [
+        {"base_link": "/tfcompose_guard", "lidar": "/tfcompose_guard", "arm": "/arm_drive"},
+        {"base_link": "/drive", "lidar": "/tfcompose_static", "arm": "/tfcompose_guard_jetson"},
+    ]
+    assert [partition_of(share) for share in shares] == ["tfc_rover.jetson", "tfc_rover"]
+    for one in (plan, *shares):
+        assert relays_of(one) == {"/tfcompose_guard", "/tfcompose_guard_jetson"}
+
+
+def test_a_strict_guard_on_one_of_several_machines_passes_nothing_on_of_the_others() -> None:
+    found = share_of(compiled_plan(ON_TWO_HOSTS + "  guard: {host: jetson}\n" + STRICT), "jetson", "x")
+    assert isinstance(found, Finding)
+    assert (found.code, found.help) == ("TF819", "remove the guard's host, or watch: guard: {mode: watch}")
+
+
+def test_a_share_is_written_and_read_and_has_a_place_of_its_own(tmp_path: Path) -> None:
+    tmp_path.chmod(0o700)
+    env = {"XDG_RUNTIME_DIR": str(tmp_path), "ROS_DOMAIN_ID": "7"}
+    plan = compiled_plan(ON_TWO_HOSTS)
+    jetson, main = share_of(plan, "jetson", "x"), share_of(plan, None, "x")
+    assert isinstance(jetson, Plan)
+    assert isinstance(main, Plan)
+    assert read_plan(write_plan(jetson), "plan.json") == jetson
+    assert read_plan(write_plan(main), "plan.json") == main
+    assert [runtime_dir_of(one, env).name for one in (plan, main, jetson)] == ["rover@7", "rover@7", "rover.jetson@7"]
+
+
+def test_two_guards_have_two_names() -> None:
+    plan = compiled_plan(ON_TWO_HOSTS)
+    nodes = [
+        share.process("guard").nodes
+        for asked in ("jetson", None)
+        if isinstance(share := share_of(plan, asked, "x"), Plan)
+    ]
+    assert nodes == [("/tfcompose_guard_jetson",), ("/tfcompose_guard",)]
+
+
+def test_a_guard_with_a_host_judges_there_only() -> None:
+    plan = compiled_plan(ON_TWO_HOSTS + "  guard: {host: jetson}\n")
+    modes = [share.guard.mode for asked in ("jetson", None) if isinstance(share := share_of(plan, asked, "x"), Plan)]
+    assert modes == ["watch", "off"]
+
+
+def test_what_only_the_own_launcher_sees_is_not_waited_for_from_elsewhere() -> None:
+    """A line of output and a code are not seen from another machine; a lifecycle state is, and is driven there."""
+    plan = compiled_plan(ON_TWO_HOSTS)
+    cases: list[tuple[dict[str, Any], Ready | None]] = [
+        ({"ready": Ready("log", "up")}, None),
+        ({"ready": Ready("topic", "/scan")}, Ready("topic", "/scan")),
+        ({"lifecycle": {"/arm_drive": "active"}}, Ready("lifecycle", "active")),
+    ]
+    for fields, expected in cases:
+        processes = tuple(replace(p, **fields) if p.name == "arm_drive" else p for p in plan.processes)
+        share = share_of(replace(plan, processes=processes), None, "x")
+        assert isinstance(share, Plan)
+        arm = share.process("arm_drive")
+        assert (arm.ready, arm.lifecycle) == (expected, {})

@@ -1,0 +1,183 @@
+"""What the launcher answers to other commands, and what another plan changes about a run."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tfcompose.findings import RejectedError
+from tfcompose.ipc import (
+    Done,
+    DownRequest,
+    PlanChange,
+    ProcessRequest,
+    ProcessStatus,
+    Refusal,
+    RobotStatus,
+    UpdateRequest,
+)
+from tfcompose.launcher.events import NewPlan
+from tfcompose.launcher.preflight import commands_of, started_by_us
+from tfcompose.launcher.readiness import is_ready, unmet_in_words, waits_for
+from tfcompose.launcher.restarts import refusal
+from tfcompose.plan import SourceLine
+from tfcompose.plan.file import read_plan
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from tfcompose.ipc import Request
+    from tfcompose.launcher.events import Event
+    from tfcompose.launcher.preflight import Command, Environment
+    from tfcompose.launcher.state import State, Tracked
+    from tfcompose.plan import Plan, PlanProcess
+
+
+Answer = RobotStatus | Done | PlanChange | Refusal
+#: The answer, what it means for the machine, and another plan's file and commands.
+Outcome = tuple[Answer, "Event | None", "tuple[Path, dict[str, Command]] | None"]
+
+
+def status(state: State, now: float) -> RobotStatus:
+    """Return all that is known of a run."""
+    return RobotStatus(
+        robot=state.plan.robot,
+        host=state.plan.host,
+        launcher=os.getpid(),
+        plan=state.plan.spec_digest,
+        uptime=round(now - (state.begun or now), 3),
+        complete=state.complete and not state.silent,
+        ready=is_ready(state),
+        stopping=state.stop is not None,
+        missing=tuple(edge.name for edge in state.missing),
+        silent=tuple(edge.name for edge in state.plan.edges if edge.child in state.silent & state.live),
+        processes=tuple(_process(state, one, now) for one in state.tracked.values()),
+    )
+
+
+def _process(state: State, one: Tracked, now: float) -> ProcessStatus:
+    owned = [child for _, child in one.process.owns]
+    return ProcessStatus(
+        name=one.process.name,
+        kind=one.process.kind,
+        host=one.process.host,
+        state=one.state,
+        detail=one.detail,
+        required=one.process.required,
+        failed=bool(one.failed) or one.state == "FATAL",
+        ready=one.ready,
+        waits=waits_for(state, one),
+        seen=one.seen,
+        pid=one.pid,
+        uptime=round(now - one.began, 3) if one.state in ("RUNNING", "STOPPING") else None,
+        restarts=one.restarts,
+        edges=len(owned),
+        live=sum(child in state.live and child not in state.silent for child in owned),
+        nodes=one.process.nodes,
+    )
+
+
+def answer(
+    request: Request, state: State, plan_file: Path, base: Mapping[str, str], environment: Environment
+) -> Outcome:
+    """Return the answer, what it means for the machine, and, for another plan, its file and commands."""
+    match request:
+        case DownRequest():
+            return Done(), request, None
+        case ProcessRequest(verb, name):
+            if why := refusal(state, name, verb):
+                return Refusal(why), None, None
+            waits = "" if verb == "stop" else unmet_in_words(state, state.tracked[name])
+            return Done(waits=waits), request, None
+        case UpdateRequest():
+            return _update(request, state, plan_file, base, environment)
+        case _:
+            return status(state, time.monotonic()), None, None
+
+
+def _update(
+    request: UpdateRequest, state: State, plan_file: Path, base: Mapping[str, str], environment: Environment
+) -> Outcome:
+    file = Path(request.plan)
+    try:
+        plan = read_plan(file.read_text("utf-8"), str(file))
+    except (OSError, RejectedError) as error:
+        return Refusal(f"{file} cannot be used: {error}"), None, None
+    if state.stop:
+        return Refusal("everything is being stopped"), None, None
+    commands, found = commands_of(plan, started_by_us(plan), file, base, environment, Path(request.base))
+    if found:
+        return Refusal("; ".join(one.message for one in found)), None, None
+    different = change(state.plan, plan_file.parent, plan, file.parent)
+    names, before = [process.name for process in plan.processes], [process.name for process in state.plan.processes]
+    answer = PlanChange(
+        changed=tuple(name for name in names if name in different.changed),
+        added=tuple(name for name in names if name not in before),
+        removed=tuple(name for name in before if name not in names),
+        held=different.held,
+    )
+    if not any((answer.changed, answer.added, answer.removed, answer.held)):
+        return answer, None, None
+    return answer, NewPlan(plan, different.changed, different.held), (file, commands)
+
+
+# What is different in another plan.
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """The processes that are in both plans and different, and the fixed frames that listeners keep as they were."""
+
+    changed: frozenset[str]
+    held: tuple[str, ...]
+
+
+def change(old: Plan, old_folder: Path, new: Plan, new_folder: Path) -> Change:
+    """Return what is different; the folders hold what stands beside the plans."""
+    described = _bytes(old_folder, old.description) != _bytes(new_folder, new.description)
+    before = {process.name: process for process in old.processes}
+    changed = set()
+    for process in new.processes:
+        other = before.get(process.name)
+        if other is None:
+            continue
+        same = (
+            process == other
+            and (old.ros, _fence(old)) == (new.ros, _fence(new))
+            and _data(old, other, old_folder) == _data(new, process, new_folder)
+        )
+        if not same or (described and process.kind in ("static", "joints")):
+            changed.add(process.name)
+    return Change(frozenset(changed), _held(old, new))
+
+
+def _data(plan: Plan, process: PlanProcess, folder: Path) -> tuple[object, ...]:
+    """Return what the process reads beside its own entry; where an edge stands in the file does not matter."""
+    edges = plan.edges if process.kind == "guard" else plan.edges_of(process.name)
+    policy = plan.guard if process.kind == "guard" else None
+    return (
+        tuple(replace(edge, source=SourceLine("", 0)) for edge in edges),
+        policy,
+        _bytes(folder, process.params_file),
+    )
+
+
+def _fence(plan: Plan) -> tuple[str, str] | None:
+    """Return behind which fence the plan's processes send, if there is one: it is put up when they start."""
+    return (plan.robot, plan.guard.fence) if plan.guard.mode == "strict" else None
+
+
+def _bytes(folder: Path, name: str | None) -> bytes | None:
+    try:
+        return None if name is None else (folder / name).read_bytes()
+    except OSError:
+        return None
+
+
+def _held(old: Plan, new: Plan) -> tuple[str, ...]:
+    """Return the fixed edges that vanish: tf2 never forgets one, so listeners keep it until they start anew."""
+    children = {edge.child for edge in new.edges}
+    return tuple(edge.name for edge in old.edges if edge.kind == "static" and edge.child not in children)

@@ -1,0 +1,246 @@
+"""One child process: it dies with the launcher, leads a process group of its own, and is read without waiting.
+
+The kernel sends a child SIGKILL when the launcher dies (PR_SET_PDEATHSIG), but not the child's own children; for
+those there is the reaper.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import signal
+import subprocess
+import time
+from collections import deque
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from tfcompose.ros.stop import SIGNALS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterator
+    from io import FileIO
+    from typing import IO
+
+    from tfcompose.launcher.preflight import Command
+
+#: A line longer than this comes in pieces; bytes.
+LINE_LIMIT = 64 * 1024
+#: What is read at once, so that a process that floods leaves time for the others; bytes.
+READ_SIZE = 64 * 1024
+#: What a process may write: so much at once, and so much a second; more is read, counted and thrown away; bytes.
+BURST = 8_000_000
+PER_SECOND = 1_000_000
+#: The end of what is thrown away is kept, and comes when there is time again: a process's last words count; bytes.
+TAIL = 4096
+#: What is read from a process that has ended, at most: more than a pipe holds, less than for ever; bytes.
+DRAIN_LIMIT = 1024 * 1024
+
+#: How much of its log goes into the finding for a process that failed: lines, and characters of each.
+LAST_LINES = 8
+LAST_LINE_LENGTH = 300
+
+_PR_SET_PDEATHSIG = 1
+_PR_SET_CHILD_SUBREAPER = 36
+_LIBC = ctypes.CDLL(None, use_errno=True)
+
+
+class Lines:
+    """Bytes into lines. What is kept between two calls is never longer than the limit."""
+
+    def __init__(self, limit: int = LINE_LIMIT) -> None:
+        self._limit = limit
+        self._rest = b""
+
+    def feed(self, data: bytes) -> Iterator[str]:
+        """Yield the lines that are whole now, and pieces of a line that is too long."""
+        *whole, self._rest = (self._rest + data).split(b"\n")
+        for line in whole:
+            yield from self._pieces(line)
+        while len(self._rest) > self._limit:
+            piece, self._rest = self._rest[: self._limit], self._rest[self._limit :]
+            yield _text(piece)
+
+    def end(self) -> Iterator[str]:
+        """Yield what stands after the last line's end, if anything does."""
+        if self._rest:
+            yield _text(self._rest)
+        self._rest = b""
+
+    def _pieces(self, line: bytes) -> Iterator[str]:
+        for start in range(0, max(len(line), 1), self._limit):
+            yield _text(line[start : start + self._limit])
+
+
+def _text(line: bytes) -> str:
+    """Return the line as a terminal shows it in the end: a progress bar is written over and over in its place."""
+    return line.rstrip(b"\r").rpartition(b"\r")[2].decode(errors="replace")
+
+
+class Bucket:
+    """How much more of a process's output is taken now, for all its pipes together; and what was thrown away."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._left: float = BURST
+        self._at = clock()
+        self._dry = False
+        self.thrown = 0
+
+    def take(self, size: int) -> bool:
+        """Return whether so many bytes are taken."""
+        now = self._clock()
+        self._left = min(BURST, self._left + (now - self._at) * PER_SECOND)
+        self._at = now
+        # Once it is empty, it is filled a little, so that what is kept comes in pieces that can be read.
+        self._dry = self._left < (PER_SECOND if self._dry else size)
+        self._left -= 0 if self._dry else size
+        return not self._dry
+
+
+class Pipe:
+    """The end of a pipe that the launcher reads. ``sink`` is given each line."""
+
+    def __init__(
+        self,
+        file: IO[bytes] | FileIO,
+        sink: Callable[[str], None],
+        limit: int = LINE_LIMIT,
+        bucket: Bucket | None = None,
+    ) -> None:
+        self.file = file
+        self._bucket = bucket
+        self._sink = sink
+        self._lines = Lines(limit)
+        self._tail = b""
+        os.set_blocking(file.fileno(), False)
+
+    def read(self) -> int | None:
+        """Pass on some of what is there to read: how many bytes, 0 at the end, None if nothing is there now."""
+        data = self.file.read(READ_SIZE)
+        if data is None:
+            return None
+        bucket = self._bucket
+        if bucket and data and not bucket.take(len(data)):
+            self._throw_away(bucket, data)
+            return len(data)
+        if bucket:
+            self._catch_up(bucket)
+        for line in self._lines.feed(data) if data else self._lines.end():
+            self._sink(line)
+        return len(data)
+
+    def _throw_away(self, bucket: Bucket, data: bytes) -> None:
+        for line in self._lines.end():
+            self._sink(line)
+        kept = (self._tail + data)[-TAIL:]
+        bucket.thrown += len(self._tail) + len(data) - len(kept)
+        self._tail = kept
+
+    def _catch_up(self, bucket: Bucket) -> None:
+        """Say how much was thrown away, and go on with the end of it, from a line's beginning."""
+        tail, self._tail = self._tail, b""
+        if bucket.thrown and b"\n" in tail[:-1]:
+            begin = tail.index(b"\n") + 1
+            bucket.thrown += begin
+            tail = tail[begin:]
+        if bucket.thrown:
+            self._sink(f"… {bucket.thrown:,} bytes of output were thrown away here: more came than a log can hold")
+            bucket.thrown = 0
+        for line in self._lines.feed(tail):
+            self._sink(line)
+
+    def drain(self) -> None:
+        """Pass on what is left of a process that has ended, then close."""
+        left = DRAIN_LIMIT
+        try:
+            while left > 0 and (count := self.read()):
+                left -= count
+            if self._bucket:
+                self._catch_up(self._bucket)
+            for line in self._lines.end():
+                self._sink(line)
+        finally:
+            self.file.close()
+
+
+@dataclass(slots=True)
+class Child:
+    """A running process, its pipes, and the end of what it wrote to each."""
+
+    name: str
+    popen: subprocess.Popen[bytes]
+    pipes: list[Pipe] = field(default_factory=list)
+    last_out: deque[str] = field(default_factory=lambda: deque(maxlen=LAST_LINES))
+    last_err: deque[str] = field(default_factory=lambda: deque(maxlen=LAST_LINES))
+    bucket: Bucket = field(default_factory=Bucket)
+    gate_matched: bool = False
+
+    @property
+    def last_lines(self) -> tuple[str, ...]:
+        """What it said last; the errors come last and count first, because two pipes have no common order."""
+        return (*self.last_out, *self.last_err)[-LAST_LINES:]
+
+
+def spawn(command: Command, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes]:
+    """Start the command as the leader of a new session, with its output in pipes.
+
+    One of tfcompose's own starts with the signals blocked that end it, and unblocks them when it handles them
+    (``tfcompose.ros.stop``): one that comes while Python itself starts waits, and neither kills it nor prints a
+    traceback.
+
+    Raises:
+        OSError: if it cannot be started.
+    """
+    launcher = os.getpid()
+
+    def before_the_program() -> None:
+        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != launcher:  # it died before the line above
+            os._exit(1)
+        if command.own:
+            signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+
+    return subprocess.Popen(
+        command.argv,
+        bufsize=0,
+        cwd="/" if command.own and not command.folder.is_dir() else command.folder,  # ours need none
+        env=command.env,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        pass_fds=pass_fds,
+        start_new_session=True,
+        preexec_fn=before_the_program,  # noqa: PLW1509 (the launcher has one thread)
+    )
+
+
+def has_ended(pid: int) -> bool:
+    """Return whether the child has ended. It stays a zombie, so that its group's number is not given away."""
+    return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
+
+
+def kill_group(pid: int, number: int) -> None:
+    """Send the signal to the child and everything in its group."""
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(pid, number)
+
+
+@contextlib.contextmanager
+def subreaper() -> Iterator[None]:
+    """Have what children leave behind become this process's own children, instead of init's, during the block."""
+    _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 1)
+    try:
+        yield
+    finally:
+        _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 0)
+
+
+def reap_adopted(known: Collection[int]) -> None:
+    """Take the exit codes of children that have ended and are not known: those that were left to this process."""
+    with contextlib.suppress(ChildProcessError):
+        while found := os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT):
+            if found.si_pid in known:
+                return
+            os.waitpid(found.si_pid, 0)

@@ -1,0 +1,372 @@
+"""The launcher's children: started, read, and reaped, with all that belongs to them."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import re
+import signal
+import subprocess
+from dataclasses import replace
+from selectors import EVENT_READ
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.ipc import (
+    EVENTS_FD,
+    GO,
+    GUARD_EVENTS,
+    GUARD_ORDERS,
+    HOLD_FD,
+    JOINS,
+    LAUNCHER,
+    MEMORY_FD,
+    ORDERS_FD,
+    PROCESS,
+    RUN_ID,
+    LogLine,
+)
+from tfcompose.launcher.child import LAST_LINE_LENGTH, Child, Pipe, has_ended, kill_group, reap_adopted, spawn
+from tfcompose.launcher.events import Exited, LogMatched, Started, StartFailed
+from tfcompose.launcher.processes import descendants, end, launcher_mark, leftovers, leftovers_of, signal_leftovers
+from tfcompose.ros.stop import SIGNALS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from selectors import BaseSelector
+
+    from tfcompose.ipc import GuardOrder, Notice, Stream
+    from tfcompose.launcher.events import Event
+    from tfcompose.launcher.preflight import Command
+    from tfcompose.plan import PlanProcess
+
+#: So much of a line is compared with what a gate waits for, in characters.
+LONGEST_MATCHED = 4000
+#: The guard's lines hold findings with notes, so they may be longer than a log's; bytes.
+EVENT_LIMIT = 1024 * 1024
+
+
+class Children:
+    """The processes that run. ``happened`` is given what becomes of them, ``notify`` what they write.
+
+    With a run's id, what they leave behind is this process's to reap and to end.
+    """
+
+    def __init__(
+        self, selector: BaseSelector, run_id: str, happened: Callable[[Event], None], notify: Callable[[Notice], None]
+    ) -> None:
+        self._selector = selector
+        self._run_id = run_id
+        self._happened = happened
+        self._notify = notify
+        self._children: dict[str, Child] = {}
+        self._held: dict[str, int] = {}
+        self._guard = ""
+        self._guard_pipes: GuardPipes | None = None
+        self._marks = {RUN_ID: run_id, LAUNCHER: launcher_mark()} if run_id else {}
+        self._reaper = Reaper(run_id)
+        self._strays: set[int] = set()
+        self._ran: set[str] = set()
+        self._left: set[str] = set()
+
+    def start(self, process: PlanProcess, command: Command, guard: GuardPipes | None = None) -> Event:
+        """Start the process, with the pipes of a guard if it is one, and return what came of it."""
+        if process.name in self._held:
+            return self._let_go(process.name)
+        try:
+            if command.missing:
+                return StartFailed(process.name, command.missing)
+            if process.name in self._ran and self._run_id:  # nobody wants two of what it left behind
+                signal_leftovers(self._run_id, {process.name}, signal.SIGKILL)
+            self._left.discard(process.name)
+            child = self._spawn(process, command, guard)
+        except (OSError, subprocess.SubprocessError, ValueError) as error:
+            if guard:
+                guard.events.close()
+                guard.close()
+            return StartFailed(process.name, _reason(error))
+        finally:
+            if guard:
+                guard.handed_over()
+        if guard:
+            self._guard, self._guard_pipes = process.name, guard
+            self._watch(child, Pipe(guard.events, lambda line: self._guard_line(process.name, line), EVENT_LIMIT))
+        return Started(process.name, child.popen.pid)
+
+    def prepare(self, process: PlanProcess, command: Command) -> None:
+        """Have one of tfcompose's own load what it needs; it joins ROS when it is started, without that delay."""
+        theirs, ours = os.pipe()
+        try:
+            self._spawn(process, replace(command, env=command.env | {HOLD_FD: str(theirs)}), None, (theirs,))
+            self._held[process.name] = ours
+        except (OSError, subprocess.SubprocessError, ValueError):
+            os.close(ours)  # its start will say why
+        finally:
+            os.close(theirs)
+
+    def dismiss(self) -> None:
+        """End those that are held: they will not be started, or in another way."""
+        for name in list(self._held):
+            os.close(self._held.pop(name))
+            child = self._children.pop(name)
+            self._end(child)
+        self._update_reaper()
+
+    def kill(self, name: str, number: int) -> None:
+        """Send the signal to the child's group, if it runs."""
+        if name in self._children:
+            self._left.add(name)
+            kill_group(self._children[name].popen.pid, number)
+
+    def order(self, order: GuardOrder) -> None:
+        """Tell the guard, if it runs."""
+        if self._guard_pipes:
+            self._guard_pipes.order(order)
+
+    def last_lines(self, name: str) -> tuple[str, ...]:
+        """Return the last lines of the process's output; nothing if it does not run."""
+        return self._children[name].last_lines if name in self._children else ()
+
+    def reap(self) -> None:
+        """Take leave of those that have ended."""
+        for child in [child for child in self._children.values() if has_ended(child.popen.pid)]:
+            if child.name not in self._held:
+                self._ended(child)
+        if self._run_id:
+            reap_adopted(self._groups() | {self._reaper.pid})
+
+    def find_strays(self) -> None:
+        """Note which groups there are of what descends from this process, and have a reaper that knows them."""
+        if not self._run_id:
+            return
+        if self._reaper.ended:
+            self._reaper = Reaper(self._run_id)
+        self._strays = set(self._descendants().values())
+        if ended := self._left.difference(self._children):
+            self._left -= ended
+            if self._strays - self._groups():
+                signal_leftovers(self._run_id, ended, signal.SIGTERM)
+        self._update_reaper()
+
+    def close(self) -> None:
+        """Kill what is left: something, only if an error in the launcher itself ends it."""
+        self.dismiss()
+        for child in self._children.values():
+            self._end(child)
+        self._children.clear()
+        self._close_guard_pipes()
+        if self._run_id:
+            marked = leftovers(self._run_id)
+            others = self._descendants().keys() - {one.pid for one in marked}
+            end(marked + leftovers_of(others, self._run_id), 1.0)
+        self._strays.clear()
+        self._update_reaper()
+        self._reaper.close()
+
+    # A process's life.
+
+    def _let_go(self, name: str) -> Event:
+        with io.FileIO(self._held.pop(name), "wb") as hold, contextlib.suppress(BrokenPipeError):
+            hold.write(GO)  # one that has ended meanwhile is seen to have ended
+        return Started(name, self._children[name].popen.pid)
+
+    def _end(self, child: Child) -> None:
+        kill_group(child.popen.pid, signal.SIGKILL)
+        child.popen.wait()
+        for pipe in child.pipes:
+            self._selector.unregister(pipe.file)
+            pipe.file.close()
+
+    def _spawn(
+        self, process: PlanProcess, command: Command, guard: GuardPipes | None, pass_fds: tuple[int, ...] = ()
+    ) -> Child:
+        more = (guard.env if guard else {}) | self._marks | ({PROCESS: process.name} if self._run_id else {})
+        self._ran.add(process.name)
+        if command.fence:
+            command.fence[0].parent.mkdir(exist_ok=True)
+            command.fence[0].write_text(command.fence[1], encoding="utf-8")
+        popen = spawn(replace(command, env=command.env | more), guard.theirs if guard else pass_fds)
+        child = Child(process.name, popen)
+        self._children[process.name] = child
+        self._update_reaper()
+        gate = process.ready.text if process.ready and process.ready.kind == "log" else None
+        if popen.stdout and popen.stderr:
+            self._watch(child, Pipe(popen.stdout, self._logger(child, "stdout", gate), bucket=child.bucket))
+            self._watch(child, Pipe(popen.stderr, self._logger(child, "stderr", gate), bucket=child.bucket))
+        return child
+
+    def _watch(self, child: Child, pipe: Pipe) -> None:
+        child.pipes.append(pipe)
+        self._selector.register(pipe.file, EVENT_READ, lambda: self._read(child, pipe))
+
+    def _read(self, child: Child, pipe: Pipe) -> None:
+        if pipe.read() == 0:
+            self._drain(child, pipe)
+
+    def _drain(self, child: Child, pipe: Pipe) -> None:
+        child.pipes.remove(pipe)
+        self._selector.unregister(pipe.file)
+        pipe.drain()
+
+    def _logger(self, child: Child, stream: Stream, gate: str | None) -> Callable[[str], None]:
+        last = child.last_err if stream == "stderr" else child.last_out
+        waited_for = re.compile(gate) if gate is not None else None
+
+        def log(text: str) -> None:
+            last.append(text[:LAST_LINE_LENGTH])
+            self._notify(LogLine(child.name, stream, text))
+            if waited_for and not child.gate_matched and waited_for.search(text[:LONGEST_MATCHED]):
+                child.gate_matched = True
+                self._happened(LogMatched(child.name, text[:LAST_LINE_LENGTH]))
+
+        return log
+
+    def _guard_line(self, name: str, line: str) -> None:
+        try:
+            event = GUARD_EVENTS.read(line)
+        except (ValueError, RecursionError):
+            self._notify(LogLine(name, "stderr", f"not an event: {line}"))
+        else:
+            self._happened(event)
+
+    def _ended(self, child: Child) -> None:
+        """Take what the process leaves behind: the rest of its group, its last words, and its exit code."""
+        kill_group(child.popen.pid, signal.SIGKILL)
+        for pipe in list(child.pipes):
+            self._drain(child, pipe)
+        returncode = child.popen.wait()
+        del self._children[child.name]
+        if child.name == self._guard:
+            self._close_guard_pipes()
+        self._update_reaper()
+        self._happened(Exited(child.name, returncode, child.last_lines))
+
+    def _close_guard_pipes(self) -> None:
+        if self._guard_pipes:
+            self._guard_pipes.close()
+            self._guard_pipes = None
+
+    def _update_reaper(self) -> None:
+        self._reaper.watch(self._groups() | self._strays)
+
+    def _groups(self) -> set[int]:
+        """Return the groups of the children, each of which leads its own."""
+        return {child.popen.pid for child in self._children.values()}
+
+    def _descendants(self) -> dict[int, int]:
+        return descendants(os.getpid(), but=self._reaper.pid)
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.strerror}: {error.filename}" if error.filename else error.strerror
+    return str(error)
+
+
+class GuardPipes:
+    """The launcher's ends of the pipes for the guard's events and for orders to it.
+
+    ``theirs`` are the guard's ends, which are closed here once it has them.
+    """
+
+    def __init__(self, *, joins: bool, memory: dict[str, Any]) -> None:
+        read_fd, write_fd = os.pipe()
+        orders_fd, self._orders = os.pipe()
+        os.set_blocking(self._orders, False)
+        self.theirs: tuple[int, ...] = (write_fd, orders_fd)
+        self.events = io.FileIO(read_fd)
+        self.env = {EVENTS_FD: str(write_fd), ORDERS_FD: str(orders_fd)} | ({JOINS: "1"} if joins else {})
+
+        if memory:
+            memory_fd = os.memfd_create("tfcompose-guard-memory")
+            with open(memory_fd, "wb", closefd=False) as file:
+                file.write(json.dumps(memory).encode())
+            os.lseek(memory_fd, 0, os.SEEK_SET)
+            self.theirs += (memory_fd,)
+            self.env[MEMORY_FD] = str(memory_fd)
+
+    def handed_over(self) -> None:
+        """Close the guard's ends."""
+        for fd in self.theirs:
+            os.close(fd)
+
+    def order(self, order: GuardOrder) -> None:
+        """Tell the guard; one that is stuck hears nothing."""
+        with contextlib.suppress(OSError):
+            os.write(self._orders, GUARD_ORDERS.line(order).encode())
+
+    def close(self) -> None:
+        """Close the launcher's end for orders; that for events is closed by whoever reads it."""
+        os.close(self._orders)
+
+
+#: What the reaper runs: it reads groups until the launcher is gone.
+_SCRIPT = """
+groups='' last=''
+while read -r line; do groups=$line; last=$line; done
+for g in $groups; do [ "$g" = end ] || kill -9 -$g; done
+[ -n "$1" ] && [ "$last" != end ] || exit 0
+for e in /proc/[0-9]*/environ; do
+    pid=${e#/proc/}; pid=${pid%/environ}
+    [ "$pid" = $$ ] || ! grep -qaF "$1" "$e" || kill -9 "$pid"
+done
+"""
+
+
+def _ignore_signals() -> None:
+    """Ignore, from the first moment on, what ends programs; what the shell starts does so too."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+
+class Reaper:
+    """What ends a run whose launcher was killed: a shell that outlives the launcher by a moment.
+
+    It kills the groups that it was given last, those of everything that descends from the launcher, and then whatever
+    carries the run's id in its environment: processes that left their groups since.
+    """
+
+    def __init__(self, run_id: str = "") -> None:
+        self._shell = subprocess.Popen(
+            ["/bin/sh", "-c", _SCRIPT, "sh", f"{RUN_ID}={run_id}" if run_id else ""],
+            bufsize=0,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+            preexec_fn=_ignore_signals,  # noqa: PLW1509 (the launcher has one thread)
+        )
+        self._watched = ""
+
+    @property
+    def pid(self) -> int:
+        """Its process number."""
+        return self._shell.pid
+
+    @property
+    def returncode(self) -> int | None:
+        """How it ended; None while it runs."""
+        return self._shell.poll()
+
+    @property
+    def ended(self) -> bool:
+        """Whether somebody killed it."""
+        return self.returncode is not None
+
+    def watch(self, groups: Iterable[int]) -> None:
+        """Say which groups there are now."""
+        watched = " ".join(map(str, sorted(groups)))
+        if self._shell.stdin and watched != self._watched:
+            self._watched = watched
+            with contextlib.suppress(BrokenPipeError):
+                self._shell.stdin.write(f"{watched}\n".encode())
+
+    def close(self) -> None:
+        """Let it go; the groups that it was given last are killed."""
+        if self._shell.stdin:
+            if not self._watched:
+                with contextlib.suppress(BrokenPipeError):
+                    self._shell.stdin.write(b"end\n")
+            self._shell.stdin.close()
+        self._shell.wait()

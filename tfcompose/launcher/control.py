@@ -1,0 +1,226 @@
+"""The control socket: other commands ask the launcher, and listen to its notices.
+
+One request is one line of JSON, as ``tfcompose.ipc`` describes it; each answer is one line, too. Whoever asks for
+events is sent the last ones again, and then each as it comes. Only the user who runs the robot is answered.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import selectors
+import socket
+import struct
+from collections import deque
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeVar
+
+from tfcompose.ipc import REQUESTS, EventsRequest, Refusal
+from tfcompose.launcher.processes import is_suspended
+from tfcompose.plan.codec import decode, encode
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from tfcompose.ipc import Request
+    from tfcompose.launcher.runtime_dir import RuntimeDir
+
+A = TypeVar("A")
+
+#: A longer request is refused; a listener that is so far behind is let go; bytes.
+LONGEST_REQUEST = 64 * 1024
+LONGEST_BACKLOG = 1024 * 1024
+#: So many lines are kept for those who come later.
+KEPT_LINES = 500
+#: How long the launcher may take to answer, in seconds.
+ANSWER_S = 20.0
+
+
+class RefusedError(Exception):
+    """Raised where the launcher does not do what it is asked; the message is its reason."""
+
+
+@dataclass(slots=True, eq=False)
+class Client:
+    """Somebody at the other end."""
+
+    connection: socket.socket
+    listens: bool = False
+    received: bytearray = field(default_factory=bytearray)
+    unsent: bytearray = field(default_factory=bytearray)
+
+
+@contextlib.contextmanager
+def _at(place: RuntimeDir) -> Iterator[str]:
+    """Give the socket's address: a short one, because Linux takes only 107 bytes."""
+    folder = os.open(place.folder, os.O_DIRECTORY | os.O_RDONLY)
+    try:
+        yield f"/proc/self/fd/{folder}/{place.socket.name}"
+    finally:
+        os.close(folder)
+
+
+def listen(place: RuntimeDir) -> socket.socket:
+    """Return the listening socket of a robot whose lock this process holds; one that was left there is replaced."""
+    with contextlib.suppress(FileNotFoundError):
+        place.socket.unlink()
+    listener = socket.socket(socket.AF_UNIX)
+    with _at(place) as address:
+        before = os.umask(0o177)
+        try:
+            listener.bind(address)
+        finally:
+            os.umask(before)
+    listener.listen(16)
+    listener.setblocking(False)  # noqa: FBT003 (its only argument)
+    return listener
+
+
+def connect(place: RuntimeDir) -> socket.socket:
+    """Return a connection to whoever runs the robot.
+
+    Raises:
+        OSError: if nobody does, or whoever does was stopped (by Ctrl-Z) and cannot answer.
+    """
+    _ensure_it_runs(place)
+    connection = socket.socket(socket.AF_UNIX)
+    connection.settimeout(ANSWER_S)
+    try:
+        with _at(place) as address:
+            connection.connect(address)
+    except BaseException:
+        connection.close()
+        raise
+    return connection
+
+
+def _ensure_it_runs(place: RuntimeDir) -> None:
+    holder = place.holder()
+    if holder is None:
+        return
+    if is_suspended(holder.pid):
+        raise ConnectionError(f"its launcher {holder.pid} is stopped; kill -CONT {holder.pid} lets it go on")
+
+
+def ask(place: RuntimeDir, request: Request, answer: type[A]) -> A:
+    """Return the launcher's answer to one request, of the class that answers it.
+
+    Raises:
+        RefusedError: with the launcher's reason, if it does not do it.
+        OSError: if nobody runs the robot, or does not answer.
+    """
+    with connect(place) as connection:
+        connection.sendall(REQUESTS.line(request).encode())
+        with connection.makefile("rb") as lines:
+            line = lines.readline()
+    if not line:
+        raise ConnectionResetError("the launcher has ended")
+    try:
+        data = json.loads(line)
+        if "error" in data:
+            raise RefusedError(decode(Refusal, data).error)
+        return decode(answer, data)
+    except (ValueError, TypeError) as error:
+        raise ConnectionError(f"its launcher answers what this tfcompose does not understand: {error}") from None
+
+
+class Control:
+    """The launcher's end. ``answer`` is given each request and returns the object that is sent back."""
+
+    def __init__(
+        self, listener: socket.socket, selector: selectors.BaseSelector, answer: Callable[[Request], object]
+    ) -> None:
+        self._listener = listener
+        self._selector = selector
+        self._answer = answer
+        self._clients: set[Client] = set()
+        self._lines: deque[str] = deque(maxlen=KEPT_LINES)
+        selector.register(listener, selectors.EVENT_READ, self._accept)
+
+    def publish(self, line: str) -> None:
+        """Send a line to all who listen, and keep it for those who come later."""
+        self._lines.append(line)
+        for client in [client for client in self._clients if client.listens]:
+            self._send(client, line)
+
+    def close(self) -> None:
+        """Send what is left, and leave."""
+        for client in list(self._clients):
+            client.connection.settimeout(0.5)
+            with contextlib.suppress(OSError):
+                client.connection.sendall(client.unsent)
+            self._leave(client)
+        self._selector.unregister(self._listener)
+        self._listener.close()
+
+    def _accept(self) -> None:
+        try:
+            connection, _ = self._listener.accept()
+        except OSError:
+            return
+        _, uid, _ = struct.unpack("3i", connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))
+        if uid not in {os.getuid(), 0}:
+            connection.close()
+            return
+        connection.setblocking(False)  # noqa: FBT003 (its only argument)
+        client = Client(connection)
+        self._clients.add(client)
+        self._selector.register(connection, selectors.EVENT_READ, lambda: self._serve(client))
+
+    def _serve(self, client: Client) -> None:
+        try:
+            data = client.connection.recv(16 * 1024)
+        except BlockingIOError:
+            data = None
+        except OSError:
+            data = b""
+        if data == b"" or len(client.received) > LONGEST_REQUEST:
+            self._leave(client)
+            return
+        client.received += data or b""
+        while b"\n" in client.received and client in self._clients:
+            line, _, rest = bytes(client.received).partition(b"\n")
+            client.received[:] = rest
+            self._take(client, line)
+        if client in self._clients:
+            self._push(client)
+
+    def _take(self, client: Client, line: bytes) -> None:
+        try:
+            request = REQUESTS.read(line)
+        except (ValueError, RecursionError) as error:
+            self._send(client, json.dumps(encode(Refusal(f"not a request: {error}"))))
+            return
+        if isinstance(request, EventsRequest):
+            client.listens = True
+            for kept in self._lines:
+                self._send(client, kept)
+        else:
+            self._send(client, json.dumps(encode(self._answer(request))))
+
+    def _send(self, client: Client, line: str) -> None:
+        client.unsent += line.encode() + b"\n"
+        if len(client.unsent) > LONGEST_BACKLOG:
+            self._leave(client)
+        else:
+            self._push(client)
+
+    def _push(self, client: Client) -> None:
+        try:
+            sent = client.connection.send(client.unsent) if client.unsent else 0
+        except BlockingIOError:
+            sent = 0
+        except OSError:
+            self._leave(client)
+            return
+        del client.unsent[:sent]
+        wanted = selectors.EVENT_READ | (selectors.EVENT_WRITE if client.unsent else 0)
+        if self._selector.get_key(client.connection).events != wanted:
+            self._selector.modify(client.connection, wanted, lambda: self._serve(client))
+
+    def _leave(self, client: Client) -> None:
+        if client in self._clients:
+            self._clients.discard(client)
+            self._selector.unregister(client.connection)
+            client.connection.close()

@@ -1,0 +1,90 @@
+"""The launcher's own findings, and how a process's end is put in words."""
+
+from __future__ import annotations
+
+import signal
+from typing import TYPE_CHECKING
+
+from tfcompose.findings import Finding, Note, finding
+
+if TYPE_CHECKING:
+    from tfcompose.launcher.events import Exited
+    from tfcompose.launcher.state import Tracked
+    from tfcompose.plan import PlanEdge
+
+
+#: How many of an owner's edges a finding names.
+NAMED_AT_MOST = 12
+
+
+def signal_name(number: int) -> str:
+    """Return the signal's name: SIGSEGV."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
+
+
+def how_ended(returncode: int) -> str:
+    """Return an exit code, or minus a signal's number, in words: "exit code 3", "SIGSEGV"."""
+    return signal_name(-returncode) if returncode < 0 else f"exit code {returncode}"
+
+
+def in_short(found: Finding) -> str:
+    """Return what a finding is called, for a line that follows it: "TF808 process_failed"."""
+    return f"{found.code} {found.name}"
+
+
+def ended_by_itself(name: str, returncode: int, when: str, last_lines: tuple[str, ...]) -> Finding:
+    """Return the finding for a process that should not have ended; ``when`` ends the sentence."""
+    verb = "was ended by" if returncode < 0 else "ended with"
+    notes = [Note(f"{name}: {line}") for line in last_lines]
+    return finding("TF808", f"{name} {verb} {how_ended(returncode)}{when}", None, notes=notes)
+
+
+def guard_lost(name: str, event: Exited, *, strict: bool) -> Finding:
+    """Return the finding for a guard that ended while the others run, and is started again."""
+    verb = "was ended by" if event.returncode < 0 else "ended with"
+    blind = "nothing of the plan passes to /tf" if strict else "nobody watches the tree"
+    message = f"{name} {verb} {how_ended(event.returncode)}: {blind} until it is back"
+    notes = [Note(f"{name}: {line}") for line in event.last_lines]
+    advice = "it is started again, and knows what it has told"
+    return finding("TF808", message, None, severity="warning", notes=notes, help=advice)
+
+
+def guard_hangs(name: str, seconds: float, *, strict: bool) -> Finding:
+    """Return the finding for a guard that runs and shows no sign of life."""
+    blind = "passed nothing on" if strict else "watched nothing"
+    message = f"{name} hangs: it has {blind} for {seconds:.0f} s"
+    return finding("TF808", message, None, severity="warning", help="it is ended and started again")
+
+
+def not_started(name: str, why: str) -> Finding:
+    """Return the finding for a process that the operating system would not start."""
+    return finding("TF808", f"{name} could not be started: {why}", None)
+
+
+def waits_in_vain(name: str, other: str, what: str, why: str) -> Finding:
+    """Return the finding for a process that is not started, because it waits for what cannot come any more."""
+    return finding("TF808", f"{name} is not started: it waits for {other} to be {what}, and {other} {why}", None)
+
+
+def never_clear(name: str, seconds: float) -> Finding:
+    """Return the finding for a guard that does not report whether the plan's edges are free."""
+    message = f"{name} did not say within {seconds:g} s whether somebody publishes the plan's edges already"
+    return finding("TF808", message, None, help="its own log says how far it came; --guard off starts without it")
+
+
+def never_published(owner: Tracked, edges: tuple[PlanEdge, ...]) -> Finding:
+    """Return the finding for the edges of one owner that nobody published until the time was up."""
+    names = ", ".join(edge.name for edge in edges[:NAMED_AT_MOST])
+    more = f" and {len(edges) - NAMED_AT_MOST} more" if len(edges) > NAMED_AT_MOST else ""
+    name = owner.process.name
+    if owner.state == "STOPPED" and owner.order == 0:
+        waits = " and ".join(f"{other} to be {what}" for other, what in owner.process.after.items())
+        why = f"was not started: it waits for {waits}" if waits else "was not started"
+        return finding("TF811", f"nobody published {names}{more}: {name} {why}", None)
+    if owner.state in ("STOPPED", "EXITED", "FATAL", "BACKOFF"):
+        why = f"{owner.state.lower()}: {owner.detail}" if owner.detail else owner.state.lower()
+        return finding("TF811", f"nobody publishes {names}{more}: {name} is {why}", None)
+    return finding("TF811", f"{name} never published {names}{more}", None)

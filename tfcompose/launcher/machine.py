@@ -1,0 +1,331 @@
+"""What the launcher does next: a pure function of what is known, what happened, and the time.
+
+The guard is started first and listens; once it reports that nobody publishes a planned edge, the others follow in the
+plan's order, each when what it waits for is there. A guard that is switched off only reports which edges are live, and
+nothing waits for it. Whatever goes wrong, or is requested, everything is stopped: a process when all that wait for it
+are gone, the guard last of all. What the guard reports while everything stops is ignored, because an owner that is
+stopped falls silent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from signal import SIGKILL
+from typing import TYPE_CHECKING
+
+from tfcompose.findings import Note
+from tfcompose.ipc import (
+    Absent,
+    Alive,
+    Clear,
+    Complete,
+    Found,
+    GateOpen,
+    GateShut,
+    Live,
+    Missing,
+    OwnerLive,
+    OwnerReady,
+    Present,
+    ProcessRequest,
+    Recovered,
+    RecoveredShown,
+    Remember,
+    Silent,
+    Taken,
+    TreeComplete,
+    Waiting,
+)
+from tfcompose.launcher.events import Begin, Event, Exited, Kill, LogMatched, NewPlan, Order, Started, StartFailed
+from tfcompose.launcher.failures import guard_hangs, in_short, never_clear, not_started
+from tfcompose.launcher.readiness import (
+    check_gates,
+    gate_of,
+    give_up_waiting,
+    late_at,
+    open_gate,
+    opens_at,
+    order_gate,
+    report_progress,
+    unmet,
+)
+from tfcompose.launcher.restarts import backoff_s, follow_plan, process_exited, process_requested, refusal
+from tfcompose.launcher.state import Stop, by_owner
+from tfcompose.launcher.stopping import edge_taken, firmer_at, send_due_signals, stop_if_requested
+from tfcompose.launcher.transition import Transition
+
+if TYPE_CHECKING:
+    from tfcompose.findings import Finding
+    from tfcompose.launcher.events import Action
+    from tfcompose.launcher.state import State, Tracked
+    from tfcompose.plan import Plan, PlanEdge
+
+
+def step(state: State, event: Event, now: float) -> tuple[State, tuple[Action, ...]]:
+    """Return what is known after the event, and what is to be done, in that order. ``now`` is in seconds."""
+    if state.finished:
+        return state, ()
+    transition = Transition(state, now)
+    _react(transition, event)
+    _settle(transition)
+    return transition.state, tuple(transition.actions)
+
+
+def wake_time(state: State) -> float | None:
+    """Return when the machine next has something to do by itself: then it wants a ``Tick``."""
+    times, due = state.times, []
+    for one in state.tracked.values():
+        if one.state == "BACKOFF":
+            due.append(one.since + backoff_s(times, one.failures))
+        firmer = firmer_at(times, one)
+        gate = [at for at in (firmer, opens_at(one), late_at(state, one)) if at is not None]
+        due += gate if state.stop is None else gate[: firmer is not None]
+    if state.stop is None and state.begun is not None:
+        if state.clear is None:
+            due.append(state.begun + times.clear_s)
+        due += [at for at in (_guard_due(state), _reminder_due(state)) if at is not None]
+    return min(due, default=None)
+
+
+# What happened.
+
+
+def _react(step: Transition, event: Event) -> None:
+    match event:
+        case Begin():
+            _begin(step)
+        case Started(name, pid):
+            _started(step, name, pid)
+        case StartFailed(name, why):
+            _not_started(step, name, why)
+        case Exited():
+            process_exited(step, event)
+        case Taken(found):
+            edge_taken(step, found)
+        case _:
+            stop_if_requested(step, event)
+            if step.state.stop is None:
+                _requested_or_reported(step, event)
+
+
+def _requested_or_reported(step: Transition, event: Event) -> None:
+    match event:
+        case ProcessRequest():
+            process_requested(step, event)
+        case NewPlan():
+            follow_plan(step, event)
+        case GateOpen(process, seen) | LogMatched(process, seen) if process in step.state.tracked:
+            if gate_of(step.state.tracked[process].process) not in ("edges", "exit", "time"):
+                open_gate(step, process, seen)
+        case GateShut(process, seen) if process in step.state.tracked:
+            step.track(process, replace(step.state.tracked[process], seen=seen))
+        case OwnerReady(process) if process in step.state.tracked:
+            _owner_ready(step, process)
+        case _:  # the guard's other events, and Tick
+            _guard_reported(step, event)
+
+
+def _not_started(step: Transition, name: str, why: str) -> None:
+    one = step.state.tracked[name]
+    step.enter(name, "FATAL", why, order=one.order if one.began else 0)
+    step.fail_process(name, not_started(name, why))
+
+
+def _begin(step: Transition) -> None:
+    guard = step.state.guard
+    judges = guard is not None and step.state.plan.guard.mode != "off"
+    step.update(begun=step.now, clear=None if judges else step.now)
+    if guard:
+        step.start(guard)
+    for name, tracked in step.state.tracked.items():
+        if tracked.state == "EXPECTED":
+            step.enter(name, "EXPECTED", began=step.now)
+            order_gate(step, step.state.tracked[name])
+
+
+def _started(step: Transition, name: str, pid: int) -> None:
+    step.enter(name, "RUNNING", pid=pid, began=step.now)
+    if name != step.state.guard:
+        order_gate(step, step.state.tracked[name])
+        return
+    _expect_no_sign_of_life(step)
+    step.update(silent=frozenset())  # it reports itself what is
+    if step.state.clear is not None:  # it joins the others
+        for other in step.state.tracked.values():
+            _introduce(step, other)
+            if not other.ready and other.state in ("RUNNING", "EXPECTED"):
+                order_gate(step, other)
+
+
+def _introduce(step: Transition, owner: Tracked) -> None:
+    """Tell a guard that joins what became of an owner meanwhile, whatever the one before it knew."""
+    name = owner.process.name
+    runs = owner.state in ("STARTING", "RUNNING", "EXPECTED")
+    missing = any(child not in step.state.live for _, child in owner.process.owns)
+    if owner.process.owns and not runs:
+        step.actions.append(Order(Absent(name)))
+    elif missing and step.state.memory:
+        step.actions += [Order(Absent(name)), Order(Present(name))]
+
+
+# What the guard reports.
+
+
+def _guard_reported(step: Transition, event: Event) -> None:
+    match event:
+        case Alive():
+            step.update(guard_alive=step.now, guard_overdue=None)
+        case Clear():
+            _clear(step)
+        case Live(children=children):
+            step.update(live=step.state.live.union(children))
+        case Silent(children, over):
+            silent = step.state.silent
+            step.update(silent=silent.difference(children) if over else silent.union(children))
+        case Complete(edges):
+            _complete(step, edges)
+        case Found(found, process):
+            _violation(step, found, process)
+        case Recovered(message):
+            step.notify(RecoveredShown(message, step.since_begin))
+        case Remember(changed):
+            step.update(memory=step.state.memory | changed)
+        case _:
+            pass
+
+
+def _clear(step: Transition) -> None:
+    state = step.state
+    if state.clear is None:
+        step.update(clear=step.now)
+    if state.unwatched is not None:
+        step.update(unwatched=None)
+        message = f"{state.guard} watches again after {step.now - state.unwatched:.1f} s"
+        step.notify(RecoveredShown(message, step.since_begin))
+
+
+def _owner_ready(step: Transition, process: str) -> None:
+    """Note that all edges of the owner are live."""
+    if gate_of(step.state.tracked[process].process) == "edges":
+        open_gate(step, process, "its edges are live")
+    edges = step.state.plan.edges_of(process)
+    if edges:
+        names = tuple(edge.name for edge in edges)
+        step.notify(OwnerLive(process, edges[0].node, names, step.since_begin))
+        if not step.state.missing:
+            _complete(step, len(step.state.plan.edges))
+
+
+def _complete(step: Transition, edges: int) -> None:
+    if not step.state.complete:
+        step.update(complete=True)
+        step.notify(TreeComplete(edges, step.since_begin))
+
+
+def _violation(step: Transition, found: Finding, process: str) -> None:
+    """Report what the guard found; by the plan's policy, ``process``, which surely did it, is stopped, or everything.
+
+    ``process`` is empty where it is not sure, or not a process of the plan.
+    """
+    policy = step.state.plan.guard.on_violation
+    if found.severity != "error" or policy == "report":
+        step.report(found)
+    elif policy == "stop":
+        step.report(found)
+        step.stop(Stop("failure", 1), in_short(found))
+    elif not process:
+        step.report(found)
+    elif why := refusal(step.state, process, "stop"):
+        step.report(_noted(found, f"nothing is stopped: {why}"))
+    else:
+        step.report(_noted(found, f"{process} is stopped for it, and stays so: on_violation is stop-offender"))
+        process_requested(step, ProcessRequest("stop", process))
+
+
+def _noted(found: Finding, text: str) -> Finding:
+    return replace(found, notes=(*found.notes, Note(text)))
+
+
+# A watchdog over the guard: one that hangs is ended, and started again like one that dies. It reports once a second
+# that it works. Where that does not come for long, the launcher itself may have been kept from running; so it waits
+# once more, with its own clock going, before it believes it.
+
+
+def _expect_no_sign_of_life(step: Transition) -> None:
+    """Expect nothing of the guard until it has reported once that it works."""
+    step.update(guard_alive=None, guard_overdue=None)
+
+
+def _guard_due(state: State) -> float | None:
+    """Return when the guard is overdue, or taken to hang; None if nothing is expected of it."""
+    if state.guard is None or state.guard_alive is None or state.tracked[state.guard].state != "RUNNING":
+        return None
+    if state.guard_overdue is None:
+        return state.guard_alive + state.times.guard_silent_s
+    return state.guard_overdue + state.times.guard_overdue_s
+
+
+def _kill_a_guard_that_hangs(step: Transition) -> None:
+    due, state = _guard_due(step.state), step.state
+    if due is None or step.now < due or state.guard is None or state.guard_alive is None:
+        return
+    if state.guard_overdue is None:
+        step.update(guard_overdue=step.now)
+        return
+    strict = state.plan.guard.mode == "strict"
+    step.report(guard_hangs(state.guard, step.now - state.guard_alive, strict=strict))
+    step.actions.append(Kill(state.guard, SIGKILL))
+    _expect_no_sign_of_life(step)
+
+
+# What follows.
+
+
+def _settle(step: Transition) -> None:
+    """Do what is due, now that the event has been taken in."""
+    state = step.state
+    if state.begun is None:
+        return
+    if state.stop is None and state.clear is None and step.now >= state.begun + state.times.clear_s:
+        step.fail(never_clear(state.guard or "guard", state.times.clear_s))
+    if step.state.stop is None:
+        _go_on(step)
+    send_due_signals(step)
+    if step.state.stop and not any(one.alive for one in step.state.tracked.values()):
+        step.finish(step.state.stop.exit_code)
+
+
+def _go_on(step: Transition) -> None:
+    check_gates(step)
+    _kill_a_guard_that_hangs(step)
+    give_up_waiting(step)
+    for name, one in step.state.tracked.items():
+        if one.state not in ("STOPPED", "BACKOFF"):
+            continue
+        fresh = one.state == "STOPPED" and one.wanted and step.state.clear is not None and not unmet(step.state, one)
+        again = one.state == "BACKOFF" and step.now >= one.since + backoff_s(step.state.times, one.failures)
+        if fresh or again:
+            step.start(name)
+    report_progress(step)
+    due = _reminder_due(step.state)
+    if due is not None and step.now >= due:
+        missing = step.state.awaited
+        step.update(reminded_of=frozenset(edge.child for edge in missing), reminded=step.now)
+        step.notify(Waiting(tuple(_missing(step.state.plan, owner, edges) for owner, edges in by_owner(missing))))
+    tracked = step.state.tracked.values()
+    if step.state.stop is None and all(one.failed or one.state in ("EXITED", "EXPECTED") for one in tracked):
+        step.finish(1 if step.state.given_up else 0)
+
+
+def _reminder_due(state: State) -> float | None:
+    """Return when missing edges are to be named; None if there is nothing new to name."""
+    if state.clear is None or state.complete or not state.awaited:
+        return None
+    if state.reminded is None:
+        return state.clear + state.times.waiting_s
+    missing = {edge.child for edge in state.awaited}
+    return None if missing == state.reminded_of else state.reminded + state.times.waiting_s
+
+
+def _missing(plan: Plan, owner: str, edges: tuple[PlanEdge, ...]) -> Missing:
+    return Missing(owner, edges[0].node, tuple(edge.name for edge in edges), len(plan.edges_of(owner)))

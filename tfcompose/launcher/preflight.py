@@ -1,0 +1,329 @@
+"""Before anything is started: the command of each process, and all that cannot work on this machine, at once.
+
+What only the starting machine knows stands in a plan as a placeholder, ``tfcompose.plan`` lists them. A ROS package's
+program, ``${executable:PACKAGE/NAME}``, is ``lib/PACKAGE/NAME`` below one of the prefixes of AMENT_PREFIX_PATH, else
+NAME on the PATH. A launch file, ``${launch:PACKAGE/FILE}``, is FILE in PACKAGE's share folder, anywhere below it, or
+at the path that is written; it is started as one process, ``ros2 launch`` of a wrapper around it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from tfcompose.findings import Finding, Note, did_you_mean, finding
+from tfcompose.ipc import REMAPPED
+from tfcompose.launcher.fence import by_partition, not_remapped, remapped, way_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from tfcompose.plan import Plan, PlanProcess, RosSettings
+
+_PLACEHOLDER = re.compile(r"\$\{(python|plan|build_dir|params_file)\}")
+_ROS_EXECUTABLE = re.compile(r"\$\{executable:([^/}]+)/([^/}]+)\}")
+_LAUNCH = re.compile(r"\$\{launch:([^/}]+)/([^}]+)\}")
+_OUTPUT = "OVERRIDE_LAUNCH_PROCESS_OUTPUT"
+_WRAPPER = Path(__file__).absolute().with_name("launch_wrapper.py")
+#: The variable in which the wrapper is given the launch file, and what the plan says of it.
+LAUNCH = "TFCOMPOSE_LAUNCH"
+_KINDS = ("*launch.py", "*launch.xml", "*launch.yaml", "*launch.yml")
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """Program and arguments, environment, and folder.
+
+    ``own`` says that it is one of tfcompose's. ``fence`` is a file that must be there first, and what it holds.
+    ``missing`` says, of a process that the run goes on without, why it cannot be started.
+    """
+
+    argv: tuple[str, ...]
+    env: dict[str, str]
+    folder: Path
+    own: bool = False
+    fence: tuple[Path, str] | None = None
+    missing: str = ""
+
+
+class Environment(Protocol):
+    """What makes a process's environment; ``own`` says that the process is one of tfcompose's."""
+
+    def __call__(self, base: Mapping[str, str], ros: RosSettings, *, own: bool) -> dict[str, str]:
+        """Return the environment.
+
+        Raises:
+            RosError: if the plan's settings cannot be followed.
+        """
+
+
+def started_by_us(plan: Plan) -> list[PlanProcess]:
+    """Return the processes that the launcher starts, in the plan's order."""
+    return [process for process in plan.processes if process.kind != "external"]
+
+
+def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
+    plan: Plan,
+    processes: list[PlanProcess],
+    plan_file: Path,
+    base: Mapping[str, str],
+    environment: Environment,
+    built_in: Path | None = None,
+) -> tuple[dict[str, Command], list[Finding]]:
+    """Return each process's command, and what is wrong; with anything wrong, nothing should be started.
+
+    ``built_in`` is the folder that the plan was built in, where ``plan_file`` is a copy of it.
+    """
+    folder = built_in or plan_file.absolute().parent
+    found = _never_started(plan)
+    commands: dict[str, Command] = {}
+    missing = []
+    way = way_of(plan, base)
+    if way == "remap":
+        found += not_remapped(plan)
+        processes = [remapped(plan, process) for process in processes]
+    for process in processes:
+        command = _command_of(process, plan.ros, (plan_file.absolute(), folder), base, environment)
+        if isinstance(command, Finding):
+            found.append(command)
+        elif isinstance(command, NotFound):
+            missing.append(command)
+        else:
+            commands[process.name] = command
+    if way == "partition":
+        commands, wrong = by_partition(plan, commands, plan_file.absolute().parent)
+        found += wrong
+    elif way == "remap":
+        commands = {name: _with_remapping_mark(plan, name, command) for name, command in commands.items()}
+    if missing:
+        found.append(not_found(missing))
+    return commands, list(dict.fromkeys(found))
+
+
+def _command_of(
+    process: PlanProcess,
+    ros: RosSettings,
+    files: tuple[Path, Path],
+    base: Mapping[str, str],
+    environment: Environment,
+) -> Command | NotFound | Finding:
+    own = process.kind != "run"
+    env = environment(base, ros, own=own) | own_env(process, *files)
+    argv = filled_in(process, *files)
+    if not argv:
+        return finding("TF902", f"the plan does not say how {process.name} is started", None)
+    folder = folder_of(process, *files)
+    if not own and not folder.is_dir():
+        lost = f"the folder {folder} that {process.name} runs in is not there"
+        optional = process.required is False
+        return Command(argv, env, folder, missing=lost) if optional else finding("TF810", lost, None)
+    command: Command | NotFound | Finding
+    if _is_launch(argv[0]):
+        launched = _launch_command(process, ros, argv, env)
+        command = Command(launched[0], env | launched[1], folder) if isinstance(launched, tuple) else launched
+    else:
+        program = executable_of(process, argv[0], folder, env)
+        command = program if isinstance(program, NotFound) else Command((program, *argv[1:]), env, folder, own)
+    if isinstance(command, NotFound) and process.required is False:
+        return Command(argv, env, folder, missing=not_found([command]).message)
+    return command
+
+
+def _with_remapping_mark(plan: Plan, name: str, command: Command) -> Command:
+    if plan.process(name).kind != "guard":
+        return command
+    return replace(command, env=command.env | {REMAPPED: "1"})
+
+
+def _never_started(plan: Plan) -> list[Finding]:
+    """Return a finding for each process that waits for what cannot come."""
+    known = {process.name: process for process in plan.processes}
+    found = []
+    for process in plan.processes:
+        for name, what in process.after.items():
+            if name not in known:
+                found.append(finding("TF902", f"{process.name} waits for {name}, which is not in the plan", None))
+            elif what not in _promises(known[name]):
+                found.append(finding("TF902", f"{process.name} waits until {name} is {what}: that never comes", None))
+    waiting = {process.name: set(process.after) & set(known) for process in plan.processes if process.kind != "guard"}
+    while free := [name for name, others in waiting.items() if not others & set(waiting)]:
+        for name in free:
+            del waiting[name]
+    if waiting:
+        found.append(finding("TF812", f"{', '.join(waiting)} wait for each other", None))
+    return found
+
+
+def _promises(process: PlanProcess) -> tuple[str, ...]:
+    return ("started", "ready", "done") if process.kind == "run" else ("started", "ready")
+
+
+# Programs.
+
+
+def folder_of(process: PlanProcess, plan_file: Path, build_dir: Path) -> Path:
+    """Return the folder that the process runs in, an absolute path without ``..`` where the plan says one."""
+    if process.cwd is None:
+        return _here()
+    return Path(os.path.normpath(build_dir / _filled(process.cwd, process, plan_file, build_dir)))
+
+
+def _here() -> Path:
+    """Return the folder that this program runs in; where it was removed meanwhile, the one that it was."""
+    try:
+        return Path.cwd()
+    except FileNotFoundError:
+        return Path(str(Path("/proc/self/cwd").readlink()).removesuffix(" (deleted)"))
+
+
+def filled_in(process: PlanProcess, plan_file: Path, build_dir: Path | None = None) -> tuple[str, ...]:
+    """Return the process's ``argv`` with the placeholders replaced; both paths are absolute."""
+    return tuple(_filled(word, process, plan_file, build_dir) for word in process.argv)
+
+
+def own_env(process: PlanProcess, plan_file: Path, build_dir: Path | None = None) -> dict[str, str]:
+    """Return the variables that the plan gives the process, with the placeholders replaced."""
+    return {name: _filled(value, process, plan_file, build_dir) for name, value in process.env.items()}
+
+
+def _filled(text: str, process: PlanProcess, plan_file: Path, build_dir: Path | None = None) -> str:
+    values = {"python": sys.executable, "plan": str(plan_file), "build_dir": str(build_dir or plan_file.parent)}
+    if process.params_file is not None:
+        values["params_file"] = str(plan_file.parent / process.params_file)
+    return _PLACEHOLDER.sub(lambda found: values.get(found[1], found[0]), text)
+
+
+@dataclass(frozen=True, slots=True)
+class NotFound:
+    """A program that is not there: whose it is, what it is called, where it was looked for, and what may help."""
+
+    process: str
+    program: str
+    places: tuple[str, ...]
+    path: str = ""
+    advice: str = ""
+
+
+def not_found(missing: Sequence[NotFound]) -> Finding:
+    """Return the one finding for all programs that were not found."""
+    what = ", ".join(f"{one.program} of {one.process}" for one in missing)
+    message = f"{len(missing)} executables were not found: {what}"
+    if len(missing) == 1:
+        message = f"the executable {what} was not found"
+    places = dict.fromkeys(place for one in missing for place in one.places)
+    paths = dict.fromkeys(f"looked in the PATH: {one.path}" for one in missing if one.path)
+    advice = dict.fromkeys(one.advice for one in missing if one.advice)
+    return finding("TF810", message, None, notes=[Note(note) for note in (*places, *paths)], help="; ".join(advice))
+
+
+def executable_of(process: PlanProcess, word: str, folder: Path, env: Mapping[str, str]) -> str | NotFound:
+    """Return the path of the program that ``word`` means, or what is missing.
+
+    A relative path is looked up in ``folder``, a bare name on the PATH of ``env``.
+    """
+    ros = _ROS_EXECUTABLE.fullmatch(word)
+    if ros:
+        return _in_package(process, ros[1], ros[2], env)
+    if "/" in word:
+        path = folder / word
+        if _can_run(path):
+            return str(path)
+        advice = "" if word.startswith("/") else f"${{file({word})}} is beside the robot file, wherever up is called"
+        return NotFound(process.name, word, (_why_not(path),), advice=advice)
+    path_variable = env.get("PATH", os.defpath)
+    return shutil.which(word, path=path_variable) or NotFound(process.name, word, (), path_variable)
+
+
+def _in_package(process: PlanProcess, package: str, name: str, env: Mapping[str, str]) -> str | NotFound:
+    prefixes = [prefix for prefix in env.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix]
+    folders = [Path(prefix) / "lib" / package for prefix in prefixes]
+    for folder in folders:
+        if _can_run(folder / name):
+            return str(folder / name)
+    path_variable = env.get("PATH", os.defpath)
+    on_path = shutil.which(name, path=path_variable)
+    if on_path:
+        return on_path
+    notes = [_why_not(folder / name) for folder in folders] or ["AMENT_PREFIX_PATH names no folder"]
+    known = [file.name for folder in folders if folder.is_dir() for file in sorted(folder.iterdir())]
+    otherwise = "source the setup file of your ROS installation first"
+    if prefixes:
+        debian = f"ros-{env.get('ROS_DISTRO', 'jazzy')}-{package.replace('_', '-')}"
+        otherwise = f"install the package {package} (on Ubuntu probably: sudo apt install {debian})"
+    advice = did_you_mean(name, known, "" if known else otherwise)
+    return NotFound(process.name, f"{package}/{name}", tuple(notes), path_variable, advice)
+
+
+def _can_run(path: Path) -> bool:
+    return path.is_file() and os.access(path, os.X_OK)
+
+
+def _why_not(path: Path) -> str:
+    if path.is_file():
+        return f"{path} may not be executed"
+    return f"{path} is a folder" if path.is_dir() else f"{path} is not there"
+
+
+# Launch files.
+
+
+def _is_launch(word: str) -> bool:
+    """Return whether the word means a launch file."""
+    return _LAUNCH.fullmatch(word) is not None
+
+
+def _launch_command(
+    process: PlanProcess, ros: RosSettings, argv: tuple[str, ...], env: Mapping[str, str]
+) -> tuple[tuple[str, ...], dict[str, str]] | NotFound | Finding:
+    """Return the command and what its environment needs besides, or what is missing or wrong."""
+    meant = _LAUNCH.fullmatch(argv[0])
+    package, name = (meant[1], meant[2]) if meant else ("", "")
+    path = env.get("PATH", os.defpath)
+    ros2 = shutil.which("ros2", path=path)
+    if ros2 is None:
+        advice = "source the setup file of your ROS installation first; ros2 launch comes with the package ros2launch"
+        return NotFound(process.name, f"ros2 (for launch {package}/{name})", (), path, advice)
+    file = _find_launch_file(process, package, name, env)
+    if isinstance(file, NotFound):
+        return file
+    arguments = dict(word.split(":=", 1) for word in argv[1:] if ":=" in word)
+    odd = [word for word in argv[1:] if ":=" not in word]
+    if odd:
+        message = f"{process.name}: {odd[0]} is no argument of a launch file"
+        return finding("TF902", message, None, help="give name: value, or name:=value")
+    given = {
+        "file": str(file),
+        "arguments": arguments,
+        "namespace": ros.namespace if process.namespace is None else process.namespace,
+        "remap": process.remap,
+        "sim_time": ros.clock == "sim",
+    }
+    # Without being told, ros2 launch keeps what its nodes say to files of its own.
+    more = {LAUNCH: json.dumps(given, sort_keys=True), _OUTPUT: env.get(_OUTPUT) or "both"}
+    return (ros2, "launch", "--noninteractive", str(_WRAPPER)), more
+
+
+def _find_launch_file(process: PlanProcess, package: str, name: str, env: Mapping[str, str]) -> Path | NotFound:
+    prefixes = [prefix for prefix in env.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix]
+    shares = [Path(prefix) / "share" / package for prefix in prefixes]
+    present = [share for share in shares if share.is_dir()]
+    for share in present:
+        direct = [file for file in (share / name, share / "launch" / name) if file.is_file()]
+        found = direct or sorted(share.rglob(name))
+        if found:
+            return found[0]
+    known = sorted({file.name for share in present for kind in _KINDS for file in share.rglob(kind)})
+    notes = tuple(f"{share} {'has no ' + name if share in present else 'is not there'}" for share in shares)
+    listed = f"it has {', '.join(known[:12])}" if known else f"install the package {package}"
+    return NotFound(
+        process.name,
+        f"launch file {package}/{name}",
+        notes or ("AMENT_PREFIX_PATH names no folder",),
+        advice=did_you_mean(name, known, listed),
+    )

@@ -1,0 +1,185 @@
+"""The runtime directory of a robot: a folder that only the user can open, with a lock, a control socket and the plan.
+
+A robot is one name in one ROS domain; a host's share of it has the host in its name.
+Its folder is in XDG_RUNTIME_DIR, or else in ``/run/user/UID``, or else in ``tfcompose-UID`` below the folder for
+temporary files. Logs outlive the run: they are in ROS's folder for logs (ROS_LOG_DIR, else ROS_HOME/log, else
+~/.ros/log), in ``tfcompose/ROBOT@DOMAIN``.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import stat
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tfcompose.plan.codec import decode, encode
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from tfcompose.plan import Plan
+
+#: Where systemd makes a folder for each user who is logged in, also for services and cron, which are not told of it.
+USERS = Path("/run/user")
+
+
+class RuntimeDirError(Exception):
+    """Raised when there is no safe folder for a run; the message is one sentence for the user."""
+
+
+@dataclass(frozen=True, slots=True)
+class Holder:
+    """Who runs a robot: the launcher's process number, since when (seconds since 1970), and the run's id."""
+
+    pid: int
+    since: float
+    run: str
+
+
+@dataclass(frozen=True, slots=True)
+class RuntimeDir:
+    """The folder of a robot in a domain; ``name`` is ROBOT@DOMAIN, or ROBOT.HOST@DOMAIN."""
+
+    name: str
+    folder: Path
+    logs: Path
+
+    @property
+    def socket(self) -> Path:
+        """The control socket."""
+        return self.folder / "control"
+
+    @property
+    def plan(self) -> Path:
+        """The plan that runs, with what stands beside it: a copy, so that a build does not reach into a run."""
+        return self.folder / "plan" / "plan.json"
+
+    def holder(self) -> Holder | None:
+        """Return who runs the robot now, or None."""
+        try:
+            descriptor = os.open(self.folder / "lock", os.O_RDWR | os.O_NOFOLLOW)
+        except OSError:
+            return None
+        try:
+            return _read_holder(descriptor) if _is_held(descriptor) else None
+        finally:
+            os.close(descriptor)
+
+
+class Lock:
+    """One run at a time: held while this process lives, however it ends. Children do not inherit it."""
+
+    def __init__(self, directory: RuntimeDir) -> None:
+        """Take the lock, or raise BlockingIOError."""
+        directory.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        self.fd = os.open(directory.folder / "lock", os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o600)
+        try:
+            _take(self.fd)
+        except BaseException:
+            os.close(self.fd)
+            raise
+        self.run = f"{directory.name}:{os.urandom(6).hex()}"
+        self.sign()
+
+    def sign(self) -> None:
+        """Write down who holds it: this process."""
+        text = json.dumps(encode(Holder(os.getpid(), time.time(), self.run)))
+        os.ftruncate(self.fd, 0)
+        os.pwrite(self.fd, text.encode(), 0)
+
+    def close(self) -> None:
+        """Give it back."""
+        os.close(self.fd)
+
+
+def _is_held(descriptor: int) -> bool:
+    """Return whether somebody runs the robot: who only looks shares the lock for a moment with others who look."""
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    fcntl.flock(descriptor, fcntl.LOCK_UN)
+    return False
+
+
+def _take(descriptor: int) -> None:
+    """Take the lock, or raise BlockingIOError; who only looks is waited for."""
+    while True:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if _is_held(descriptor):
+                raise
+            time.sleep(0.001)
+        else:
+            return
+
+
+def _read_holder(descriptor: int) -> Holder | None:
+    for _ in range(500):  # it is written a moment after it is taken
+        try:
+            return decode(Holder, json.loads(os.pread(descriptor, 4096, 0)))
+        except ValueError:
+            time.sleep(0.01)
+    return Holder(0, 0.0, "")
+
+
+def runtime_dir_of(plan: Plan, env: Mapping[str, str]) -> RuntimeDir:
+    """Return the runtime directory of the plan's robot in its domain; the folder above it is there afterwards.
+
+    Raises:
+        RuntimeDirError: if there is no folder that only this user can open.
+    """
+    domain = str(plan.ros.domain_id) if plan.ros.domain_id is not None else env.get("ROS_DOMAIN_ID") or "0"
+    share = f"{plan.robot}.{plan.host}" if plan.host else plan.robot
+    return _dir(f"{share}@{domain.strip()}".replace("/", "_"), _runtime_folder(env), env)
+
+
+def runtime_dirs(env: Mapping[str, str]) -> list[RuntimeDir]:
+    """Return every runtime directory that a run has used and that is still there, by name.
+
+    Raises:
+        RuntimeDirError: if there is no folder that only this user can open.
+    """
+    base = _runtime_folder(env)
+    return [_dir(folder.name, base, env) for folder in sorted(base.iterdir()) if (folder / "lock").is_file()]
+
+
+def log_folder(env: Mapping[str, str]) -> Path:
+    """Return where ROS keeps its logs."""
+    if env.get("ROS_LOG_DIR"):
+        return Path(env["ROS_LOG_DIR"])
+    return Path(env.get("ROS_HOME") or Path(env.get("HOME") or "~").expanduser() / ".ros") / "log"
+
+
+def _dir(name: str, base: Path, env: Mapping[str, str]) -> RuntimeDir:
+    return RuntimeDir(name, base / name, log_folder(env) / "tfcompose" / name)
+
+
+def _runtime_folder(env: Mapping[str, str]) -> Path:
+    given = env.get("XDG_RUNTIME_DIR") or str(USERS / str(os.getuid()))
+    if given.startswith("/") and _is_ours(Path(given)):
+        folder = Path(given) / "tfcompose"
+    else:
+        folder = Path(tempfile.gettempdir()) / f"tfcompose-{os.getuid()}"
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+    except OSError as error:
+        raise RuntimeDirError(f"{folder} cannot be made: {error.strerror}") from None
+    if not _is_ours(folder):
+        raise RuntimeDirError(f"{folder} is not a folder that only this user can open; set XDG_RUNTIME_DIR to one")
+    return folder
+
+
+def _is_ours(folder: Path) -> bool:
+    try:
+        found = folder.lstat()
+    except OSError:
+        return False
+    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o077

@@ -1,0 +1,168 @@
+"""What the process machine knows: values only.
+
+Times are seconds of one monotonic clock.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+from tfcompose.ipc import SETTLE
+
+if TYPE_CHECKING:
+    from tfcompose.ipc import StateName
+    from tfcompose.plan import Plan, PlanEdge, PlanProcess
+
+
+@dataclass(frozen=True, slots=True)
+class Times:
+    """How long the launcher waits, in seconds."""
+
+    clear_s: float = 20.0
+    """for the guard's word that nobody publishes a planned edge yet, besides the time that it was told to look"""
+    interrupt_s: float = 5.0
+    """between SIGINT and SIGTERM"""
+    terminate_s: float = 5.0
+    """between SIGTERM and SIGKILL"""
+    waiting_s: float = 5.0
+    """until missing edges are named, and between two such notices"""
+    backoff_s: float = 1.0
+    """before the first restart; doubled with each further one"""
+    backoff_limit_s: float = 30.0
+    """the longest wait before a restart"""
+    steady_s: float = 10.0
+    """a run as long as this makes earlier failures forgotten"""
+    ready_s: float = 30.0
+    """for a process to be ready, where it says by what and not until when"""
+    guard_silent_s: float = 10.0
+    """without a sign of life of the guard's, until it is overdue"""
+    guard_overdue_s: float = 5.0
+    """further, until it is taken to hang"""
+    same_signal_s: float = 0.2
+    """two signals closer than this are one: ``timeout`` and closing terminals send theirs twice"""
+
+
+MAX_RESTARTS = 5
+#: The exit code when nobody reads the output any more: what a shell says of a program that SIGPIPE ended.
+UNREAD = 141
+
+
+@dataclass(frozen=True, slots=True)
+class Tracked:
+    """One process. ``since`` is when it came into its state, or when it was sent its last signal.
+
+    ``order`` counts the starts of all processes, 0 for one that was never started; ``failures`` the short runs in a
+    row; ``restarts`` all starts but the first; ``level`` how often it was told to stop, each time more firmly.
+    ``leaving`` says what follows once it has stopped: "stop" and it stays so, "again" and it is started, "drop" and it
+    is forgotten. ``seen`` is what its gate saw last, ``late`` whether it was reported as late. ``detail`` says why it
+    is in its state. ``failed`` is what was reported when the run went on without it: the finding and the end of its
+    log.
+    """
+
+    process: PlanProcess
+    state: StateName
+    pid: int | None = None
+    since: float = 0.0
+    order: int = 0
+    failures: int = 0
+    level: int = 0
+    ready: bool = False
+    wanted: bool = True
+    leaving: Literal["", "stop", "again", "drop"] = ""
+    restarts: int = 0
+    began: float = 0.0
+    ready_since: float | None = None
+    seen: str = ""
+    late: bool = False
+    detail: str = ""
+    failed: tuple[str, ...] = ()
+
+    @property
+    def alive(self) -> bool:
+        """Whether there is an operating system's process, or will be in a moment."""
+        return self.state in ("STARTING", "RUNNING", "STOPPING")
+
+    @property
+    def was_started(self) -> bool:
+        """Whether it has run, or runs."""
+        return self.order > 0 and self.state != "STARTING"
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Why everything stops, and how it will have ended. ``signals`` counts those that asked for it."""
+
+    cause: Literal["signal", "time", "taken", "failure"]
+    exit_code: int
+    signals: int = 0
+    signalled: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """Everything that is known about a running plan.
+
+    ``clear`` is when the guard reported that nobody publishes an edge of the plan yet. ``live`` holds the children of
+    the edges that were received, ``silent`` those that come no more. ``reported`` are the codes of the errors that were
+    shown, ``reminded_of`` the missing edges that were named last. ``replanned`` is when another plan came, if one did.
+    ``memory`` is what the guard wants the next one to know; ``unwatched`` is since when it is dead, if it is;
+    ``guard_alive`` when it last reported that it works, and ``guard_overdue`` since when that is missed.
+    """
+
+    plan: Plan
+    times: Times
+    tracked: dict[str, Tracked]
+    guard: str | None
+    begun: float | None = None
+    replanned: float = 0.0
+    clear: float | None = None
+    live: frozenset[str] = frozenset()
+    silent: frozenset[str] = frozenset()
+    complete: bool = False
+    reported: frozenset[str] = frozenset()
+    reminded_of: frozenset[str] = frozenset()
+    reminded: float | None = None
+    all_started: bool = False
+    all_ready: bool = False
+    stop: Stop | None = None
+    because: tuple[str, ...] = ()
+    finished: bool = False
+    memory: dict[str, Any] = field(default_factory=dict)
+    unwatched: float | None = None
+    guard_alive: float | None = None
+    guard_overdue: float | None = None
+
+    @property
+    def missing(self) -> tuple[PlanEdge, ...]:
+        """The edges that were not received yet; none where there is no guard."""
+        return () if self.guard is None else tuple(edge for edge in self.plan.edges if edge.child not in self.live)
+
+    @property
+    def awaited(self) -> tuple[PlanEdge, ...]:
+        """The missing edges that may still come: their owners have not failed."""
+        return tuple(edge for edge in self.missing if not self.tracked[edge.owner].failed)
+
+    @property
+    def given_up(self) -> tuple[str, ...]:
+        """The processes that have failed, and without which the run goes on."""
+        return tuple(name for name, one in self.tracked.items() if one.failed)
+
+
+def initial(plan: Plan, times: Times | None = None) -> State:
+    """Return the state before ``Begin``: nothing runs."""
+    processes = plan.processes
+    guards = [process.name for process in processes if process.kind == "guard"]
+    tracked = {
+        process.name: Tracked(process, "EXPECTED" if process.kind == "external" else "STOPPED") for process in processes
+    }
+    times = times or Times()
+    looks_s = sum(float(tracked[name].process.env.get(SETTLE, 0)) for name in guards)
+    times = replace(times, clear_s=times.clear_s + looks_s)
+    return State(plan, times, tracked, guards[0] if guards else None, complete=not plan.edges)
+
+
+def by_owner(edges: tuple[PlanEdge, ...]) -> tuple[tuple[str, tuple[PlanEdge, ...]], ...]:
+    """Return each owner with its edges, in the order of the edges."""
+    owners = dict.fromkeys(edge.owner for edge in edges)
+    return tuple((owner, tuple(edge for edge in edges if edge.owner == owner)) for owner in owners)

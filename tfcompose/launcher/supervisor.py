@@ -1,0 +1,301 @@
+"""Runs a plan: one loop that turns pipes, signals and time into the machine's events, and does what it decides.
+
+The launcher has one thread. Its children lead sessions of their own, so that a Ctrl-C in the terminal reaches the
+launcher alone. A process whose output comes faster than it can be passed on waits in its own pipe; nothing piles up
+here.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import selectors
+import signal
+import time
+from collections import deque
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, final
+
+from tfcompose import interrupt
+from tfcompose.findings import Note
+from tfcompose.ipc import Ended, FindingShown
+from tfcompose.launcher.answers import answer
+from tfcompose.launcher.child import subreaper
+from tfcompose.launcher.children import Children, GuardPipes
+from tfcompose.launcher.events import (
+    Begin,
+    Finish,
+    Kill,
+    Notify,
+    NotifyLate,
+    Order,
+    OutputLost,
+    Signalled,
+    Start,
+    StartFailed,
+    Tick,
+    TimeUp,
+)
+from tfcompose.launcher.machine import step, wake_time
+from tfcompose.launcher.output import Notifier
+from tfcompose.launcher.preflight import commands_of
+from tfcompose.launcher.state import initial
+from tfcompose.ros.environment import child_environment
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+    from pathlib import Path
+    from socket import socket
+    from types import FrameType, TracebackType
+
+    from tfcompose.findings import Finding
+    from tfcompose.ipc import Notice, Request
+    from tfcompose.launcher.answers import Answer, Outcome
+    from tfcompose.launcher.events import Action, Event
+    from tfcompose.launcher.output import NonBlockingOutput
+    from tfcompose.launcher.preflight import Command, Environment
+    from tfcompose.launcher.state import State, Times
+    from tfcompose.plan import Plan
+
+#: The loop checks its children at least this often, whatever signals say; seconds.
+LONGEST_SLEEP_S = 1.0
+#: What ends a plan.
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+#: Processes that can be held before they join ROS.
+_PREPARED = ("static", "joints", "simulate")
+
+
+@dataclass(slots=True)
+class Session:
+    """The plan's file, the run's id, the control socket, and an output that does not wait.
+
+    ``base`` is the folder that the plan was built in, where ``plan_file`` is a copy. With an id, what the run's
+    processes leave behind is ended with it, also what left their groups. ``refresh`` is called now and then.
+    """
+
+    plan_file: Path
+    run_id: str = ""
+    base: Path | None = None
+    listener: socket | None = None
+    output: NonBlockingOutput | None = None
+    refresh: Callable[[], None] | None = None
+
+
+def supervise(  # noqa: PLR0913 (all but two are named, and most have what a user wants as default)
+    plan: Plan,
+    plan_file: Path,
+    *,
+    report: Callable[[Notice], None],
+    duration_s: float | None = None,
+    base_env: Mapping[str, str] | None = None,
+    environment: Environment = child_environment,
+    times: Times | None = None,
+    session: Session | None = None,
+) -> int:
+    """Run the plan until it ends, and return the exit code: 0 after a clean end, 1 after a failure or a finding.
+
+    SIGINT, SIGTERM and SIGHUP end it. ``report`` is given everything that a person should know, in order; an OSError
+    from it means that nobody reads it any more, and ends the plan. ``duration_s`` is how long to run after
+    the look before the start, in seconds. ``session`` is what the run has on this machine besides its processes. Must
+    be called in the main thread.
+    """
+    state = initial(plan, times)
+    processes = [one.process for one in state.tracked.values() if one.state != "EXPECTED"]
+    base = os.environ if base_env is None else base_env
+    built_in = session.base if session else None
+    commands, found = commands_of(plan, processes, plan_file, base, environment, built_in)
+    if found:
+        for one in found:
+            report(FindingShown(one))
+        report(Ended(1))
+        return 1
+    with contextlib.ExitStack() as stack:
+        decide = partial(answer, base=base, environment=environment)
+        supervisor = _Supervisor(state, commands, report, session or Session(plan_file), decide, stack)
+        return supervisor.run(duration_s)
+
+
+class _Supervisor:
+    def __init__(  # noqa: PLR0913, PLR0917 (made in one place)
+        self,
+        state: State,
+        commands: dict[str, Command],
+        report: Callable[[Notice], None],
+        session: Session,
+        decide: Callable[..., Outcome],
+        stack: contextlib.ExitStack,
+    ) -> None:
+        self._state = state
+        self._commands = commands
+        self._events: deque[Event] = deque()
+        self._exit_code: int | None = None
+        self._due: float | None = None
+        self._check_at = 0.0
+        selector = stack.enter_context(selectors.DefaultSelector())
+        self._selector = selector
+        self._signals = stack.enter_context(Signals())
+        selector.register(self._signals.fd, selectors.EVENT_READ, self._signals.woken)
+        self._session = session
+        self._decide = decide
+        self._notifier = Notifier(selector, session, report, lambda: self._events.append(OutputLost()))
+        self._notifier.listen(session, self._answer)
+        self._notify = self._notifier.notify
+        stack.callback(self._notifier.close)
+        if session.run_id:
+            stack.enter_context(subreaper())
+        self._children = Children(selector, session.run_id, self._handle, self._notify)
+        stack.callback(self._children.close)
+
+    def run(self, duration_s: float | None) -> int:
+        self._handle(Begin())
+        self._prepare()
+        while self._exit_code is None:
+            end = self._end(duration_s)
+            self._notifier.catch_up()
+            for key, _ in self._selector.select(self._sleep_s(end)):
+                key.data()
+            for number in self._signals.taken():
+                self._handle(Signalled(number))
+            is_due = time.monotonic() >= self._check_at
+            if self._signals.children_changed() or is_due:
+                self._children.reap()
+            if is_due:
+                self._children.find_strays()
+                self._check_at = time.monotonic() + LONGEST_SLEEP_S
+            if end is not None and time.monotonic() >= end:
+                self._handle(TimeUp())
+            elif self._events or (self._due or math.inf) <= time.monotonic():
+                self._handle(Tick())
+        return self._exit_code
+
+    def _prepare(self) -> None:
+        """While the guard checks whether an edge is taken, have as many publishers load Python as there are cores."""
+        if self._state.clear is not None or self._state.stop:
+            return
+        own = [one.process for one in self._state.tracked.values() if one.process.kind in _PREPARED]
+        for process in [process for process in own if not process.after][: os.cpu_count() or 1]:
+            self._children.prepare(process, self._commands[process.name])
+
+    def _answer(self, request: Request) -> Answer:
+        answer, event, planned = self._decide(request, self._state, self._session.plan_file)
+        if planned:
+            self._children.dismiss()
+            self._session.plan_file, self._commands = planned
+        if event:
+            self._handle(event)
+        return answer
+
+    def _end(self, duration_s: float | None) -> float | None:
+        """Return when the time is up: it counts from the end of the look before the start."""
+        state = self._state
+        if duration_s is None or state.clear is None or state.stop:
+            return None
+        return state.clear + duration_s
+
+    def _sleep_s(self, end: float | None) -> float:
+        due = [at for at in (self._due, end) if at is not None]
+        return min(LONGEST_SLEEP_S, max(0.0, min(due, default=float("inf")) - time.monotonic()))
+
+    def _handle(self, event: Event) -> None:
+        self._events.append(event)
+        while self._events:
+            self._state, actions = step(self._state, self._events.popleft(), time.monotonic())
+            for action in actions:
+                self._do(action)
+        if self._state.stop:
+            self._children.dismiss()
+        self._due = wake_time(self._state)
+
+    def _do(self, action: Action) -> None:
+        match action:
+            case Start(name):
+                self._start(name)
+            case Kill(name, number):
+                self._children.kill(name, number)
+            case Notify(notice):
+                self._notify(notice)
+            case Order(order):
+                self._children.order(order)
+            case NotifyLate(name, found):
+                self._notify_late(name, found)
+            case Finish(exit_code):
+                self._exit_code = exit_code
+            case _:
+                pass
+
+    def _start(self, name: str) -> None:
+        state = self._state
+        guard = None
+        try:
+            if name == state.guard:
+                guard = GuardPipes(joins=state.clear is not None, memory=state.memory)
+        except OSError as error:
+            self._events.append(StartFailed(name, str(error)))
+            return
+        self._events.append(self._children.start(state.tracked[name].process, self._commands[name], guard))
+
+    def _notify_late(self, name: str, found: Finding) -> None:
+        notes = [Note(f"{name}: {line}") for line in self._children.last_lines(name)]
+        self._notify(FindingShown(replace(found, notes=(*found.notes, *notes))))
+
+
+@final
+class Signals:
+    """Catches what ends a plan, and SIGCHLD so that it wakes the loop; puts everything back afterwards.
+
+    A SIGHUP that is ignored, as below ``nohup``, stays ignored.
+    """
+
+    def __init__(self) -> None:
+        self._taken: deque[int] = deque()
+        self._children_changed = False
+        self._stack = contextlib.ExitStack()
+        self.fd = -1
+
+    def __enter__(self) -> Signals:
+        self.fd, write_fd = os.pipe()
+        self._stack.callback(os.close, self.fd)
+        self._stack.callback(os.close, write_fd)
+        os.set_blocking(self.fd, False)
+        os.set_blocking(write_fd, False)
+        before = signal.set_wakeup_fd(write_fd, warn_on_full_buffer=False)
+        self._stack.callback(signal.set_wakeup_fd, before)
+        for number in (*ENDING, signal.SIGCHLD):
+            if number == signal.SIGHUP and signal.getsignal(number) == signal.SIG_IGN:
+                continue
+            handler = signal.signal(number, self._append)
+            self._stack.callback(signal.signal, number, signal.SIG_DFL if handler is None else handler)
+        if interrupt.taken():
+            self._taken.append(signal.SIGINT)
+            os.write(write_fd, b"\0")
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.close()
+
+    def _append(self, number: int, _frame: FrameType | None) -> None:
+        self._taken.append(number)
+
+    def woken(self) -> None:
+        """Empty the pipe that woke the loop."""
+        with contextlib.suppress(BlockingIOError):
+            os.read(self.fd, 4096)
+
+    def taken(self) -> Iterator[int]:
+        """Yield the signals that came since the last call, without SIGCHLD."""
+        while self._taken:
+            number = self._taken.popleft()
+            if number != signal.SIGCHLD:
+                yield number
+            else:
+                self._children_changed = True
+
+    def children_changed(self) -> bool:
+        """Return whether SIGCHLD was among those that ``taken`` has passed since the last call."""
+        changed, self._children_changed = self._children_changed, False
+        return changed

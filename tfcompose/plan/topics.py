@@ -1,0 +1,74 @@
+"""On which topics a plan's processes publish TF: those of the plan, and behind which fence, if its guard is strict.
+
+A fence is a DDS partition, or topics of each process's own, to which it is remapped. Launcher and guard both know it.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import TYPE_CHECKING
+from zlib import crc32
+
+if TYPE_CHECKING:
+    from tfcompose.plan import Plan, PlanEdge, PlanProcess
+
+#: Topics of moving and of fixed edges.
+Topics = tuple[str, str]
+
+#: The topics of moving and of fixed edges, where nothing moves them.
+GLOBAL = ("/tf", "/tf_static")
+#: What no part of a topic's name may hold.
+_UNDERSCORES = re.compile(r"__+|_(?=/|$)")
+
+
+def parts_of(plan: Plan) -> dict[Topics, Plan]:
+    """Return, for each pair of topics (moving, fixed) that owners publish on, the plan with the edges on these."""
+    topics = {process.name: process.topics for process in plan.processes}
+    edges: dict[Topics, list[PlanEdge]] = {}
+    for edge in plan.edges:
+        edges.setdefault(topics.get(edge.owner, GLOBAL), []).append(edge)
+    return {pair: replace(plan, edges=tuple(some)) for pair, some in edges.items()}
+
+
+def partition_of(plan: Plan) -> str:
+    """Return the partition that the plan's processes send TF in: those of one host, where it runs on several."""
+    return f"tfc_{plan.robot}.{re.sub(r'[^A-Za-z0-9.-]', '_', plan.host)}" if plan.host else f"tfc_{plan.robot}"
+
+
+def judged_topics(plan: Plan) -> set[Topics]:
+    """Return the pairs of topics that the guard watches: a process that sends on others is nobody's business."""
+    return {process.topics for process in plan.processes if process.kind == "guard"} | parts_of(plan).keys()
+
+
+def private_topics(plan: Plan) -> dict[str, Topics]:
+    """Return, for each process that can be remapped, the topics (moving, fixed) that it is remapped to.
+
+    Their first underscore hides them from lists of topics.
+    """
+    judged = judged_topics(plan)
+    folders = {
+        process.name: f"/_tfcompose/{_plain(plan.robot)}/{_plain(process.name)}"
+        for process in plan.processes
+        if takes_remappings(process) and process.topics in judged
+    }
+    return {name: (f"{folder}/tf", f"{folder}/tf_static") for name, folder in folders.items()}
+
+
+def takes_remappings(process: PlanProcess) -> bool:
+    """Return whether it is started by us, may send TF, and takes ROS arguments as far as anybody knows.
+
+    What is started by a plain command may be no ROS node at all, unless it owns an edge or is given ROS arguments. What
+    follows a text that a shell reads does not reach the program.
+    """
+    if process.kind != "run":
+        return process.kind in ("static", "joints", "simulate")
+    if not process.argv or process.argv[:2] == ("/bin/sh", "-c"):
+        return False
+    return process.argv[0].startswith("${") or bool(process.owns) or "--ros-args" in process.argv
+
+
+def _plain(name: str) -> str:
+    """Return the name as part of a topic's, which holds no two underscores in a row and ends with none."""
+    plain = _UNDERSCORES.sub("_0", name)
+    return name if plain == name else f"{plain}_{crc32(name.encode()):08x}"

@@ -40,12 +40,15 @@ MAY_IMPORT: dict[str, set[str]] = {
     "urdf": {"catalogue", "check", "files", "findings", "geometry", "load", "model", "numbers"},
     "export": {"emit", "files", "numbers", "plan"},
     "emit": {"draw", "files", "geometry", "model", "numbers", "plan", "render", "urdf"},
+    "text": set(),
     "ros": {"findings", "interrupt", "plan", "geometry"},
-    "verdict": {"catalogue", "findings", "plan", "geometry"},
+    "live": {"geometry", "plan", "ros", "tf2", "tree"},
+    "bags": {"geometry", "live", "plan", "ros", "tf2"},
+    "verdict": {"catalogue", "findings", "geometry", "live", "plan", "ros", "text", "tree"},
+    "guard": {"findings", "geometry", "ipc", "live", "plan", "ros", "run", "text", "verdict"},
     "launcher": {"findings", "interrupt", "ipc", "plan", "ros"},
-    "run": {"findings", "ipc", "plan", "geometry", "launcher", "ros", "tree", "verdict"},
+    "run": {"findings", "ipc", "interrupt", "plan", "geometry", "guard", "launcher", "ros"},
     "tf2": {"geometry", "ros"},
-    "observe": {"catalogue", "findings", "model", "plan", "geometry", "ros", "tf2", "tree", "verdict"},
     "compile": FOUNDATIONS | STAGES,
     "pages": {"catalogue", "check"},
     "importing": {"compile", "files", "findings", "geometry", "language", "model", "numbers", "resolve", "urdf"},
@@ -64,7 +67,7 @@ ONLY_IN: dict[str, set[str]] = {
     "yourdfpy": {"urdf"},
     "pypdfium2": {"draw"},
     "rclpy": {"ros"},
-    "rosbags": {"observe"},
+    "rosbags": {"bags"},
     "tf2_msgs": {"ros"},
     "geometry_msgs": {"ros"},
     "sensor_msgs": {"ros"},
@@ -142,7 +145,7 @@ def test_a_stage_is_imported_by_its_own_name_from_outside(file: Path) -> None:
 
 def test_launcher_guard_and_publishers_do_not_know_each_other() -> None:
     """They are processes of their own: what they tell each other stands in ``ipc``."""
-    rooms = ("tfcompose.launcher", "tfcompose.run.guard", "tfcompose.run.publishing")
+    rooms = ("tfcompose.launcher", "tfcompose.guard", "tfcompose.run.publishing")
     for room in rooms:
         files = list((PACKAGE.parent / room.replace(".", "/")).rglob("*.py"))
         assert files
@@ -161,6 +164,10 @@ def test_a_command_is_imported_by_the_parser_alone() -> None:
     assert importers == ["cli/parser.py"]
 
 
+#: Parts that import in a function what is optional, or heavy and rarely needed.
+LATE_IMPORTS = {"bags", "cli", "guard", "ros", "run", "tf2"}
+
+
 def test_nothing_is_imported_inside_a_function() -> None:
     """A circle would be broken that way; only the command line loads what is heavy where a command needs it."""
     inside = [
@@ -169,7 +176,7 @@ def test_nothing_is_imported_inside_a_function() -> None:
         for function in ast.walk(ast.parse(file.read_text("utf-8")))
         if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef))
         for node in ast.walk(function)
-        if isinstance(node, (ast.Import, ast.ImportFrom)) and part_of(file) not in {"cli", "ros", "run", "tf2"}
+        if isinstance(node, (ast.Import, ast.ImportFrom)) and part_of(file) not in LATE_IMPORTS
     ]
     assert not inside
 
@@ -220,7 +227,7 @@ def test_commands_after_the_plan_load_nothing_from_elsewhere_and_no_compiler(
     built = "tests/golden/my_robot/plan.json"
     loaded = loaded_by(command(*(built if word == "plan.json" else word for word in words)))
     assert not foreign(loaded, bare)
-    assert "run" in parts_in(loaded)
+    assert {"launcher", "plan"} & parts_in(loaded)
     assert not parts_in(loaded) & {*STAGES, "compile", "emit"}
 
 
@@ -233,7 +240,7 @@ def test_commands_before_the_plan_load_yaml_and_pydantic_and_nothing_else_from_e
     loaded = loaded_by(command(words[0], robot, *words[1:], *more))
     pydantic = {"pydantic", "pydantic_core", "annotated_types", "typing_extensions", "typing_inspection"}
     assert foreign(loaded, bare) - {"cython_runtime"} == {"yaml", *pydantic}
-    assert not loaded & {"tfcompose.ros", "tfcompose.run", "tfcompose.observe"}
+    assert not loaded & {"tfcompose.ros", "tfcompose.run", "tfcompose.launcher", "tfcompose.guard", "tfcompose.live"}
 
 
 def test_reading_and_supervising_a_plan_loads_nothing_from_elsewhere_and_no_compiler(bare: set[str]) -> None:
@@ -256,7 +263,7 @@ def test_the_buffer_stands_on_its_own() -> None:
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("module", ["publishing.static_role", "publishing.simulate_role", "guard.watch"])
+@pytest.mark.parametrize("module", ["run.publishing.static_role", "run.publishing.simulate_role", "guard.process"])
 def test_processes_that_need_no_arrays_load_no_numpy_and_no_pydantic(module: str) -> None:
     """Each is a fifth of their memory."""
-    assert not {"numpy", "pydantic", "pydantic_core"} & loaded_by(f"import tfcompose.run.{module}")
+    assert not {"numpy", "pydantic", "pydantic_core"} & loaded_by(f"import tfcompose.{module}")

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tfcompose.cli.edge_table import lines_of
-from tfcompose.observe.census import Census, Publisher
+from tfcompose.live.edges import TreeObserver
+from tfcompose.live.publishers import Publisher
 
 SECOND = 1_000_000_000
 
@@ -15,10 +16,10 @@ def row(parent: str, child: str, stamp_ns: int) -> tuple[object, ...]:
 
 
 @pytest.fixture
-def census() -> Census:
-    seen = Census()
+def observer() -> TreeObserver:
+    seen = TreeObserver()
     fixed = [Publisher(gid, "/static", static=True) for gid in (b"2", b"3")]
-    seen.graph([Publisher(b"1", "/front/diff_drive_controller", static=False), *fixed])
+    seen.take_graph([Publisher(b"1", "/front/diff_drive_controller", static=False), *fixed])
     for tenth in range(10, 40):
         at = tenth * SECOND // 10
         rows = [row("front/odom", "front/base_footprint", at - 2_000_000)]
@@ -37,16 +38,18 @@ def census() -> Census:
         (70, "edge publisher rate age delay"),
     ],
 )
-def test_a_narrow_window_has_fewer_columns_and_whole_numbers(census: Census, width: int | None, heads: str) -> None:
-    edges = census.edges(4 * SECOND)
-    _, head, *rows = lines_of(edges, census, 4 * SECOND, width)
+def test_a_narrow_window_has_fewer_columns_and_whole_numbers(
+    observer: TreeObserver, width: int | None, heads: str
+) -> None:
+    edges = observer.edges(4 * SECOND)
+    _, head, *rows = lines_of(edges, observer, 4 * SECOND, width)
     assert " ".join(head.split()) == heads
     assert all(len(line) < (width or 200) for line in (head, *rows))
     assert any("10.0 Hz" in line and line.endswith("2.0 ms") for line in rows), rows
 
 
-def test_a_remark_is_read_before_how_even_an_edge_is(census: Census) -> None:
-    census.take([row("mast", "lidar", 0)], static=True, gid=b"3", received_ns=0)  # type: ignore[list-item]
-    table = "\n".join(lines_of(census.edges(4 * SECOND), census, 4 * SECOND, 100))
+def test_a_remark_is_read_before_how_even_an_edge_is(observer: TreeObserver) -> None:
+    observer.take([row("mast", "lidar", 0)], static=True, gid=b"3", received_ns=0)  # type: ignore[list-item]
+    table = "\n".join(lines_of(observer.edges(4 * SECOND), observer, 4 * SECOND, 100))
     assert "jitter" not in table
     assert table.count("not the only one\n") + table.endswith("not the only one") == 2

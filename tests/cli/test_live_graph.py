@@ -7,9 +7,10 @@ from typing import Any
 import pytest
 
 from tfcompose.cli import main
-from tfcompose.cli.commands.graph import graph_of_censuses
+from tfcompose.cli.commands.graph import graph_of_observers
 from tfcompose.geometry import Pose
-from tfcompose.observe.census import Census, Publisher
+from tfcompose.live.edges import TreeObserver
+from tfcompose.live.publishers import Publisher
 from tfcompose.plan import Plan, PlanEdge, RosSettings, SourceLine
 
 SECOND = 1_000_000_000
@@ -20,9 +21,9 @@ def row(parent: str, child: str, second: int, x: float = 0.0, w: float = 1.0) ->
 
 
 @pytest.fixture
-def census() -> Census:
-    seen = Census()
-    seen.graph([Publisher(b"1", "/drive", static=False), Publisher(b"2", "/static", static=True)])
+def observer() -> TreeObserver:
+    seen = TreeObserver()
+    seen.take_graph([Publisher(b"1", "/drive", static=False), Publisher(b"2", "/static", static=True)])
     for second in range(1, 5):
         seen.take([row("odom", "base", second)], static=False, gid=b"1", received_ns=second * SECOND)  # type: ignore[list-item]
     seen.take([row("base", "lidar", 1, 0.25)], static=True, gid=b"2", received_ns=4 * SECOND)  # type: ignore[list-item]
@@ -30,8 +31,8 @@ def census() -> Census:
     return seen
 
 
-def test_each_edge_has_its_publisher_its_kind_and_its_rate(census: Census) -> None:
-    arrows = {(one.parent, one.child): one for one in graph_of_censuses([census], "/tf").arrows}
+def test_each_edge_has_its_publisher_its_kind_and_its_rate(observer: TreeObserver) -> None:
+    arrows = {(one.parent, one.child): one for one in graph_of_observers([observer], "/tf").arrows}
     assert len(arrows) == 3
     moving, fixed, second = arrows["odom", "base"], arrows["base", "lidar"], arrows["mast", "lidar"]
     assert (moving.owner, moving.kind, moving.detail, moving.pose) == ("/drive", "dynamic", "1.0 Hz", "")
@@ -39,19 +40,19 @@ def test_each_edge_has_its_publisher_its_kind_and_its_rate(census: Census) -> No
     assert second.owner == "somebody"
 
 
-def test_poses_stand_below_and_a_rotation_that_is_none_is_said(census: Census) -> None:
-    arrows = {(one.parent, one.child): one for one in graph_of_censuses([census], "/tf", poses=True).arrows}
+def test_poses_stand_below_and_a_rotation_that_is_none_is_said(observer: TreeObserver) -> None:
+    arrows = {(one.parent, one.child): one for one in graph_of_observers([observer], "/tf", poses=True).arrows}
     assert arrows["base", "lidar"].pose == "xyz 0.25 0 0"
     assert arrows["mast", "lidar"].pose == "no rotation"
 
 
-def test_what_the_plan_expects_and_nobody_publishes_is_said_to_be_missing(census: Census) -> None:
+def test_what_the_plan_expects_and_nobody_publishes_is_said_to_be_missing(observer: TreeObserver) -> None:
     edges = (
         PlanEdge("odom", "base", "dynamic", "drive", "/drive", Pose(), 1.0, SourceLine("rover.yaml", 1)),
         PlanEdge("base", "imu", "static", "static", "/static", Pose(), None, SourceLine("rover.yaml", 2)),
     )
     plan = Plan("rover", "0", "base", RosSettings(), edges, ())
-    graph = graph_of_censuses([census], "rover", plan)
+    graph = graph_of_observers([observer], "rover", plan)
     assert [(one.child, one.owner) for one in graph.arrows if one.detail == "missing"] == [("imu", "/static")]
 
 

@@ -16,7 +16,7 @@ from tfcompose.plan import Plan, Ready
 from tfcompose.plan.file import read_plan, write_plan
 from tfcompose.plan.hosts import describe_share, hosts_of, share_of
 from tfcompose.plan.topics import partition_of
-from tfcompose.verdict.offence import relays_of
+from tfcompose.verdict.ownership import relays_of
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -7,9 +7,11 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.geometry import Pose
+from tfcompose.guard.judge import Judge
 from tfcompose.ipc import Clear, Found, GuardEvent, Taken
+from tfcompose.live.messages import Message
+from tfcompose.live.publishers import Publisher as TFPublisher
 from tfcompose.plan import Claim, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
-from tfcompose.run.guard.judge import Judge, Message, Writer
 
 if TYPE_CHECKING:
     from tfcompose.findings import Finding
@@ -124,7 +126,7 @@ class History:
         return self
 
     def look(self) -> History:
-        writers = [Writer(p.gid, p.node, p.static, p.volatile) for p in self.graph]
+        writers = [TFPublisher(p.gid, p.node, p.static, latched=not p.volatile) for p in self.graph]
         self.events += self.judge.graph(writers, self.now)
         self.events += self.judge.tick(self.now)
         return self

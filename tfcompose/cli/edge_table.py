@@ -11,7 +11,7 @@ from tfcompose.cli.terminal import counted, printable
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tfcompose.observe.census import Census, EdgeSeen
+    from tfcompose.live.edges import EdgeState, TreeObserver
 
 #: A stamp that is farther off is taken to be of another clock.
 _CLOCKS_AGREE_S = 1e6
@@ -23,7 +23,7 @@ _SPARED = ("jitter", "gap", "kind")
 _READABLE = (20, 20, *(0,) * 6, 16)
 
 
-def lines_of(edges: Sequence[EdgeSeen], census: Census, now_ns: int, width: int | None = None) -> list[str]:
+def lines_of(edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int, width: int | None = None) -> list[str]:
     """Return a line about all, and a table with a line for each edge of each publisher.
 
     Where the table is wider than ``width``, columns are left out and names are cut.
@@ -34,7 +34,7 @@ def lines_of(edges: Sequence[EdgeSeen], census: Census, now_ns: int, width: int 
     if width is not None:
         _narrow(widths, width)
     table = [_line(row, widths) for row in rows] if edges else []
-    return [_summary(edges, census, now_ns), *table]
+    return [_summary(edges, observer, now_ns), *table]
 
 
 def _narrow(widths: dict[int, int], width: int) -> None:
@@ -53,40 +53,40 @@ def _over(widths: dict[int, int], width: int) -> int:
     return sum(widths.values()) + 2 * (len(widths) - 1) - (width - 1)
 
 
-def _several(edges: Sequence[EdgeSeen]) -> set[str]:
+def _several(edges: Sequence[EdgeState]) -> set[str]:
     """Return the children that more than one publisher sends, or that have more than one parent."""
-    counts = Counter(seen.strand.child for seen in edges if seen.present is not False)
+    counts = Counter(seen.stream.child for seen in edges if seen.present is not False)
     return {child for child, number in counts.items() if number > 1}
 
 
-def _summary(edges: Sequence[EdgeSeen], census: Census, now_ns: int) -> str:
-    seconds = max(0, now_ns - census.begun_ns) / 1e9 if census.begun_ns else 0.0
-    names = {(seen.strand.parent, seen.strand.child) for seen in edges}
-    parts = [counted(len(names), "edge"), f"{counted(census.messages, 'message')} in {seconds:.1f} s"]
+def _summary(edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int) -> str:
+    seconds = max(0, now_ns - observer.begun_ns) / 1e9 if observer.begun_ns else 0.0
+    names = {(seen.stream.parent, seen.stream.child) for seen in edges}
+    parts = [counted(len(names), "edge"), f"{counted(observer.messages, 'message')} in {seconds:.1f} s"]
     senders = {seen.publisher for seen in edges if seen.publisher}
     if senders:
         parts.insert(1, counted(len(senders), "publisher"))
-    bad = sum(census.malformed.values())
+    bad = sum(observer.malformed.values())
     parts += [f"{bad} not readable"] if bad else []
-    parts += ["delays are from stamp to recording"] if census.end_ns else []
-    parts += [f"{census.beyond} transforms of further edges not kept"] if census.beyond else []
+    parts += ["delays are from stamp to recording"] if observer.end_ns else []
+    parts += [f"{observer.beyond} transforms of further edges not kept"] if observer.beyond else []
     return ", ".join(parts)
 
 
-def _row(seen: EdgeSeen, several: set[str]) -> tuple[str, ...]:
-    strand, timing = seen.strand, seen.timing
+def _row(seen: EdgeState, several: set[str]) -> tuple[str, ...]:
+    stream, timing = seen.stream, seen.timing
     remarks = []
-    if strand.refused is not None:
-        some = f"{strand.refusals} of {strand.tally.count} " if strand.refusals < strand.tally.count else ""
-        remarks.append(f"{some}refused: {strand.refused.text}")
-    if strand.child in several and seen.present is not False:
+    if stream.rejected is not None:
+        some = f"{stream.rejections} of {stream.arrivals.count} " if stream.rejections < stream.arrivals.count else ""
+        remarks.append(f"{some}refused: {stream.rejected.text}")
+    if stream.child in several and seen.present is not False:
         remarks.append("not the only one")
     if seen.present is False:
         remarks.append("publisher left")
-    if strand.stamps_back and not strand.static:
-        remarks.append(f"{strand.stamps_back}× back in time")
+    if stream.stamps_back and not stream.static:
+        remarks.append(f"{stream.stamps_back}× back in time")
     name, who = printable(seen.name), printable(seen.publisher) or "–"
-    if strand.static:
+    if stream.static:
         return (name, who, "static", "", "", "", "", "", ", ".join(remarks))
     return (
         name, who, "dynamic",
@@ -114,29 +114,29 @@ def _line(row: Sequence[str], widths: dict[int, int]) -> str:
     return "  ".join(cells).rstrip()
 
 
-def objects_of(edges: Sequence[EdgeSeen], census: Census, now_ns: int) -> str:
+def objects_of(edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int) -> str:
     """Return one line of JSON: what was counted, and a list of edges; times in seconds, stamps in nanoseconds."""
     data = {
         "time_ns": now_ns,
-        "messages": census.messages,
-        "delay_until": "recording" if census.end_ns else "arrival",
-        "malformed": sum(census.malformed.values()),
+        "messages": observer.messages,
+        "delay_until": "recording" if observer.end_ns else "arrival",
+        "malformed": sum(observer.malformed.values()),
         "edges": [object_of(seen) for seen in edges],
     }
     return json.dumps(data, ensure_ascii=False) + "\n"
 
 
-def object_of(seen: EdgeSeen) -> dict[str, Any]:
+def object_of(seen: EdgeState) -> dict[str, Any]:
     """Return one edge for programs; what is not known is null."""
-    strand, timing = seen.strand, seen.timing
+    stream, timing = seen.stream, seen.timing
     return {
-        "parent": strand.parent,
-        "child": strand.child,
-        "kind": "static" if strand.static else "dynamic",
+        "parent": stream.parent,
+        "child": stream.child,
+        "kind": "static" if stream.static else "dynamic",
         "publisher": seen.nodes[0] if len(seen.nodes) == 1 else None,
         "publishers": list(seen.nodes),
         "present": seen.present,
-        "count": strand.tally.count,
+        "count": stream.arrivals.count,
         "rate": timing.rate,
         "jitter_s": timing.jitter_s,
         "longest_gap_s": timing.longest_gap_s,
@@ -145,9 +145,9 @@ def object_of(seen: EdgeSeen) -> dict[str, Any]:
         "delay_s": timing.delay_s,
         "least_delay_s": timing.least_delay_s,
         "most_delay_s": timing.most_delay_s,
-        "stamp_ns": strand.stamp_ns,
-        "stamps_back": strand.stamps_back,
-        "stamps_repeated": strand.stamps_repeated,
-        "refused": strand.refused.value if strand.refused else None,
-        "refusals": strand.refusals,
+        "stamp_ns": stream.stamp_ns,
+        "stamps_back": stream.stamps_back,
+        "stamps_repeated": stream.stamps_repeated,
+        "refused": stream.rejected.value if stream.rejected else None,
+        "refusals": stream.rejections,
     }

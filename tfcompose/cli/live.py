@@ -5,23 +5,21 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, TypeVar
 
+from tfcompose.bags import BagError, missing_rosbags, observe_bag
 from tfcompose.cli.plans import expected_plan
 from tfcompose.cli.terminal import INTERRUPTED, UNREADABLE, complain, fail, reject
 from tfcompose.findings import Note, finding
-from tfcompose.observe.bag import missing_rosbags, take_bag
-from tfcompose.observe.bag_files import BagError
-from tfcompose.observe.census import topics_below
-from tfcompose.observe.elsewhere import advice, said
 from tfcompose.plan import RosSettings
-from tfcompose.plan.topics import parts_of
+from tfcompose.plan.topics import parts_of, topics_below
 from tfcompose.ros.environment import RosError, child_environment, ros_trouble
 from tfcompose.ros.stop import Stop
+from tfcompose.verdict.setup import elsewhere_help, settings_text
 
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
-    from tfcompose.observe.census import Census
+    from tfcompose.live.edges import TreeObserver
     from tfcompose.plan import Plan
 
     Topics = tuple[str, str]
@@ -55,15 +53,15 @@ def observed_topics(arguments: Namespace) -> tuple[Plan | None, list[Topics]]:
     return plan, list(parts_of(plan)) or [topics_below(plan.ros.namespace)]
 
 
-def read_bag(path: str, censuses: Mapping[Topics, Census], *, may_be_silent: bool = False) -> None:
-    """Put a bag into the censuses of these topics (moving, fixed).
+def read_bag(path: str, observers: Mapping[Topics, TreeObserver], *, may_be_silent: bool = False) -> None:
+    """Put a bag into the observers of these topics (moving, fixed).
 
     Raises:
         SystemExit: after saying why not: nothing came is a reason, unless it ``may_be_silent``.
     """
-    from_bag(lambda: take_bag(path, censuses))
-    if not may_be_silent and not any(census.heard for census in censuses.values()):
-        message = f"no message was recorded on {names_of(censuses)} in {path}"
+    from_bag(lambda: observe_bag(path, observers))
+    if not may_be_silent and not any(observer.heard for observer in observers.values()):
+        message = f"no message was recorded on {names_of(observers)} in {path}"
         help_ = "was the robot running? /tf_static is sent once: record it with durability transient_local"
         reject([finding("TF811", message, None, help=help_)])
 
@@ -86,7 +84,7 @@ def from_bag(read: Callable[[], T]) -> T:
 
 def observe(  # noqa: PLR0913 (all but two are named)
     name: str,
-    censuses: Mapping[Topics, Census],
+    observers: Mapping[Topics, TreeObserver],
     *,
     ros: RosSettings | None = None,
     duration_s: float | None,
@@ -94,26 +92,26 @@ def observe(  # noqa: PLR0913 (all but two are named)
     show: Callable[[int], None] | None = None,
     may_be_silent: bool = False,
 ) -> None:
-    """Fill the censuses from the running system, until the time is over or a signal comes.
+    """Fill the observers from the running system, until the time is over or a signal comes.
 
-    ``show`` is called as by ``watch``.
+    ``show`` is called as by ``listen``.
 
     Raises:
         SystemExit: after saying why not: nothing came is a reason, unless it ``may_be_silent``.
     """
     set_up_ros(ros)
-    from tfcompose.observe.watching import watch  # rclpy reads the environment when it is loaded
+    from tfcompose.live.listener import listen  # rclpy reads the environment when it is loaded
 
     with Stop() as stop:
         try:
-            seconds, elsewhere = watch(name, censuses, stop, duration_s=duration_s, every_s=every_s, show=show)
+            seconds, elsewhere = listen(name, observers, stop, duration_s=duration_s, every_s=every_s, show=show)
         except RosError as error:
             reject([finding("TF901", str(error), None)])
-        heard = any(census.heard for census in censuses.values())
+        heard = any(observer.heard for observer in observers.values())
         if stop.requested:
             check_early_end(seconds, duration_s, heard=heard)
     if not heard and not may_be_silent:
-        _reject_silence(list(censuses), seconds, elsewhere)
+        _reject_silence(list(observers), seconds, elsewhere)
 
 
 def set_up_ros(ros: RosSettings | None = None) -> None:
@@ -147,8 +145,8 @@ def check_early_end(seconds: float, duration_s: float | None, *, heard: bool) ->
 def _reject_silence(topics: Sequence[Topics], seconds: float, elsewhere: Sequence[str]) -> None:
     """Say that there was no TF at all."""
     message = f"no TF message came on {names_of(topics)} for {seconds:.1f} s"
-    notes = [Note(f"looked with {said(os.environ)}")]
-    reject([finding("TF811", message, None, notes=notes, help=advice(elsewhere))])
+    notes = [Note(f"looked with {settings_text(os.environ)}")]
+    reject([finding("TF811", message, None, notes=notes, help=elsewhere_help(elsewhere))])
 
 
 def names_of(topics: Iterable[Topics]) -> str:

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 from zlib import crc32
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from tfcompose.plan import Plan, PlanEdge, PlanProcess
 
 #: Topics of moving and of fixed edges.
@@ -20,6 +22,18 @@ Topics = tuple[str, str]
 GLOBAL = ("/tf", "/tf_static")
 #: What no part of a topic's name may hold.
 _UNDERSCORES = re.compile(r"__+|_(?=/|$)")
+
+
+def topics_below(namespace: str) -> Topics:
+    """Return the topics of moving and of fixed edges below a namespace."""
+    prefix = f"/{namespace.strip('/')}" if namespace.strip("/") else ""
+    return f"{prefix}/tf", f"{prefix}/tf_static"
+
+
+def namespace_options(names: Iterable[str]) -> str:
+    """Return the options that lead to these topics: ``--namespace /robot1 or --namespace /robot2``."""
+    spaces = dict.fromkeys(name.rpartition("/")[0] for name in names)
+    return " or ".join(f"--namespace {name}" if name else "without --namespace" for name in spaces)
 
 
 def parts_of(plan: Plan) -> dict[Topics, Plan]:

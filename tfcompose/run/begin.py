@@ -24,7 +24,7 @@ ROLES = {
     "static": ("tfcompose.run.publishing.static_role", "static"),
     "joints": ("tfcompose.run.publishing.joint_role", "joints"),
     "simulate": ("tfcompose.run.publishing.simulate_role", "simulate"),
-    "guard": ("tfcompose.run.guard.watch", "guard"),
+    "guard": ("tfcompose.guard.process", "guard"),
 }
 
 

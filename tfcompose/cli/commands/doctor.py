@@ -50,12 +50,13 @@ def run(arguments: Namespace) -> int:
     if trouble:
         return _print([trouble], arguments.format)
     from tfcompose.cli.live import check_early_end
-    from tfcompose.observe.doctor import examine
-    from tfcompose.observe.elsewhere import namespace_words
+    from tfcompose.live.snapshot import look
+    from tfcompose.plan.topics import namespace_options
+    from tfcompose.verdict.doctor import examine
 
     with Stop() as stop:
         try:
-            found = examine(_expected(plan, arguments.namespace), arguments.duration, stop)
+            found = examine(look(_expected(plan, arguments.namespace), arguments.duration, stop))
         except RosError as error:
             return _print([finding("TF901", str(error), None)], arguments.format)
         if stop.requested:
@@ -66,7 +67,7 @@ def run(arguments: Namespace) -> int:
         looked += f" below {printable(', '.join(found.roots[:MOST_ROOTS]))}" if found.roots else ""
         print(f"looked for {found.seconds:.1f} s at {looked}: {_summary(found.findings)}")
         if found.edges and found.elsewhere:
-            words = namespace_words(found.elsewhere)
+            words = namespace_options(found.elsewhere)
             print(f"there is TF on {', '.join(found.elsewhere[:MOST_ROOTS])} too: {words}")
     return code
 
@@ -105,8 +106,7 @@ def _plan(arguments: Namespace) -> Plan | None:
 
 def _expected(plan: Plan | None, below: str | None) -> dict[tuple[str, str], Plan | None]:
     """Return the topics to look at, each pair with the part of the plan that is expected there."""
-    from tfcompose.observe.census import topics_below
-    from tfcompose.plan.topics import parts_of
+    from tfcompose.plan.topics import parts_of, topics_below
 
     topics = topics_below(below or "")
     if plan is None:

@@ -18,10 +18,9 @@ from tfcompose.cli.terminal import INTERRUPTED, fail, reject
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-    from collections.abc import Callable
 
     from tfcompose.geometry import Pose
-    from tfcompose.observe.asked import Asked, Missed
+    from tfcompose.live.pose_query import NoPose, OnPose, PoseQuery
 
 #: A stamp that is older is taken to be of another clock than the wall's.
 _CLOCKS_AGREE_S = 1e6
@@ -60,39 +59,41 @@ def run(arguments: Namespace) -> int:
     """Echo until a signal comes; exit code 1 if there was no pose."""
     from tfcompose.cli.live import from_bag
     from tfcompose.findings import finding
+    from tfcompose.live.pose_query import PoseQuery
     from tfcompose.numbers import clean
-    from tfcompose.observe.asked import Asked
+    from tfcompose.plan.topics import topics_below
+    from tfcompose.verdict.setup import elsewhere_help
 
     # tf2 takes a name with a slash before it for the name.
     arguments.a, arguments.b = (name.removeprefix("/") for name in (arguments.a, arguments.b))
-    asked = Asked(
-        arguments.a, arguments.b, arguments.once, arguments.rate, arguments.timeout, arguments.namespace, arguments.at
-    )
+    topics = topics_below(arguments.namespace)
+    query = PoseQuery(arguments.a, arguments.b, arguments.once, arguments.rate, arguments.timeout, topics, arguments.at)
 
     def show(pose: Pose, stamp_ns: int | None) -> None:
         sys.stdout.write(_formatted(arguments, clean(pose), stamp_ns))
         sys.stdout.flush()
 
     if arguments.bag:
-        from tfcompose.observe.replay import echo_bag
+        from tfcompose.bags import echo_bag
 
-        missed = from_bag(lambda: echo_bag(asked, arguments.bag, show))
+        missed = from_bag(lambda: echo_bag(arguments.bag, query, show))
     else:
-        missed = _live(asked, show)
+        missed = _live(query, show)
     if missed is not None:
         message = f"no pose of {arguments.b} in {arguments.a}: {missed.reason}"
-        reject([finding("TF814", message, None, help=missed.help)])
+        help_ = missed.help if missed.elsewhere is None else elsewhere_help(missed.elsewhere)
+        reject([finding("TF814", message, None, help=help_)])
     return 0
 
 
-def _live(asked: Asked, show: Callable[[Pose, int | None], None]) -> Missed | None:
+def _live(query: PoseQuery, show: OnPose) -> NoPose | None:
     from tfcompose.cli.live import set_up_ros
     from tfcompose.findings import finding
     from tfcompose.ros.environment import RosError
     from tfcompose.ros.stop import Stop
 
     set_up_ros()
-    from tfcompose.observe.echo import echo
+    from tfcompose.live.echo import echo
 
     begun = time.monotonic()
     shown = False
@@ -104,7 +105,7 @@ def _live(asked: Asked, show: Callable[[Pose, int | None], None]) -> Missed | No
 
     with Stop() as stop:
         try:
-            missed = echo(asked, note, stop)
+            missed = echo(query, note, stop)
         except RosError as error:
             reject([finding("TF901", str(error), None)])
         if stop.requested and not shown and missed is None:

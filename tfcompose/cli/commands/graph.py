@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from tfcompose.draw import Arrow, Graph
     from tfcompose.draw.graph import Kind
-    from tfcompose.observe.census import Census, EdgeSeen
+    from tfcompose.live.edges import EdgeState, TreeObserver
     from tfcompose.plan import Plan
 
 FORMATS = (".svg", ".pdf", ".png", ".dot", ".gv", ".mmd")
@@ -118,20 +118,20 @@ def picture(graph: Graph, ending: str) -> bytes:
 def _published_graph(arguments: Namespace) -> Graph:
     """Return the published tree as a graph."""
     from tfcompose.cli.live import observe, observed_topics, read_bag
-    from tfcompose.observe.census import SETTLE_S, Census
+    from tfcompose.live.edges import SETTLE_S, TreeObserver
 
     plan, pairs = observed_topics(arguments)
-    censuses = {pair: Census(settle_s=0.0 if arguments.bag else SETTLE_S) for pair in pairs}
+    observers = {pair: TreeObserver(settle_s=0.0 if arguments.bag else SETTLE_S) for pair in pairs}
     if arguments.bag:
-        read_bag(arguments.bag, censuses)
+        read_bag(arguments.bag, observers)
     else:
-        observe("tfcompose_graph", censuses, ros=plan.ros if plan else None, duration_s=arguments.duration)
+        observe("tfcompose_graph", observers, ros=plan.ros if plan else None, duration_s=arguments.duration)
     title = arguments.bag or (plan.robot if plan else pairs[0][0])
-    return graph_of_censuses(list(censuses.values()), title, plan, poses=arguments.poses)
+    return graph_of_observers(list(observers.values()), title, plan, poses=arguments.poses)
 
 
-def graph_of_censuses(
-    censuses: Sequence[Census], title: str, plan: Plan | None = None, *, poses: bool = False
+def graph_of_observers(
+    observers: Sequence[TreeObserver], title: str, plan: Plan | None = None, *, poses: bool = False
 ) -> Graph:
     """Return what was seen as a graph: second parents and loops as they are, publishers as owners.
 
@@ -139,23 +139,23 @@ def graph_of_censuses(
     """
     from tfcompose.draw import Arrow, Graph
 
-    edges = [one for census in censuses for one in census.edges(census.end_ns or census.last_ns)]
-    children = {one.strand.child for one in edges}
+    edges = [one for observer in observers for one in observer.edges(observer.end_ns or observer.last_ns)]
+    children = {one.stream.child for one in edges}
     missing = [edge for edge in plan.edges if edge.child not in children] if plan else []
     arrows = [_arrow(one, poses=poses) for one in edges]
     arrows += [Arrow(edge.parent, edge.child, edge.kind, edge.node, "missing", "") for edge in missing]
     return Graph(printable(title), (), tuple(arrows))
 
 
-def _arrow(one: EdgeSeen, *, poses: bool) -> Arrow:
+def _arrow(one: EdgeState, *, poses: bool) -> Arrow:
     from tfcompose.draw import Arrow
 
-    strand = one.strand
-    rate = "" if strand.static or one.timing.rate is None else f"{one.timing.rate:.1f} Hz"
+    stream = one.stream
+    rate = "" if stream.static or one.timing.rate is None else f"{one.timing.rate:.1f} Hz"
     owner = printable(one.publisher) or "somebody"
-    below = _pose(strand.pose) if poses else ""
-    kind: Kind = "static" if strand.static else "dynamic"
-    return Arrow(printable(strand.parent), printable(strand.child), kind, owner, rate, below)
+    below = _pose(stream.pose) if poses else ""
+    kind: Kind = "static" if stream.static else "dynamic"
+    return Arrow(printable(stream.parent), printable(stream.child), kind, owner, rate, below)
 
 
 def _pose(pose: Pose) -> str:

@@ -19,7 +19,7 @@ from tfcompose.cli.terminal import UNREADABLE, LiveLines, can_redraw, fail
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.observe.census import Census
+    from tfcompose.live.edges import TreeObserver
 
 #: Of the running tree the last 5 to 10 s are told.
 WINDOW_S = 5.0
@@ -39,37 +39,38 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Monitor until a signal comes; exit code 1 if no TF came at all, 2 if a bag cannot be read."""
     from tfcompose.cli.live import observe, read_bag
-    from tfcompose.observe.census import SETTLE_S, Census, topics_below
+    from tfcompose.live.edges import SETTLE_S, TreeObserver
+    from tfcompose.plan.topics import topics_below
 
     if arguments.bag and arguments.duration:
         fail("a recording is always read to its end: leave out --for", UNREADABLE)
     topics = topics_below(arguments.namespace)
     whole = arguments.bag or arguments.duration
-    census = Census(0.0 if whole else WINDOW_S, 0.0 if arguments.bag else SETTLE_S)
+    observer = TreeObserver(0.0 if whole else WINDOW_S, 0.0 if arguments.bag else SETTLE_S)
     if arguments.bag:
-        read_bag(arguments.bag, {topics: census})
-        _show(arguments, census, None, census.end_ns)
+        read_bag(arguments.bag, {topics: observer})
+        _show(arguments, observer, None, observer.end_ns)
         return 0
     lines = LiveLines(sys.stdout) if arguments.format == "text" and can_redraw(sys.stdout) else None
-    show = None if arguments.duration and not lines else partial(_show, arguments, census, lines)
-    observe("tfcompose_monitor", {topics: census}, duration_s=arguments.duration, every_s=arguments.every, show=show)
+    show = None if arguments.duration and not lines else partial(_show, arguments, observer, lines)
+    observe("tfcompose_monitor", {topics: observer}, duration_s=arguments.duration, every_s=arguments.every, show=show)
     if arguments.duration:
-        _show(arguments, census, lines, time.time_ns())
+        _show(arguments, observer, lines, time.time_ns())
     return 0
 
 
-def _show(arguments: Namespace, census: Census, live: LiveLines | None, now_ns: int) -> None:
+def _show(arguments: Namespace, observer: TreeObserver, live: LiveLines | None, now_ns: int) -> None:
     from tfcompose.cli.edge_table import lines_of, objects_of
     from tfcompose.cli.live import names_of
-    from tfcompose.observe.census import topics_below
+    from tfcompose.plan.topics import topics_below
 
-    edges = sorted(census.edges(now_ns), key=lambda seen: seen.strand.static)  # what moves first
+    edges = sorted(observer.edges(now_ns), key=lambda seen: seen.stream.static)  # what moves first
     if arguments.format == "json":
-        sys.stdout.write(objects_of(edges, census, now_ns))
+        sys.stdout.write(objects_of(edges, observer, now_ns))
         sys.stdout.flush()
         return
-    lines = lines_of(edges, census, now_ns, width=live.width if live else None)
-    if not census.heard:
+    lines = lines_of(edges, observer, now_ns, width=live.width if live else None)
+    if not observer.heard:
         lines = [f"no TF yet on {names_of([topics_below(arguments.namespace)])}"]
     if live is not None:
         live.draw(lines)

@@ -18,8 +18,8 @@ from tfcompose.cli.terminal import printable
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
+    from tfcompose.live.forest import Branch, Tree
     from tfcompose.model import Robot
-    from tfcompose.observe.forest import Branch, Tree
     from tfcompose.plan import Plan, PlanEdge
 
     Topics = tuple[str, str]
@@ -52,7 +52,7 @@ def run(arguments: Namespace) -> int:
 def _planned_json(robot: Robot) -> str:
     """Return one line of JSON, in the shape of --live: the trees with their roots, and what the robot says of edges."""
     from tfcompose.emit.plan import plan_of
-    from tfcompose.observe.forest import forest
+    from tfcompose.live.forest import forest
 
     trees = [
         _tree_object(tree, [_planned_edge(branch.planned) for branch in tree.branches if branch.planned is not None])
@@ -80,21 +80,21 @@ def _planned_edge(edge: PlanEdge) -> dict[str, Any]:
 
 def _print_published(arguments: Namespace) -> None:
     from tfcompose.cli.live import observe, observed_topics, read_bag
-    from tfcompose.observe.census import SETTLE_S, Census
-    from tfcompose.observe.forest import forest
+    from tfcompose.live.edges import SETTLE_S, TreeObserver
+    from tfcompose.live.forest import forest
     from tfcompose.plan.topics import parts_of
 
     plan, pairs = observed_topics(arguments)
     parts = parts_of(plan) if plan else {}
-    censuses = {pair: Census(settle_s=0.0 if arguments.bag else SETTLE_S) for pair in pairs}
+    observers = {pair: TreeObserver(settle_s=0.0 if arguments.bag else SETTLE_S) for pair in pairs}
     if arguments.bag:
-        read_bag(arguments.bag, censuses)
+        read_bag(arguments.bag, observers)
     else:
-        observe("tfcompose_tree", censuses, ros=plan.ros if plan else None, duration_s=arguments.duration)
-    for pair, census in censuses.items():
-        now_ns = census.end_ns if arguments.bag else time.time_ns()
+        observe("tfcompose_tree", observers, ros=plan.ros if plan else None, duration_s=arguments.duration)
+    for pair, observer in observers.items():
+        now_ns = observer.end_ns if arguments.bag else time.time_ns()
         planned = {edge.child: edge for edge in parts[pair].edges} if pair in parts else None
-        trees = forest(census.edges(now_ns), planned)
+        trees = forest(observer.edges(now_ns), planned)
         if arguments.format == "json":
             sys.stdout.write(_published_json(pair, trees, plan=plan))
         else:
@@ -139,15 +139,15 @@ def _row(branch: Branch, *, plan: Plan | None) -> tuple[str, ...]:
         f"also {printable(other.name)} from {printable(other.publisher) or 'somebody'}" for other in branch.seen[1:]
     ]
     remarks = [_status(branch, plan)] if plan else []
-    rate = "" if one.strand.static else f"{one.timing.rate:.1f} Hz" if one.timing.rate is not None else "–"
+    rate = "" if one.stream.static else f"{one.timing.rate:.1f} Hz" if one.timing.rate is not None else "–"
     age = "" if one.data_age_s is None else duration(one.data_age_s)
-    kind = "static" if one.strand.static else "dynamic"
+    kind = "static" if one.stream.static else "dynamic"
     return (name, kind, printable(_owner(branch, plan)) or "–", rate, age, "; ".join([*remarks, *others]))
 
 
 def _owner(branch: Branch, plan: Plan | None) -> str:
     """Return who publishes the frame: the owner with its node where it is the owner, else the node."""
-    from tfcompose.verdict.offence import may_be_owners, relays_of
+    from tfcompose.verdict.ownership import may_be_owners, relays_of
 
     planned, one = branch.planned, branch.seen[0]
     if plan is None or planned is None or not may_be_owners(planned, one.nodes, relays_of(plan)):
@@ -157,16 +157,16 @@ def _owner(branch: Branch, plan: Plan | None) -> str:
 
 
 def _status(branch: Branch, plan: Plan) -> str:
-    from tfcompose.verdict.offence import code_of, may_be_owners, relays_of
+    from tfcompose.verdict.ownership import code_of, may_be_owners, relays_of
 
     planned, one = branch.planned, branch.seen[0] if branch.seen else None
     if one is None:
         return "missing"
     if planned is None:
-        allowed = plan.may_be_undeclared(one.strand.parent, one.strand.child)
+        allowed = plan.may_be_undeclared(one.stream.parent, one.stream.child)
         return "allowed" if allowed else "unexpected"
     owner = not one.nodes or may_be_owners(planned, one.nodes, relays_of(plan))
-    code = code_of(planned, one.strand.parent, static=one.strand.static, owner=owner, sure=len(one.nodes) < 2)  # noqa: PLR2004 (one, or a recording)
+    code = code_of(planned, one.stream.parent, static=one.stream.static, owner=owner, sure=len(one.nodes) < 2)  # noqa: PLR2004 (one, or a recording)
     match code:
         case "TF802":
             return f"expected in {planned.parent}"

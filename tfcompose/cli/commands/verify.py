@@ -21,9 +21,9 @@ from tfcompose.cli.terminal import print_findings
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.observe.verify import Verdict
     from tfcompose.plan import Plan
-    from tfcompose.verdict.offset import Offset
+    from tfcompose.verdict.poses import Offset
+    from tfcompose.verdict.verify import Verdict
 
 _UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "deg": math.pi / 180, "rad": 1.0}
 _ANGLES = frozenset({"deg", "rad"})
@@ -51,23 +51,23 @@ def run(arguments: Namespace) -> int:
     """Verify; exit code 0 if all is as expected, 1 if not, 2 if something cannot be read."""
     from tfcompose.cli.live import observe, read_bag, refuse_live_bag
     from tfcompose.cli.plans import expected_plan
-    from tfcompose.observe.census import SETTLE_S, Census
-    from tfcompose.observe.verify import verify
+    from tfcompose.live.edges import SETTLE_S, TreeObserver
     from tfcompose.plan.topics import parts_of
+    from tfcompose.verdict.verify import verify
 
     refuse_live_bag(arguments)
     plan, places = expected_plan(arguments.file, arguments)
-    censuses = {topics: Census(settle_s=0.0 if arguments.bag else SETTLE_S) for topics in parts_of(plan)}
+    observers = {topics: TreeObserver(settle_s=0.0 if arguments.bag else SETTLE_S) for topics in parts_of(plan)}
     # Programs are told of each edge that it is missing; a robot without edges misses none.
     may_be_silent = arguments.format != "text" or not plan.edges
     begun = time.monotonic()
     if arguments.bag:
-        read_bag(arguments.bag, censuses, may_be_silent=may_be_silent)
+        read_bag(arguments.bag, observers, may_be_silent=may_be_silent)
     else:
-        observe("tfcompose_verify", censuses, ros=plan.ros, duration_s=arguments.duration, may_be_silent=may_be_silent)
+        observe("tfcompose_verify", observers, ros=plan.ros, duration_s=arguments.duration, may_be_silent=may_be_silent)
     seconds = time.monotonic() - begun
-    now_ns = max(census.end_ns for census in censuses.values()) if arguments.bag else time.time_ns()
-    return _report(arguments, plan, verify(plan, censuses, now_ns, arguments.tolerance, places), seconds)
+    now_ns = max(observer.end_ns for observer in observers.values()) if arguments.bag else time.time_ns()
+    return _report(arguments, plan, verify(plan, observers, now_ns, arguments.tolerance, places), seconds)
 
 
 def _report(arguments: Namespace, plan: Plan, verdicts: list[Verdict], seconds: float) -> int:
@@ -84,7 +84,7 @@ def _report(arguments: Namespace, plan: Plan, verdicts: list[Verdict], seconds: 
 
         sys.stdout.write(render_json(found))
     else:
-        from tfcompose.observe.verify import summary
+        from tfcompose.verdict.verify import summary
 
         print_findings(found, sys.stdout)
         print(f"{plan.robot}: {summary(verdicts)}, in {arguments.bag or 'the running tree'}")
@@ -97,7 +97,7 @@ def tolerance(text: str) -> Offset:
     Raises:
         ArgumentTypeError: if it is neither.
     """
-    from tfcompose.verdict.offset import DEFAULT_TOLERANCE, Offset
+    from tfcompose.verdict.poses import DEFAULT_TOLERANCE, Offset
 
     given: dict[bool, float] = {}
     for part in text.split(","):

@@ -1,0 +1,31 @@
+"""What the launcher hears of edges that come no more."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tests.support.guard_history import FIXED, History, edge
+from tfcompose.guard.channel import SilentEdges
+from tfcompose.ipc import Silent
+
+if TYPE_CHECKING:
+    from tfcompose.ipc import GuardEvent
+
+
+def test_each_edge_that_falls_silent_or_whose_publisher_is_gone_is_said_once_and_when_it_is_back() -> None:
+    edges = (edge("base lidar", "static", "static"), edge("base camera", "static", "static"))
+    running = History(edges=(edge("odom base", "drive", rate=10), *edges)).clear()
+    said: list[GuardEvent] = []
+    look = SilentEdges([running.judge], said.append).report
+    static, drive = running.joins("/static", static=True), running.joins("/drive")
+    running.send(static, FIXED).repeat(drive, "odom base", 20)
+    look()
+    assert said == []
+    running.leaves(static)
+    running.repeat(drive, "odom base", 50)
+    look()
+    assert said == [Silent(("camera", "lidar"), over=False)]
+    running.send(running.joins("/static", static=True), FIXED).wait(5)
+    look()
+    look()
+    assert said[1:] == [Silent(("base",), over=False), Silent(("camera", "lidar"), over=True)]

@@ -1,0 +1,430 @@
+"""Faults of owners and strangers on the real thing: loops, stamps, QoS, leaks; the guard names each."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING, Any
+
+import psutil
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+
+from tests.support import processes
+from tests.support.guard_without_ids import guard_without_ids
+from tests.support.waiting import TIMEOUT_S, in_one_of_a_few, until, whole_lines
+from tfcompose.guard.judge import FINDING_S
+from tfcompose.plan import SILENT_PERIODS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+
+pytestmark = pytest.mark.ros
+
+ROBOT = """
+tfcompose: 1
+robot: faulty
+ros: {discovery: localhost}
+links: {base_link: {}}
+frames:
+  map: {}
+  odom: {parent: map, owner: slam, rate: 10 Hz}
+  base_link: {parent: odom, owner: drive}
+processes:
+  slam: {simulate: {fixed: {}, rate: 10 Hz}}
+  drive: {external: true, node: /drive}
+guard: {allow: [{parent: map, child: "person_*"}]}
+"""
+#: Its owner comes far more often than it must, so that it falls silent only if it is kept from running for long.
+PATIENT = ROBOT.replace("owner: slam, rate: 10 Hz", "owner: slam, rate: 1 Hz")
+ISOLATED = ROBOT.replace("discovery: localhost", "discovery: localhost, namespace: rover, isolate: topics")
+#: A node that sends edges at 20 Hz: full name, QoS, how it stamps, edges.
+NODE = """
+import os, signal, sys, time
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from tfcompose.ros.tf_codec import Transform, encode
+from tfcompose.ros.node import open_node, qos
+from tfcompose.ros.typesupport import tf_message_type
+name, reliability, stamps, *edges = sys.argv[1:]
+signal.signal(signal.SIGTERM, lambda *_: sys.exit())
+begun = time.time_ns()
+def stamp(n):
+    now = time.time_ns()
+    return {"right": now, "frozen": begun, "since start": now - begun, "none": 0,
+            "back": now - 2 * 10**9 * (n % 10 == 9)}[stamps]
+namespace, _, name = name.rpartition("/")
+with open_node(name, namespace) as node:
+    profile = qos(100, DurabilityPolicy.VOLATILE, ReliabilityPolicy[reliability.upper()])
+    publisher = node.create_publisher(tf_message_type(), "/tf", profile)
+    print("ready", flush=True)
+    n = 0
+    while True:
+        n += 1
+        transforms = [Transform(stamp(n), *edge.split(), (1., 0., 0.), (0., 0., 0., 1.)) for edge in edges]
+        publisher.publish(encode(transforms))
+        time.sleep(0.05)
+"""
+
+
+class Running:
+    """A robot under ``up``, and the nodes that a test lets join."""
+
+    def __init__(self, folder: Path, text: str) -> None:
+        (folder / "robot.yaml").write_text(text, encoding="utf-8")
+        self.output = folder / "output.txt"
+        with self.output.open("wb") as out:
+            command = [sys.executable, "-m", "tfcompose", "up"]
+            self.popen = processes.start(command, cwd=folder, stdout=out, stderr=out)
+        self.nodes: list[subprocess.Popen[str]] = []
+
+    def joins(self, name: str, *edges: str, reliability: str = "reliable", stamps: str = "right") -> int:
+        """Let a node send these edges, and return its process id."""
+        return self.starts(NODE, name, reliability, stamps, *edges)
+
+    def starts(self, code: str, *arguments: str) -> int:
+        """Start a node of this code, wait for its first line, and return its process id."""
+        node = processes.start([sys.executable, "-c", code, *arguments], stdout=subprocess.PIPE)
+        self.nodes.append(node)
+        assert node.stdout
+        assert node.stdout.readline()
+        return node.pid
+
+    def leaves(self) -> None:
+        """Let all nodes leave."""
+        for node in self.nodes:
+            node.terminate()
+            node.wait(TIMEOUT_S)
+            if node.stdout:
+                node.stdout.close()
+        self.nodes.clear()
+
+    def says(self, *words: str, notes: tuple[str, ...] = ()) -> None:
+        """Wait for a line with all the words, and for these notes in the lines behind it."""
+
+        def said() -> bool:
+            lines = whole_lines(self.output)
+            found = ("\n".join(lines[at : at + 8]) for at, line in enumerate(lines) if all(w in line for w in words))
+            return any(all(note in block for note in notes) for block in found)
+
+        assert until(said), f"{words} {notes} not in\n{self.output.read_text('utf-8')}"
+
+    def child(self, name: str) -> psutil.Process:
+        """Return one of the robot's processes."""
+        return next(p for p in psutil.Process(self.popen.pid).children() if name in command_of(p)[-1:])
+
+    def count(self, *words: str) -> int:
+        """Return how many lines hold all the words."""
+        return sum(all(word in line for word in words) for line in whole_lines(self.output))
+
+    def end(self) -> int:
+        self.leaves()
+        self.popen.send_signal(signal.SIGINT)
+        try:
+            return self.popen.wait(TIMEOUT_S)
+        finally:
+            self.popen.kill()
+
+
+def command_of(process: psutil.Process) -> list[str]:
+    """Return the words of a process's command; none if it has ended."""
+    try:
+        return process.cmdline()
+    except psutil.NoSuchProcess:
+        return []
+
+
+@pytest.fixture
+def up(domain: object, tmp_path: Path) -> Iterator[Callable[[str], Running]]:
+    """Start a robot and wait until it is: who joins before the end of the first look was there before the start."""
+    assert domain
+    robots: list[Running] = []
+
+    def start(text: str) -> Running:
+        robots.append(Running(tmp_path, text))
+        robots[0].says("started slam")
+        return robots[0]
+
+    yield start
+    for robot in robots:
+        robot.end()
+
+
+def test_what_strangers_do_to_the_tree_is_named_as_what_it_is(up: Callable[[str], Running]) -> None:
+    robot = up(ROBOT)
+    robot.joins("/drive", "odom base_link")
+    robot.says("complete")
+    pid = robot.joins("/strange/loop", "base_link map")
+    notes = ("map → odom → base_link → map", f"/strange/loop runs on this machine as pid {pid}: ")
+    robot.says("error[TF820]", "/strange/loop publishes base_link → map, which closes the loop", notes=notes)
+    robot.joins("/strange/itself", "odom odom")
+    robot.says("warning[TF821]", "/strange/itself publishes odom → odom, a frame in itself, which tf2 drops")
+    robot.joins("/strange/best", "base_link cup", reliability="best_effort")
+    robot.says("error[TF826]", "/strange/best writes /tf best effort")
+    robot.joins("/tracker_a", "map person_1")
+    robot.joins("/tracker_b", "map person_1")
+    robot.says("warning[TF822]", "map → person_1 is published by /tracker_")
+    robot.leaves()
+    robot.says("over", "base_link → map is no longer published by /strange/loop")
+    assert "TF803" not in robot.output.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("stamps", "code", "said"),
+    [
+        ("since start", "error[TF825]", "simulated time, or time since a start"),
+        ("none", "error[TF825]", "without a stamp"),
+        ("frozen", "warning[TF823]", "with the same stamp again and again"),
+        ("back", "warning[TF824]", "back in time, by "),
+    ],
+)
+def test_an_owner_whose_stamps_are_wrong_is_named(
+    up: Callable[[str], Running], stamps: str, code: str, said: str
+) -> None:
+    robot = up(ROBOT)
+    robot.joins("/drive", "odom base_link", stamps=stamps)
+    robot.says(code, "/drive", "odom → base_link", said)
+    robot.says("complete")
+
+
+#: A node that latches its edges one message each: before anybody can have found it, if nobody looks meanwhile.
+LATCHES = """
+import signal, sys, time
+from tfcompose.ros.tf_codec import Transform, encode
+from tfcompose.ros.node import TFPublisher, open_node
+signal.signal(signal.SIGTERM, lambda *_: sys.exit())
+with open_node("mounts", "/") as node:
+    publisher = TFPublisher(node, static=True)
+    for child in ("camera", "lidar"):
+        publisher.publish(encode([Transform(time.time_ns(), "base_link", child, (1., 0., 0.), (0., 0., 0., 1.))]))
+    print("ready", flush=True)
+    while True:
+        time.sleep(1)
+"""
+
+
+def test_an_owner_that_replaced_a_latched_edge_before_it_was_heard_is_named(up: Callable[[str], Running]) -> None:
+    mounts = "  camera: {parent: base_link, owner: mounts, static: true}\n"
+    mounts += "  lidar: {parent: base_link, owner: mounts, static: true}\nprocesses:\n"
+    robot = up(ROBOT.replace("processes:\n", mounts + "  mounts: {external: true, node: /mounts}\n"))
+    robot.joins("/drive", "odom base_link")
+    guard = robot.child("guard")
+    guard.send_signal(signal.SIGSTOP)
+    assert until(lambda: guard.status() == psutil.STATUS_STOPPED)
+    robot.starts(LATCHES)
+    guard.send_signal(signal.SIGCONT)
+    notes = ("none since holds base_link → camera",)
+    robot.says("warning[TF850]", "/mounts sent 1 message on /tf_static before anybody heard it", notes=notes)
+    assert robot.count("TF850") == 1
+
+
+def test_a_node_of_an_isolated_plan_that_writes_the_global_topic_is_named(up: Callable[[str], Running]) -> None:
+    robot = up(ISOLATED)
+    robot.joins("/other_robot/drive", "odom base_link")
+    robot.joins("/rover/drive", "odom base_link")
+    robot.says("error[TF827]", "/rover/drive writes the global /tf, and its robot keeps its own on /rover/tf")
+    said = robot.output.read_text(encoding="utf-8")
+    assert ("/other_robot" in said, said.count("TF827")) == (False, 1)
+
+
+def test_what_the_guard_knows_and_finds_is_on_the_diagnostics_page(up: Callable[[str], Running]) -> None:
+    robot = up(ROBOT)
+    robot.joins("/drive", "odom base_link")
+    robot.says("complete")
+    robot.joins("/rogue", "map odom")
+    robot.says("TF801")
+    pages: list[Any] = []
+
+    def last() -> dict[str, Any]:
+        return {line.name.removeprefix("tfcompose faulty: "): line for line in pages[-1].status} if pages else {}
+
+    def told() -> bool:
+        """Return whether the page says what is; a process that was kept from running is slow for a while."""
+        rclpy.spin_once(reader, timeout_sec=0.1)
+        return bool(pages) and last()["slam"].level == DiagnosticStatus.OK
+
+    rclpy.init()
+    try:
+        reader: Any = rclpy.create_node("reader")
+        reader.create_subscription(DiagnosticArray, "/diagnostics", pages.append, 10)
+        assert until(told), pages
+        reader.destroy_node()
+    finally:
+        rclpy.shutdown()
+    tree, slam = last()["tree"], last()["slam"]
+    assert (tree.level, tree.hardware_id) == (DiagnosticStatus.ERROR, "faulty")
+    assert "TF801 map → odom is published by /rogue" in tree.message
+    assert [pair.key for pair in slam.values] == ["map → odom"]
+    assert " Hz" in slam.values[0].value
+    assert "from /slam" in slam.values[0].value
+
+
+def test_a_guard_that_is_killed_is_back_with_what_it_knew_and_tells_nothing_twice(up: Callable[[str], Running]) -> None:
+    robot = up(PATIENT)
+    robot.joins("/drive", "odom base_link")
+    robot.says("complete")
+    robot.joins("/rogue", "map odom")
+    robot.says("TF801", "/rogue")
+    robot.child("guard").kill()
+    robot.says("warning[TF808] guard was ended by SIGKILL: nobody watches the tree until it is back")
+    robot.says("over", "guard watches again after")
+    robot.joins("/rogue_too", "map odom")
+    robot.says("TF801", "/rogue_too")
+    time.sleep(FINDING_S + SILENT_PERIODS + 1)  # by then it misses whom it has not found
+    robot.leaves()
+    robot.says("over", "map → odom is no longer published by /rogue")
+    assert robot.count("TF801", "/rogue;") == 1
+    assert (robot.count("| live "), robot.count("complete"), robot.count("watching 2 edges again")) == (2, 1, 1)
+    assert robot.count("fell silent", "slam") == 0
+
+
+def test_where_ids_do_not_say_whose_they_are_two_on_an_edge_are_named_as_one_of_all_on_the_topic(
+    up: Callable[[str], Running], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in guard_without_ids(tmp_path).items():
+        monkeypatch.setenv(name, value)
+    robot = up(ROBOT)
+    robot.joins("/drive", "odom base_link")
+    robot.says("complete")
+    robot.says("guard", "this rmw does not say with a message who sent it")
+    robot.joins("/rogue", "map odom")
+    robot.says("error[TF801] map → odom is published by one of /drive, /rogue, /slam; the owner is slam (/slam)")
+    assert robot.count("error[") == 1
+    assert robot.count("fell silent") == 0
+
+
+#: A child that owns an edge, and once there is a file "lie" sends that of another, too.
+TRAITOR = NODE.replace("for edge in edges]", "for edge in edges[: 1 + os.path.exists('lie')]]")
+
+
+def test_the_policy_stop_offender_stops_the_plans_own_offender_and_no_stranger(
+    up: Callable[[str], Running], tmp_path: Path
+) -> None:
+    (tmp_path / "traitor.py").write_text(TRAITOR, encoding="utf-8")
+    run = json.dumps([sys.executable, "traitor.py", "/traitor", "reliable", "right", "odom cup", "map odom"])
+    text = ROBOT.replace(
+        "processes:\n", f"  cup: {{parent: odom, owner: traitor}}\nprocesses:\n  traitor: {{run: {run}}}\n"
+    )
+    robot = up(text.replace("guard: {", "guard: {on_violation: stop-offender, "))
+    robot.joins("/drive", "odom base_link")
+    robot.says("live", "map → odom")
+    robot.joins("/stranger", "map odom")
+    robot.says("error[TF801]", "map → odom is published by /stranger")
+    (tmp_path / "lie").touch()
+    robot.says("error[TF801]", "map → odom is published by /traitor; the owner is slam (/slam)")
+    robot.says("traitor is stopped for it, and stays so: on_violation is stop-offender")
+    robot.says("over", "map → odom is no longer published by /traitor")
+    assert robot.count("is stopped for it") == 1
+    assert robot.popen.poll() is None
+
+    def children() -> list[list[str]]:
+        return [command_of(process) for process in psutil.Process(robot.popen.pid).children()]
+
+    assert until(lambda: not any("traitor.py" in words for words in children()))
+    assert {"guard", "slam"} <= {words[-1] for words in children() if words}
+
+
+#: A node that sends edges of others at 1 kHz.
+FLOOD = """
+import signal, sys, time
+from tfcompose.ros.tf_codec import Template
+from tfcompose.ros.node import TFPublisher, open_node
+signal.signal(signal.SIGTERM, lambda *_: sys.exit())
+with open_node("rogue", "/") as node:
+    publisher, template, due = TFPublisher(node, static=False), Template([("map", "odom")]), time.monotonic()
+    print("ready", flush=True)
+    while True:
+        template.set_stamp(time.time_ns())
+        publisher.publish(template.data)
+        due += 0.001
+        time.sleep(max(0.0, due - time.monotonic()))
+"""
+#: The least that any rclpy listener does with the same messages: it takes their bytes.
+LISTENER = """
+import signal, sys
+import rclpy
+from rclpy.qos import QoSProfile
+from tfcompose.ros.typesupport import tf_message_type
+from rclpy.signals import SignalHandlerOptions
+signal.signal(signal.SIGTERM, lambda *_: sys.exit())
+rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+node, taken = rclpy.create_node("plain_listener"), []
+def take(data):
+    if not taken:
+        print("hears", flush=True)
+    taken[:] = [data]
+node.create_subscription(tf_message_type(), "/tf", take, QoSProfile(depth=100), raw=True)
+rclpy.spin(node)
+"""
+#: A node with so many latched publishers: one for each frame, as a static_transform_publisher is.
+MANY = """
+import signal
+from tfcompose.ros.tf_codec import Transform, encode
+from tfcompose.ros.node import TFPublisher, open_node
+with open_node("foreign", "/") as node:
+    publishers = [TFPublisher(node, static=True) for _ in range(120)]
+    for n, publisher in enumerate(publishers):
+        publisher.publish(encode([Transform(1, "map", f"dock_{n}", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))]))
+    print("ready", flush=True)
+    signal.pause()
+"""
+GUARDS = ["mode: watch", "mode: strict, fence: partition", "mode: strict, fence: remap"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("guard", GUARDS)
+def test_a_rogue_at_1_khz_is_named_once_and_costs_the_guard_little_beside_a_plain_listener(
+    up: Callable[[str], Running], guard: str
+) -> None:
+    robot = up(ROBOT.replace("guard: {", f"guard: {{{guard}, "))
+    robot.joins("/drive", "odom base_link")
+    robot.says("complete")
+    silent = robot.count("fell silent")
+    robot.starts(FLOOD)
+    robot.says("error[TF801]", "map → odom is published by /rogue; the owner is slam (/slam)")
+    both = [robot.child("guard"), psutil.Process(robot.starts(LISTENER))]
+
+    def attempt(_: int) -> bool:
+        """Return whether nobody fell silent: one who is kept from running does, and not each time."""
+        nonlocal silent
+        before_s, before_bytes = [sum(each.cpu_times()[:2]) for each in both], both[0].memory_info().rss
+        time.sleep(4)
+        guard_s, listener_s = (sum(each.cpu_times()[:2]) - s for each, s in zip(both, before_s, strict=True))
+        assert guard_s < 2 * listener_s
+        assert both[0].memory_info().rss < 1.1 * before_bytes
+        before, silent = silent, robot.count("fell silent")
+        return silent == before
+
+    assert in_one_of_a_few(attempt)
+    assert robot.count("TF801") == 1
+    robot.leaves()
+    robot.says("over", "map → odom is no longer published by /rogue")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("guard", GUARDS)
+def test_of_more_static_publishers_than_a_listener_keeps_every_one_is_seen(
+    up: Callable[[str], Running], guard: str
+) -> None:
+    foreign = processes.start([sys.executable, "-c", MANY], stdout=subprocess.PIPE)
+    try:
+        assert foreign.stdout
+        assert foreign.stdout.readline()
+        robot = up(ROBOT.replace("guard: {", f"guard: {{{guard}, "))
+        robot.joins("/drive", "odom base_link")
+        robot.says("complete")
+        told = re.compile(r"dock_\d+(?: and (\d+) more)?.* published by /foreign")
+
+        def named() -> int:
+            return sum(1 + int(more or 0) for more in told.findall(robot.output.read_text("utf-8")))
+
+        assert until(lambda: named() == 120), named()
+    finally:
+        foreign.kill()
+        foreign.communicate()

@@ -1,0 +1,240 @@
+"""What the guard finds of publishers and edges, from histories with a clock that is set by hand."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.support.guard_history import FIXED, LOOK_S, SETTLE_S, History, Publisher
+from tfcompose.ipc import Clear, Complete, Found, Live, OwnerReady, Recovered
+from tfcompose.plan import EdgePattern, GuardPolicy
+
+
+def test_owners_are_live_and_nothing_is_found(running: History) -> None:
+    static, joints = running.joins("/static", static=True), running.joins("/joints")
+    slam, drive = running.joins("/slam"), running.joins("/drive")
+    running.send(static, FIXED)
+    for _ in range(40):
+        running.send(joints, "base left").send(slam, "map odom").send(drive, "odom base").wait(0.1)
+    live = (("static", ("lidar", "camera")), ("joints", ("left",)), ("slam", ("odom",)), ("drive", ("base",)))
+    assert running.all(Live) == [Live(owner, children) for owner, children in live]
+    assert running.all(OwnerReady) == [OwnerReady(name) for name in ("static", "joints", "slam", "drive")]
+    assert running.all(Complete) == [Complete(5)]
+    assert running.said() == []
+
+
+def test_all_is_clear_after_the_settling_time_when_nobody_sends(history: History) -> None:
+    history.wait(SETTLE_S - 0.05)
+    assert history.events == []
+    assert history.wait(LOOK_S).events == [Clear()]
+
+
+def test_an_external_owner_that_is_there_before_the_start_is_right(history: History) -> None:
+    drive = history.joins("/drive")
+    history.repeat(drive, "odom base", 30)
+    assert history.said() == []
+    assert Live("drive", ("base",)) in history.events
+
+
+def test_a_restarted_owner_is_right_also_while_its_old_publisher_is_still_in_the_graph(running: History) -> None:
+    for _ in range(4):
+        running.repeat(running.joins("/slam"), "map odom", 10)
+    assert running.said() == []
+
+
+def test_an_owner_may_send_other_edges_that_are_allowed() -> None:
+    running = History(GuardPolicy(unknown_edges="error", allow=(EdgePattern("map", "goal_*"),))).clear()
+    running.repeat(running.joins("/slam"), "map odom, map goal_1", 5)
+    assert running.said() == []
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.sampled_from(("/static", "/joints", "/slam", "/drive")), st.floats(0, 0.3), st.floats(0, 0.65)),
+        max_size=40,
+    )
+)
+def test_rightful_messages_are_never_found_however_they_are_ordered_and_their_names_delayed(
+    sends: list[tuple[str, float, float]],
+) -> None:
+    running = History().clear()
+    edges = {"/static": FIXED, "/joints": "base left", "/slam": "map odom", "/drive": "odom base"}
+    publishers: dict[str, Publisher] = {}
+    named: list[tuple[float, Publisher, str]] = []
+    for node, pause, delay in sends:
+        if node not in publishers:
+            publishers[node] = running.joins(None, static=node == "/static")
+            named.append((running.now + delay, publishers[node], node))
+        for at, publisher, name in named:
+            publisher.node = name if running.now >= at else publisher.node
+        running.send(publishers[node], edges[node], ago=min(delay, running.now - 1000 - SETTLE_S - LOOK_S)).wait(pause)
+    for _, publisher, name in named:
+        publisher.node = name
+    running.wait(2)
+    assert running.said() == []
+    assert {e.owner for e in running.all(Live) if isinstance(e, Live)} == {name[1:] for name in publishers}
+
+
+def test_a_foreign_publisher_is_named_once_and_within_a_look(running: History) -> None:
+    rogue = running.joins("/rogue")
+    running.send(rogue, "map odom").wait(LOOK_S)
+    assert running.said() == ["TF801 map → odom is published by /rogue; the owner is slam (/slam)"]
+    running.repeat(rogue, "map odom", 100)
+    assert len(running.found()) == 1
+    assert running.found()[0].severity == "error"
+    assert [note.message for note in running.found()[0].notes] == ["map → odom is declared in rover.yaml:7"]
+
+
+def test_a_foreign_publisher_that_ended_is_said_to_have_and_is_reported_when_it_comes_again(running: History) -> None:
+    rogue = running.joins("/rogue")
+    running.repeat(rogue, "map odom", 5)
+    running.leaves(rogue)
+    assert running.wait(4).all(Recovered) == [Recovered("map → odom is no longer published by /rogue")]
+    running.repeat(running.joins("/rogue"), "map odom", 5)
+    assert len(running.found()) == 2
+
+
+def test_a_foreign_publisher_that_sends_every_five_seconds_is_reported_once(running: History) -> None:
+    rogue = running.joins("/rogue")
+    running.repeat(rogue, "map odom", 10, every=5)
+    assert len(running.found()) == 1
+    assert running.all(Recovered) == []
+    assert len(running.wait(31).all(Recovered)) == 1
+
+
+def test_a_foreign_publisher_that_pauses_for_long_is_reported_again_when_it_goes_on(running: History) -> None:
+    rogue = running.joins("/rogue")
+    running.repeat(rogue, "map odom", 5).wait(40).repeat(rogue, "map odom", 5)
+    assert (len(running.found()), len(running.all(Recovered))) == (2, 1)
+
+
+def test_a_latched_offence_lasts_while_its_publisher_does(running: History) -> None:
+    rogue = running.joins("/rogue", static=True)
+    running.send(rogue, "base lidar").wait(120)
+    assert (len(running.found()), running.all(Recovered)) == (1, [])
+    running.leaves(rogue)
+    assert len(running.wait(4).all(Recovered)) == 1
+
+
+def test_many_edges_of_one_node_are_one_finding_also_when_each_comes_in_a_message_of_its_own(running: History) -> None:
+    rogue = running.joins("/rogue", static=True)
+    running.send(rogue, "base lidar").send(rogue, "base camera").wait(LOOK_S)
+    assert running.said() == [
+        "TF801 base → lidar and 1 more edge are published by /rogue; the owner is static (/static)"
+    ]
+    assert [note.message for note in running.found()[0].notes][:2] == ["base → lidar", "base → camera"]
+
+
+def test_edges_of_several_owners_are_one_finding_that_names_all_owners(running: History) -> None:
+    running.send(running.joins("/rogue"), "map odom, odom base, odom base").wait(LOOK_S)
+    assert running.said() == [
+        "TF801 map → odom and 1 more edge are published by /rogue; the owners are slam (/slam), drive (/drive)"
+    ]
+
+
+def test_edges_that_an_offender_adds_later_are_reported_too_and_those_of_a_flood_together(running: History) -> None:
+    rogue = running.joins("/rogue")
+    for n in range(100):
+        running.send(rogue, f"base thing_{n}").wait(0.02)
+    running.wait(1)
+    assert 2 <= len(running.found()) <= 6
+    assert len(running.found()[1].notes) <= 13
+    running.send(rogue, "map odom").wait(LOOK_S)
+    assert running.found()[-1].code == "TF801"
+
+
+def test_a_second_parent_is_reported_with_both_parents(running: History) -> None:
+    running.send(running.joins("/rogue"), "base_footprint base").wait(LOOK_S)
+    message = "base has two parents: base_footprint (from /rogue) and odom (from its owner drive (/drive))"
+    assert running.said() == [f"TF802 {message}"]
+
+
+def test_a_second_parent_is_reported_also_when_the_owner_itself_sends_it(running: History) -> None:
+    drive = running.joins("/drive")
+    running.repeat(drive, "odom base, map base", 10)
+    assert [found.code for found in running.found()] == ["TF802"]
+    assert "base has the wrong parent: its owner drive (/drive) publishes map → base, " in running.found()[0].message
+
+
+@pytest.mark.parametrize(("policy", "severities"), [("ignore", []), ("warn", ["warning"]), ("error", ["error"])])
+def test_an_undeclared_edge_is_reported_as_the_policy_says(policy: str, severities: list[str]) -> None:
+    running = History(GuardPolicy(unknown_edges=policy)).clear()  # type: ignore[arg-type]
+    running.repeat(running.joins("/tracker"), "map person", 10)
+    assert [(found.code, found.severity) for found in running.found()] == [("TF803", one) for one in severities]
+
+
+def test_only_undeclared_edges_that_no_pattern_allows_are_reported() -> None:
+    running = History(GuardPolicy(allow=(EdgePattern("map", "person_*"),))).clear()
+    tracker = running.joins("/tracker")
+    running.repeat(tracker, "map person_1, odom person_2, map person", 3)
+    (found,) = running.found()
+    assert found.message.startswith("odom → person_2 and 1 more edge are published by /tracker, but not declared")
+    assert [note.message for note in found.notes] == ["odom → person_2", "map → person"]
+
+
+def test_an_owner_on_the_wrong_topic_is_reported(running: History) -> None:
+    running.repeat(running.joins("/slam", static=True), "map odom", 3)
+    (found,) = running.found()
+    assert (found.code, "published on /tf_static by its owner /slam, declared for /tf" in found.message) == (
+        "TF809",
+        True,
+    )
+
+
+def test_a_volatile_writer_of_static_edges_is_reported_once_with_what_it_owns(running: History) -> None:
+    running.joins("/static", static=True, volatile=True)
+    running.joins("/slam", volatile=True)
+    running.wait(5)
+    (found,) = running.found()
+    assert (found.code, "/static publishes /tf_static with durability volatile" in found.message) == ("TF806", True)
+    assert "base → lidar" in found.notes[0].message
+
+
+@pytest.mark.parametrize("late", [0.0, 5.0])
+def test_an_owner_that_replaced_a_latched_edge_before_it_was_heard_is_told_once_with_what_is_lost(late: float) -> None:
+    running = History().clear().wait(late)
+    static = running.joins("/static", static=True)
+    static.sent = 1  # with base → lidar, before the guard had found it
+    running.send(static, "base camera").wait(1)
+    assert running.said() == []
+    running.wait(5)
+    (found,) = running.found()
+    assert (found.code, found.severity) == ("TF850", "warning")
+    assert found.message == (
+        "/static sent 1 message on /tf_static before the guard heard it, and none since holds base → lidar"
+    )
+    running.dies()
+    running.wait(10)
+    assert running.found() == []
+
+
+@pytest.mark.parametrize("edges", ["base lidar, base camera", "base camera"])
+def test_an_owner_whose_latched_messages_were_all_heard_or_hold_all_replaced_nothing(edges: str) -> None:
+    running = History().clear()
+    static = running.joins("/static", static=True)
+    static.sent = 0 if edges == "base camera" else 3
+    running.send(static, edges).wait(5)
+    running.send(static, FIXED).wait(5)
+    assert running.said() == []
+
+
+def test_of_who_has_new_frames_again_and_again_is_told_ever_more_rarely_and_of_all_of_them(running: History) -> None:
+    """A tracker that names its frames after what it sees: tag_1, tag_2, …; for a minute, ten a second."""
+    tracker = running.joins("/tracker")
+    for number in range(600):
+        running.send(tracker, f"base tag_{number}").wait(0.1)
+    assert 5 < len(running.said()) < 10
+    running.wait(130)
+    over = [event.message for event in running.events if isinstance(event, Recovered)]
+    for told in (running.said(), over):
+        assert len(told) < 20
+        counted = [re.search(r"and (\d+) more", one) for one in told]
+        assert sum(1 + int(more[1]) if more else 1 for more in counted) == 600
+    found = [event.found for event in running.events if isinstance(event, Found)]
+    assert "child: 'tag_*'}" in (found[-1].help or "")
+    running.send(tracker, "base tag_600").wait(0.5)
+    assert "base → tag_600 is published" in running.said()[-1], "after some quiet it is told at once again"

@@ -1,0 +1,223 @@
+"""What the guard remembers, shows, hands on to the next guard, and lets pass."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.support.guard_history import EDGES, FIXED, History, edge, wall
+from tfcompose.geometry import Pose
+from tfcompose.guard.diagnostics import statuses
+from tfcompose.ipc import Clear, Found, Live, Recovered
+from tfcompose.live.publishers import Publisher
+from tfcompose.plan import Claim, EdgePattern, GuardPolicy, PlanEdge, PlanProcess, SourceLine
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.sampled_from("sdrjx"), st.sampled_from((0.0, 0.05, 0.1, 0.7))), max_size=60))
+def test_remembered_verdicts_are_those_that_would_be_given_anew(sends: list[tuple[str, float]]) -> None:
+    """The same history, judged with and without memory of what was judged before."""
+    said = []
+    for forgets in (False, True):
+        running = History(GuardPolicy(allow=(EdgePattern("map", "person"),))).clear()
+        senders = {
+            "s": (running.joins("/slam"), "map odom"),
+            "d": (running.joins("/drive"), "odom base, map person"),
+            "r": (running.joins("/rogue"), "map odom, base cup"),
+            "j": (running.joins("/slam"), "map odom"),
+            "x": (running.joins("/x"), "map person, cup map"),
+        }
+        for who, pause in sends:
+            if forgets:
+                running.judge._verdicts._verdicts.clear()
+            running.send(*senders[who]).wait(pause)
+        running.wait(1)
+        said.append(running.events)
+    assert said[0] == said[1]
+
+
+def test_edges_that_waited_for_a_name_share_a_history_all_the_same(running: History) -> None:
+    rates = tuple(
+        PlanEdge("base", f"part_{n}", "dynamic", "drive", "/drive", Pose(), 10.0, SourceLine("r.yaml", 1))
+        for n in range(99)
+    )
+    running = History(edges=rates).clear()
+    drive, names = running.joins(None), ", ".join(f"base part_{n}" for n in range(99))
+    running.repeat(drive, names, 3)
+    drive.node = "/drive"
+    running.repeat(drive, names, 10)
+    assert len(running.judge.live.tracks) == 1
+    assert [len(one.children) for one in running.all(Live) if isinstance(one, Live)] == [99]
+
+
+def test_each_edge_has_its_publisher_rate_age_and_delay_and_is_not_seen_before_it_came() -> None:
+    rated = tuple(replace(one, rate=10.0) if one.owner == "slam" else one for one in EDGES)
+    running = History(edges=rated).clear()
+    slam, static = running.joins("/slam"), running.joins("/static", static=True)
+    running.send(static, FIXED)
+    for _ in range(30):
+        running.send(slam, "map odom", stamp_s=wall(running) - 0.25).wait(0.1)
+    running.wait(0.2)
+    health = {one.edge.child: one for one in running.judge.health(running.now)}
+    odom = health["odom"]
+    assert odom.publisher == "/slam"
+    assert odom.rate is not None
+    assert odom.age_s is not None
+    assert odom.delay_s is not None
+    assert [round(value, 2) for value in (odom.rate, odom.age_s, odom.delay_s)] == [10.0, 0.3, 0.25]
+    assert (health["lidar"].text, health["base"].text) == ("latched, from /static", "not seen yet")
+    levels = {line.name: line.level for line in statuses("rover", list(health.values()), running.judge.wrong())}
+    assert levels == {
+        "tfcompose rover: tree": 0,
+        "tfcompose rover: slam": 0,
+        "tfcompose rover: drive": 3,
+        "tfcompose rover: joints": 3,
+        "tfcompose rover: static": 0,
+    }
+
+
+def test_what_is_wrong_now_is_on_the_page_and_gone_when_it_is_over(running: History) -> None:
+    rogue = running.joins("/rogue")
+    running.repeat(rogue, "map odom, base cup", 3)
+    lines = statuses("rover", running.judge.health(running.now), running.judge.wrong())
+    assert (lines[0].level, [key for key, _ in lines[0].values]) == (2, ["TF801", "TF803"])
+    running.leaves(rogue)
+    running.wait(5)
+    assert running.judge.wrong() == []
+
+
+@pytest.mark.parametrize(("switch", "advice"), [
+    ("enable_odom_tf: false", "/diff publishes it by default: set enable_odom_tf: false"),
+    ("", "/diff publishes it by default and has no switch: let its process own the edge"),
+])  # fmt: skip
+def test_the_guard_names_the_switch_of_a_node_that_publishes_by_default(switch: str, advice: str) -> None:
+    history = History(claims=(Claim("/diff", "odom", "base", switch),)).clear()
+    history.repeat(history.joins("/drive"), "odom base", 5)
+    history.repeat(history.joins("/diff"), "odom base", 10)
+    (found,) = history.found()
+    assert (found.code, found.help) == ("TF801", advice)
+
+
+def test_the_guard_names_no_switch_for_another_node_or_edge() -> None:
+    history = History(claims=(Claim("/diff", "odom", "base", "x: false"),)).clear()
+    history.repeat(history.joins("/other"), "odom base", 10)
+    history.repeat(history.joins("/diff"), "map odom", 10)
+    assert [("set" in found.help) for found in history.found()] == [False, False]
+
+
+def test_a_judge_that_follows_another_tells_nothing_twice_and_goes_on(running: History) -> None:
+    static, slam, rogue = running.joins("/static", static=True), running.joins("/slam"), running.joins("/rogue")
+    volatile = running.joins("/volatile", static=True, volatile=True)
+    running.send(static, FIXED).repeat(slam, "map odom", 5).repeat(rogue, "map odom, map cup", 5)
+    assert [line[:5] for line in running.said()] == ["TF806", "TF801", "TF803"]
+    assert running.all(Live) != []
+    running.dies()
+    assert running.events == [Clear()]
+    running.send(static, FIXED, ago=10)
+    for _ in range(100):
+        running.send(slam, "map odom").send(rogue, "map odom, map cup").wait(0.1)
+    assert running.events == [Clear()]
+    running.leaves(rogue)
+    running.leaves(volatile)
+    running.repeat(slam, "map odom", 50)
+    assert [type(event) for event in running.events[1:]] == [Recovered, Recovered]
+    running.repeat(running.joins("/other"), "map odom", 5)
+    assert running.said() == ["TF801 map → odom is published by /other; the owner is slam (/slam)"]
+
+
+def test_a_judge_that_follows_another_does_not_miss_whom_it_has_not_found_yet(running: History) -> None:
+    running = History(edges=(edge("map odom", "slam", rate=10.0), edge("base lidar", "static", "static"))).clear()
+    static, slam, rogue = running.joins("/static", static=True), running.joins("/slam"), running.joins("/rogue")
+    running.send(static, FIXED[:10]).repeat(slam, "map odom", 30).repeat(rogue, "map odom", 3)
+    running.graph.clear()
+    running.dies().wait(4)
+    assert running.events == [Clear()]
+    running.graph += [static, slam, rogue]
+    for _ in range(40):
+        running.send(slam, "map odom").send(rogue, "map odom").wait(0.1)
+    assert running.events == [Clear()]
+    running.leaves(static)
+    running.repeat(rogue, "map odom", 20)
+    assert sorted(line[:10] for line in running.said()) == ["TF804 slam", "TF804 stat"]
+
+
+def test_an_owner_that_was_silent_is_not_said_to_be_again_and_is_back_when_it_is() -> None:
+    running = History(edges=(edge("map odom", "slam", rate=10.0),)).clear()
+    slam = running.joins("/slam")
+    running.repeat(slam, "map odom", 30).wait(2)
+    assert [line[:5] for line in running.said()] == ["TF804"]
+    running.dies().wait(8)
+    assert running.events == [Clear()]
+    running.repeat(slam, "map odom", 5)
+    assert [event for event in running.events if not isinstance(event, Clear)] == running.all(Recovered) != []
+
+
+def test_a_namesake_is_still_told_from_the_owner_after_the_guard_died(running: History) -> None:
+    slam, other = running.joins("/slam"), running.joins("/slam")
+    running.repeat(slam, "map odom", 5).dies()
+    running.send(other, "map odom").repeat(slam, "map odom", 5)
+    assert running.said()[0].startswith("TF801 map → odom is published by another /slam")
+
+
+def test_a_message_may_pass_when_all_of_it_is_its_senders_and_only_once_that_has_a_name(running: History) -> None:
+    slam = running.joins(None)
+    for name, edges, admitted in (
+        (None, "map odom", set()),
+        ("/slam", "map odom", None),
+        ("/slam", "map odom, odom base", {("map", "odom")}),
+        ("/slam", "odom base", set()),
+        ("/slam", "map odom, map cup", {("map", "odom")}),
+        ("/slam", "odom map", set()),
+    ):
+        slam.node = name
+        running.look().send(slam, edges)
+        assert running.judge.admitted == admitted, edges
+        running.send(slam, edges)
+        assert running.judge.admitted == admitted, edges
+
+
+def test_only_an_offender_that_is_surely_of_the_run_can_be_stopped_for_it() -> None:
+    processes = (PlanProcess("slam", "run", nodes=("/slam",)), PlanProcess("drive", "external", nodes=("/drive",)))
+    for namesakes, process in ((0, "slam"), (1, "")):
+        running = History(processes=processes).clear()
+        slam = running.joins("/slam")
+        for _ in range(namesakes):
+            running.joins("/slam")
+        running.repeat(slam, "odom base", 5)
+        assert [event.process for event in running.events if isinstance(event, Found)] == [process]
+
+
+@pytest.mark.parametrize(("ours", "process"), [(True, "slam"), (False, ""), (None, "slam")])
+def test_an_offender_whose_process_is_seen_is_of_the_run_or_is_not(*, ours: bool | None, process: str) -> None:
+    running = History(processes=(PlanProcess("slam", "run", nodes=("/slam",)),)).clear()
+    slam = running.joins("/slam")
+    running.send(slam, "odom base")
+    running.judge.graph([Publisher(slam.gid, "/slam", static=False, ours=ours)], running.now)
+    (found,) = running.judge.tick(running.now + 0.2)
+    assert isinstance(found, Found)
+    assert found.process == process
+
+
+@pytest.mark.parametrize(
+    ("process", "edges", "advice"),
+    [
+        ("slam", "map odom", "it is slam itself: write node: /other there, or have the program name its node /slam"),
+        ("slam", "odom base", "end /other, or switch its TF off; tf2 takes whatever came last"),
+        ("", "map odom", "end /other, or switch its TF off; tf2 takes whatever came last"),
+    ],
+)
+def test_an_owner_whose_node_has_another_name_is_told_to_say_so_and_not_to_end_itself(
+    process: str, edges: str, advice: str
+) -> None:
+    processes = [PlanProcess(name, "run", nodes=(f"/{name}",)) for name in ("slam", "drive")]
+    running = History(processes=tuple(processes)).clear()
+    other = running.joins("/other")
+    running.send(other, edges)
+    writer = Publisher(other.gid, "/other", static=False, ours=True, process=process)
+    running.judge.graph([writer], running.now)
+    (found,) = running.judge.tick(running.now + 0.2)
+    assert isinstance(found, Found)
+    assert (found.found.code, found.found.help) == ("TF801", advice)

@@ -1,0 +1,178 @@
+"""Switched edges, loops, frames in themselves, edges that are allowed to anybody, and how they are published."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from tests.support.guard_history import EDGES, PROCESSES, SETTLE_S, TOOL, History
+from tfcompose.guard.judge import Judge
+from tfcompose.ipc import Found, Recovered, Taken
+from tfcompose.live.publishers import Publisher
+from tfcompose.plan import EdgePattern, GuardPolicy, Plan, RosSettings
+
+
+def test_the_owner_may_hang_a_switched_edge_on_each_of_its_parents_and_on_no_other() -> None:
+    history = History(edges=(*EDGES, TOOL)).clear()
+    changer = history.joins("/changer")
+    for parent in ("arm", "rack_1", "rack_2", "arm"):
+        history.repeat(changer, f"{parent} tool", 5)
+    assert history.said() == []
+    history.repeat(changer, "table tool", 10)
+    message = "tool has the wrong parent: its owner changer (/changer) publishes table → tool, declared is arm → tool"
+    assert history.said() == [f"TF802 {message}"]
+
+
+def test_another_node_may_not_publish_a_switched_edge_on_any_of_its_parents() -> None:
+    history = History(edges=(*EDGES, TOOL)).clear()
+    history.repeat(history.joins("/changer"), "arm tool", 5)
+    history.repeat(history.joins("/rogue"), "rack_1 tool", 10)
+    assert [found.code for found in history.found()] == ["TF801"]
+    assert "/rogue" in history.found()[0].message
+
+
+@pytest.mark.parametrize(
+    "policy", [GuardPolicy(), GuardPolicy(allow=(EdgePattern("*", "*"),)), GuardPolicy("watch", "ignore")]
+)
+def test_an_edge_that_closes_a_loop_is_an_error_whatever_is_allowed_and_the_loop_is_named(policy: GuardPolicy) -> None:
+    running = History(policy).clear()
+    running.repeat(running.joins("/rogue"), "base map", 5)
+    assert running.said() == ["TF820 the frames map → odom → base → map form a loop, closed by base → map from /rogue"]
+    assert running.found()[0].severity == "error"
+    assert "end /rogue" in running.found()[0].help
+
+
+def test_a_second_parent_among_its_own_descendants_is_a_loop(running: History) -> None:
+    running.repeat(running.joins("/rogue"), "base odom", 5)
+    assert running.said() == ["TF820 the frames odom → base → odom form a loop, closed by base → odom from /rogue"]
+
+
+def test_a_loop_through_several_strangers_is_found_when_the_last_edge_comes(running: History) -> None:
+    one, other = running.joins("/one"), running.joins("/other")
+    for _ in range(5):
+        running.send(one, "base cup").send(other, "cup map").wait(0.1)
+    loop = next(found.message for found in running.found() if found.code == "TF820")
+    assert loop.endswith("cup → map from /other")
+    assert "the frames map → odom → base → cup → map" in next(said for said in running.said() if "TF820" in said)
+
+
+def test_a_loop_among_frames_of_others_is_not_the_robots_business_where_these_are_allowed() -> None:
+    running = History(GuardPolicy(allow=(EdgePattern("cup", "saucer"), EdgePattern("saucer", "cup")))).clear()
+    running.repeat(running.joins("/waiter"), "cup saucer, saucer cup", 10)
+    assert running.said() == []
+
+
+def test_an_edge_that_others_stopped_sending_closes_no_loop_any_more(running: History) -> None:
+    one = running.joins("/one")
+    running.repeat(one, "base cup", 3).leaves(one)
+    running.wait(12).repeat(running.joins("/other"), "cup map", 3)
+    assert [said[:5] for said in running.said()] == ["TF803", "TF803"]
+
+
+def test_a_stranger_that_sends_for_long_closes_a_loop_all_the_same(running: History) -> None:
+    one = running.joins("/one")
+    running.repeat(one, "base cup", 200)
+    running.send(running.joins("/other"), "cup map").send(one, "base cup").wait(0.2)
+    assert "TF820" in [said[:5] for said in running.said()]
+
+
+def test_a_loop_is_said_to_be_over_and_to_have_been_there_before_the_start(running: History) -> None:
+    rogue = running.joins("/rogue")
+    running.repeat(rogue, "base map", 5).leaves(rogue)
+    assert running.wait(4).all(Recovered) == [Recovered("base → map is no longer published by /rogue")]
+    early = History()
+    early.repeat(early.joins("/rogue"), "base map", 20)
+    assert early.all(Found) == []
+    assert isinstance(early.events[0], Taken)
+    assert early.said() == [
+        "TF807 base → map is already published by /rogue, which closes the loop map → odom → base → map"
+    ]
+
+
+def test_a_frame_in_itself_is_said_to_be_dropped_and_is_no_second_parent(running: History) -> None:
+    running.repeat(running.joins("/slam"), "odom odom", 5)
+    assert running.said() == ["TF821 /slam publishes odom → odom, a frame as its own parent, which tf2 drops"]
+    assert running.found()[0].severity == "warning"
+    assert not [event for event in running.events if type(event).__name__ == "Live"]
+
+
+def test_two_nodes_that_publish_one_allowed_frame_are_named(running: History) -> None:
+    running = History(GuardPolicy(allow=(EdgePattern("*", "person_*"),))).clear()
+    a, b = running.joins("/a"), running.joins("/b")
+    for _ in range(10):
+        running.send(a, "map person_1").send(b, "odom person_1").wait(0.1)
+    assert len(running.said()) in {1, 2}
+    assert "person_1 is published by /" in running.said()[0]
+    assert {"/a", "/b"} <= set(running.said()[0].replace(",", "").split())
+    assert {found.code for found in running.found()} == {"TF822"}
+
+
+def test_a_node_that_was_started_anew_is_no_second_writer() -> None:
+    running = History(GuardPolicy(allow=(EdgePattern("*", "person_*"),))).clear()
+    for _ in range(3):
+        tracker = running.joins("/tracker")
+        running.repeat(tracker, "map person_1", 5).leaves(tracker)
+    assert running.said() == []
+
+
+@pytest.mark.parametrize("static", [False, True])
+def test_a_best_effort_writer_is_reported_once(running: History, static: bool) -> None:  # noqa: FBT001
+    writer = Publisher(b"w" * 16, "/slam", static, reliable=False)
+    for _ in range(5):
+        running.events += running.judge.graph([writer], running.now)
+    topic = "/tf_static" if static else "/tf"
+    assert [(found.code, f"/slam publishes {topic} best effort" in found.message) for found in running.found()] == [
+        ("TF826", True)
+    ]
+
+
+def test_only_the_plans_own_nodes_leak_to_the_global_topic() -> None:
+    plan = Plan("rover", "0", "base", RosSettings("/rover"), EDGES, PROCESSES)
+    judge = Judge(plan, SETTLE_S, 0.0, 0)
+    writers = [
+        Publisher(bytes([n]) * 16, node, static=n == 1)
+        for n, node in enumerate(["/rover/ekf", "/rover/static", "/other/ekf", None, "/roverette/ekf"])
+    ]
+    events = [event for _ in range(3) for event in judge.leaks(writers, ("/rover/tf", "/rover/tf_static"))]
+    said = [event.found.message for event in events if isinstance(event, Found)]
+    assert said == [
+        "/rover/ekf publishes the global /tf, but its robot's TF is on /rover/tf",
+        "/rover/static publishes the global /tf_static, but its robot's TF is on /rover/tf_static",
+    ]
+
+
+def test_where_a_publisher_runs_is_a_note(running: History) -> None:
+    rogue = running.joins("/rogue")
+    running.events += running.judge.graph(
+        [Publisher(rogue.gid, "/rogue", static=False, where="on another machine")], running.now
+    )
+    running.send(rogue, "map odom")
+    running.events += running.judge.tick(running.now + 0.1)
+    assert "/rogue runs on another machine" in [note.message for note in running.found()[0].notes]
+
+
+def test_the_process_that_can_be_stopped_is_named_only_where_it_is_sure() -> None:
+    running = History(processes=tuple(replace(one, nodes=(f"/{one.name}",)) for one in PROCESSES)).clear()
+    running.repeat(running.joins("/slam"), "odom base", 3)
+    running.repeat(running.joins("/rogue"), "base lidar", 3)
+    running.repeat(running.joins("/drive"), "base camera", 3)
+    found = [event for event in running.events if isinstance(event, Found)]
+    assert [(event.found.code, event.process) for event in found] == [("TF801", "slam"), ("TF801", ""), ("TF801", "")]
+
+
+@pytest.mark.parametrize(
+    ("edges", "advice"),
+    [
+        ("odom base", "let /mapper leave base out, or own it: owner: slam"),
+        ("map base", "let /mapper leave base out"),
+    ],
+)
+def test_a_program_of_the_robots_own_is_not_to_be_ended_but_to_leave_the_edge_out(edges: str, advice: str) -> None:
+    slam = next(one for one in PROCESSES if one.name == "slam")
+    history = History(processes=(*(one for one in PROCESSES if one != slam), replace(slam, nodes=("/mapper",)))).clear()
+    history.repeat(history.joins("/mapper"), edges, 5).repeat(history.joins("/rogue"), edges, 5)
+    assert [found.help.split("; ")[0] for found in history.found()] == [
+        advice,
+        "end /rogue, or switch its TF off",
+    ]

@@ -1,0 +1,238 @@
+"""Histories of arrivals, judged with a clock that is set by hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tfcompose.geometry import Pose
+from tfcompose.guard.liveness import Liveness
+from tfcompose.ipc import GUARD_EVENTS, Complete, Found, GuardEvent, Live, OwnerReady, Recovered
+from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from tfcompose.plan import EdgeKind
+
+LOOK_S = 0.1
+
+
+def edge(names: str, owner: str, rate: float | None = None, kind: EdgeKind = "dynamic") -> PlanEdge:
+    parent, child = names.split()
+    return PlanEdge(parent, child, kind, owner, f"/{owner}", Pose(), rate, SourceLine("rover.yaml", 3))
+
+
+@dataclass
+class History:
+    """Arrivals at given times, and a look every tenth of a second."""
+
+    live: Liveness
+    now: float = 500.0
+    events: list[GuardEvent] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.live.look(self.now)
+
+    def run(self, seconds: float, arrivals: Iterable[tuple[float, str]] = ()) -> History:
+        """Let time pass with these arrivals, at seconds from now."""
+        begun = self.now
+        looks = [(LOOK_S * n, "") for n in range(1, round(seconds / LOOK_S) + 1)]
+        for at, child in sorted([*arrivals, *looks]):
+            self.now = begun + at
+            self.events += self.live.arrived((child,), self.now) if child else self.live.judge(self.now)
+        self.now = begun + seconds
+        return self
+
+    def steadily(self, seconds: float, hertz: float, *children: str) -> History:
+        return self.run(seconds, [(n / hertz, child) for n in range(round(seconds * hertz)) for child in children])
+
+    def said(self) -> list[str]:
+        return [f"{event.found.code} {event.found.message}" for event in self.events if isinstance(event, Found)]
+
+    def over(self) -> list[str]:
+        return [event.message for event in self.events if isinstance(event, Recovered)]
+
+
+@pytest.fixture
+def watch() -> Callable[..., History]:
+    def make(*edges: PlanEdge) -> History:
+        owners = dict.fromkeys(one.owner for one in edges)
+        processes = tuple(PlanProcess(owner, "external") for owner in owners)
+        return History(Liveness(Plan("rover", "0", None, RosSettings(), edges, processes)))
+
+    return make
+
+
+def test_what_comes_in_one_message_is_announced_in_few_events(watch: Callable[..., History]) -> None:
+    names = [f"frame_{n}" for n in range(2500)]
+    history = watch(*(edge(f"base {name}", "static", kind="static") for name in names))
+    live = [event for event in history.live.arrived(tuple(names), history.now) if isinstance(event, Live)]
+    assert [len(event.children) for event in live] == [1000, 1000, 500]
+    assert [child for event in live for child in event.children] == names
+    assert [GUARD_EVENTS.read(GUARD_EVENTS.line(event)) for event in live] == live
+
+
+def test_edges_owners_and_the_tree_are_each_announced_once(watch: Callable[..., History]) -> None:
+    history = watch(edge("map odom", "slam", 10), edge("odom a", "drive", 10), edge("odom b", "drive", 10))
+    history.steadily(1, 10, "a", "odom").steadily(1, 10, "a", "b", "odom")
+    assert [event.children for event in history.events if isinstance(event, Live)] == [("a",), ("odom",), ("b",)]
+    assert [event.process for event in history.events if isinstance(event, OwnerReady)] == ["slam", "drive"]
+    assert [event for event in history.events if isinstance(event, Complete)] == [Complete(3)]
+
+
+@pytest.mark.parametrize("hertz", [10, 50])
+def test_an_owner_that_falls_silent_is_named_within_a_second_and_once(
+    watch: Callable[..., History], hertz: int
+) -> None:
+    history = watch(edge("map odom", "slam", hertz)).steadily(3, hertz, "odom").run(1 - 1 / hertz)
+    (said,) = history.said()
+    assert said.startswith("TF804 slam (/slam) fell silent: nothing on map → odom for ")
+    assert history.run(60).said() == [said]
+
+
+def test_an_owner_that_was_never_heard_is_not_silent(watch: Callable[..., History]) -> None:
+    assert watch(edge("map odom", "slam", 10)).run(60).events == []
+
+
+def test_edges_without_a_rate_and_static_ones_are_never_silent(watch: Callable[..., History]) -> None:
+    history = watch(edge("base left", "joints"), edge("base lidar", "lidar", 10, "static"))
+    assert history.steadily(0.1, 10, "left", "lidar").run(60).said() == []
+
+
+def test_a_slow_rate_may_be_quiet_for_four_periods(watch: Callable[..., History]) -> None:
+    history = watch(edge("map odom", "slam", 0.5)).steadily(20, 0.5, "odom").run(5)
+    assert history.said() == []
+    assert len(history.run(2).said()) == 1
+
+
+def test_several_edges_of_one_owner_that_falls_silent_are_one_finding_and_come_back_in_one_sentence(
+    watch: Callable[..., History],
+) -> None:
+    children = [f"wheel_{n}" for n in range(8)]
+    history = watch(*(edge(f"base {child}", "drive", 20) for child in children), edge("map odom", "slam", 10))
+    history.steadily(2, 10, *children, *children, "odom").steadily(2, 10, "odom")
+    (said,) = history.said()
+    assert "base → wheel_5 and 2 more for" in said
+    history.steadily(2, 10, *children, *children, "odom")
+    (over,) = history.over()
+    assert over.startswith("base → wheel_0, ")
+    assert "and 2 more are back after 2." in over
+
+
+def test_an_owner_that_is_back_and_falls_silent_again_is_named_again(watch: Callable[..., History]) -> None:
+    history = watch(edge("map odom", "slam", 10)).steadily(2, 10, "odom").run(2).steadily(2, 10, "odom")
+    assert history.over() == ["map → odom is back after 2.3 s"]
+    assert len(history.run(2).said()) == 2
+
+
+@pytest.mark.parametrize(("declared", "hertz"), [(10, 7), (50, 30), (100, 79), (300, 200), (1000, 500), (1, 0.7)])
+def test_an_owner_that_is_too_slow_is_named_once_with_its_rate(
+    watch: Callable[..., History], declared: float, hertz: float
+) -> None:
+    history = watch(edge("map odom", "slam", declared)).steadily(30, hertz, "odom")
+    wanted = f"from slam (/slam), but {declared} Hz is declared"
+    assert history.said() == [f"TF805 map → odom comes at {hertz} Hz {wanted}"]
+    assert [event.found.severity for event in history.events if isinstance(event, Found)] == ["warning"]
+
+
+@pytest.mark.parametrize("hertz", [8.5, 10, 40])
+def test_an_owner_that_is_nearly_as_fast_as_declared_or_faster_is_right(
+    watch: Callable[..., History], hertz: float
+) -> None:
+    assert watch(edge("map odom", "slam", 10)).steadily(20, hertz, "odom").said() == []
+
+
+def test_an_owner_that_is_fast_enough_again_is_said_to_be(watch: Callable[..., History]) -> None:
+    history = watch(edge("map odom", "slam", 10)).steadily(6, 5, "odom").steadily(6, 10, "odom")
+    assert len(history.said()) == 1
+    (over,) = history.over()
+    assert over.startswith("map → odom is sent at ")
+
+
+def test_several_slow_edges_of_one_owner_are_one_finding(watch: Callable[..., History]) -> None:
+    history = watch(edge("odom a", "drive", 10), edge("odom b", "drive", 10)).steadily(6, 5, "a", "b")
+    assert history.said() == ["TF805 odom → a, odom → b come at 5 Hz from drive (/drive), but 10 Hz is declared"]
+
+
+def test_an_owner_that_sends_a_tenth_of_what_is_declared_is_silent_then_slow_and_no_more_is_said(
+    watch: Callable[..., History],
+) -> None:
+    history = watch(edge("map odom", "slam", 10)).steadily(3, 10, "odom").steadily(60, 1, "odom")
+    assert [said[:5] for said in history.said()] == ["TF804", "TF805"]
+    assert history.over() == []
+    assert len(history.steadily(5, 10, "odom").over()) == 1
+
+
+def test_a_hiccup_of_half_a_second_is_neither_silence_nor_slowness(watch: Callable[..., History]) -> None:
+    history = watch(edge("odom base", "drive", 50)).steadily(3, 50, "base").run(0.5).steadily(5, 50, "base")
+    assert history.said() == []
+
+
+@pytest.mark.parametrize(("stall_s", "late_s"), [(0.5, 0.2), (2, 3), (30, 3)])
+def test_a_guard_that_was_kept_from_looking_does_not_cry_wolf(
+    watch: Callable[..., History], stall_s: float, late_s: float
+) -> None:
+    history = watch(edge("map odom", "slam", 10), edge("odom base", "drive", 50))
+    history.steadily(3, 50, "base").steadily(3, 10, "odom", "base", "base", "base", "base", "base")
+    history.now += stall_s
+    history.events += history.live.judge(history.now)  # before what has come meanwhile is delivered
+    history.run(late_s)
+    for child in ["odom"] * 20 + ["base"] * 100:
+        history.live.arrived((child,), history.now)
+    history.steadily(6, 10, "odom", "base", "base", "base", "base", "base")
+    assert history.said() == []
+    assert len(history.run(2).said()) == 2
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    st.sampled_from((10.0, 50.0)),
+    st.lists(st.floats(-0.45, 0.45), min_size=400, max_size=400),
+    st.lists(st.sampled_from((0.05, 0.1, 0.2, 0.4, 1.5)), max_size=12),
+)
+def test_jitter_and_looks_at_uneven_times_find_nothing(hertz: float, jitter: list[float], looks: list[float]) -> None:
+    plan = Plan("rover", "0", None, RosSettings(), (edge("map odom", "slam", hertz),), ())
+    live, at, now, sent = Liveness(plan), 500.0, 500.0, 0
+    times = [500.0 + (n + part) / hertz for n, part in enumerate(jitter)]
+    for pause in [*looks, *[LOOK_S] * 20]:
+        now += pause
+        while sent < len(times) and times[sent] <= now:
+            at = max(at, times[sent])
+            live.arrived(("odom",), now if pause > LOOK_S else at)
+            sent += 1
+        if sent < len(times):
+            assert [event for event in live.judge(now) if isinstance(event, Found)] == []
+
+
+def test_a_latching_owner_that_leaves_the_graph_is_reported_once_with_its_edges_and_when_it_is_back(
+    watch: Callable[..., History],
+) -> None:
+    live = watch(edge("base lidar", "static", None, "static"), edge("base imu", "static", None, "static")).live
+    assert live.static_writers([]) == []
+    live.arrived(("lidar",), 1)
+    live.arrived(("imu",), 1)
+    assert live.static_writers(["/static", "/other"]) == []
+    (found,) = live.static_writers(["/other"])
+    assert isinstance(found, Found)
+    assert found.found.message == "static (/static) has left: nobody latches base → lidar, base → imu any more"
+    assert live.static_writers([]) == []
+    assert live.static_writers(["/static"]) == [Recovered("static (/static) is back")]
+
+
+def test_edges_may_come_together_apart_and_in_other_company(watch: Callable[..., History]) -> None:
+    history = watch(*(edge(f"base {child}", "drive", 4) for child in "abc"))
+    for _ in range(10):
+        for children in (("a", "b", "c"), ("a", "b"), ("b", "c"), ("c",), ("a", "c")):
+            history.live.arrived(children, history.now)
+            history.run(0.1)
+    assert history.said() == []
+    for _ in range(20):
+        history.live.arrived(("a", "b"), history.now)
+        history.run(0.1)
+    (said,) = history.said()
+    assert "nothing on base → c for" in said

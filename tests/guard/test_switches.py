@@ -1,0 +1,151 @@
+"""Switches that were read back from nodes, against what the plan wrote."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tfcompose.guard import switches
+from tfcompose.guard.channel import SwitchMemory, recalled
+from tfcompose.guard.switches import Switches
+from tfcompose.ipc import MEMORY_FD, Found, GuardEvent, Remember
+from tfcompose.plan import Driven, Plan, PlanProcess, RosSettings
+from tfcompose.verdict.drivers import not_taken
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from tfcompose.ros.parameters import Value
+
+DRIVEN = (Driven("front", "realsense/d455", publishes=False, switch={"publish_tf": False}),)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "found", "told"),
+    [
+        (False, False, False),
+        (False, True, True),
+        (True, True, False),
+        (0.0, 0.0, False),
+        (0.0, 0, False),
+        (0.0, 0.05, True),
+        (1, True, True),
+        (False, 0, True),
+        ("link", "link", False),
+        ("link", "frame", True),
+        (False, None, True),
+    ],
+)
+def test_a_parameter_is_told_exactly_where_it_is_another_value(
+    wanted: Value, found: Value | None, *, told: bool
+) -> None:
+    wrong = not_taken("/front/front", {"switch": wanted}, {"switch": found}, DRIVEN)
+    assert [one.code for one in wrong] == ["TF829"] * told
+
+
+def test_the_finding_names_the_node_the_parameter_and_both_values() -> None:
+    (one,) = not_taken("/front/front", {"publish_tf": False}, {"publish_tf": True}, DRIVEN)
+    assert one.message == (
+        "/front/front has publish_tf: true, and the plan wrote publish_tf: false for front (realsense/d455)"
+    )
+    (one,) = not_taken("/drive", {"enable_odom_tf": False}, {"enable_odom_tf": None})
+    assert one.message == "/drive has no parameter enable_odom_tf, and the plan wrote enable_odom_tf: false"
+
+
+# Guards that follow each other.
+
+
+@dataclass
+class Reader:
+    """Stands in for a node's parameters."""
+
+    is_there: bool = True
+    asked: int = 0
+
+    def ask(self, _: float) -> None:
+        self.asked += 1
+
+    def take(self) -> dict[str, Any] | None:
+        return {"publish_tf": True} if self.asked else None
+
+
+@dataclass
+class Watch:
+    """A guard's part that reads switches back, and a clock."""
+
+    reader: Reader
+    now: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.told: list[GuardEvent] = []
+
+    def follow(self, left: dict[str, Any]) -> None:
+        """Let a guard look that knows what is ``left`` of the one before."""
+        drive = PlanProcess("front", "external", switches={"/front": {"publish_tf": False}})
+        plan = Plan("rover", "", None, RosSettings(), (), (drive,))
+        self.switches = Switches(None, plan, self.told.append)  # type: ignore[arg-type]
+        self.memory = SwitchMemory(self.switches, self.told.append, left)
+
+    def look(self, seconds: float) -> None:
+        end = self.now + seconds
+        while self.now < end:
+            self.now += 0.5
+            self.switches.look()
+            self.memory.hand_on()
+
+    def all(self, kind: type[Any]) -> list[Any]:
+        return [one for one in self.told if isinstance(one, kind)]
+
+
+@pytest.fixture
+def watch(monkeypatch: pytest.MonkeyPatch) -> Watch:
+    one = Watch(Reader())
+    monkeypatch.setattr(switches, "_reader", lambda *_: one.reader)
+    monkeypatch.setattr("time.monotonic", lambda: one.now)
+    one.follow({})
+    return one
+
+
+@pytest.fixture
+def left(watch: Watch, tmp_path: Path) -> Callable[[], dict[str, Any]]:
+    """Return what the guard that died has left, as the next one reads it."""
+
+    def read() -> dict[str, Any]:
+        known: dict[str, Any] = {}
+        for one in watch.all(Remember):
+            known |= one.changed
+        (tmp_path / "memory").write_text(json.dumps(known))
+        return recalled({MEMORY_FD: str(os.open(tmp_path / "memory", os.O_RDONLY))})
+
+    return read
+
+
+def test_a_guard_that_follows_one_that_died_tells_no_switch_twice(
+    watch: Watch, left: Callable[[], dict[str, Any]]
+) -> None:
+    watch.look(10)
+    assert len(watch.all(Found)) == 1
+    watch.follow(left())
+    watch.reader.is_there = False  # it is found after a while
+    watch.look(2)
+    watch.reader.is_there = True
+    watch.look(10)
+    assert (len(watch.all(Found)), watch.reader.asked) == (1, 1)
+
+
+def test_a_node_that_comes_back_after_the_guard_has_is_asked_anew(
+    watch: Watch, left: Callable[[], dict[str, Any]]
+) -> None:
+    watch.look(10)
+    watch.follow(left())
+    watch.look(10)
+    watch.reader.is_there = False
+    watch.look(2)
+    watch.reader.is_there = True
+    watch.look(10)
+    assert len(watch.all(Found)) == 2

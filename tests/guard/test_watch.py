@@ -1,0 +1,52 @@
+"""Judges of robots on topics of their own: what each of them is given, and what is said of all together."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.guard.watch import plans_by_topics, together
+from tfcompose.ipc import Clear, Complete, GuardEvent, OwnerReady
+from tfcompose.plan import Plan, PlanProcess, RosSettings
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tfcompose.plan import PlanEdge
+
+OWN = {"/tf": "/one/tf", "/tf_static": "/one/tf_static"}
+
+
+def plan(*edges: PlanEdge) -> Plan:
+    processes = (
+        PlanProcess("static", "static"),
+        PlanProcess("one/static", "static", remap=OWN),
+        PlanProcess("guard", "guard"),
+    )
+    return Plan("fleet", "0", None, RosSettings(), edges, processes)
+
+
+def test_each_judge_gets_the_edges_of_the_owners_on_its_topics(edge: Callable[..., PlanEdge]) -> None:
+    mine, theirs = edge("map dock"), edge("map one/base", "one/static")
+    whole = plan(mine, theirs)
+    plans = plans_by_topics(whole, whole.process("guard"))
+    assert {topics: some.edges for topics, some in plans.items()} == {
+        ("/tf", "/tf_static"): (mine,),
+        ("/one/tf", "/one/tf_static"): (theirs,),
+    }
+
+
+def test_the_guards_own_topics_are_watched_where_nothing_is_planned_on_them(edge: Callable[..., PlanEdge]) -> None:
+    whole = plan(edge("map one/base", "one/static"))
+    assert plans_by_topics(whole, whole.process("guard"))["/tf", "/tf_static"].edges == ()
+
+
+def test_all_is_clear_and_complete_once_the_last_judge_says_so(edge: Callable[..., PlanEdge]) -> None:
+    said: list[GuardEvent] = []
+    one, two, none = plan(edge("a b")), plan(edge("c d"), edge("c e")), plan()
+    tell = together(said.append, [one, two, none])
+    for event in (Clear(), Clear(), OwnerReady("static"), Complete(0), Complete(1)):
+        tell(event)
+    assert said == [OwnerReady("static")]
+    tell(Clear())
+    tell(Complete(2))
+    assert said == [OwnerReady("static"), Clear(), Complete(3)]

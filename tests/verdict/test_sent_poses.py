@@ -1,0 +1,138 @@
+"""Where drivers say that their frames are, against nominal and exact values."""
+
+from __future__ import annotations
+
+from math import nan
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tfcompose.geometry import OPTICAL_XYZW, Pose, multiply, quat_from_rpy
+from tfcompose.live.messages import Message
+from tfcompose.live.publishers import Publisher, Senders
+from tfcompose.plan import Driven, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
+from tfcompose.verdict.drivers import SentPoses
+
+if TYPE_CHECKING:
+    from tfcompose.findings import Finding
+
+LENS, OPTICAL = Pose((0.0, -0.05, 0.0)), Pose((0.0, 0.0, 0.0), OPTICAL_XYZW)
+DRIVEN = Driven("front", "realsense/d435i", publishes=True, frames={"lens": "nominal", "optical": "exact"})
+PLAN = Plan(
+    "rover",
+    "0",
+    "base",
+    RosSettings(),
+    (
+        PlanEdge("link", "lens", "static", "front", "/front/front", LENS, None, SourceLine("r.yaml", 1)),
+        PlanEdge("lens", "optical", "static", "front", "/front/front", OPTICAL, None, SourceLine("r.yaml", 1)),
+    ),
+    (PlanProcess("front", "run", nodes=("/front/front",), drives=(DRIVEN,)),),
+)
+GID = b"g" * 16
+
+
+class Guard:
+    """The comparison, with publishers that are sent for by name."""
+
+    def __init__(self) -> None:
+        self.senders = Senders()
+        self.poses = SentPoses(PLAN, self.senders)
+
+    def hears(self, *sent: tuple[str, str, Pose], gid: bytes | None = GID) -> None:
+        edges = tuple((parent, child) for parent, child, _ in sent)
+        self.poses.take(
+            Message(edges, static=True, gid=gid, source_ns=0, sequence=1, poses=[pose for _, _, pose in sent])
+        )
+
+    def knows(self, node: str, gid: bytes = GID) -> None:
+        self.senders.update([*self.senders.present.values(), Publisher(gid, node, static=True)])
+
+    def says(self) -> list[Finding]:
+        return list(self.poses.judge())
+
+
+def moved(pose: Pose, metres: float = 0.0, turn_deg: float = 0.0) -> Pose:
+    x, y, z = pose.xyz
+    turn = quat_from_rpy(0.0, turn_deg * 0.017453292519943295, 0.0)
+    return Pose((x, y, z + metres), multiply(turn, pose.quat_xyzw))
+
+
+@pytest.mark.parametrize(
+    ("names", "metres", "turn_deg", "told"),
+    [
+        ("link lens", 0.019, 4.9, False),
+        ("link lens", 0.021, 0.0, True),
+        ("link lens", 0.0, 5.1, True),
+        ("lens optical", 0.0009, 0.19, False),
+        ("lens optical", 0.0011, 0.0, True),
+        ("lens optical", 0.0, 0.21, True),
+    ],
+)
+def test_a_nominal_frame_may_be_calibrated_and_an_exact_one_only_rounded(
+    names: str, metres: float, turn_deg: float, *, told: bool
+) -> None:
+    guard = Guard()
+    guard.knows("/front/front")
+    parent, child = names.split()
+    guard.hears((parent, child, moved(LENS if child == "lens" else OPTICAL, metres, turn_deg)))
+    assert [one.code for one in guard.says()] == ["TF828"] * told
+
+
+def test_all_frames_of_one_driver_are_one_finding_that_is_told_once() -> None:
+    guard = Guard()
+    guard.knows("/front/front")
+    for _ in range(3):
+        guard.hears(("link", "lens", moved(LENS, 0.1)), ("lens", "optical", moved(OPTICAL, 0.1)))
+    (one,) = guard.says()
+    assert one.message == (
+        "the pose of lens in link from the driver /front/front is 100 mm off preset realsense/d435i, and 1 more frame "
+        "elsewhere: seen xyz 0 -0.05 0.1 m, rpy 0 0 0 deg; expected xyz 0 -0.05 0 m, rpy 0 0 0 deg"
+    )
+    assert one.severity == "warning"
+    assert [note.message for note in one.notes] == [
+        "optical in lens: seen xyz 0 0 0.1 m, rpy -90 0 -90 deg; expected xyz 0 0 0 m, rpy -90 0 -90 deg"
+    ]
+    guard.hears(("link", "lens", moved(LENS, 0.2)))
+    assert guard.says() == []
+
+
+def test_a_driver_that_was_started_again_is_compared_again() -> None:
+    guard = Guard()
+    guard.knows("/front/front")
+    guard.hears(("link", "lens", LENS))
+    assert guard.says() == []
+    guard.knows("/front/front", b"h" * 16)
+    guard.hears(("link", "lens", moved(LENS, 0.1)), gid=b"h" * 16)
+    assert len(guard.says()) == 1
+
+
+def test_a_sender_without_a_name_is_waited_for_and_a_stranger_is_not_compared() -> None:
+    """Whoever else sends the edge is told that it is not theirs."""
+    guard = Guard()
+    guard.hears(("link", "lens", moved(LENS, 0.1)))
+    assert guard.says() == []
+    guard.knows("/front/front")
+    assert len(guard.says()) == 1
+    other = Guard()
+    other.knows("/stranger")
+    other.hears(("link", "lens", moved(LENS, 0.1)))
+    assert other.says() == []
+
+
+@pytest.mark.parametrize(
+    "pose", [Pose((nan, 0.0, 0.0)), Pose(LENS.xyz, (0.0, 0.0, 0.0, 0.0)), Pose(LENS.xyz, (0.0, 0.0, 0.0, nan))]
+)
+def test_what_tf2_drops_is_no_pose_to_compare(pose: Pose) -> None:
+    guard = Guard()
+    guard.knows("/front/front")
+    guard.hears(("link", "lens", pose))
+    assert guard.says() == []
+
+
+def test_without_an_id_or_below_another_parent_nothing_is_compared() -> None:
+    guard = Guard()
+    guard.knows("/front/front")
+    guard.hears(("link", "lens", moved(LENS, 0.1)), gid=None)
+    guard.hears(("other", "lens", moved(LENS, 0.1)))
+    assert guard.says() == []

@@ -1,0 +1,206 @@
+"""The guard's ends of the pipes to and from the launcher: orders in, events out, and what the next guard must know.
+
+Without a launcher there are no orders, and events go to the guard's own output. What a guard leaves to the one that
+follows it, should it die, the launcher keeps without looking into it: ``ipc.MEMORY_FD`` names the environment
+variable that holds the descriptor of a file with the memory, one JSON object, by the TF topics that a judge watches.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import sys
+import time
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.guard.liveness import MOST_NAMED
+from tfcompose.ipc import (
+    EVENTS_FD,
+    GUARD_EVENTS,
+    GUARD_ORDERS,
+    MEMORY_FD,
+    ORDERS_FD,
+    Absent,
+    Alive,
+    Clear,
+    Complete,
+    Gate,
+    GateOpen,
+    GateShut,
+    GuardEvent,
+    Live,
+    OwnerReady,
+    Present,
+    Remember,
+    Silent,
+)
+from tfcompose.run.own import say
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from tfcompose.guard.gates import Gates
+    from tfcompose.guard.judge import Judge
+    from tfcompose.guard.relay import Relay
+    from tfcompose.guard.switches import Switches
+
+#: What a guard reports that is switched off: it looks, and judges nobody.
+_OBSERVATIONS = (Alive, Clear, Live, OwnerReady, Complete, GateOpen, GateShut, Remember, Silent)
+#: How often the launcher hears that the guard looks, in seconds.
+ALIVE_EVERY_S = 1.0
+#: A longer part of the memory is not handed on: the launcher takes no longer lines; characters.
+LONGEST = 900_000
+#: The part of the memory that no topics have.
+_SWITCHES, _ANSWERED = "switches", "answered"
+
+
+class OrderReader:
+    """Follows the launcher's orders as they come."""
+
+    def __init__(self, judges: list[Judge], gates: Gates) -> None:
+        self._judges = judges
+        self._gates = gates
+        self._fd = int(os.environ[ORDERS_FD]) if ORDERS_FD in os.environ else None
+        self._rest = b""
+        if self._fd is not None:
+            os.set_blocking(self._fd, False)
+
+    def take(self) -> None:
+        """Follow the orders that have come, and look at the gates."""
+        for line in self._lines():
+            match GUARD_ORDERS.read(line):
+                case Absent(process):
+                    for judge in self._judges:
+                        judge.absent(process)
+                    self._gates.forget(process)
+                case Present(process):
+                    for judge in self._judges:
+                        judge.live.present(process)
+                case Gate() as gate:
+                    self._gates.add(gate)
+        self._gates.look()
+
+    def _lines(self) -> list[str]:
+        try:
+            data = os.read(self._fd, 64 * 1024) if self._fd is not None else b""
+        except BlockingIOError:
+            return []
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        return [line.decode() for line in lines]
+
+
+class EventWriter:
+    """Writes the events of one look at once, so that a guard that is killed has not written half of them."""
+
+    def __init__(self, *, judges: bool) -> None:
+        self._judges = judges
+        self._lines: list[str] = []
+        self._pipe = int(os.environ[EVENTS_FD]) if EVENTS_FD in os.environ else None
+        self._alive_due = 0.0
+
+    def emit(self, event: GuardEvent) -> None:
+        """Take an event; a guard that judges nobody keeps what it finds to itself."""
+        if not self._judges and not isinstance(event, _OBSERVATIONS):
+            return
+        if self._pipe is not None:
+            self._lines.append(GUARD_EVENTS.line(event))
+        elif not isinstance(event, (Remember, Silent)):
+            say(GUARD_EVENTS.line(event).rstrip())
+
+    def heartbeat(self) -> None:
+        """Write from time to time that the guard looks; a launcher that does not listen is not waited for."""
+        now = time.monotonic()
+        if self._pipe is None or now < self._alive_due:
+            return
+        self._alive_due = now + ALIVE_EVERY_S
+        if select.select([], [self._pipe], [], 0)[1]:
+            self.emit(Alive())
+
+    def flush(self) -> None:
+        """Write what was taken."""
+        if not self._lines or self._pipe is None:
+            return
+        data = memoryview("".join(self._lines).encode())
+        self._lines.clear()
+        try:
+            while data:
+                data = data[os.write(self._pipe, data) :]
+        except BrokenPipeError:
+            sys.exit(1)  # the launcher is gone
+
+
+class SilentEdges:
+    """Reports which edges that were live became silent, and which are no longer: the launcher counts them out."""
+
+    def __init__(self, judges: Sequence[Judge], emit: Callable[[GuardEvent], None]) -> None:
+        self._judges, self._emit = judges, emit
+        self._changes = -1
+        self._reported: list[str] = []
+
+    def report(self) -> None:
+        """Report what is different."""
+        changes = sum(judge.live.changes for judge in self._judges)
+        if changes == self._changes:
+            return
+        self._changes = changes
+        before, self._reported = self._reported, [child for judge in self._judges for child in judge.live.silent()]
+        for children, others, over in ((self._reported, before, False), (before, self._reported, True)):
+            new = sorted(set(children).difference(others))
+            for start in range(0, len(new), MOST_NAMED):
+                self._emit(Silent(tuple(new[start : start + MOST_NAMED]), over=over))
+
+
+def recalled(env: Mapping[str, str]) -> dict[str, Any]:
+    """Return what the guard before this one left, by topics; nothing where there was none."""
+    if MEMORY_FD not in env:
+        return {}
+    with os.fdopen(int(env[MEMORY_FD]), "rb") as file:
+        left: dict[str, Any] = json.loads(file.read())
+    by_topics: dict[str, Any] = {}
+    for key, value in left.items():
+        topics, _, part = key.rpartition(" ")
+        by_topics.setdefault(topics, {})[part] = value
+    return by_topics
+
+
+class Memory:
+    """Hands on what a judge knows, and a relay latches, part by part, whenever a part has changed."""
+
+    def __init__(self, topics: str, judge: Judge, relay: Relay | None, emit: Callable[[GuardEvent], None]) -> None:
+        self._topics = topics
+        self._judge = judge
+        self._relay = relay
+        self._emit = emit
+        self._mark: object = None
+        self._left: dict[str, Any] = {}
+
+    def hand_on(self) -> None:
+        """Hand on what has changed."""
+        mark = (self._judge.mark, self._relay and self._relay.changes)
+        if mark == self._mark:
+            return
+        self._mark = mark
+        known = self._judge.memory() | (self._relay.memory() if self._relay else {})
+        gone = dict.fromkeys(self._left.keys() - known.keys())
+        for part, value in (known | gone).items():
+            if self._left.get(part) != value and len(json.dumps(value)) < LONGEST:
+                self._emit(Remember({f"{self._topics} {part}": value}))
+        self._left = known
+
+
+class SwitchMemory:
+    """Hands on which nodes have answered what their switches are, so that nobody is told twice."""
+
+    def __init__(self, switches: Switches, emit: Callable[[GuardEvent], None], left: Mapping[str, Any]) -> None:
+        self._switches = switches
+        self._emit = emit
+        self._left = left.get(_SWITCHES, {}).get(_ANSWERED, [])
+        switches.recall(self._left)
+
+    def hand_on(self) -> None:
+        """Hand on what has changed."""
+        answered = self._switches.answered
+        if answered != self._left:
+            self._left = answered
+            self._emit(Remember({f"{_SWITCHES} {_ANSWERED}": answered}))

@@ -1,0 +1,104 @@
+"""What the guard knows, edge by edge, and as a page on /diagnostics."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tfcompose.ros.diagnostics import ERROR, OK, STALE, WARN, DiagnosticsPublisher, Status
+from tfcompose.run.own import say
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from rclpy.node import Node
+
+    from tfcompose.findings import Finding
+    from tfcompose.guard.judge import Judge
+    from tfcompose.plan import PlanEdge
+
+EVERY_S = 1.0
+_NAMES = {OK: "ok", WARN: "warning", ERROR: "error", STALE: "not seen"}
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeHealth:
+    """One planned edge: who sends it (a node's full name, empty while nobody has), and how.
+
+    ``rate`` is in hertz, ``age_s`` counts since it came last, ``delay_s`` is how old its stamp was then; None: not
+    known. ``silent`` and ``slow`` are against what the plan says.
+    """
+
+    edge: PlanEdge
+    publisher: str = ""
+    rate: float | None = None
+    age_s: float | None = None
+    delay_s: float | None = None
+    silent: bool = False
+    slow: bool = False
+
+    @property
+    def level(self) -> int:
+        """How bad it is, as on a diagnostics page."""
+        if self.age_s is None:
+            return STALE
+        return ERROR if self.silent else WARN if self.slow else OK
+
+    @property
+    def text(self) -> str:
+        """What is known, in words."""
+        if self.age_s is None:
+            return "not seen yet"
+        numbers = [f"age {self.age_s:.3f} s"] if self.edge.kind != "static" else ["latched"]
+        numbers += [f"{self.rate:.3g} Hz"] if self.rate is not None else []
+        numbers += [f"delay {self.delay_s:.3f} s"] if self.delay_s is not None else []
+        return ", ".join([*numbers, f"from {self.publisher}"])
+
+
+def held_status(robot: str, held: Mapping[tuple[str, str, str], int]) -> Status:
+    """Return the status of what a strict guard held back: transforms by their sender's node, parent and child."""
+    lines = [(f"{parent} → {child} from {who}", str(count)) for (who, parent, child), count in held.items()]
+    message = f"{sum(held.values())} transforms were held back"
+    return Status(f"tfcompose {robot}: strict", WARN if held else OK, message, lines)
+
+
+def statuses(robot: str, edges: Sequence[EdgeHealth], found: Sequence[Finding]) -> list[Status]:
+    """Return one status for the tree, with what is wrong now, and one for each owner, with its edges."""
+    severe = any(one.severity == "error" for one in found)
+    level = ERROR if severe else WARN if found else OK
+    message = "; ".join(f"{one.code} {one.message}" for one in found) or f"{len(edges)} edges are watched"
+    lines = [Status(f"tfcompose {robot}: tree", level, message, [(one.code, one.message) for one in found])]
+    for owner in dict.fromkeys(one.edge.owner for one in edges):
+        owned = [one for one in edges if one.edge.owner == owner]
+        # Not seen yet is worse than fine, and better than silent.
+        worst = max((one.level for one in owned), key=[OK, WARN, STALE, ERROR].index)
+        number = sum(one.level == worst for one in owned)
+        said = f"{number} of {len(owned)} edges: {_NAMES[worst]}"
+        lines.append(Status(f"tfcompose {robot}: {owner}", worst, said, [(one.edge.name, one.text) for one in owned]))
+    return lines
+
+
+class DiagnosticsPage:
+    """Publishes what judges know of the robot on /diagnostics, once a second while anybody reads it."""
+
+    def __init__(self, node: Node, robot: str) -> None:
+        self._robot = robot
+        self._due = 0.0
+        self._publisher = DiagnosticsPublisher(node, robot) if DiagnosticsPublisher.is_installed() else None
+        if self._publisher is None:
+            say("nothing on /diagnostics: the package diagnostic_msgs is not installed")
+
+    def publish(self, judges: Sequence[Judge], held: Callable[[], Mapping[tuple[str, str, str], int] | None]) -> None:
+        """Publish if it is time to, and somebody listens; ``held`` says what a strict guard held back."""
+        now = time.monotonic()
+        if self._publisher is None or now < self._due:
+            return
+        self._due = now + EVERY_S
+        if self._publisher.is_heard:
+            edges = [edge for judge in judges for edge in judge.health(now)]
+            wrong = [one for judge in judges for one in judge.wrong()]
+            page = statuses(self._robot, edges, wrong)
+            if (counts := held()) is not None:
+                page.append(held_status(self._robot, counts))
+            self._publisher.publish(page, time.time_ns())

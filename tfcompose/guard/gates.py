@@ -1,0 +1,143 @@
+"""Gates: topics, services, and the lifecycle states of nodes, which the guard may also drive.
+
+Where no launcher gives orders, in units and containers, the guard brings nodes into their states by itself: a node that
+was started again is brought there again; one that somebody deactivated stays so.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tfcompose.ipc import Gate, GateOpen, GateShut
+from tfcompose.ros.graph import is_offered, services, writers
+from tfcompose.run.own import say
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rclpy.node import Node
+
+    from tfcompose.ipc import GuardEvent
+    from tfcompose.plan import Plan
+    from tfcompose.ros.lifecycle import Lifecycle
+
+#: How often a gate is looked at, in seconds.
+LOOK_EVERY_S = 0.2
+#: And at a node that is in its state.
+ASK_AGAIN_S = 2.0
+NAMED_AT_MOST = 6
+
+
+class Gates:
+    """The gates that are not open yet."""
+
+    def __init__(self, node: Node, emit: Callable[[GuardEvent], None]) -> None:
+        self._node = node
+        self._emit = emit
+        self._gates: dict[str, Gate] = {}
+        self._nodes: dict[tuple[str, str], Lifecycle] = {}
+        self._reported: dict[str, str] = {}
+        self._due = 0.0
+
+    def add(self, gate: Gate) -> None:
+        """Look at this gate from now on."""
+        self.forget(gate.process)
+        if gate == Gate(gate.process):
+            return
+        self._gates[gate.process] = gate
+        for name, state in gate.nodes.items():
+            self._nodes[gate.process, name] = _lifecycle(self._node, name, state, drive=gate.drive)
+
+    def forget(self, process: str) -> None:
+        """Look at the process's gate no more."""
+        self._gates.pop(process, None)
+        self._reported.pop(process, None)
+        for key in [key for key in self._nodes if key[0] == process]:
+            self._nodes.pop(key).close()
+
+    def look(self) -> None:
+        """Look at all, from time to time, and say which are open and what is seen at the others."""
+        now = time.monotonic()
+        if not self._gates or now < self._due:
+            return
+        self._due = now + LOOK_EVERY_S
+        for process, gate in list(self._gates.items()):
+            is_open, seen = self._at(gate, now)
+            if is_open:
+                self.forget(process)
+                self._emit(GateOpen(process, seen))
+            elif self._reported.get(process) != seen:
+                self._reported[process] = seen
+                self._emit(GateShut(process, seen))
+
+    def _at(self, gate: Gate, now: float) -> tuple[bool, str]:
+        states = [self._nodes[gate.process, name].look(now) for name in gate.nodes]
+        if gate.topic:
+            found = writers(self._node, gate.topic)
+            seen = (
+                f"{gate.topic} is published by {', '.join(one.node for one in found)}"
+                if found
+                else self._topics(gate.topic)
+            )
+            states.append((bool(found), seen))
+        if gate.service:
+            is_there = is_offered(self._node, gate.service)
+            seen = f"the service {gate.service} is there" if is_there else self._services(gate.service)
+            states.append((is_there, seen))
+        for topic in gate.writers:
+            names = ", ".join(one.node for one in writers(self._node, topic))
+            states.append((False, f"{topic} is published by {names or 'nobody'}"))
+        return all(is_open for is_open, _ in states), "; ".join(seen for _, seen in states)
+
+    def _topics(self, wanted: str) -> str:
+        return _some("topics", [name for name, _ in self._node.get_topic_names_and_types()], wanted)
+
+    def _services(self, wanted: str) -> str:
+        return _some("services", services(self._node), wanted)
+
+
+@dataclass(slots=True)
+class _DrivenNode:
+    name: str
+    node: Lifecycle
+    due: float = 0.0
+    reported: str = ""
+
+
+class LifecycleDriver:
+    """The plan's lifecycle nodes, where no launcher gives orders."""
+
+    def __init__(self, node: Node, plan: Plan) -> None:
+        wanted = {name: state for process in plan.processes for name, state in process.lifecycle.items()}
+        self._nodes = [_DrivenNode(name, _lifecycle(node, name, state, drive=True)) for name, state in wanted.items()]
+
+    def look(self) -> None:
+        """Go on with each node that is due, and say what has changed of it."""
+        now = time.monotonic()
+        for one in self._nodes:
+            if now < one.due:
+                continue
+            is_there, seen = one.node.look(now)
+            one.due = now + LOOK_EVERY_S
+            if one.node.answers and seen != one.reported:
+                one.reported = seen
+                say(seen)
+            if is_there:
+                one.due = now + ASK_AGAIN_S
+                one.node.ask_again()
+
+
+def _some(what: str, names: list[str], wanted: str) -> str:
+    """Return the first names: those with another namespace, then those of the same, then the others."""
+    above, _, last = wanted.rpartition("/")
+    names = sorted(names, key=lambda name: (name.rpartition("/")[2] != last, name.rpartition("/")[0] != above, name))
+    more = f" and {len(names) - NAMED_AT_MOST} more" if len(names) > NAMED_AT_MOST else ""
+    return f"{what} {', '.join(names[:NAMED_AT_MOST])}{more}" if names else f"no {what}"
+
+
+def _lifecycle(node: Node, name: str, state: str, *, drive: bool) -> Lifecycle:
+    from tfcompose.ros.lifecycle import Lifecycle  # noqa: PLC0415 (its messages are loaded where a node has states)
+
+    return Lifecycle(node, name, state, drive=drive)

@@ -1,0 +1,346 @@
+"""Whether owners send what they own, often enough: arrivals, judged at given times.
+
+Edges that have always come together share one history. At first those of one owner do, and a message that holds only
+some of them parts them; so a message costs what it brings, however many edges it holds.
+
+Times are monotonic seconds. What is measured is the time in which the guard looked: a guard that was kept from looking
+knows nothing of the time between, and blames nobody for it.
+"""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.ipc import Complete, Found, GuardEvent, Live, OwnerReady, Recovered
+from tfcompose.live.arrivals import Arrivals
+from tfcompose.plan import SLOW_BELOW
+from tfcompose.text import listed
+from tfcompose.verdict.rates import left, silent, slow
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from tfcompose.plan import Plan, PlanEdge
+
+#: A rate is judged over this time, or so many periods; half of it at least. Arrivals are counted in stretches of this
+#: part of it, of which the last two count.
+WINDOW_S = 2.0
+WINDOW_PERIODS = 8.0
+STRETCH = 0.6
+#: A rate is fast enough again above this part of what is declared.
+FAST_AGAIN_ABOVE = 0.9
+#: For so many combinations of edges their tracks are remembered.
+MOST_MESSAGES = 1000
+#: So many edges one event names: a line of it is shorter than what a pipe's reader takes.
+MOST_NAMED = 1000
+#: Of the time between two looks only so much counts; the guard looks ten times a second.
+LOOK_COUNTS_S = 0.25
+#: After so long without a look messages are lost, and come when the writer's next heartbeat does: 3 s in Fast DDS.
+STALLED_S = 1.0
+CATCH_UP_S = 3.5
+
+
+@dataclass(slots=True)
+class WatchedTime:
+    """The seconds in which the guard looked, as a clock that stands while it is kept from looking."""
+
+    _seconds: float = 0.0
+    _looked: float | None = None
+    _catching_up_until: float = 0.0
+
+    def at(self, now: float) -> float:
+        """Return the seconds until ``now``."""
+        if self._looked is None or now < self._catching_up_until:
+            return self._seconds
+        return self._seconds + min(max(now - self._looked, 0.0), LOOK_COUNTS_S)
+
+    def begins_late(self, until: float) -> None:
+        """Take what is missing until then as not found yet."""
+        self._catching_up_until = until
+
+    def is_behind(self, now: float) -> bool:
+        """Return whether what comes now may have waited: the guard was kept from looking, or still catches up."""
+        stalled = self._looked is not None and now - self._looked > STALLED_S
+        return stalled or now < self._catching_up_until
+
+    def look(self, now: float) -> float:
+        """Note that the guard looks now, and return the seconds until then."""
+        if self._looked is not None and now - self._looked > STALLED_S:
+            self._catching_up_until = now + CATCH_UP_S
+        self._seconds, self._looked = self.at(now), now
+        return self._seconds
+
+
+@dataclass(slots=True)
+class Track:
+    """What is known of planned edges that come together: of one owner, kind and rate.
+
+    ``arrivals`` and ``heard`` are watched seconds, ``last`` is monotonic; ``delay_s`` is the age of the last stamp when
+    it came, ``silent_after`` how long the edges may be quiet, in seconds, or None if they say no rate.
+    """
+
+    edges: tuple[PlanEdge, ...]
+    silent_after: float | None = field(init=False)
+    delay_s: float | None = None
+    live: bool = False
+    last: float = 0.0
+    heard: float = 0.0
+    silent: bool = False
+    silent_since: float = 0.0
+    steady: bool = False
+    slow: bool = False
+    arrivals: Arrivals = field(default_factory=Arrivals)
+    _window_ns: int = field(init=False)
+
+    @property
+    def edge(self) -> PlanEdge:
+        """One of them."""
+        return self.edges[0]
+
+    def __post_init__(self) -> None:
+        rate = self.edge.rate
+        self._window_ns = int(max(WINDOW_S, WINDOW_PERIODS / (rate or WINDOW_PERIODS)) * 1e9)
+        self.silent_after = self.edge.silent_after_s
+        if not self.arrivals.count:
+            self.forget()
+
+    def arrived(self, watched: float, now: float) -> None:
+        """Note an arrival. An edge that was silent is steady again with two arrivals close enough to each other."""
+        after = self.silent_after
+        self.steady = after is not None and self.live and watched - self.heard <= after
+        self.last, self.heard = now, watched
+        if after is not None:
+            self.arrivals.arrived(int(watched * 1e9), None)
+
+    def forget(self) -> None:
+        """Take the next arrival as the first one."""
+        self.arrivals = Arrivals(int(STRETCH * self._window_ns))
+
+    def rate(self) -> float | None:
+        """Return the rate over the window in hertz, without its longest gap; None while there is too little to say."""
+        return self.arrivals.steady_rate(self._window_ns // 2)
+
+
+class Liveness:
+    """The planned edges and their owners; ``changes`` counts what was reported, and what became of owners."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.changes = 0
+        self._order = {edge.child: index for index, edge in enumerate(plan.edges)}
+        together: dict[tuple[str, str, float | None], list[PlanEdge]] = {}
+        for edge in plan.edges:
+            together.setdefault((edge.owner, edge.kind, edge.rate), []).append(edge)
+        self.tracks = [Track(tuple(edges)) for edges in together.values()]
+        self._track_of = {edge.child: track for track in self.tracks for edge in track.edges}
+        self._of_message: dict[tuple[str, ...], list[Track]] = {}
+        self._waiting = {name: {e.child for e in plan.edges_of(name)} for name in {e.owner for e in plan.edges}}
+        self._complete = False
+        self._gone: set[str] = set()
+        self._absent: set[str] = set()
+        self._watched = WatchedTime()
+
+    def absent(self, owner: str) -> None:
+        """Take the owner as stopped on purpose: nobody misses its edges, and none of them is live."""
+        self._absent.add(owner)
+        self.changes += 1
+        self._gone.discard(owner)
+        self._complete = False
+        tracks = [track for track in self.tracks if track.edge.owner == owner]
+        self._waiting[owner] = {edge.child for track in tracks for edge in track.edges}
+        for track in tracks:
+            track.live = track.silent = track.slow = track.steady = False
+            track.forget()
+
+    def present(self, owner: str) -> None:
+        """Take the owner as started: its edges are to be seen anew."""
+        self._absent.discard(owner)
+
+    def memory(self) -> dict[str, Any]:
+        """Return what the next guard must know, as values of JSON: who is live, slow, silent (since when)."""
+        silent = [[track.silent_since, _children([track])] for track in self.tracks if track.silent]
+        live, slow = ([t for t in self.tracks if t.live], [t for t in self.tracks if t.slow])
+        return {"live": _children(live), "slow": _children(slow), "silent": silent, "gone": sorted(self._gone)}
+
+    def recall(self, memory: dict[str, Any], now: float, until: float) -> None:
+        """Know what the guard before knew, and miss nobody before ``until``: publishers have to be found again."""
+        self._watched.begins_late(until)
+        self._gone = set(memory["gone"])
+        for track in self._parted(self._planned(memory["live"])):
+            track.live, track.last = True, now
+            self._waiting[track.edge.owner].difference_update(edge.child for edge in track.edges)
+        for track in self._parted(self._planned(memory["slow"])):
+            track.slow = True
+        for since, children in memory["silent"]:
+            for track in self._parted(self._planned(children)):
+                track.silent, track.silent_since, track.last = True, since, since
+        self._complete = not any(self._waiting.values())
+
+    def _planned(self, children: list[str]) -> tuple[str, ...]:
+        return tuple(child for child in children if child in self._track_of)
+
+    def arrived(self, children: tuple[str, ...], now: float, delay_s: float | None = None) -> list[GuardEvent]:
+        """Note that owners sent these edges, in one message, and return what that means."""
+        watched, events = self._watched.at(now), []
+        for track in self._of_message.get(children) or self._parted(children):
+            if track.edge.owner in self._absent:
+                continue
+            track.arrived(watched, now)
+            track.delay_s = delay_s
+            if not track.live:
+                track.live = True
+                events += self._began(track)
+        return events
+
+    def _parted(self, children: tuple[str, ...]) -> list[Track]:
+        """Return the tracks of exactly these edges; tracks that hold others too are parted."""
+        wanted = set(children)
+        touched = {id(track): track for child in children for track in (self._track_of[child],)}
+        found = []
+        for track in touched.values():
+            rest = tuple(edge for edge in track.edges if edge.child not in wanted)
+            if rest:
+                part = replace(track, edges=rest, arrivals=deepcopy(track.arrivals))
+                self.tracks.append(part)
+                self._track_of.update((edge.child, part) for edge in rest)
+                track.edges = tuple(edge for edge in track.edges if edge.child in wanted)
+                self._of_message.clear()
+            found.append(track)
+        if len(self._of_message) > MOST_MESSAGES:
+            self._of_message.clear()
+        self._of_message[children] = found
+        return found
+
+    def _began(self, track: Track) -> list[GuardEvent]:
+        """Return that the track's edges are live."""
+        owner = track.edge.owner
+        self.changes += 1
+        children = tuple(edge.child for edge in track.edges)
+        events: list[GuardEvent] = [
+            Live(owner, children[start : start + MOST_NAMED]) for start in range(0, len(children), MOST_NAMED)
+        ]
+        waiting = self._waiting[owner]
+        waiting.difference_update(children)
+        if not waiting:
+            events.append(OwnerReady(owner))
+        if not self._complete and not any(self._waiting.values()):
+            self._complete = True
+            events.append(Complete(len(self._order)))
+        return events
+
+    def seconds_since(self, track: Track, now: float) -> tuple[float, float | None]:
+        """Return the age of the track's last arrival, and its rate in hertz, None while there is too little to say."""
+        return now - track.last, track.rate() if track.silent_after is not None else None
+
+    def silent(self) -> list[str]:
+        """Return the children of the edges that were live and come no more."""
+        quiet = [track for track in self.tracks if track.live and (track.silent or self._is_gone(track))]
+        return _children(quiet)
+
+    def _is_gone(self, track: Track) -> bool:
+        return track.edge.kind == "static" and track.edge.owner in self._gone
+
+    def is_behind(self, now: float) -> bool:
+        """Return whether what comes now may have waited for the guard."""
+        return self._watched.is_behind(now)
+
+    def look(self, now: float) -> None:
+        """Note that the guard looks, and judge nobody."""
+        self._watched.look(now)
+
+    def judge(self, now: float, speed: float = 1.0, *, paused: bool = False) -> list[GuardEvent]:
+        """Return which owners fell silent or slow since the last time, and came back: one event for each owner.
+
+        ``speed`` is how fast time goes by for them: in a simulation that is slow all rates are lower, and in one that
+        is ``paused`` nobody falls silent.
+        """
+        watched = self._watched.look(now)
+        if paused:
+            for track in self.tracks:
+                track.heard = track.heard if track.silent else watched
+        changed: dict[tuple[str, str], list[Track]] = {}
+        for track in self.tracks:
+            change = _change(track, watched, speed) if track.live and track.silent_after is not None else None
+            if change:
+                changed.setdefault((change, track.edge.owner), []).append(track)
+        self.changes += len(changed)
+        return [change_event(change, self._in_order(tracks), now) for (change, _), tracks in changed.items()]
+
+    def _in_order(self, tracks: list[Track]) -> list[Track]:
+        """Return tracks by their first edge's place in the plan."""
+        return sorted(tracks, key=lambda track: self._order[track.edge.child])
+
+    def partly_missing(self) -> dict[str, list[str]]:
+        """Return the fixed edges, by name, that never came from a node of which others came."""
+        if not any(self._waiting.values()):
+            return {}
+        fixed = [t for t in self._in_order(self.tracks) if t.edge.kind == "static" and t.edge.owner not in self._absent]
+        heard = {track.edge.node for track in fixed if track.live}
+        missing: dict[str, list[str]] = {}
+        for track in fixed:
+            if not track.live and track.edge.node in heard:
+                missing.setdefault(track.edge.node, []).extend(edge.name for edge in track.edges)
+        return missing
+
+    def static_writers(self, nodes: Collection[str]) -> list[GuardEvent]:
+        """Take the nodes that write /tf_static now; an owner whose edges were live and that is gone is silent."""
+        lost: dict[str, list[Track]] = {}
+        events: list[GuardEvent] = []
+        for track in self._in_order(self.tracks):
+            if track.edge.kind == "static" and track.live:
+                lost.setdefault(track.edge.owner, []).append(track)
+        for owner, tracks in lost.items():
+            edge = tracks[0].edge
+            if edge.node not in nodes and owner not in self._gone:
+                self._gone.add(owner)
+                events.append(Found(left([edge for track in tracks for edge in track.edges])))
+            elif edge.node in nodes and owner in self._gone:
+                self._gone.discard(owner)
+                events.append(Recovered(f"{owner} ({edge.node}) is back"))
+        self.changes += len(events)
+        return events
+
+
+def change_event(change: str, tracks: list[Track], now: float) -> GuardEvent:
+    """Return the event for tracks that fell silent or slow, or came back: ``change`` says which."""
+    edges = [edge for track in tracks for edge in track.edges]
+    named, are = listed([edge.name for edge in edges]), "is" if len(edges) == 1 else "are"
+    match change:
+        case "silent":
+            return Found(silent(edges, max(now - track.last for track in tracks)))
+        case "slow":
+            return Found(slow(edges, min(track.rate() or 0.0 for track in tracks)))
+        case "back":
+            quiet = now - min(track.silent_since for track in tracks)
+            return Recovered(f"{named} {are} back after {quiet:.1f} s")
+        case _:
+            return Recovered(f"{named} {are} sent at {min(track.rate() or 0.0 for track in tracks):.3g} Hz again")
+
+
+def _children(tracks: list[Track]) -> list[str]:
+    return [edge.child for track in tracks for edge in track.edges]
+
+
+def _change(track: Track, watched: float, speed: float) -> str | None:
+    """Bring the track up to date and return what changed."""
+    after = track.silent_after or 0.0
+    quiet = watched - track.heard > after
+    if quiet and not track.silent:
+        track.silent, track.silent_since, track.steady = True, track.last, False
+        track.forget()
+        return "silent"
+    if track.silent and track.steady and not quiet:
+        track.silent = track.slow = False
+        track.forget()
+        return "back"
+    rate, wanted = track.rate(), speed * (track.edge.rate or 0.0)
+    if rate is None:
+        return None
+    if not track.slow and rate < SLOW_BELOW * wanted:
+        track.slow = True
+        return "slow"
+    if track.slow and not track.silent and rate > FAST_AGAIN_ABOVE * wanted:
+        track.slow = False
+        return "fast"
+    return None

@@ -1,0 +1,284 @@
+"""What a strict guard passes on: of what the plan's own processes send, which is fenced off, that which is theirs.
+
+A message that is all its sender's goes on as it is, byte for byte. Of others what is not is left out. Each sender of
+fixed edges has a latched publisher here, so that late joiners get all of them while their sender is there, also where
+it sent one after the other; a guard that follows one that died latches them again.
+"""
+
+from __future__ import annotations
+
+from base64 import b64decode, b64encode
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.live.messages import Message
+from tfcompose.ros.node import TFPublisher
+from tfcompose.ros.tf_codec import Transform, decode, encode
+from tfcompose.run.own import say
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterator, Mapping
+
+    from rclpy.node import Node
+
+    from tfcompose.live.publishers import Publisher
+    from tfcompose.live.topics import TFData, TFGraph
+    from tfcompose.plan import Plan
+
+    Edge = tuple[str, str]
+    Topics = tuple[str, str]
+    #: Says which edges of a message may pass; None: all.
+    Admits = Callable[[Message], Collection[Edge] | None]
+
+#: The parts of a guard's memory that are a sender's fixed edges begin so.
+_LATCHED = "latched:"
+#: Of so many senders' edges what was held back is counted.
+MOST_COUNTED = 1000
+NAMED_AT_MOST = 6
+#: So many messages with fixed edges wait for their senders' names.
+MOST_WAITING = 200
+
+
+@dataclass(slots=True)
+class _Latched:
+    """The fixed edges of one sender, by their child, and the process whose own topic they came on, if any."""
+
+    publisher: TFPublisher
+    process: str
+    edges: dict[str, Transform] = field(default_factory=dict)
+    data: bytes = b""
+
+
+class Relay:
+    """Passes on what is sent behind the fence on one pair of topics (moving, fixed).
+
+    ``own`` takes the ids of its publishers. With ``feedback`` the fence is one of remappings. ``changes`` counts what
+    was latched.
+    """
+
+    def __init__(
+        self, node: Node, graph: TFGraph, plan: Plan, own: set[bytes | None], feedback: Feedback | None = None
+    ) -> None:
+        self._node = node
+        self._graph = graph
+        self._own = own
+        self._feedback = feedback
+        self._moving = TFPublisher(node, static=False, topic=graph.topics[0])
+        own.add(self._moving.raw_gid)
+        self._fixed: dict[bytes, _Latched] = {}
+        self._nodes = {name for process in plan.processes if process.kind != "external" for name in process.nodes}
+        self._finds_until = 0.0
+        self.changes = 0
+        self.waiting: list[tuple[TFData, Message]] = []
+        self.held = HeldBack()
+
+    def pass_on(self, sent: TFData, message: Message, admitted: Collection[Edge] | None, who: str) -> None:
+        """Pass on what is admitted of the message that ``who`` sent; None: all of it."""
+        if self._feedback and not sent.process:
+            self._feed(sent, message)  # everybody has it
+            return
+        gid = sent.received.gid
+        may_pass = False if gid is None else self._graph.may_pass(gid)
+        if gid is None or may_pass is False:
+            self._complain(who)  # it is not fenced off, and has reached everybody, or nobody knows whose it is
+            return
+        if not who or may_pass is None:
+            if message.static and len(self.waiting) < MOST_WAITING:
+                self.waiting.append((sent, message))
+            return
+        if admitted is not None:
+            self.held.count(message, admitted, who)
+        data = sent.received.data
+        if message.static:
+            self._latch(gid, data, message, admitted, sent.process)
+        elif admitted is None:
+            self._send(data, sent.process)
+        elif admitted:
+            self._send(encode(list(_admitted(data, message, admitted))), sent.process)
+
+    def memory(self) -> dict[str, Any]:
+        """Return what the guard that follows must latch: not every sender latches all that it has sent."""
+        return {
+            f"{_LATCHED}{gid.hex()}": [one.process, b64encode(one.data).decode()] for gid, one in self._fixed.items()
+        }
+
+    def recall(self, memory: Mapping[str, Any], admits: Admits, until: float) -> None:
+        """Latch what the guard before this one latched and may still pass, and forget nobody before ``until``.
+
+        Until then the senders are found again.
+        """
+        self._finds_until = until
+        for part, said in memory.items():
+            if part.startswith(_LATCHED) and said is not None:
+                gid, data = bytes.fromhex(part.removeprefix(_LATCHED)), b64decode(said[1])
+                edges = tuple((t.parent.removeprefix("/"), t.child.removeprefix("/")) for t in decode(data))
+                message = Message(edges, static=True, gid=gid, source_ns=0, sequence=0)
+                self._latch(gid, data, message, admits(message), said[0])
+
+    def look(self, writers: Collection[Publisher], now: float) -> None:
+        """Latch the edges of those no more who are not in the graph any more, and feed listeners."""
+        if now >= self._finds_until:
+            present = {writer.gid for writer in writers}
+            for gid in [gid for gid in self._fixed if gid not in present]:
+                self.changes += 1
+                self._node.destroy_publisher(self._fixed.pop(gid).publisher.publisher)
+                if self._feedback:
+                    self._feedback.forget([gid])
+            self._forget_others(writers, present)
+        if self._feedback:
+            self._feedback.look()
+
+    def _forget_others(self, writers: Collection[Publisher], present: Collection[bytes]) -> None:
+        """Feed no more what everybody had from one that has left; where ids do not tell who, from all when all have."""
+        if self._feedback is None:
+            return
+        others = self._feedback.sources("")
+        if not self._graph.says_who and any(one.static and not one.fenced for one in writers):
+            return
+        self._feedback.forget([source for source in others if source not in present])
+
+    def _complain(self, who: str) -> None:
+        if who in self._nodes:
+            self._nodes.discard(who)
+            say(f"{who} is not seen to be a process of this run: what it sends is not passed on")
+
+    def _send(self, data: bytes, process: str) -> None:
+        self._moving.publish(data)
+        if self._feedback:
+            self._feedback.moving(data, process)
+
+    def _feed(self, sent: TFData, message: Message) -> None:
+        if self._feedback is None:
+            return
+        if message.static:
+            found = {t.child: t for t in decode(sent.received.data)}
+            self._feedback.fixed(sent.received.raw_gid or b"", found, "")
+        else:
+            self._feedback.moving(sent.received.data, "")
+
+    def _latch(
+        self, gid: bytes, data: bytes, message: Message, admitted: Collection[Edge] | None, process: str
+    ) -> None:
+        found = {t.child: t for t in _admitted(data, message, admitted)}
+        latched = self._fixed.get(gid)
+        if latched is None:
+            if not found:
+                return
+            latched = self._new(gid, process)
+        whole = admitted is None and found.keys() >= latched.edges.keys()
+        latched.edges |= found
+        latched.data = data if whole else encode(list(latched.edges.values()))
+        latched.publisher.publish(latched.data)
+        if self._feedback:
+            self._feedback.fixed(gid, latched.edges, process)
+        self.changes += 1
+
+    def _new(self, gid: bytes, process: str) -> _Latched:
+        publisher = TFPublisher(self._node, static=True, topic=self._graph.topics[1])
+        self._own.add(publisher.raw_gid)
+        latched = self._fixed[gid] = _Latched(publisher, process)
+        return latched
+
+
+def _admitted(data: bytes, message: Message, admitted: Collection[Edge] | None) -> Iterator[Transform]:
+    for transform, edge in zip(decode(data), message.edges, strict=True):
+        if admitted is None or edge in admitted:
+            yield transform
+
+
+class HeldBack:
+    """What was not passed on: ``counts`` are transforms, by the sender's node, parent and child."""
+
+    def __init__(self) -> None:
+        self.counts: dict[tuple[str, str, str], int] = {}
+        self._reported: dict[tuple[str, str, str], int] = {}
+
+    def count(self, message: Message, admitted: Collection[tuple[str, str]], who: str) -> None:
+        """Count what is not admitted of a message."""
+        for parent, child in message.edges:
+            key = (who, parent, child)
+            if (parent, child) not in admitted and (key in self.counts or len(self.counts) < MOST_COUNTED):
+                self.counts[key] = self.counts.get(key, 0) + 1
+
+    def report(self) -> str:
+        """Return how much was held back since the last time, and whose it is; empty if nothing was."""
+        now = {key: count for key, count in self.counts.items() if count != self._reported.get(key)}
+        self._reported.update(now)
+        parts = [f"{count} × {parent} → {child} from {who}" for (who, parent, child), count in now.items()]
+        more = [f"and {len(parts) - NAMED_AT_MOST} more"] if len(parts) > NAMED_AT_MOST else []
+        return ", ".join([*parts[:NAMED_AT_MOST], *more])
+
+
+@dataclass(slots=True)
+class _Listener:
+    """A process's topics, and what is sent to them: nothing (None) until somebody listens."""
+
+    topics: Topics
+    moving: TFPublisher | None = None
+    fixed: TFPublisher | None = None
+    is_sent: bool = False
+
+
+class Feedback:
+    """Sends to processes that are fenced off by remapping what others send, which their listeners would miss.
+
+    Moving edges go on as they come, fixed ones latched, all in one message, as long as somebody listens. ``own`` takes
+    the ids of its publishers; the node listens there itself.
+    """
+
+    def __init__(self, node: Node, private: Mapping[str, Topics], own: set[bytes | None]) -> None:
+        self._node = node
+        self._own = own
+        self._listeners = {process: _Listener(topics) for process, topics in private.items()}
+        self._fixed: dict[bytes, tuple[str, dict[str, Transform]]] = {}
+
+    def look(self) -> None:
+        """See who listens now, and latch for them what has changed."""
+        for process, one in self._listeners.items():
+            if one.moving is None and self._is_heard(one.topics[0]):
+                one.moving = self._publisher(one.topics[0], static=False)
+            if one.fixed is None and self._is_heard(one.topics[1]):
+                one.fixed = self._publisher(one.topics[1], static=True)
+            if one.fixed and not one.is_sent:
+                one.is_sent = True
+                one.fixed.publish(encode(self._rest(process)))
+
+    def moving(self, data: bytes, sender: str) -> None:
+        """Send a message to all but the process that it is from; empty: it is from none of them."""
+        for process, one in self._listeners.items():
+            if one.moving and process != sender:
+                one.moving.publish(data)
+
+    def fixed(self, source: bytes, edges: Mapping[str, Transform], sender: str) -> None:
+        """Latch the fixed edges of one source, by their child, with the next look."""
+        known = self._fixed.pop(source, (sender, {}))[1]  # the newest comes last
+        self._fixed[source] = (sender, {**known, **edges})
+        self._outdate_all_but(sender)
+
+    def forget(self, sources: Collection[bytes]) -> None:
+        """Latch the edges of these no more."""
+        for source in [one for one in sources if one in self._fixed]:
+            self._outdate_all_but(self._fixed.pop(source)[0])
+
+    def sources(self, sender: str) -> list[bytes]:
+        """Return the sources of fixed edges that are from that process; empty: from none of them."""
+        return [source for source, (process, _) in self._fixed.items() if process == sender]
+
+    def _rest(self, process: str) -> list[Transform]:
+        rest: dict[str, Transform] = {}
+        for sender, edges in self._fixed.values():
+            if sender != process:
+                rest |= edges
+        return list(rest.values())
+
+    def _outdate_all_but(self, sender: str) -> None:
+        for process, one in self._listeners.items():
+            one.is_sent = one.is_sent and process == sender
+
+    def _is_heard(self, topic: str) -> bool:
+        return self._node.count_subscribers(topic) > 1  # the first is the node's own
+
+    def _publisher(self, topic: str, *, static: bool) -> TFPublisher:
+        publisher = TFPublisher(self._node, static=static, topic=topic)
+        self._own.add(publisher.raw_gid)
+        return publisher

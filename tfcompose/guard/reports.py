@@ -1,0 +1,302 @@
+"""What the guard reports, once: violations as cases, and publishers whose settings are wrong.
+
+A violation is reported together with others of its kind and node, and said to be over when it has ended.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.findings import Note
+from tfcompose.ipc import Found, GuardEvent, Recovered, Taken
+from tfcompose.live.publishers import FEWEST_GAPS, NAMELESS_S, UNCOUNTED
+from tfcompose.live.state import NAMELESS
+from tfcompose.plan.topics import GLOBAL
+from tfcompose.verdict.drivers import drives_of, sensor_of
+from tfcompose.verdict.ownership import Violation, misnamed_help, taken_finding, violation_finding
+from tfcompose.verdict.publishers import best_effort_publisher, leak, replaced_latched, volatile_publisher
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from tfcompose.findings import Finding
+    from tfcompose.live.publishers import Publisher, Senders
+    from tfcompose.plan import Plan, PlanEdge
+    from tfcompose.verdict.ownership import Start
+
+#: For how long after the start a publisher can turn out to have been there first, and by how much it must have been.
+FIRST_S = 15.0
+FIRST_BY_NS = 500_000_000
+#: How long messages are waited for that tell from their count when a publisher began.
+COUNTING_S = 0.7
+#: A violation is over when its publisher has left and nothing came for so long, or for longer from one that stays.
+OVER_S = 3.0
+QUIET_S = 30.0
+#: Further edges of an offender that was just reported are collected for so long, and for longer while more come and
+#: come: who names frames after what it tracks has new ones each second.
+COLLECTED_S = 0.5
+COLLECTED_AT_MOST_S = 60.0
+#: So many edges have a line each when they are over; more are reported in one.
+OVER_IN_LINES = 3
+#: So long after it was first heard, an owner's latched message is surely all that is left of those before, in seconds.
+ALL_HEARD_S = 2.0
+#: What a publisher can do before the start that keeps the plan from starting.
+_TAKES = frozenset({"TF801", "TF802", "TF820"})
+#: Violations that ``stop-offender`` ends: who commits them breaks the tree.
+_STOPPED_FOR = frozenset({"TF801", "TF802", "TF803", "TF820"})
+
+Key = tuple[str, str, str, str]
+#: Code and node, and whether it is about the end.
+Group = tuple[str, str, bool]
+
+
+@dataclass(slots=True)
+class Case:
+    """A violation that was seen first at ``since`` and again at ``last``; ``reported`` says whether that was done."""
+
+    violation: Violation
+    gid: bytes | None
+    since: float
+    last: float
+    reported: bool = False
+
+
+class Cases:
+    """All that were seen and are not over; ``changes`` counts what was reported."""
+
+    def __init__(self, plan: Plan, senders: Senders, start: Start) -> None:
+        self.open: dict[Key, Case] = {}
+        self.changes = 0
+        self._plan = plan
+        self._senders = senders
+        self._start = start
+        self._drives = drives_of(plan)
+        self._reported: dict[Group, tuple[float, float]] = {}
+        self._ended: dict[Group, list[Violation]] = {}
+        self._processes = {
+            node: process.name for process in plan.processes if process.kind != "external" for node in process.nodes
+        }
+
+    def note(self, violation: Violation, gid: bytes | None, now: float) -> Case:
+        """Note that the violation was seen now."""
+        key = self._key(violation, gid)
+        case = self.open.setdefault(key, Case(violation, gid, now, now))
+        case.gid, case.last = gid, now
+        if violation.nodes:  # what was blamed on nobody has a name now
+            self.open.pop((violation.code, violation.parent, violation.child, NAMELESS), None)
+        return case
+
+    def _key(self, violation: Violation, gid: bytes | None) -> Key:
+        """Return what the case is known by; where ids do not say whose, who may have done it changes all the time."""
+        who = violation.who if self._senders.is_sure(gid) else ""
+        return (violation.code, violation.parent, violation.child, who)
+
+    @property
+    def unreported(self) -> bool:
+        """Whether there is something that was not reported yet."""
+        return not all(case.reported for case in self.open.values())
+
+    def report(self, now: float) -> list[GuardEvent]:
+        """Report new cases, those of one kind and node in one finding."""
+        grouped: dict[Group, list[Case]] = {}
+        for case in self._ripe(now):
+            grouped.setdefault((case.violation.code, case.violation.who, False), []).append(case)
+        events: list[GuardEvent] = []
+        for group, cases in grouped.items():
+            if not self._is_due(group, now):
+                continue
+            self.changes += 1
+            events.append(self._event(cases, now))
+            for case in cases:
+                case.reported = True
+        return events
+
+    def _ripe(self, now: float) -> Iterator[Case]:
+        """Yield the cases to report: those of which nothing more comes to be known.
+
+        Where ids do not say whose they are, whoever takes turns with the owner may not be in the graph yet; all that it
+        shows a while later are named.
+        """
+        for case in self.open.values():
+            if case.reported or self._may_learn_more(case.gid, now):
+                continue
+            if case.violation.namesake and case.gid is not None and not self._senders.is_sure(case.gid):
+                if now - case.since < NAMELESS_S:
+                    continue
+                nodes = self._senders.nodes(case.gid, static=case.violation.static)
+                case.violation = replace(case.violation, nodes=nodes or case.violation.nodes)
+            yield case
+
+    def _is_due(self, group: Group, now: float) -> bool:
+        """Return whether the group is reported now, and note it: the more often it is, the longer others wait."""
+        at, collected_s = self._reported.get(group, (-COLLECTED_AT_MOST_S, 0.0))
+        if now - at < collected_s:
+            return False
+        goes_on = self._start.cleared is not None and now - at < 2 * collected_s
+        self._reported[group] = (now, min(2 * collected_s, COLLECTED_AT_MOST_S) if goes_on else COLLECTED_S)
+        return True
+
+    def _event(self, cases: list[Case], now: float) -> GuardEvent:
+        violations = [case.violation for case in cases]
+        where = self._senders.where(cases[0].gid)
+        if any(self._was_first(case, now) for case in cases):
+            return Taken(taken_finding(violations, where))
+        driven = sensor_of(violations[0], self._drives)
+        found = violation_finding(violations, self._plan, where, driven)
+        if advice := misnamed_help(violations, self._plan, self._senders.process(cases[0].gid)):
+            found = replace(found, help=advice)
+        if self._plan.guard.mode == "strict" and not violations[0].is_of_stamps:
+            found = replace(found, notes=(*found.notes, Note(_fate(held=self._senders.is_held_back(cases[0].gid)))))
+        return Found(found, self._process(violations[0], cases[0].gid))
+
+    def _process(self, violation: Violation, gid: bytes | None) -> str:
+        """Return the plan's process that did it, where that is sure and it can be stopped for it."""
+        if violation.namesake or len(violation.nodes) != 1 or violation.code not in _STOPPED_FOR:
+            return ""
+        return self._processes.get(violation.nodes[0], "") if self._senders.is_of_this_run(gid) else ""
+
+    def _may_learn_more(self, gid: bytes | None, now: float) -> bool:
+        """Whether more messages of this publisher can tell if it was there before the start."""
+        sender, cleared = self._senders.sender(gid), self._start.cleared
+        if sender is None or cleared is None or now - cleared > FIRST_S:
+            return False
+        began_before = sender.began_before(self._start.cleared_ns - FIRST_BY_NS)
+        return began_before is None and now - sender.first_seen < COUNTING_S
+
+    def _was_first(self, case: Case, now: float) -> bool:
+        """Whether the offender had the edge before the plan was started."""
+        if case.violation.code not in _TAKES:
+            return False
+        cleared = self._start.cleared
+        if cleared is None:
+            return True
+        sender = self._senders.sender(case.gid)
+        if sender is None or now - cleared >= FIRST_S:
+            return False
+        return bool(sender.began_before(self._start.cleared_ns - FIRST_BY_NS, FEWEST_GAPS))
+
+    def memory(self) -> list[list[Any]]:
+        """Return what was reported and is not over, as values of JSON."""
+        return [_to_json(case) for case in self.open.values() if case.reported]
+
+    def recall(self, memory: list[list[Any]], until: float) -> None:
+        """Take these as reported by the guard before, and as going on ``until`` then at least."""
+        planned = {edge.child: edge for edge in self._plan.edges}
+        for one in memory:
+            case = _from_json(one, planned, until)
+            self.open[self._key(case.violation, case.gid)] = case
+
+    def over(self, now: float) -> list[GuardEvent]:
+        """Forget violations that have ended, and say so; the next of their kind is a new case."""
+        ended = [key for key, case in self.open.items() if case.reported and self._has_ended(case, now)]
+        self.changes += len(ended)
+        for key in ended:
+            one = self.open.pop(key).violation
+            self._ended.setdefault((one.code, one.who, True), []).append(one)
+        due = [group for group in self._ended if self._is_due(group, now)]
+        return [Recovered(text) for group in due for text in _over(self._ended.pop(group))]
+
+    def _has_ended(self, case: Case, now: float) -> bool:
+        if self._senders.is_present(case.gid) and not case.violation.is_of_stamps:
+            return not case.violation.static and now - case.last > QUIET_S
+        return now - case.last > OVER_S
+
+
+def _fate(*, held: bool) -> str:
+    return (
+        "held back: no listener gets it"
+        if held
+        else "not behind the fence, so it cannot be held back: listeners get it"
+    )
+
+
+def _over(ended: list[Violation]) -> list[str]:
+    """Return in words that these of one kind and node are over."""
+    if len(ended) <= OVER_IN_LINES:
+        return [one.over() for one in ended]
+    return [ended[0].over(len(ended) - 1)]
+
+
+def _to_json(case: Case) -> list[Any]:
+    one = case.violation
+    gid = None if case.gid is None else case.gid.hex()
+    what = (one.code, one.parent, one.child, list(one.nodes), one.static, one.edge is not None)
+    return [*what, one.namesake, list(one.loop), one.detail, gid]
+
+
+def _from_json(data: list[Any], planned: dict[str, PlanEdge], last: float) -> Case:
+    code, parent, child, nodes, static, is_planned, namesake, loop, detail, gid = data
+    edge = planned.get(child) if is_planned else None
+    violation = Violation(code, parent, child, tuple(nodes), static, edge, namesake, tuple(loop), detail)
+    return Case(violation, None if gid is None else bytes.fromhex(gid), last, last, reported=True)
+
+
+class PublisherReports:
+    """Publishers that nobody hears, or not wholly, or that are where they do not belong; each is reported once.
+
+    That holds for as long as guards follow each other; ``changes`` counts what was reported.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self._plan = plan
+        self._nodes = {node for process in plan.processes for node in process.nodes}
+        self._reported: set[tuple[str, bytes]] = set()
+
+    @property
+    def changes(self) -> int:
+        """How much was reported."""
+        return len(self._reported)
+
+    def wrong_settings(self, publishers: Sequence[Publisher]) -> list[Found]:
+        """Return the findings for those on the plan's topics whose quality of service no listener accepts."""
+        return [found for one in publishers for wrong in self._wrong_settings(one) for found in self._once(one, wrong)]
+
+    def _wrong_settings(self, one: Publisher) -> Iterator[Finding]:
+        if one.node is None:
+            return
+        topic = one.topic or GLOBAL[one.static]
+        if one.static and not one.latched:
+            owned = [edge.name for edge in self._plan.edges if edge.node == one.node and edge.kind == "static"]
+            yield volatile_publisher(one.node, topic, owned)
+        if not one.reliable:
+            yield best_effort_publisher(one.node, topic)
+
+    def leaks(self, publishers: Sequence[Publisher], topics: tuple[str, str]) -> list[Found]:
+        """Return the findings for the plan's nodes on the global topics, while its own (moving, static) are others."""
+        inside = f"/{self._plan.ros.namespace.strip('/')}/"
+        return [
+            found
+            for one in publishers
+            if one.node and (one.node in self._nodes or one.node.startswith(inside))
+            for found in self._once(one, leak(one.node, GLOBAL[one.static], topics[one.static]))
+        ]
+
+    def replaced(self, senders: Senders, missing: Mapping[str, Sequence[str]], now: float) -> list[Found]:
+        """Return the findings for nodes that sent latched messages before they were first heard.
+
+        ``missing`` are names of fixed edges that did not come, by the node, of which others came.
+        """
+        found = []
+        for one in senders.present.values() if missing else ():
+            edges, sender = missing.get(one.node or ""), senders.sender(one.gid)
+            if not (one.node and one.static and edges and sender):
+                continue
+            first = sender.first_sequence
+            if 1 < first < UNCOUNTED and now - sender.first_seen >= ALL_HEARD_S:
+                found += self._once(one, replaced_latched(one.node, first - 1, edges))
+        return found
+
+    def memory(self) -> list[list[str]]:
+        """Return what was reported, as values of JSON."""
+        return sorted([code, gid.hex()] for code, gid in self._reported)
+
+    def recall(self, memory: list[list[str]]) -> None:
+        """Take this as reported by the guard before."""
+        self._reported = {(code, bytes.fromhex(gid)) for code, gid in memory}
+
+    def _once(self, one: Publisher, found: Finding) -> list[Found]:
+        if (found.code, one.gid) in self._reported:
+            return []
+        self._reported.add((found.code, one.gid))
+        return [Found(found)]

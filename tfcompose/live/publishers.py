@@ -1,0 +1,217 @@
+"""Who publishes on TF topics, by the ids that come with messages, and when each publisher began."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tfcompose.live.messages import Message
+
+#: So many publishers that have left are remembered.
+MOST_KNOWN = 20_000
+#: So many bytes of an id are its participant's (RTPS: a GUID's prefix).
+PARTICIPANT = 12
+#: How many gaps between messages tell surely when a publisher began; so many at least, when time is short.
+GAPS, FEWEST_GAPS = 5, 2
+#: A gap that was seen may be shorter than usual by this factor.
+UNSURE = 3.0
+#: How long a publisher may stay without a name, or out of the graph, before it is judged all the same.
+NAMELESS_S = 0.7
+UNCOUNTED = 2**64 - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Publisher:
+    """A publisher on a TF topic, as the graph shows it.
+
+    Attributes:
+        gid: its id, 16 bytes, which comes with its messages where the rmw says who sent them.
+        node: its node's full name, None while that is not known.
+        static: whether its topic is one of fixed edges.
+        topic: its topic's full name.
+        type: its type, such as ``tf2_msgs/msg/TFMessage``.
+        latched: whether its durability is transient_local.
+        reliable: whether its reliability is reliable.
+        where: on which machine and as which process it runs; empty if that is not known.
+        ours: whether that process is of the guard's own run; None: not known.
+        fenced: whether it sends behind the fence of a strict plan; None: if it is ours.
+        others: further nodes of which it may be one.
+        process: the plan's process that it is of, where that was seen.
+    """
+
+    gid: bytes
+    node: str | None
+    static: bool
+    topic: str = ""
+    type: str = ""
+    latched: bool = True
+    reliable: bool = True
+    where: str = ""
+    ours: bool | None = None
+    fenced: bool | None = None
+    others: tuple[str, ...] = ()
+    process: str = ""
+
+    @property
+    def nodes(self) -> tuple[str, ...]:
+        """The nodes of which one is the publisher's; none while it has no name."""
+        return () if self.node is None else (self.node, *self.others)
+
+
+class Publishers:
+    """All publishers that the graph has shown: those that are there, and the names of those that have left.
+
+    Where the rmw does not say who sent a message (``says_who``), ids of messages tell senders apart, and any node on
+    the topic may be the one.
+    """
+
+    def __init__(self, *, says_who: bool = True) -> None:
+        self.says_who = says_who
+        #: Whether the graph was asked: of a recording nobody can.
+        self.asked = False
+        #: Those that are there, by id.
+        self.present: dict[bytes, Publisher] = {}
+        #: All by id, as they were when they had a name last.
+        self.known: dict[bytes, Publisher] = {}
+
+    def update(self, publishers: Sequence[Publisher]) -> None:
+        """Take who is in the graph now."""
+        self.asked = True
+        self.present = {one.gid: one for one in publishers}
+        if len(self.known) + len(publishers) > MOST_KNOWN:
+            self.known = {gid: one for gid, one in self.known.items() if gid in self.present}
+        self.known |= {one.gid: one for one in publishers if one.node is not None or one.gid not in self.known}
+
+    def is_named(self, gid: bytes | None) -> bool:
+        """Return whether the publisher's node has a name."""
+        return gid is not None and gid in self.known and self.known[gid].node is not None
+
+    def is_sure(self, gid: bytes | None) -> bool:
+        """Return whether the id says whose it is: by the graph, once it shows the publisher's name."""
+        return gid is not None and (self.says_who or self.is_named(gid))
+
+    def nodes(self, gid: bytes | None, *, static: bool) -> tuple[str, ...]:
+        """Return the publisher's node, nothing while it is not known; all on the topic where ids do not say whose.
+
+        One that sends behind a fence of remappings has an id in any case.
+        """
+        if gid is not None and self.is_sure(gid):
+            return self.known[gid].nodes if gid in self.known else ()
+        there = self.present.values()
+        return tuple(sorted({one.node for one in there if one.static == static and one.node and not one.fenced}))
+
+    def where(self, gid: bytes | None) -> str:
+        """Return where the publisher runs, empty where that is not known."""
+        return self.known[gid].where if gid is not None and gid in self.known else ""
+
+    def is_present(self, gid: bytes | None) -> bool:
+        """Return whether the publisher is there; one whose id does not say whose it is, is while anybody is."""
+        return gid in self.present if self.is_sure(gid) else bool(self.present)
+
+
+@dataclass(slots=True)
+class Sender:
+    """One publisher: when it was first heard, and how fast it counts."""
+
+    first_seen: float
+    first_ns: int
+    first_sequence: int
+    last_ns: int
+    last_sequence: int
+    gaps_ns: list[float] = field(default_factory=list)
+
+    def heard(self, message: Message) -> None:
+        """Note a further message."""
+        counted = message.sequence - self.last_sequence
+        if counted > 0 and len(self.gaps_ns) < GAPS:
+            self.gaps_ns.append((message.source_ns - self.last_ns) / counted)
+        self.last_ns, self.last_sequence = message.source_ns, message.sequence
+
+    def began_before(self, time_ns: float, gaps: int = GAPS) -> bool | None:
+        """Return whether its first message was sent before that time; None: not sure by so many gaps.
+
+        A newcomer that is far from it is recognised by its second message.
+        """
+        if self.first_sequence in {1, UNCOUNTED}:
+            return self.first_ns < time_ns
+        before = self.first_sequence - 1
+        if self.gaps_ns and self.first_ns - UNSURE * max(self.gaps_ns) * before > time_ns:
+            return False
+        return self.first_ns - _median(self.gaps_ns) * before < time_ns if len(self.gaps_ns) >= gaps else None
+
+
+def _median(values: Sequence[float]) -> float:
+    """Return the middle one; the library's median costs two megabytes in a process that needs it only here."""
+    ordered, half = sorted(values), len(values) // 2
+    return ordered[half] if len(ordered) % 2 else (ordered[half - 1] + ordered[half]) / 2
+
+
+class Senders(Publishers):
+    """All publishers that were heard, or that the graph shows."""
+
+    def __init__(self, *, says_who: bool = True) -> None:
+        super().__init__(says_who=says_who)
+        self._heard: dict[bytes, Sender] = {}
+
+    def heard(self, message: Message, now: float) -> None:
+        """Count a message. Without ids nobody's messages can be counted."""
+        if message.gid is None:
+            return
+        sender = self._heard.get(message.gid)
+        if sender:
+            sender.heard(message)
+        else:
+            first = (message.source_ns, message.sequence)
+            self._heard[message.gid] = Sender(now, *first, *first)
+
+    def sender(self, gid: bytes | None) -> Sender | None:
+        """Return what is known of that publisher's messages."""
+        return None if gid is None else self._heard.get(gid)
+
+    def process(self, gid: bytes | None) -> str:
+        """Return the plan's process that the publisher was seen to be of, or nothing."""
+        one = self.present.get(gid) if gid is not None else None
+        return one.process if one else ""
+
+    def is_of_this_run(self, gid: bytes | None) -> bool:
+        """Whether the publisher is surely a process of the guard's own run.
+
+        Where its process cannot be seen, its node's name says so if no other participant has a node of that name.
+        """
+        one = self.present.get(gid) if gid is not None else None
+        if one is None or one.ours is not None:
+            return one is not None and bool(one.ours)
+        if one.fenced:
+            return True
+        return len({other.gid[:PARTICIPANT] for other in self.present.values() if other.node == one.node}) == 1
+
+    def is_held_back(self, gid: bytes | None) -> bool:
+        """Whether what the publisher may not send reaches nobody in a strict plan."""
+        one = self.present.get(gid) if gid is not None else None
+        return self.is_of_this_run(gid) if one is None or one.fenced is None else one.fenced
+
+    @property
+    def mark(self) -> tuple[int, int]:
+        """What changes when there is more to remember."""
+        return len(self._heard), sum(one.node is not None for one in self.known.values())
+
+    def memory(self) -> dict[str, list[Any]]:
+        """Return what the next guard must know of those that are there, as values of JSON."""
+        there = {gid: sender for gid, sender in self._heard.items() if gid in self.present}
+        return {gid.hex(): [self.known[gid].nodes, *_to_json(one)] for gid, one in there.items()}
+
+    def recall(self, memory: dict[str, list[Any]]) -> None:
+        """Know what the guard before knew."""
+        for hexed, (names, *said) in memory.items():
+            gid = bytes.fromhex(hexed)
+            self._heard[gid] = Sender(*said)
+            if names:
+                self.known[gid] = Publisher(gid, names[0], static=False, others=tuple(names[1:]))
+
+
+def _to_json(one: Sender) -> list[Any]:
+    first = (one.first_seen, one.first_ns, one.first_sequence)
+    return [*first, one.last_ns, one.last_sequence, list(one.gaps_ns)]

@@ -1,0 +1,184 @@
+"""The TF topics of the running system: what comes on them, and who publishes there, with the process of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from hashlib import blake2b
+from typing import TYPE_CHECKING
+
+from tfcompose.live.publishers import PARTICIPANT, Publisher
+from tfcompose.plan.topics import GLOBAL
+from tfcompose.ros.graph import UNKNOWN_NODE, ids_say_who, own_gid, writers, writers_unmapped
+from tfcompose.ros.node import TFSubscription
+from tfcompose.ros.processes import has_variable, origin, variable_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from rclpy.node import Node
+
+    from tfcompose.ros.graph import Writer
+    from tfcompose.ros.node import Received
+
+    Topics = tuple[str, str]
+
+_ID_BYTES = 16
+
+
+def id_of_topic(topic: str) -> bytes:
+    """Return what stands for the id of whoever sends on a process's own topic, where the rmw does not say who sent."""
+    return blake2b(topic.encode(), digest_size=_ID_BYTES).digest()
+
+
+@dataclass(frozen=True, slots=True)
+class TFData:
+    """A message as bytes, the kind of its topic, and whose own topic that is; empty: it is everybody's."""
+
+    received: Received
+    static: bool
+    process: str = ""
+
+
+class TFTopics:
+    """Subscriptions to a pair of TF topics (moving, fixed), and to those that processes are remapped to.
+
+    With ``deep`` they keep more messages than a listener's do. ``own`` are ids whose messages are not taken.
+    """
+
+    def __init__(
+        self, node: Node, topics: Topics, private: Mapping[str, Topics] | None = None, *, deep: bool = False
+    ) -> None:
+        self.own: set[bytes | None] = set()
+        self._subscriptions = [
+            (TFSubscription(node, static=static, topic=pair[static], deep=deep), static, process)
+            for process, pair in [("", topics), *(private or {}).items()]
+            for static in (True, False)
+        ]
+
+    @property
+    def subscriptions(self) -> list[TFSubscription]:
+        """What is waited for."""
+        return [subscription for subscription, *_ in self._subscriptions]
+
+    def take(self) -> Iterator[TFData]:
+        """Yield what has come, but from oneself.
+
+        What comes on a process's own topic is of that process, also where the rmw does not say whose it is.
+        """
+        for subscription, static, process in self._subscriptions:
+            for received in subscription.take():
+                if received.raw_gid in self.own and received.raw_gid is not None:
+                    continue
+                if process and received.gid is None:
+                    received = replace(received, gid=id_of_topic(subscription.topic))  # noqa: PLW2901 (the same message)
+                yield TFData(received, static, process)
+
+
+class TFGraph:
+    """The publishers on a pair of TF topics (moving, fixed), and on the global ones; the node's own are left out.
+
+    Args:
+        node: the node that asks.
+        topics: the pair of topics.
+        private: the pairs of topics that processes are remapped to, where they are.
+        run: NAME=VALUE that processes of one's own run have in their environment; empty: nobody has.
+        process_variable: the variable that says to which process of the plan they belong.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        topics: Topics,
+        private: Sequence[Topics] | None = None,
+        *,
+        run: str = "",
+        process_variable: str = "",
+    ) -> None:
+        self.topics = topics
+        self.says_who = ids_say_who(node)
+        self._node = node
+        self._private = private
+        self._run = run
+        self._process_variable = process_variable
+        self._where: dict[bytes, str] = {}
+        self._ours: dict[bytes, bool | None] = {}
+        self._process: dict[bytes, str] = {}
+        self._own = b""
+
+    def publishers(self) -> list[Publisher]:
+        """Return who publishes now: on the pair of topics, and on those that processes are remapped to."""
+        if self._private is None:
+            return self._on(writers, self.topics)
+        found = self._on(writers, self.topics, fenced=False)
+        for topics in self._private:
+            there = self._on(writers, topics, fenced=True)
+            found += there if self.says_who else [*there, *self._by_topic(topics, there)]
+        return found
+
+    def may_pass(self, gid: bytes) -> bool | None:
+        """Whether what the publisher sends behind the fence is of one's own run; None: it is not known yet.
+
+        In the common partition that must be seen; on a topic of a process's own, nobody else is expected.
+        """
+        if gid not in self._ours:
+            return None
+        ours = self._ours[gid]
+        return bool(ours) if self._private is None else ours is not False
+
+    def sends_clock(self) -> bool:
+        """Return whether somebody is there who publishes /clock."""
+        return bool(writers(self._node, "/clock"))
+
+    def global_publishers(self) -> list[Publisher]:
+        """Return who publishes on the global topics now, whatever the node's remappings are."""
+        return self._on(writers_unmapped, GLOBAL)
+
+    def _on(
+        self, ask: Callable[[Node, str], list[Writer]], topics: Topics, *, fenced: bool | None = None
+    ) -> list[Publisher]:
+        moving, fixed = topics
+        own = self._own_gid()[:PARTICIPANT]
+        return [
+            self._publisher(one, topic, static=static, fenced=fenced)
+            for static, topic in ((True, fixed), (False, moving))
+            for one in ask(self._node, topic)
+            if one.gid[:PARTICIPANT] != own
+        ]
+
+    def _by_topic(self, topics: Topics, there: list[Publisher]) -> Iterator[Publisher]:
+        """Yield what stands for all that send on a topic, as a message does not say which of them did."""
+        for static, topic in zip((False, True), topics, strict=True):
+            gid = id_of_topic(topic)
+            nodes = sorted({one.node for one in there if one.static == static and one.node})
+            if nodes:
+                self._ours[gid] = None
+                yield Publisher(gid, nodes[0], static, topic, fenced=True, others=tuple(nodes[1:]))
+
+    def _publisher(self, one: Writer, topic: str, *, static: bool, fenced: bool | None) -> Publisher:
+        if one.gid not in self._where:
+            self._find_process(one.gid)
+        return Publisher(
+            one.gid,
+            None if one.node.endswith(UNKNOWN_NODE) else one.node,
+            static,
+            topic,
+            one.type,
+            one.durability == "transient_local",
+            one.reliability == "reliable",
+            self._where[one.gid],
+            self._ours[one.gid],
+            fenced,
+            process=self._process[one.gid],
+        )
+
+    def _find_process(self, gid: bytes) -> None:
+        own = self._own_gid()
+        self._where[gid] = origin(gid, own)
+        ours = self._ours[gid] = has_variable(gid, own, self._run) if self._run else None
+        self._process[gid] = variable_of(gid, own, self._process_variable) if ours and self._process_variable else ""
+
+    def _own_gid(self) -> bytes:
+        """Return an id of this process's: that of its reader."""
+        if not self._own:
+            self._own = own_gid(self._node, self.topics[0])
+        return self._own

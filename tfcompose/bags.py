@@ -233,14 +233,16 @@ def _is_tf(connection: Any, wanted: Mapping[str, Topics]) -> bool:
 
 def _no_topic(path: str, pairs: Sequence[Topics], held: set[tuple[str, str]]) -> BagError:
     """Return what to say where none of the topics is: which TF topics the bag has instead."""
-    asked = [topic for pair in pairs for topic in pair]
+    requested = [topic for pair in pairs for topic in pair]
     for topic, type_ in sorted(held):
-        if topic in asked:
+        if topic in requested:
             return BagError(f"{topic} in {path} is {type_}, not {TF_MESSAGE}", _help_of(type_))
     others = sorted(topic for topic, type_ in held if type_ == TF_MESSAGE)
     if others:
         names = ", ".join(others[:_NAMED_AT_MOST])
-        return BagError(f"{path} has neither {' nor '.join(asked)}", f"TF is on {names}: {namespace_options(others)}")
+        return BagError(
+            f"{path} has neither {' nor '.join(requested)}", f"TF is on {names}: {namespace_options(others)}"
+        )
     names = ", ".join(sorted({topic for topic, _ in held})[:_NAMED_AT_MOST])
     return BagError(f"{path} holds no TF", f"it holds {names}" if names else "it holds nothing")
 

@@ -53,7 +53,7 @@ class Target:
         return posixpath.relpath(posixpath.join(self.top, path), begin)
 
 
-AS_WRITTEN = Target()
+AS_IN_SOURCE = Target()
 _NOT_IN_ADDRESSES = re.compile(r"[\x00-\x20\x7f#%?]")
 
 

@@ -112,9 +112,9 @@ def rpy_from_quat(quat_xyzw: Quaternion) -> Vector:
         return (0.0, math.atan2(-r20, horizontal), math.atan2(-r01, r11))
     pitch, yaw = math.atan2(-r20, horizontal), math.atan2(r10, r00)
     x, y, z, w = quat_from_rpy(0.0, pitch, yaw)
-    turn = multiply((-x, -y, -z, w), quat_xyzw)
-    sign = 1.0 if turn[3] >= 0 else -1.0
-    return (2 * math.atan2(sign * turn[0], sign * turn[3]), pitch, yaw)
+    rotation = multiply((-x, -y, -z, w), quat_xyzw)
+    sign = 1.0 if rotation[3] >= 0 else -1.0
+    return (2 * math.atan2(sign * rotation[0], sign * rotation[3]), pitch, yaw)
 
 
 def quat_from_axis_angle(axis: Vector, angle: float) -> Quaternion:

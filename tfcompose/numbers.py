@@ -68,7 +68,7 @@ def clean_rpy(quat_xyzw: Quaternion) -> Vector:
 
 @lru_cache(maxsize=_REMEMBERED)
 def _clean_rpy(quat_xyzw: Quaternion) -> Vector:
-    _, pitch, yaw = (_whole_degree(angle) for angle in rpy_from_quat(quat_xyzw))
+    _, pitch, yaw = (_integer_degree(angle) for angle in rpy_from_quat(quat_xyzw))
     first = _with_roll(pitch, yaw, quat_xyzw)
     if abs(abs(pitch) - math.pi / 2) > NEAR_UPRIGHT_RAD:
         return first
@@ -83,12 +83,12 @@ def _clean_rpy(quat_xyzw: Quaternion) -> Vector:
 def _with_roll(pitch: float, yaw: float, quat_xyzw: Quaternion) -> Vector:
     """Return the angles with the roll that remains to be turned."""
     x, y, z, w = quat_from_rpy(0.0, pitch, yaw)
-    turn = multiply((-x, -y, -z, w), quat_xyzw)
-    roll = 2 * (math.atan2(turn[0], turn[3]) if turn[3] >= 0 else math.atan2(-turn[0], -turn[3]))
-    return (_whole_degree(roll), pitch, yaw)
+    rotation = multiply((-x, -y, -z, w), quat_xyzw)
+    roll = 2 * (math.atan2(rotation[0], rotation[3]) if rotation[3] >= 0 else math.atan2(-rotation[0], -rotation[3]))
+    return (_integer_degree(roll), pitch, yaw)
 
 
-def _whole_degree(angle: float) -> float:
+def _integer_degree(angle: float) -> float:
     snapped = math.radians(round(math.degrees(angle)))
     return (snapped if abs(angle - snapped) < ANGLE_NOISE_RAD else angle) + 0.0
 

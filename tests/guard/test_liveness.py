@@ -36,7 +36,7 @@ class History:
     events: list[GuardEvent] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.live.look(self.now)
+        self.live.tick(self.now)
 
     def run(self, seconds: float, arrivals: Iterable[tuple[float, str]] = ()) -> History:
         """Let time pass with these arrivals, at seconds from now."""

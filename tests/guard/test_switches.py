@@ -85,17 +85,17 @@ class Watch:
         self.told: list[GuardEvent] = []
 
     def follow(self, left: dict[str, Any]) -> None:
-        """Let a guard look that knows what is ``left`` of the one before."""
+        """Let a guard run that knows what is ``left`` of the one before."""
         drive = PlanProcess("front", "external", switches={"/front": {"publish_tf": False}})
         plan = Plan("rover", "", None, RosSettings(), (), (drive,))
         self.switches = Switches(None, plan, self.told.append)  # type: ignore[arg-type]
         self.memory = SwitchMemory(self.switches, self.told.append, left)
 
-    def look(self, seconds: float) -> None:
+    def run_for(self, seconds: float) -> None:
         end = self.now + seconds
         while self.now < end:
             self.now += 0.5
-            self.switches.look()
+            self.switches.check()
             self.memory.hand_on()
 
     def all(self, kind: type[Any]) -> list[Any]:
@@ -128,24 +128,24 @@ def left(watch: Watch, tmp_path: Path) -> Callable[[], dict[str, Any]]:
 def test_a_guard_that_follows_one_that_died_tells_no_switch_twice(
     watch: Watch, left: Callable[[], dict[str, Any]]
 ) -> None:
-    watch.look(10)
+    watch.run_for(10)
     assert len(watch.all(Found)) == 1
     watch.follow(left())
     watch.reader.is_there = False  # it is found after a while
-    watch.look(2)
+    watch.run_for(2)
     watch.reader.is_there = True
-    watch.look(10)
+    watch.run_for(10)
     assert (len(watch.all(Found)), watch.reader.asked) == (1, 1)
 
 
 def test_a_node_that_comes_back_after_the_guard_has_is_asked_anew(
     watch: Watch, left: Callable[[], dict[str, Any]]
 ) -> None:
-    watch.look(10)
+    watch.run_for(10)
     watch.follow(left())
-    watch.look(10)
+    watch.run_for(10)
     watch.reader.is_there = False
-    watch.look(2)
+    watch.run_for(2)
     watch.reader.is_there = True
-    watch.look(10)
+    watch.run_for(10)
     assert len(watch.all(Found)) == 2

@@ -7,7 +7,7 @@ import os
 import time
 from typing import TYPE_CHECKING
 
-from tfcompose.launcher.logs import KEPT, Follower, Logs, last_written, logged, read_logs
+from tfcompose.launcher.logs import KEPT, Follower, Logs, last_modified, logged, read_logs
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -50,7 +50,7 @@ def test_the_run_that_wrote_last_is_known_by_its_lines_and_not_by_when_its_files
     for logs, name, second in ((begun, "arm/static", 10), (later, "static", 20), (begun, "arm/static", 30)):
         logs.write(name, "text")
         os.utime(logs.folder / f"{name}.log", (second, second))
-    assert [last_written(tmp_path / name) for name in ("a", "b", "none")] == [30, 20, 0]
+    assert [last_modified(tmp_path / name) for name in ("a", "b", "none")] == [30, 20, 0]
     begun.close()
     later.close()
 

@@ -10,7 +10,7 @@ from xml.sax.saxutils import quoteattr
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tfcompose.run.publishing.addresses import with_whole_addresses
+from tfcompose.run.publishing.addresses import with_absolute_addresses
 
 FOLDER = Path("/builds/a b & <c>/rover")
 
@@ -18,7 +18,7 @@ FOLDER = Path("/builds/a b & <c>/rover")
 def address(filename: str) -> str:
     urdf = f'<robot name="r"><link name="mesh filename="/><mesh scale="1 1 1" filename={quoteattr(filename)}/></robot>'
     urdf = urdf.replace('name="mesh filename="/', 'name="../a"/')
-    found = ET.fromstring(with_whole_addresses(urdf, FOLDER))  # noqa: S314 (ours)
+    found = ET.fromstring(with_absolute_addresses(urdf, FOLDER))  # noqa: S314 (ours)
     assert [link.get("name") for link in found.iter("link")] == ["../a"]
     return str(next(found.iter("mesh")).get("filename"))
 
@@ -36,7 +36,7 @@ def test_other_addresses_stay_as_they_are() -> None:
 def test_a_texture_is_addressed_too_and_nothing_else_changes() -> None:
     urdf = '<material name="m"><texture filename="../t.png"/></material><plugin filename="libx.so"/>'
     expected = urdf.replace("../t.png", "file:///builds/a%20b%20%26%20%3Cc%3E/t.png")
-    assert with_whole_addresses(urdf, FOLDER) == expected
+    assert with_absolute_addresses(urdf, FOLDER) == expected
 
 
 @given(st.text(st.characters(blacklist_categories=("Cs", "Cc")), min_size=1, max_size=12))

@@ -16,7 +16,7 @@ from tfcompose.geometry import Pose, angle_between, normalised
 from tfcompose.plan import Joint, PlanEdge, SourceLine
 from tfcompose.ros.joint_codec import encode_names, fill
 from tfcompose.ros.tf_codec import Transform, decode
-from tfcompose.run.publishing.joint_mover import JointMover, Told
+from tfcompose.run.publishing.joint_mover import JointMover, PublishOptions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -33,7 +33,7 @@ quaternions = st.tuples(numbers, numbers, numbers, numbers).filter(lambda q: mat
 class Robot:
     """A mover, what it said, and messages for it."""
 
-    def __init__(self, edges: list[PlanEdge], told: Told | None = None, now_ns: int | None = 5) -> None:
+    def __init__(self, edges: list[PlanEdge], told: PublishOptions | None = None, now_ns: int | None = 5) -> None:
         self.said: list[str] = []
         self.mover = JointMover(edges, self.said.append, lambda arrival: now_ns and arrival + now_ns, told)
 
@@ -192,7 +192,7 @@ def test_a_time_that_comes_twice_is_left_out_as_tf2_would_with_one_line() -> Non
 
 
 def test_a_recording_that_starts_anew_is_published() -> None:
-    robot = Robot([slide("left")], Told(publish_frequency=10))
+    robot = Robot([slide("left")], PublishOptions(publish_frequency=10))
     stamps = [20 * SECOND_NS, 21 * SECOND_NS, 3 * SECOND_NS, 3 * SECOND_NS + 1, 4 * SECOND_NS]
     assert [bool(robot.hear({"left": 1.0}, stamp)) for stamp in stamps] == [True, True, True, False, True]
 
@@ -209,7 +209,7 @@ def test_publish_frequency_gives_that_frequency_and_says_when_it_leaves_somethin
     source: int, most: int, seed: int
 ) -> None:
     jitter = Random(seed)
-    robot = Robot([slide("left")], Told(publish_frequency=most))
+    robot = Robot([slide("left")], PublishOptions(publish_frequency=most))
     stamps = [SECOND_NS + int(SECOND_NS * (n + jitter.uniform(-0.2, 0.2)) / source) for n in range(500)]
     published = sum(bool(robot.hear({"left": 1.0}, stamp)) for stamp in stamps)
     assert published == pytest.approx(500 * min(1, most / source), rel=0.02, abs=2)
@@ -223,7 +223,7 @@ def test_without_publish_frequency_everything_is_published() -> None:
 
 
 def test_ignore_timestamp_publishes_whatever_the_time_is() -> None:
-    robot = Robot([slide("left")], Told(publish_frequency=1, ignore_timestamp=True))
+    robot = Robot([slide("left")], PublishOptions(publish_frequency=1, ignore_timestamp=True))
     assert all(robot.hear({"left": 1.0}, stamp) for stamp in (10, 10, 9, 11))
     assert robot.said == []
 

@@ -26,7 +26,7 @@ from tfcompose.plan import RosSettings
 from tfcompose.plan.file import read_plan
 from tfcompose.ros.joint_codec import encode_names, fill
 from tfcompose.ros.tf_codec import decode
-from tfcompose.run.publishing.joint_mover import JointMover, Told
+from tfcompose.run.publishing.joint_mover import JointMover, PublishOptions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -90,7 +90,7 @@ class Own:
         self.base = plan.base
         self.edges = {edge.child: edge for edge in plan.edges}
         self.moving = [edge for edge in plan.edges if edge.joint]
-        self.mover = JointMover(plan.edges, print, lambda arrival: arrival, Told(ignore_timestamp=True))
+        self.mover = JointMover(plan.edges, print, lambda arrival: arrival, PublishOptions(ignore_timestamp=True))
 
     def positions(self, chance: random.Random) -> dict[str, float]:
         """Return a position for each joint: random, and what follows from it for those that mimic one."""

@@ -148,8 +148,8 @@ def quaternion_w_first(robot: Robot) -> Iterator[Finding]:
         identity = abs(first) == 1 and not (second or third or fourth)
         small = _SMALL_ROTATION_W < abs(first) < 1 and second == 0 and (third == 0) != (fourth == 0)
         if identity or small:
-            turns = f"turns by {_degrees(fourth)} deg, and by {_degrees(first)} deg if w is first"
-            message = f"{value.entry}: quat_xyzw {_listed(value.numbers)} {turns}"
+            rotations = f"turns by {_degrees(fourth)} deg, and by {_degrees(first)} deg if w is first"
+            message = f"{value.entry}: quat_xyzw {_listed(value.numbers)} {rotations}"
             advice = f"if w is first, write {_listed((second, third, fourth, first))}"
             if identity:
                 advice += "; if the half turn is meant, rpy: [180 deg, 0, 0]"

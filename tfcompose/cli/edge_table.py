@@ -29,7 +29,7 @@ def lines_of(edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int, wi
     Where the table is wider than ``width``, columns are left out and names are cut.
     """
     several = _several(edges)
-    rows = [_HEADS, *(_row(seen, several) for seen in edges)]
+    rows = [_HEADS, *(_row(state, several) for state in edges)]
     widths = {column: max(len(row[column]) for row in rows) for column in range(len(_HEADS))}
     if width is not None:
         _narrow(widths, width)
@@ -55,15 +55,15 @@ def _over(widths: dict[int, int], width: int) -> int:
 
 def _several(edges: Sequence[EdgeState]) -> set[str]:
     """Return the children that more than one publisher sends, or that have more than one parent."""
-    counts = Counter(seen.stream.child for seen in edges if seen.present is not False)
+    counts = Counter(state.stream.child for state in edges if state.present is not False)
     return {child for child, number in counts.items() if number > 1}
 
 
 def _summary(edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int) -> str:
     seconds = max(0, now_ns - observer.begun_ns) / 1e9 if observer.begun_ns else 0.0
-    names = {(seen.stream.parent, seen.stream.child) for seen in edges}
+    names = {(state.stream.parent, state.stream.child) for state in edges}
     parts = [counted(len(names), "edge"), f"{counted(observer.messages, 'message')} in {seconds:.1f} s"]
-    senders = {seen.publisher for seen in edges if seen.publisher}
+    senders = {state.publisher for state in edges if state.publisher}
     if senders:
         parts.insert(1, counted(len(senders), "publisher"))
     bad = sum(observer.malformed.values())
@@ -73,25 +73,25 @@ def _summary(edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int) ->
     return ", ".join(parts)
 
 
-def _row(seen: EdgeState, several: set[str]) -> tuple[str, ...]:
-    stream, timing = seen.stream, seen.timing
+def _row(state: EdgeState, several: set[str]) -> tuple[str, ...]:
+    stream, timing = state.stream, state.timing
     remarks = []
     if stream.rejected is not None:
         some = f"{stream.rejections} of {stream.arrivals.count} " if stream.rejections < stream.arrivals.count else ""
         remarks.append(f"{some}refused: {stream.rejected.text}")
-    if stream.child in several and seen.present is not False:
+    if stream.child in several and state.present is not False:
         remarks.append("not the only one")
-    if seen.present is False:
+    if state.present is False:
         remarks.append("publisher left")
     if stream.stamps_back and not stream.static:
         remarks.append(f"{stream.stamps_back}× back in time")
-    name, who = printable(seen.name), printable(seen.publisher) or "–"
+    name, who = printable(state.name), printable(state.publisher) or "–"
     if stream.static:
         return (name, who, "static", "", "", "", "", "", ", ".join(remarks))
     return (
         name, who, "dynamic",
         f"{timing.rate:.1f} Hz" if timing.rate is not None else "–",
-        duration(timing.jitter_s), duration(timing.longest_gap_s), duration(seen.data_age_s), duration(timing.delay_s),
+        duration(timing.jitter_s), duration(timing.longest_gap_s), duration(state.data_age_s), duration(timing.delay_s),
         ", ".join(remarks),
     )  # fmt: skip
 
@@ -121,27 +121,27 @@ def objects_of(edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int) 
         "messages": observer.messages,
         "delay_until": "recording" if observer.end_ns else "arrival",
         "malformed": sum(observer.malformed.values()),
-        "edges": [object_of(seen) for seen in edges],
+        "edges": [object_of(state) for state in edges],
     }
     return json.dumps(data, ensure_ascii=False) + "\n"
 
 
-def object_of(seen: EdgeState) -> dict[str, Any]:
+def object_of(state: EdgeState) -> dict[str, Any]:
     """Return one edge for programs; what is not known is null."""
-    stream, timing = seen.stream, seen.timing
+    stream, timing = state.stream, state.timing
     return {
         "parent": stream.parent,
         "child": stream.child,
         "kind": "static" if stream.static else "dynamic",
-        "publisher": seen.nodes[0] if len(seen.nodes) == 1 else None,
-        "publishers": list(seen.nodes),
-        "present": seen.present,
+        "publisher": state.nodes[0] if len(state.nodes) == 1 else None,
+        "publishers": list(state.nodes),
+        "present": state.present,
         "count": stream.arrivals.count,
         "rate": timing.rate,
         "jitter_s": timing.jitter_s,
         "longest_gap_s": timing.longest_gap_s,
-        "age_s": seen.age_s,
-        "data_age_s": seen.data_age_s,
+        "age_s": state.age_s,
+        "data_age_s": state.data_age_s,
         "delay_s": timing.delay_s,
         "least_delay_s": timing.least_delay_s,
         "most_delay_s": timing.most_delay_s,

@@ -108,8 +108,8 @@ class Fixer:
         for edit in (edit for one in fixed for edit in one.edits):
             by_file.setdefault(edit.span.file, {})[edit] = None
         texts = {_path(file): edited(self.read(file), list(edits)) for file, edits in by_file.items()}
-        whole = {file: text for file, text in texts.items() if text is not None}
-        return whole if len(whole) == len(texts) == len(by_file) else None
+        complete = {file: text for file, text in texts.items() if text is not None}
+        return complete if len(complete) == len(texts) == len(by_file) else None
 
 
 def _path(file: str) -> str:

@@ -27,7 +27,7 @@ def rows() -> list[dict[str, str]]:
 def facts(name: str) -> dict[str, Any]:
     """Return the preset as plain data; the frames of a claim have the names that they have by default."""
     preset = node_preset(name)
-    usual = {role: said.default for role, said in preset.frames.items()}
+    usual = {role: frame.default for role, frame in preset.frames.items()}
     return {
         "name": name,
         "package": preset.package,
@@ -35,7 +35,7 @@ def facts(name: str) -> dict[str, Any]:
         "kind": "node",
         "about": preset.about,
         "frames": {
-            role: {"parameter": said.parameter, "default": said.default} for role, said in preset.frames.items()
+            role: {"parameter": frame.parameter, "default": frame.default} for role, frame in preset.frames.items()
         },
         "one_of": preset.one_of,
         "publishes": [_claim(claim, usual) for claim in preset.publishes],
@@ -72,7 +72,7 @@ def text(preset: dict[str, Any]) -> str:
     parts[-1] += "".join(f"\n  {_claim_text(claim)}" for claim in preset["publishes"])
     if preset["frames"]:
         width = max(map(len, preset["frames"]))
-        lines = [f"  {role:<{width}}  {_role_text(said)}" for role, said in preset["frames"].items()]
+        lines = [f"  {role:<{width}}  {_role_text(frame)}" for role, frame in preset["frames"].items()]
         parts.append("frames\n" + "\n".join(lines))
     if preset["set"]:
         parts.append(f"told as well\n  {_pairs(preset['set'])}")
@@ -93,10 +93,10 @@ def _claim_text(claim: dict[str, Any]) -> str:
     return f"{claim['parent']} → {claim['child']}  {', '.join(how)}"
 
 
-def _role_text(said: dict[str, Any]) -> str:
-    if said["parameter"] is None:
-        return f"{said['default']}, which cannot be told"
-    return f"{said['parameter']}, by default {said['default']}"
+def _role_text(frame: dict[str, Any]) -> str:
+    if frame["parameter"] is None:
+        return f"{frame['default']}, which cannot be told"
+    return f"{frame['parameter']}, by default {frame['default']}"
 
 
 def _pairs(values: dict[str, Any]) -> str:

@@ -16,7 +16,7 @@ from tfcompose.ipc import SETTLE
 from tfcompose.plan import Plan
 from tfcompose.plan.file import read_plan, write_plan
 from tfcompose.plan.hosts import share_of
-from tfcompose.run.publishing.addresses import with_whole_addresses
+from tfcompose.run.publishing.addresses import with_absolute_addresses
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -122,7 +122,7 @@ def copy_plan(plan: Plan, file: Path, place: RuntimeDir, *, alone: bool) -> Path
             if name is not None and (file.parent / name).is_file():
                 parts[name] = (file.parent / name).read_bytes()
         for name in descriptions & parts.keys():
-            parts[name] = _with_whole_addresses(parts[name], (file.parent / name).parent)
+            parts[name] = _with_absolute_addresses(parts[name], (file.parent / name).parent)
         digest = hashlib.sha256(repr(sorted(parts.items())).encode()).hexdigest()[:16]
         folder = place.folder / f"plan-{digest}"
         if alone:
@@ -147,9 +147,9 @@ def _write_copy(parts: dict[str, bytes], folder: Path) -> None:
         new.replace(file)
 
 
-def _with_whole_addresses(urdf: bytes, folder: Path) -> bytes:
+def _with_absolute_addresses(urdf: bytes, folder: Path) -> bytes:
     """Return a description with whole addresses; bytes that are no text stay, for their reader to refuse."""
     try:
-        return with_whole_addresses(urdf.decode("utf-8"), folder).encode()
+        return with_absolute_addresses(urdf.decode("utf-8"), folder).encode()
     except UnicodeDecodeError:
         return urdf

@@ -43,8 +43,8 @@ def facts(name: str, library: Library) -> dict[str, Any]:
         "body": _body(preset),
         "driver": _driver(preset.driver, preset) if preset.driver else None,
         "topics": [
-            {"topic": topic} | _shown(said, preset, ("type", "frame", "hard_coded", "rate", "when"))
-            for topic, said in preset.topics.items()
+            {"topic": topic} | _shown(fields, preset, ("type", "frame", "hard_coded", "rate", "when"))
+            for topic, fields in preset.topics.items()
         ],
         "source": [_shown(fact, preset, ("repository", "path", "commit", "about")) for fact in preset.source],
     }
@@ -75,8 +75,8 @@ def _plain(value: Any, preset: PresetSpec) -> Any:
     if isinstance(value, str):
         return _named(value, preset)
     if isinstance(value, Chosen):
-        said = {"option": value.option} if value.option else {"when": value.when}
-        return said if value.option else said | {"value": value.value, "otherwise": value.otherwise}
+        fields = {"option": value.option} if value.option else {"when": value.when}
+        return fields if value.option else fields | {"value": value.value, "otherwise": value.otherwise}
     if isinstance(value, dict):
         return {_named(key, preset): _plain(item, preset) for key, item in value.items()}
     return [_plain(item, preset) for item in value] if isinstance(value, (list, tuple)) else value
@@ -84,19 +84,19 @@ def _plain(value: Any, preset: PresetSpec) -> Any:
 
 def _shown(model: Any, preset: PresetSpec, keys: tuple[str, ...]) -> dict[str, Any]:
     """Return what is said under the keys, without what is empty."""
-    said = {key: _plain(getattr(model, key), preset) for key in keys}
-    return {key: value for key, value in said.items() if value not in (None, "", {}, [], False)}
+    fields = {key: _plain(getattr(model, key), preset) for key in keys}
+    return {key: value for key, value in fields.items() if value not in (None, "", {}, [], False)}
 
 
 def _option(option: Option) -> dict[str, Any]:
     values = list(option.variants) if option.type == "choice" else list(option.values)
-    said = {"type": option.type, "values": values, "default": option.default, "about": option.about}
-    return {key: value for key, value in said.items() if value not in ([], "", None)}
+    fields = {"type": option.type, "values": values, "default": option.default, "about": option.about}
+    return {key: value for key, value in fields.items() if value not in ([], "", None)}
 
 
 def _frame(name: str, frame: PresetFrame, preset: PresetSpec) -> dict[str, Any]:
     quat = rotation_of(frame, _named(name, preset)) or (IDENTITY_XYZW if frame.xyz is not None else None)
-    said: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "name": _named(name, preset),
         "parent": _named(frame.parent, preset),
         "xyz": list(frame.xyz) if frame.xyz is not None else None,
@@ -105,18 +105,18 @@ def _frame(name: str, frame: PresetFrame, preset: PresetSpec) -> dict[str, Any]:
         "driver": frame.driver,
     }
     if frame.by_driver:
-        said["by_driver"] = {"parent": _named(frame.by_driver.parent, preset)}
+        fields["by_driver"] = {"parent": _named(frame.by_driver.parent, preset)}
         if frame.by_driver.xyz:
-            said["by_driver"]["xyz"] = list(frame.by_driver.xyz)
-    return said | _shown(frame, preset, ("when", "about"))
+            fields["by_driver"]["xyz"] = list(frame.by_driver.xyz)
+    return fields | _shown(frame, preset, ("when", "about"))
 
 
 def _body(preset: PresetSpec) -> dict[str, Any] | None:
     body = preset.body
     if body is None:
         return None
-    said = {"frame": _named(body.frame, preset), "shape": _shape(body.shape), "xyz": list(body.shape.xyz)}
-    return said | ({"mass": body.mass} if body.mass else {})
+    fields = {"frame": _named(body.frame, preset), "shape": _shape(body.shape), "xyz": list(body.shape.xyz)}
+    return fields | ({"mass": body.mass} if body.mass else {})
 
 
 def _shape(shape: Shape) -> dict[str, Any]:
@@ -128,12 +128,12 @@ def _shape(shape: Shape) -> dict[str, Any]:
 def _driver(driver: PresetDriver, preset: PresetSpec) -> dict[str, Any]:
     keys = ("package", "executable", "launch", "lifecycle", "versions", "params", "args", "naming", "on", "about")
     published = any(frame.driver for frame in preset.frames.values())
-    said = _shown(driver, preset, keys)
-    said["node"] = "/" + "/".join(_named(part, preset) for part in (driver.namespace, driver.node) if part)
-    said["tf"] = driver.tf if published else "tfcompose"
-    said["off"] = _plain(driver.off, preset) if published else None
-    said["claims"] = [_shown(claim, preset, ("parent", "child", "off", "about")) for claim in driver.claims]
-    return said
+    fields = _shown(driver, preset, keys)
+    fields["node"] = "/" + "/".join(_named(part, preset) for part in (driver.namespace, driver.node) if part)
+    fields["tf"] = driver.tf if published else "tfcompose"
+    fields["off"] = _plain(driver.off, preset) if published else None
+    fields["claims"] = [_shown(claim, preset, ("parent", "child", "off", "about")) for claim in driver.claims]
+    return fields
 
 
 def _table(rows: Sequence[tuple[str, ...]]) -> str:

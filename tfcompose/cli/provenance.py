@@ -17,7 +17,7 @@ _KEYS = (
 )
 
 
-def written_values(edge: Edge, sources: Sequence[Source]) -> list[str]:
+def source_values(edge: Edge, sources: Sequence[Source]) -> list[str]:
     """Return a line for each value that the edge was made of: key, value, place, and the places of what it replaced.
 
     ``sources`` are the robot's own, and those of its parts.

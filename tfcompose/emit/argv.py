@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.emit.params import written_params
+from tfcompose.emit.params import file_params
 from tfcompose.model import SHELL
-from tfcompose.plan import told_at_start
+from tfcompose.plan import known_at_launch
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -34,23 +34,23 @@ def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> 
     if process.kind == "external":
         return ()
     if process.kind != "run":
-        told = [word for name, value in _own_params(process) for word in ("-p", f"{name}:={json.dumps(value)}")]
+        arguments = [word for name, value in _own_params(process) for word in ("-p", f"{name}:={json.dumps(value)}")]
         own = ("${python}", "-m", MODULES[process.kind], "${plan}", process.name)
-        return (*own, "--ros-args", *told) if told else own
+        return (*own, "--ros-args", *arguments) if arguments else own
     if process.launch is not None:
         return (f"${{launch:{process.launch}}}", *process.argv)
     if process.package is None and not _is_node(process, owns=owns):
         return process.argv
-    told = _told_to_node(process, robot, has_params=has_params)
+    arguments = _ros_arguments(process, robot, has_params=has_params)
     if process.package is None:
         names = _names(process, robot)
-        if "--params-file" in told:  # which is keyed by the node's name
-            told = [*names, *told]
-        elif process.namespace is not None or (robot.ros.namespace and (told or owns)):
-            told = [*names[-2:], *told]
-        return (*process.argv, "--ros-args", *told) if told else process.argv
+        if "--params-file" in arguments:  # which is keyed by the node's name
+            arguments = [*names, *arguments]
+        elif process.namespace is not None or (robot.ros.namespace and (arguments or owns)):
+            arguments = [*names[-2:], *arguments]
+        return (*process.argv, "--ros-args", *arguments) if arguments else process.argv
     program = f"${{executable:{process.package}/{process.executable}}}"
-    return (program, *process.argv, "--ros-args", *_names(process, robot), *told)
+    return (program, *process.argv, "--ros-args", *_names(process, robot), *arguments)
 
 
 def _is_node(process: Process, *, owns: bool) -> bool:
@@ -60,11 +60,11 @@ def _is_node(process: Process, *, owns: bool) -> bool:
     """
     if process.argv[:2] == SHELL:
         return False
-    is_told = process.log_level is not None or process.namespace is not None or bool(written_params(process))
-    return owns or is_told or bool(process.remap.keys() - _TF_TOPICS) or "--ros-args" in process.argv
+    has_node_settings = process.log_level is not None or process.namespace is not None or bool(file_params(process))
+    return owns or has_node_settings or bool(process.remap.keys() - _TF_TOPICS) or "--ros-args" in process.argv
 
 
-def _told_to_node(process: Process, robot: Robot, *, has_params: bool) -> list[str]:
+def _ros_arguments(process: Process, robot: Robot, *, has_params: bool) -> list[str]:
     """Return the ROS arguments but for names; a parameter file is named once."""
     ros_args = [word for old, new in process.remap.items() for word in ("-r", f"{old}:={new}")]
     if process.log_level is not None:
@@ -73,7 +73,7 @@ def _told_to_node(process: Process, robot: Robot, *, has_params: bool) -> list[s
         ros_args += ["-p", "use_sim_time:=true"]
     if has_params and not any(_PARAMS_FILE in word for word in (*process.argv, *process.env.values())):
         ros_args += ["--params-file", _PARAMS_FILE]
-    for name, value in _told(process.params):
+    for name, value in _launch_time_params(process.params):
         ros_args += ["-p", f"{name}:={json.dumps(value, ensure_ascii=False)}"]
     return ros_args
 
@@ -85,12 +85,12 @@ def _own_params(process: Process) -> list[tuple[str, Any]]:
     ]
 
 
-def _told(params: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+def _launch_time_params(params: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
     """Yield the parameters, by their full names, with paths that only the launcher knows."""
     for key, value in params.items():
         if isinstance(value, dict):
-            yield from _told(value, f"{above}{key}.")
-        elif told_at_start(value):
+            yield from _launch_time_params(value, f"{above}{key}.")
+        elif known_at_launch(value):
             yield f"{above}{key}", value
 
 

@@ -24,9 +24,9 @@ def switches_of(process: Process, robot: Robot) -> dict[str, dict[str, Any]]:
     found = {}
     for node in process.nodes if process.kind in {"run", "external"} else ():
         wanted = keys | {key for claim in robot.claims if claim.node == node.name for key in claim.switch}
-        written = {key: value for key, value in node.params.items() if key in wanted}
-        if written:
-            found[node.name] = written
+        switches = {key: value for key, value in node.params.items() if key in wanted}
+        if switches:
+            found[node.name] = switches
     return found
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.draw.picture import draw
 from tfcompose.draw.svg import svg
-from tfcompose.emit.params import params_file, written_params
+from tfcompose.emit.params import file_params, params_file
 from tfcompose.emit.plan import plan_of
-from tfcompose.files import AS_WRITTEN, File, Target
+from tfcompose.files import AS_IN_SOURCE, File, Target
 from tfcompose.plan import DESCRIPTION
 from tfcompose.plan.file import write_plan
 from tfcompose.render.tree import graph_of, tree
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Process, Robot
 
 
-def emit(robot: Robot, target: Target = AS_WRITTEN) -> tuple[File, ...]:
+def emit(robot: Robot, target: Target = AS_IN_SOURCE) -> tuple[File, ...]:
     """Return the robot's files; the same robot gives the same bytes. There must be no errors in it.
 
     ``target`` says where they are written and how they address meshes.
@@ -36,7 +36,7 @@ def emit(robot: Robot, target: Target = AS_WRITTEN) -> tuple[File, ...]:
         *(file for files in descriptions.values() for file in files),
         File("tree.txt", tree(live)),
         File("tree.svg", svg(draw(graph_of(live)))),
-        *(_params(process, nodes, stock) for process in robot.processes if (nodes := written_params(process))),
+        *(_params(process, nodes, stock) for process in robot.processes if (nodes := file_params(process))),
     )
 
 

@@ -7,7 +7,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.model import AsInFile
-from tfcompose.plan import told_at_start
+from tfcompose.plan import known_at_launch
 
 if TYPE_CHECKING:
     from tfcompose.model import Process
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _ESCAPED = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 
 
-def written_params(process: Process) -> dict[str, dict[str, Any]]:
+def file_params(process: Process) -> dict[str, dict[str, Any]]:
     """Return what the process's parameter file holds, by node: all but the paths that only the launcher knows."""
     if process.kind != "run":
         return {}
@@ -27,7 +27,7 @@ def written_params(process: Process) -> dict[str, dict[str, Any]]:
 def _known(params: dict[str, Any]) -> dict[str, Any]:
     kept = {}
     for key, value in params.items():
-        if not told_at_start(value):
+        if not known_at_launch(value):
             kept[key] = value
         elif isinstance(value, dict) and (rest := _known(value)):
             kept[key] = rest

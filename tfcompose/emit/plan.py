@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from tfcompose.emit.argv import argv_of
 from tfcompose.emit.driven import driven_of, switches_of
-from tfcompose.emit.params import written_params
-from tfcompose.files import AS_WRITTEN, Target
+from tfcompose.emit.params import file_params
+from tfcompose.files import AS_IN_SOURCE, Target
 from tfcompose.model import JOINTS, STATIC
 from tfcompose.numbers import clean
 from tfcompose.plan import DESCRIPTION, Claim, Joint, Plan, PlanEdge, PlanProcess, SourceLine, switch_text
@@ -30,7 +30,7 @@ _PUBLISHERS = frozenset({"static", "joints"})
 _ORDER = {"static": 0, "joints": 1, "guard": 3}
 
 
-def plan_of(robot: Robot, target: Target = AS_WRITTEN) -> Plan:
+def plan_of(robot: Robot, target: Target = AS_IN_SOURCE) -> Plan:
     """Return the plan of a right robot; ``target`` says where it will be written."""
     nodes = {process.name: process.node for process in robot.processes}
     needed = _needed(robot)
@@ -118,7 +118,7 @@ def _relative(file: str, to: str) -> str:
 
 
 def _process(process: Process, robot: Robot, owned: list[tuple[str, str]], names: frozenset[str]) -> PlanProcess:
-    has_params = process.kind == "run" and bool(written_params(process))
+    has_params = process.kind == "run" and bool(file_params(process))
     simulation = process.simulate
     if simulation:
         simulation = replace(simulation, pose=clean(simulation.pose))

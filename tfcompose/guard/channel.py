@@ -79,7 +79,7 @@ class OrderReader:
                         judge.live.present(process)
                 case Gate() as gate:
                     self._gates.add(gate)
-        self._gates.look()
+        self._gates.check()
 
     def _lines(self) -> list[str]:
         try:

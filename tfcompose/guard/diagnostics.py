@@ -74,8 +74,10 @@ def statuses(robot: str, edges: Sequence[EdgeHealth], found: Sequence[Finding]) 
         # Not seen yet is worse than fine, and better than silent.
         worst = max((one.level for one in owned), key=[OK, WARN, STALE, ERROR].index)
         number = sum(one.level == worst for one in owned)
-        said = f"{number} of {len(owned)} edges: {_NAMES[worst]}"
-        lines.append(Status(f"tfcompose {robot}: {owner}", worst, said, [(one.edge.name, one.text) for one in owned]))
+        summary = f"{number} of {len(owned)} edges: {_NAMES[worst]}"
+        lines.append(
+            Status(f"tfcompose {robot}: {owner}", worst, summary, [(one.edge.name, one.text) for one in owned])
+        )
     return lines
 
 

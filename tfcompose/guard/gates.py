@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from tfcompose.ros.lifecycle import Lifecycle
 
 #: How often a gate is looked at, in seconds.
-LOOK_EVERY_S = 0.2
+CHECK_EVERY_S = 0.2
 #: And at a node that is in its state.
 ASK_AGAIN_S = 2.0
 NAMED_AT_MOST = 6
@@ -57,39 +57,39 @@ class Gates:
         for key in [key for key in self._nodes if key[0] == process]:
             self._nodes.pop(key).close()
 
-    def look(self) -> None:
-        """Look at all, from time to time, and say which are open and what is seen at the others."""
+    def check(self) -> None:
+        """Check all gates where it is time, and report which are open and what is observed at the others."""
         now = time.monotonic()
         if not self._gates or now < self._due:
             return
-        self._due = now + LOOK_EVERY_S
+        self._due = now + CHECK_EVERY_S
         for process, gate in list(self._gates.items()):
-            is_open, seen = self._at(gate, now)
+            is_open, observed = self._at(gate, now)
             if is_open:
                 self.forget(process)
-                self._emit(GateOpen(process, seen))
-            elif self._reported.get(process) != seen:
-                self._reported[process] = seen
-                self._emit(GateShut(process, seen))
+                self._emit(GateOpen(process, observed))
+            elif self._reported.get(process) != observed:
+                self._reported[process] = observed
+                self._emit(GateShut(process, observed))
 
     def _at(self, gate: Gate, now: float) -> tuple[bool, str]:
-        states = [self._nodes[gate.process, name].look(now) for name in gate.nodes]
+        states = [self._nodes[gate.process, name].check(now) for name in gate.nodes]
         if gate.topic:
             found = writers(self._node, gate.topic)
-            seen = (
+            observed = (
                 f"{gate.topic} is published by {', '.join(one.node for one in found)}"
                 if found
                 else self._topics(gate.topic)
             )
-            states.append((bool(found), seen))
+            states.append((bool(found), observed))
         if gate.service:
             is_there = is_offered(self._node, gate.service)
-            seen = f"the service {gate.service} is there" if is_there else self._services(gate.service)
-            states.append((is_there, seen))
+            observed = f"the service {gate.service} is there" if is_there else self._services(gate.service)
+            states.append((is_there, observed))
         for topic in gate.writers:
             names = ", ".join(one.node for one in writers(self._node, topic))
             states.append((False, f"{topic} is published by {names or 'nobody'}"))
-        return all(is_open for is_open, _ in states), "; ".join(seen for _, seen in states)
+        return all(is_open for is_open, _ in states), "; ".join(observed for _, observed in states)
 
     def _topics(self, wanted: str) -> str:
         return _some("topics", [name for name, _ in self._node.get_topic_names_and_types()], wanted)
@@ -113,17 +113,17 @@ class LifecycleDriver:
         wanted = {name: state for process in plan.processes for name, state in process.lifecycle.items()}
         self._nodes = [_DrivenNode(name, _lifecycle(node, name, state, drive=True)) for name, state in wanted.items()]
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Go on with each node that is due, and say what has changed of it."""
         now = time.monotonic()
         for one in self._nodes:
             if now < one.due:
                 continue
-            is_there, seen = one.node.look(now)
-            one.due = now + LOOK_EVERY_S
-            if one.node.answers and seen != one.reported:
-                one.reported = seen
-                say(seen)
+            is_there, observed = one.node.check(now)
+            one.due = now + CHECK_EVERY_S
+            if one.node.answers and observed != one.reported:
+                one.reported = observed
+                say(observed)
             if is_there:
                 one.due = now + ASK_AGAIN_S
                 one.node.ask_again()

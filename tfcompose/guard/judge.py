@@ -127,7 +127,7 @@ class Judge:
             replaced = self._publishers.replaced(self._senders, self.live.partly_missing(), now)
             silence = self.live.judge(now, self.clocks.speed(now), paused=self.clocks.stands(now))
             return [*events, *silence, *replaced, *over]
-        self.live.look(now)
+        self.live.tick(now)
         if now - self.begun >= self.settle_s and not self._verdicts.waits and not self.cases.unreported:
             self._start.clear(now)
             self._rules.changes += 1

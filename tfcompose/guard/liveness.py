@@ -35,41 +35,41 @@ FAST_AGAIN_ABOVE = 0.9
 MOST_MESSAGES = 1000
 #: So many edges one event names: a line of it is shorter than what a pipe's reader takes.
 MOST_NAMED = 1000
-#: Of the time between two looks only so much counts; the guard looks ten times a second.
-LOOK_COUNTS_S = 0.25
-#: After so long without a look messages are lost, and come when the writer's next heartbeat does: 3 s in Fast DDS.
+#: Of the time between two ticks only so much counts; the guard ticks ten times a second.
+MAX_TICK_S = 0.25
+#: After so long without a tick messages are lost, and come when the writer's next heartbeat does: 3 s in Fast DDS.
 STALLED_S = 1.0
 CATCH_UP_S = 3.5
 
 
 @dataclass(slots=True)
 class WatchedTime:
-    """The seconds in which the guard looked, as a clock that stands while it is kept from looking."""
+    """The seconds in which the guard ran: a clock that stops while the guard is kept from running."""
 
     _seconds: float = 0.0
-    _looked: float | None = None
+    _ticked: float | None = None
     _catching_up_until: float = 0.0
 
     def at(self, now: float) -> float:
         """Return the seconds until ``now``."""
-        if self._looked is None or now < self._catching_up_until:
+        if self._ticked is None or now < self._catching_up_until:
             return self._seconds
-        return self._seconds + min(max(now - self._looked, 0.0), LOOK_COUNTS_S)
+        return self._seconds + min(max(now - self._ticked, 0.0), MAX_TICK_S)
 
     def begins_late(self, until: float) -> None:
         """Take what is missing until then as not found yet."""
         self._catching_up_until = until
 
     def is_behind(self, now: float) -> bool:
-        """Return whether what comes now may have waited: the guard was kept from looking, or still catches up."""
-        stalled = self._looked is not None and now - self._looked > STALLED_S
+        """Return whether what comes now may have waited: the guard was kept from running, or still catches up."""
+        stalled = self._ticked is not None and now - self._ticked > STALLED_S
         return stalled or now < self._catching_up_until
 
-    def look(self, now: float) -> float:
-        """Note that the guard looks now, and return the seconds until then."""
-        if self._looked is not None and now - self._looked > STALLED_S:
+    def tick(self, now: float) -> float:
+        """Note that the guard runs now, and return the seconds until then."""
+        if self._ticked is not None and now - self._ticked > STALLED_S:
             self._catching_up_until = now + CATCH_UP_S
-        self._seconds, self._looked = self.at(now), now
+        self._seconds, self._ticked = self.at(now), now
         return self._seconds
 
 
@@ -235,8 +235,7 @@ class Liveness:
 
     def silent(self) -> list[str]:
         """Return the children of the edges that were live and come no more."""
-        quiet = [track for track in self.tracks if track.live and (track.silent or self._is_gone(track))]
-        return _children(quiet)
+        return _children([track for track in self.tracks if track.live and (track.silent or self._is_gone(track))])
 
     def _is_gone(self, track: Track) -> bool:
         return track.edge.kind == "static" and track.edge.owner in self._gone
@@ -245,9 +244,9 @@ class Liveness:
         """Return whether what comes now may have waited for the guard."""
         return self._watched.is_behind(now)
 
-    def look(self, now: float) -> None:
-        """Note that the guard looks, and judge nobody."""
-        self._watched.look(now)
+    def tick(self, now: float) -> None:
+        """Note that the guard runs, without judging anybody."""
+        self._watched.tick(now)
 
     def judge(self, now: float, speed: float = 1.0, *, paused: bool = False) -> list[GuardEvent]:
         """Return which owners fell silent or slow since the last time, and came back: one event for each owner.
@@ -255,7 +254,7 @@ class Liveness:
         ``speed`` is how fast time goes by for them: in a simulation that is slow all rates are lower, and in one that
         is ``paused`` nobody falls silent.
         """
-        watched = self._watched.look(now)
+        watched = self._watched.tick(now)
         if paused:
             for track in self.tracks:
                 track.heard = track.heard if track.silent else watched
@@ -312,8 +311,8 @@ def change_event(change: str, tracks: list[Track], now: float) -> GuardEvent:
         case "slow":
             return Found(slow(edges, min(track.rate() or 0.0 for track in tracks)))
         case "back":
-            quiet = now - min(track.silent_since for track in tracks)
-            return Recovered(f"{named} {are} back after {quiet:.1f} s")
+            silence_s = now - min(track.silent_since for track in tracks)
+            return Recovered(f"{named} {are} back after {silence_s:.1f} s")
         case _:
             return Recovered(f"{named} {are} sent at {min(track.rate() or 0.0 for track in tracks):.3g} Hz again")
 
@@ -325,12 +324,12 @@ def _children(tracks: list[Track]) -> list[str]:
 def _change(track: Track, watched: float, speed: float) -> str | None:
     """Bring the track up to date and return what changed."""
     after = track.silent_after or 0.0
-    quiet = watched - track.heard > after
-    if quiet and not track.silent:
+    is_silent = watched - track.heard > after
+    if is_silent and not track.silent:
         track.silent, track.silent_since, track.steady = True, track.last, False
         track.forget()
         return "silent"
-    if track.silent and track.steady and not quiet:
+    if track.silent and track.steady and not is_silent:
         track.silent = track.slow = False
         track.forget()
         return "back"

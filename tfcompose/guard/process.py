@@ -15,7 +15,7 @@ from tfcompose.guard.diagnostics import DiagnosticsPage
 from tfcompose.guard.gates import Gates, LifecycleDriver
 from tfcompose.guard.judge import Judge
 from tfcompose.guard.switches import Switches
-from tfcompose.guard.watch import LOOK_EVERY_S, TopicWatch, held_back, plans_by_topics, together
+from tfcompose.guard.watch import CHECK_EVERY_S, TopicWatch, held_back, plans_by_topics, together
 from tfcompose.ipc import JOINS, ORDERS_FD, REMAPPED, SETTLE
 from tfcompose.plan.topics import GLOBAL, private_topics
 from tfcompose.ros.graph import ids_say_who
@@ -73,12 +73,12 @@ def guard(own: Own, stop: Stop) -> None:
             events.flush,
             lambda: diagnostics.publish(judged, lambda: held_back(watches)),
         ]
-        steps += [switches.look] if switches else []
-        steps += [] if ORDERS_FD in os.environ else [LifecycleDriver(node, own.plan).look]
-        steps += [ClockWatch(own, node).look, *(watch.report for watch in watches)]
+        steps += [switches.check] if switches else []
+        steps += [] if ORDERS_FD in os.environ else [LifecycleDriver(node, own.plan).check]
+        steps += [ClockWatch(own, node).check, *(watch.report for watch in watches)]
         subscriptions = [each for watch in watches for each in watch.data.subscriptions]
         while not stop.requested:
-            wait(node, subscriptions, LOOK_EVERY_S, stop)
+            wait(node, subscriptions, CHECK_EVERY_S, stop)
             for step in steps:
                 step()
         for watch in watches:

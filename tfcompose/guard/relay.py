@@ -108,14 +108,14 @@ class Relay:
         Until then the senders are found again.
         """
         self._finds_until = until
-        for part, said in memory.items():
-            if part.startswith(_LATCHED) and said is not None:
-                gid, data = bytes.fromhex(part.removeprefix(_LATCHED)), b64decode(said[1])
+        for part, entry in memory.items():
+            if part.startswith(_LATCHED) and entry is not None:
+                gid, data = bytes.fromhex(part.removeprefix(_LATCHED)), b64decode(entry[1])
                 edges = tuple((t.parent.removeprefix("/"), t.child.removeprefix("/")) for t in decode(data))
                 message = Message(edges, static=True, gid=gid, source_ns=0, sequence=0)
-                self._latch(gid, data, message, admits(message), said[0])
+                self._latch(gid, data, message, admits(message), entry[0])
 
-    def look(self, writers: Collection[Publisher], now: float) -> None:
+    def update(self, writers: Collection[Publisher], now: float) -> None:
         """Latch the edges of those no more who are not in the graph any more, and feed listeners."""
         if now >= self._finds_until:
             present = {writer.gid for writer in writers}
@@ -126,7 +126,7 @@ class Relay:
                     self._feedback.forget([gid])
             self._forget_others(writers, present)
         if self._feedback:
-            self._feedback.look()
+            self._feedback.update()
 
     def _forget_others(self, writers: Collection[Publisher], present: Collection[bytes]) -> None:
         """Feed no more what everybody had from one that has left; where ids do not tell who, from all when all have."""
@@ -165,9 +165,9 @@ class Relay:
             if not found:
                 return
             latched = self._new(gid, process)
-        whole = admitted is None and found.keys() >= latched.edges.keys()
+        is_all = admitted is None and found.keys() >= latched.edges.keys()
         latched.edges |= found
-        latched.data = data if whole else encode(list(latched.edges.values()))
+        latched.data = data if is_all else encode(list(latched.edges.values()))
         latched.publisher.publish(latched.data)
         if self._feedback:
             self._feedback.fixed(gid, latched.edges, process)
@@ -232,7 +232,7 @@ class Feedback:
         self._listeners = {process: _Listener(topics) for process, topics in private.items()}
         self._fixed: dict[bytes, tuple[str, dict[str, Transform]]] = {}
 
-    def look(self) -> None:
+    def update(self) -> None:
         """See who listens now, and latch for them what has changed."""
         for process, one in self._listeners.items():
             if one.moving is None and self._is_heard(one.topics[0]):

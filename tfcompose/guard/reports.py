@@ -32,7 +32,7 @@ FIRST_BY_NS = 500_000_000
 COUNTING_S = 0.7
 #: A violation is over when its publisher has left and nothing came for so long, or for longer from one that stays.
 OVER_S = 3.0
-QUIET_S = 30.0
+OVER_WHILE_PRESENT_S = 30.0
 #: Further edges of an offender that was just reported are collected for so long, and for longer while more come and
 #: come: who names frames after what it tracks has new ones each second.
 COLLECTED_S = 0.5
@@ -162,7 +162,7 @@ class Cases:
         if sender is None or cleared is None or now - cleared > FIRST_S:
             return False
         began_before = sender.began_before(self._start.cleared_ns - FIRST_BY_NS)
-        return began_before is None and now - sender.first_seen < COUNTING_S
+        return began_before is None and now - sender.first_received < COUNTING_S
 
     def _was_first(self, case: Case, now: float) -> bool:
         """Whether the offender had the edge before the plan was started."""
@@ -199,7 +199,7 @@ class Cases:
 
     def _has_ended(self, case: Case, now: float) -> bool:
         if self._senders.is_present(case.gid) and not case.violation.is_of_stamps:
-            return not case.violation.static and now - case.last > QUIET_S
+            return not case.violation.static and now - case.last > OVER_WHILE_PRESENT_S
         return now - case.last > OVER_S
 
 
@@ -283,7 +283,7 @@ class PublisherReports:
             if not (one.node and one.static and edges and sender):
                 continue
             first = sender.first_sequence
-            if 1 < first < UNCOUNTED and now - sender.first_seen >= ALL_HEARD_S:
+            if 1 < first < UNCOUNTED and now - sender.first_received >= ALL_HEARD_S:
                 found += self._once(one, replaced_latched(one.node, first - 1, edges))
         return found
 

@@ -24,14 +24,14 @@ if TYPE_CHECKING:
     from tfcompose.ros.parameters import ParameterReader, Value
 
 #: How often nodes are looked for, in seconds.
-LOOK_EVERY_S = 0.5
+CHECK_EVERY_S = 0.5
 #: For so long a parameter that the node does not have is asked for again, so often.
 DECLARED_WITHIN_S = 20.0
 AGAIN_EVERY_S = 2.0
 
 
 @dataclass(slots=True)
-class _Asked:
+class _NodeSwitches:
     """One node: what the plan wrote, for which sensors, and how far the question is."""
 
     node: str
@@ -50,7 +50,7 @@ class Switches:
         self._emit = emit
         self._due = self._finds_until = 0.0
         self._nodes = [
-            _Asked(name, wanted, process.drives, _reader(node, name, tuple(wanted)))
+            _NodeSwitches(name, wanted, process.drives, _reader(node, name, tuple(wanted)))
             for process in plan.processes
             for name, wanted in process.switches.items()
         ]
@@ -66,16 +66,16 @@ class Switches:
         for one in self._nodes:
             one.done = one.node in answered
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Take what was answered, ask whom there is to ask, and wait for nothing."""
         now = time.monotonic()
         if not self._nodes or now < self._due:
             return
-        self._due = now + LOOK_EVERY_S
+        self._due = now + CHECK_EVERY_S
         for one in self._nodes:
             self._at(one, now)
 
-    def _at(self, one: _Asked, now: float) -> None:
+    def _at(self, one: _NodeSwitches, now: float) -> None:
         if not one.reader.is_there:
             one.since, one.done = None, one.done and now < self._finds_until
             return

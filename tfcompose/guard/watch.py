@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     Topics = tuple[str, str]
 
-LOOK_EVERY_S = 0.1
+CHECK_EVERY_S = 0.1
 #: How often a strict guard says what it held back, in seconds.
 REPORT_EVERY_S = 10.0
 
@@ -96,7 +96,7 @@ class TopicWatch:
         for each in taken:
             self._take(each, now)
         if now >= self._due:
-            self._due = now + LOOK_EVERY_S
+            self._due = now + CHECK_EVERY_S
             if not strangers:  # after the messages: what a strict guard passes on does not wait for it
                 self._ask_graph(now)
             if self._clock:
@@ -140,7 +140,7 @@ class TopicWatch:
             for data, message in waiting:
                 admitted = self.judge.admits(message, now)
                 self.relay.pass_on(data, message, admitted, self.judge.name_of(data.received.gid))
-            self.relay.look(publishers, now)
+            self.relay.update(publishers, now)
 
     def _pass_on(self, events: list[GuardEvent]) -> None:
         for event in events:

@@ -194,8 +194,8 @@ class _Search:
         far, twist = math.dist(nominal.xyz, edge.pose.xyz), angle_between(nominal.quat_xyzw, edge.pose.quat_xyzw)
         if far > NEAR or twist > NEAR:
             return None
-        turns = rotation is not None and rotation != Pose().quat_xyzw
-        tells = (frame.xyz is not None and any(frame.xyz)) or (preset.vendor == GENERIC and turns)
+        rotates = rotation is not None and rotation != Pose().quat_xyzw
+        tells = (frame.xyz is not None and any(frame.xyz)) or (preset.vendor == GENERIC and rotates)
         return _Match(edge, frame.xyz is None or far > EQUAL, unknown or twist > EQUAL, tells)
 
 

@@ -84,11 +84,11 @@ def text(value: str) -> str:
         return str(value)
     if _PLAIN.fullmatch(value) and value.lower() not in _RESERVED:
         return value
-    return '"' + "".join(_ESCAPES.get(letter) or _printed(letter) for letter in value) + '"'
+    return '"' + "".join(_ESCAPES.get(char) or _printed(char) for char in value) + '"'
 
 
-def _printed(letter: str) -> str:
-    return letter if letter.isprintable() else f"\\U{ord(letter):08x}"
+def _printed(char: str) -> str:
+    return char if char.isprintable() else f"\\U{ord(char):08x}"
 
 
 def _literal(value: str) -> list[str] | None:

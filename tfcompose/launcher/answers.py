@@ -70,7 +70,7 @@ def _process(state: State, one: Tracked, now: float) -> ProcessStatus:
         failed=bool(one.failed) or one.state == "FATAL",
         ready=one.ready,
         waits=waits_for(state, one),
-        seen=one.seen,
+        seen=one.observed,
         pid=one.pid,
         uptime=round(now - one.began, 3) if one.state in ("RUNNING", "STOPPING") else None,
         restarts=one.restarts,

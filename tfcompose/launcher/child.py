@@ -55,8 +55,8 @@ class Lines:
 
     def feed(self, data: bytes) -> Iterator[str]:
         """Yield the lines that are whole now, and pieces of a line that is too long."""
-        *whole, self._rest = (self._rest + data).split(b"\n")
-        for line in whole:
+        *complete, self._rest = (self._rest + data).split(b"\n")
+        for line in complete:
             yield from self._pieces(line)
         while len(self._rest) > self._limit:
             piece, self._rest = self._rest[: self._limit], self._rest[self._limit :]

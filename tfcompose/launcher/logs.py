@@ -53,7 +53,7 @@ class Logs:
         try:
             log = self._open.get(process) or self._begin(process)
             if log.size + len(data) > self.file_bytes:
-                log = self._turn_over(process, log)
+                log = self._rotate(process, log)
             if os.write(log.fd, data) != len(data):
                 os.write(log.fd, b"\n")  # no room for all of it: the next attempt says why
             log.size += len(data)
@@ -75,7 +75,7 @@ class Logs:
         log = self._open[process] = _Log(path, fd, os.fstat(fd).st_size)
         return log
 
-    def _turn_over(self, process: str, log: _Log) -> _Log:
+    def _rotate(self, process: str, log: _Log) -> _Log:
         os.close(log.fd)
         del self._open[process]
         for number in range(KEPT, 0, -1):
@@ -98,7 +98,7 @@ def logged(folder: Path) -> list[str]:
     return sorted(file.relative_to(folder).as_posix().removesuffix(".log") for file in folder.rglob("*.log"))
 
 
-def last_written(folder: Path) -> float:
+def last_modified(folder: Path) -> float:
     """Return when a line was last written below the folder, in seconds since 1970; 0 where there is none.
 
     A folder's own time says only when its last file was made.
@@ -158,8 +158,8 @@ class Follower:
         with contextlib.suppress(OSError):
             data += _from(self._folder / f"{name}.log", offset)
         self._at[name] = end
-        *whole, self._rest[name] = (self._rest[name] + data).split(b"\n")
-        for line in whole:
+        *complete, self._rest[name] = (self._rest[name] + data).split(b"\n")
+        for line in complete:
             at, _, text = line.decode(errors="replace").partition(" ")
             yield at, name, text
 

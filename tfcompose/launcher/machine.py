@@ -114,11 +114,11 @@ def _requested_or_reported(step: Transition, event: Event) -> None:
             process_requested(step, event)
         case NewPlan():
             follow_plan(step, event)
-        case GateOpen(process, seen) | LogMatched(process, seen) if process in step.state.tracked:
+        case GateOpen(process, observed) | LogMatched(process, observed) if process in step.state.tracked:
             if gate_of(step.state.tracked[process].process) not in ("edges", "exit", "time"):
-                open_gate(step, process, seen)
-        case GateShut(process, seen) if process in step.state.tracked:
-            step.track(process, replace(step.state.tracked[process], seen=seen))
+                open_gate(step, process, observed)
+        case GateShut(process, observed) if process in step.state.tracked:
+            step.track(process, replace(step.state.tracked[process], observed=observed))
         case OwnerReady(process) if process in step.state.tracked:
             _owner_ready(step, process)
         case _:  # the guard's other events, and Tick

@@ -93,16 +93,16 @@ def order_gate(step: Transition, one: Tracked) -> None:
     step.actions.append(Order(gate))
 
 
-def open_gate(step: Transition, name: str, seen: str = "") -> None:
+def open_gate(step: Transition, name: str, observed: str = "") -> None:
     """Note that the process is ready."""
     one = step.state.tracked[name]
     if one.ready:
         return
-    step.track(name, replace(one, ready=True, ready_since=step.now, seen=seen, late=False))
+    step.track(name, replace(one, ready=True, ready_since=step.now, observed=observed, late=False))
     if gate_of(one.process) == "edges" and has_own_gate(one.process):
         step.actions.append(Order(Gate(name)))  # the guard need not watch it any more
     if has_own_gate(one.process):
-        step.notify(ProcessReady(name, seen, step.since_begin))
+        step.notify(ProcessReady(name, observed, step.since_begin))
 
 
 def check_gates(step: Transition) -> None:
@@ -162,7 +162,7 @@ def waits_for(state: State, one: Tracked) -> str:
 
 
 def _late(state: State, one: Tracked, seconds: float) -> Finding:
-    notes = [Note(f"seen instead: {one.seen}")] if one.seen else []
+    notes = [Note(f"seen instead: {one.observed}")] if one.observed else []
     message = f"{one.process.name} is not ready after {seconds:g} s: {waits_for(state, one)}"
     return finding("TF817", message, None, notes=notes)
 

@@ -73,7 +73,7 @@ def _guard_exited(step: Transition, one: Tracked, event: Exited) -> None:
 def lose_edges(step: Transition, one: Tracked) -> None:
     """Take the edges of a process as not live: it has ended, or is about to."""
     state, name = step.state, one.process.name
-    step.track(name, replace(one, ready=False, ready_since=None, seen="", late=False))
+    step.track(name, replace(one, ready=False, ready_since=None, observed="", late=False))
     if name == state.guard:
         # A strict guard's memory holds what it latched, also for one that is restarted by request.
         memory = state.memory if state.plan.guard.mode == "strict" else {}

@@ -53,9 +53,9 @@ class Tracked:
     """One process. ``since`` is when it came into its state, or when it was sent its last signal.
 
     ``order`` counts the starts of all processes, 0 for one that was never started; ``failures`` the short runs in a
-    row; ``restarts`` all starts but the first; ``level`` how often it was told to stop, each time more firmly.
+    row; ``restarts`` all starts but the first; ``level`` how often it was ordered to stop, each time more firmly.
     ``leaving`` says what follows once it has stopped: "stop" and it stays so, "again" and it is started, "drop" and it
-    is forgotten. ``seen`` is what its gate saw last, ``late`` whether it was reported as late. ``detail`` says why it
+    is forgotten. ``observed`` is what its gate found last, ``late`` whether that was reported. ``detail`` says why it
     is in its state. ``failed`` is what was reported when the run went on without it: the finding and the end of its
     log.
     """
@@ -73,7 +73,7 @@ class Tracked:
     restarts: int = 0
     began: float = 0.0
     ready_since: float | None = None
-    seen: str = ""
+    observed: str = ""
     late: bool = False
     detail: str = ""
     failed: tuple[str, ...] = ()
@@ -157,8 +157,8 @@ def initial(plan: Plan, times: Times | None = None) -> State:
         process.name: Tracked(process, "EXPECTED" if process.kind == "external" else "STOPPED") for process in processes
     }
     times = times or Times()
-    looks_s = sum(float(tracked[name].process.env.get(SETTLE, 0)) for name in guards)
-    times = replace(times, clear_s=times.clear_s + looks_s)
+    settle_s = sum(float(tracked[name].process.env.get(SETTLE, 0)) for name in guards)
+    times = replace(times, clear_s=times.clear_s + settle_s)
     return State(plan, times, tracked, guards[0] if guards else None, complete=not plan.edges)
 
 

@@ -122,8 +122,8 @@ class Arrivals:
         if not sums.gaps:
             return Timing(None, None, None, *delays)
         mean_s = sums.gaps_ns / sums.gaps * 1e-9
-        quiet_ns = max(0, now_ns - self.last_ns - sums.longest_ns)
-        total_s = (sums.gaps_ns + quiet_ns) * 1e-9
+        open_gap_ns = max(0, now_ns - self.last_ns - sums.longest_ns)
+        total_s = (sums.gaps_ns + open_gap_ns) * 1e-9
         return Timing(
             sums.gaps / total_s if total_s > 0 else None,
             sqrt(max(0.0, sums.squares / sums.gaps - mean_s * mean_s)) if sums.gaps > 1 else None,

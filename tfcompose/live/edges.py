@@ -25,7 +25,7 @@ MOST_STREAMS = 20_000
 #: So long after an edge first came its times are not counted: a new subscriber gets at once what was kept.
 SETTLE_S = 0.3
 #: A frame that stays in each parent for so many transforms, or more, in the mean, is handed over.
-SOME_IN_TURN = 3
+MIN_RUN = 3
 _SECOND_NS = 1_000_000_000
 
 
@@ -152,7 +152,7 @@ class Handover:
     @property
     def is_one(self) -> bool:
         """Whether the frame changes hands, now and then; where one comes between the others, it jumps to and fro."""
-        return all((each.begun - 1) * SOME_IN_TURN <= each.arrivals.count for each in self.streams)
+        return all((each.begun - 1) * MIN_RUN <= each.arrivals.count for each in self.streams)
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,7 +271,7 @@ class TreeObserver:
     @property
     def recorded(self) -> bool:
         """Whether there is no graph to ask, as with a recording."""
-        return not self.publishers.asked
+        return not self.publishers.queried
 
     def edges(self, now_ns: int) -> list[EdgeState]:
         """Return what is known of each edge at ``now_ns`` of the receiver's clock, sorted by parent and child."""

@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 class Branch:
     """A frame in a tree. ``indent`` draws the lines to it; ``parent`` is None for a root.
 
-    ``seen`` are all who publish where it is, the one that counts first; ``planned`` is what was expected of it.
+    ``observed`` are all who publish where it is, the one that counts first; ``planned`` is what was expected of it.
     """
 
     frame: str
     parent: str | None
     indent: str
-    seen: tuple[EdgeState, ...] = ()
+    observed: tuple[EdgeState, ...] = ()
     planned: PlanEdge | None = None
 
 
@@ -51,8 +51,8 @@ def forest(edges: Iterable[EdgeState], planned: Mapping[str, PlanEdge] | None = 
     children = children_of(sorted((parent, child) for child, parent in parents.items()))
 
     def branch(frame: str, indent: str = "") -> Branch:
-        seen = tuple(by_child.get(frame, ()))
-        return Branch(frame, parents.get(frame), indent, seen, (planned or {}).get(frame))
+        observed = tuple(by_child.get(frame, ()))
+        return Branch(frame, parents.get(frame), indent, observed, (planned or {}).get(frame))
 
     grown = [
         Tree((branch(root), *(branch(frame, lines) for lines, frame in drawn(children, root, str))))

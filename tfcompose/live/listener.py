@@ -44,7 +44,7 @@ class TreeListener:
         self._data = TFTopics(node, topics)
         self._clock = SimClock(node)
         self._decoder = Decoder()
-        self._asked = float("-inf")
+        self._requested_at = float("-inf")
 
     @property
     def clock_ns(self) -> int | None:
@@ -77,10 +77,10 @@ class TreeListener:
 
     def _ask_graph(self, senders: set[bytes]) -> None:
         """Ask who publishes, where it is time, or somebody without a name sends."""
-        since = time.monotonic() - self._asked
+        since = time.monotonic() - self._requested_at
         nameless = not all(self.observer.publishers.is_named(gid) for gid in senders)
         if since >= ASK_EVERY_S or (nameless and since >= ASK_AGAIN_S):
-            self._asked = time.monotonic()
+            self._requested_at = time.monotonic()
             self.observer.take_graph(self.graph.publishers(), nodes(self.node))
 
 

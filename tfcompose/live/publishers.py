@@ -71,7 +71,7 @@ class Publishers:
     def __init__(self, *, says_who: bool = True) -> None:
         self.says_who = says_who
         #: Whether the graph was asked: of a recording nobody can.
-        self.asked = False
+        self.queried = False
         #: Those that are there, by id.
         self.present: dict[bytes, Publisher] = {}
         #: All by id, as they were when they had a name last.
@@ -79,7 +79,7 @@ class Publishers:
 
     def update(self, publishers: Sequence[Publisher]) -> None:
         """Take who is in the graph now."""
-        self.asked = True
+        self.queried = True
         self.present = {one.gid: one for one in publishers}
         if len(self.known) + len(publishers) > MOST_KNOWN:
             self.known = {gid: one for gid, one in self.known.items() if gid in self.present}
@@ -116,7 +116,7 @@ class Publishers:
 class Sender:
     """One publisher: when it was first heard, and how fast it counts."""
 
-    first_seen: float
+    first_received: float
     first_ns: int
     first_sequence: int
     last_ns: int
@@ -205,13 +205,13 @@ class Senders(Publishers):
 
     def recall(self, memory: dict[str, list[Any]]) -> None:
         """Know what the guard before knew."""
-        for hexed, (names, *said) in memory.items():
+        for hexed, (names, *numbers) in memory.items():
             gid = bytes.fromhex(hexed)
-            self._heard[gid] = Sender(*said)
+            self._heard[gid] = Sender(*numbers)
             if names:
                 self.known[gid] = Publisher(gid, names[0], static=False, others=tuple(names[1:]))
 
 
 def _to_json(one: Sender) -> list[Any]:
-    first = (one.first_seen, one.first_ns, one.first_sequence)
+    first = (one.first_received, one.first_ns, one.first_sequence)
     return [*first, one.last_ns, one.last_sequence, list(one.gaps_ns)]

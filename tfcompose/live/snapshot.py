@@ -39,8 +39,8 @@ TOOLS = ("/tfcompose_", "/_ros2cli_")
 INTERESTING = ("tf2_msgs/msg/TFMessage", "rosgraph_msgs/msg/Clock", "sensor_msgs/msg/JointState")
 
 
-def look(expected: Mapping[Topics, Plan | None], seconds: float, stop: Stop) -> list[TreeState]:
-    """Look at the topics (moving, fixed) for so many seconds, or until ``stop`` is requested.
+def observe(expected: Mapping[Topics, Plan | None], seconds: float, stop: Stop) -> list[TreeState]:
+    """Observe the topics (moving, fixed) for so many seconds, or until ``stop`` is requested.
 
     Each pair of topics may have a plan that says what is expected on it; there is a state for each pair.
 

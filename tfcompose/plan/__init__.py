@@ -25,8 +25,8 @@ from tfcompose.plan.plan import (
     SourceLine,
     StopRule,
     Sweep,
+    known_at_launch,
     switch_text,
-    told_at_start,
 )
 from tfcompose.plan.words import (
     Clock,
@@ -91,6 +91,6 @@ __all__ = [
     "StopSignal",
     "Sweep",
     "UnknownEdges",
+    "known_at_launch",
     "switch_text",
-    "told_at_start",
 ]

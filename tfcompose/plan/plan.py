@@ -243,12 +243,12 @@ class PlanProcess:
         return self.remap.get("/tf", "/tf"), self.remap.get("/tf_static", "/tf_static")
 
 
-def told_at_start(value: Any) -> bool:
+def known_at_launch(value: Any) -> bool:
     """Return whether a value holds a path that only the launcher knows."""
     if isinstance(value, str):
         return bool(_AT_START.search(value))
     items = value.values() if isinstance(value, dict) else value if isinstance(value, (list, tuple)) else ()
-    return any(told_at_start(item) for item in items)
+    return any(known_at_launch(item) for item in items)
 
 
 @dataclass(frozen=True, slots=True)

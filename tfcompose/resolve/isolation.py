@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.load import path_named
 from tfcompose.model import SHELL
-from tfcompose.plan import RosSettings, told_at_start
+from tfcompose.plan import RosSettings, known_at_launch
 
 if TYPE_CHECKING:
     from tfcompose.language.robot import RobotSpec, RosSpec
@@ -170,7 +170,7 @@ class Filler:
         """Find parameters with a path that only the launcher knows, where it has no way to tell the node."""
         can = process.kind == "run" and process.package is not None and len(process.nodes) == 1
         for key, value in node.params.items() if not can else ():
-            if told_at_start(value):
+            if known_at_launch(value):
                 message = f"the parameter {key} of {process.name} holds a path that is known at the start only"
                 advice = "write it among the arguments of run"
                 place = self.source.at((*node.path, "params", key))

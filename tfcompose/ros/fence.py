@@ -60,9 +60,9 @@ def profile(env: Mapping[str, str], topics: Sequence[str], partition: str, *, re
         raise RosError(f"the profile file {file} cannot be read: {error}") from None
     at = text.rfind(_END)
     kind = "data_reader" if reads else "data_writer"
-    said = set(re.findall(rf"<{kind}\s[^>]*profile_name\s*=\s*[\"']([^\"']*)[\"']", text))
-    if at < 0 or said & set(topics):
-        why = "says what its writers of TF do" if said else "holds no profiles"
+    profiles = set(re.findall(rf"<{kind}\s[^>]*profile_name\s*=\s*[\"']([^\"']*)[\"']", text))
+    if at < 0 or profiles & set(topics):
+        why = "says what its writers of TF do" if profiles else "holds no profiles"
         raise RosError(f"the profile file {file} {why}: guard: strict cannot add to it")
     partitions = f";{partition}" if reads else partition
     added = "".join(_PROFILE.format(kind=kind, topic=topic, partitions=partitions) for topic in dict.fromkeys(topics))

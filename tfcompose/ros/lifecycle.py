@@ -40,7 +40,7 @@ class Lifecycle:
         self._get: Any = node.create_client(GetState, f"{name}/get_state")
         self._change: Any = node.create_client(ChangeState, f"{name}/change_state")
         self._pending: tuple[Any, int, str] | None = None
-        self._asked = 0.0
+        self._requested_at = 0.0
         self._not_before = 0.0
         self._state = ""
         self._fault = ""
@@ -59,14 +59,14 @@ class Lifecycle:
         """Ask for the state anew. A node that has begun anew is driven again, one that was deactivated is not."""
         self._state, self._is_fresh = "", False
 
-    def look(self, now: float) -> tuple[bool, str]:
-        """Take what was answered, ask on, and return whether the node is in its state, and what is seen."""
+    def check(self, now: float) -> tuple[bool, str]:
+        """Take what was answered, ask on, and return whether the node is in its state, and what is observed."""
         self._take(now)
         if self._pending is None and self._state != self._wanted and now >= self._not_before:
             self._ask(now)
-        return self._state == self._wanted, self._seen()
+        return self._state == self._wanted, self._description()
 
-    def _seen(self) -> str:
+    def _description(self) -> str:
         if not self._state:
             return f"{self._name} answers no lifecycle service"
         return f"{self._name} is {self._state}{self._fault}"
@@ -81,7 +81,7 @@ class Lifecycle:
             return
         with client.handle:
             sequence = client.handle.send_request(request)
-        self._pending, self._asked = (client, sequence, what), now
+        self._pending, self._requested_at = (client, sequence, what), now
 
     def _step(self) -> tuple[int, str] | None:
         """Return the transition that is due: its number and name."""
@@ -95,7 +95,7 @@ class Lifecycle:
         with client.handle:
             header, response = client.handle.take_response(client.srv_type.Response)
         if header is None:
-            if now - self._asked > ANSWER_S * (1 if what == "state" else 6):
+            if now - self._requested_at > ANSWER_S * (1 if what == "state" else 6):
                 self._pending = None
             return
         if header.request_id.sequence_number != sequence:

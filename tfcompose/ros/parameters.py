@@ -33,7 +33,7 @@ class ParameterReader:
         self._parameters = list(parameters)
         self._client: Any = node.create_client(GetParameters, f"{name}/get_parameters")
         self._sequence: int | None = None
-        self._asked = 0.0
+        self._requested_at = 0.0
 
     def close(self) -> None:
         """Take the client away."""
@@ -46,11 +46,11 @@ class ParameterReader:
 
     def ask(self, now: float) -> None:
         """Ask, unless an answer is waited for."""
-        if self._sequence is not None and now - self._asked < ANSWER_S:
+        if self._sequence is not None and now - self._requested_at < ANSWER_S:
             return
         request = GetParameters.Request(names=self._parameters)
         with self._client.handle:
-            self._sequence, self._asked = self._client.handle.send_request(request), now
+            self._sequence, self._requested_at = self._client.handle.send_request(request), now
 
     def take(self) -> dict[str, Value | None] | None:
         """Return the values if the answer has come, else None; a parameter that the node does not have is None.

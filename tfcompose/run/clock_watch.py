@@ -18,14 +18,14 @@ CLOCK_AFTER_S = 5.0
 
 
 class ClockWatch:
-    """Looks for the first message on /clock, if the plan's time is simulated; ``look`` costs nothing afterwards."""
+    """Looks for the first message on /clock, if the plan's time is simulated; ``check`` costs nothing afterwards."""
 
     def __init__(self, own: Own, node: Node) -> None:
         self._node = node
         self._due = time.monotonic() + CLOCK_AFTER_S
         self._clock = SimClock(node) if own.plan.ros.clock == "sim" else None
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Say after some seconds that nothing has come, and who should have sent it."""
         if self._clock is None or (self._clock.now_ns() is None and time.monotonic() < self._due):
             return

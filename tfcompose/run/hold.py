@@ -14,7 +14,7 @@ from tfcompose.ipc import GO, HOLD_FD
 if TYPE_CHECKING:
     from tfcompose.ros.stop import Stop
 
-_LOOK_EVERY_S = 0.2
+_CHECK_EVERY_S = 0.2
 
 
 def wait_for_go(stop: Stop) -> None:
@@ -24,7 +24,7 @@ def wait_for_go(stop: Stop) -> None:
     fd = int(os.environ.pop(HOLD_FD))
     try:
         while not stop.requested:
-            if select([fd], [], [], _LOOK_EVERY_S)[0]:
+            if select([fd], [], [], _CHECK_EVERY_S)[0]:
                 if os.read(fd, len(GO)) != GO:
                     stop.request()
                 return

@@ -220,7 +220,7 @@ def moved_points(points: ArrayLike, pose: PoseTuple) -> NDArray[Any]:
     if given.ndim == 0 or given.shape[-1] != 3:  # noqa: PLR2004 (x, y, z)
         raise InvalidArgumentException(f"points have the shape (…, 3), not {given.shape}")
     moved = np.empty(given.shape, given.dtype if given.dtype in (np.float32, np.float64) else np.float64)
-    turned, to = turn_and_shift(pose)
+    turned, to = rotation_and_translation(pose)
     rows, out = given.reshape(-1, 3), moved.reshape(-1, 3)
     for start in range(0, len(rows), _POINTS):
         block = slice(start, start + _POINTS)
@@ -228,7 +228,7 @@ def moved_points(points: ArrayLike, pose: PoseTuple) -> NDArray[Any]:
     return moved
 
 
-def turn_and_shift(pose: PoseTuple) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def rotation_and_translation(pose: PoseTuple) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return what takes rows of points along: ``rows @ turn + shift``; 3×3 and 3."""
     x, y, z, qx, qy, qz, qw = pose
     return np.array(matrix_from_quat((qx, qy, qz, qw))).T.copy(), np.array((x, y, z))
@@ -243,7 +243,7 @@ def moved_cloud(cloud: Any, pose: PoseTuple) -> Any:
     given = cloud.data if isinstance(cloud.data, (array, bytes, bytearray, memoryview)) else bytes(cloud.data)
     data = np.frombuffer(given, np.uint8).copy()
     columns = [_column(cloud, name, data) for name in "xyz"]
-    turned, to = turn_and_shift(pose)
+    turned, to = rotation_and_translation(pose)
     for row in range(cloud.height):
         for start in range(0, cloud.width, _POINTS):
             block = slice(start, start + _POINTS)

@@ -470,11 +470,11 @@ def _awaitable(future: Any) -> Any:
 
 
 def _row(transform: Any) -> Row:
-    header, to, turn = transform.header, transform.transform.translation, transform.transform.rotation
+    header, to, rotation = transform.header, transform.transform.translation, transform.transform.rotation
     stamp = header.stamp
     return (
         header.frame_id, transform.child_frame_id, stamp.sec, stamp.nanosec, to.x, to.y, to.z,
-        turn.x, turn.y, turn.z, turn.w,
+        rotation.x, rotation.y, rotation.z, rotation.w,
     )  # fmt: skip
 
 

@@ -291,7 +291,7 @@ def _climb(
 ) -> tuple[list[TimeCache], str]:
     """Return the edges from ``frame`` up to one of the goal, or else as far as there are parents; and that frame."""
     way: list[TimeCache] = []
-    seen = {frame}
+    visited = {frame}
     while frame not in goal:
         cache = caches.get(frame)
         parent = parent_of(cache) if cache else ""
@@ -299,7 +299,7 @@ def _climb(
             break
         way.append(cache)
         frame = parent
-        if frame in seen and frame not in goal:
+        if frame in visited and frame not in goal:
             raise LookupException(exceptions.loop(frame, [each.child for each in way]))
-        seen.add(frame)
+        visited.add(frame)
     return way, frame

@@ -185,8 +185,8 @@ def no_common_time(moving: Sequence[TimeCache]) -> str:
 def seconds(stamp_ns: int) -> str:
     """Return a time in seconds with all nine decimals."""
     sign = "-" if stamp_ns < 0 else ""
-    whole, rest = divmod(abs(stamp_ns), 1_000_000_000)
-    return f"{sign}{whole}.{rest:09d} s"
+    seconds, rest = divmod(abs(stamp_ns), 1_000_000_000)
+    return f"{sign}{seconds}.{rest:09d} s"
 
 
 def _ms(nanoseconds: int) -> str:

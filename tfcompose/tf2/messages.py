@@ -156,8 +156,8 @@ def _by_constructor() -> Maker:
         message = module.TransformStamped()
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, _SECOND_NS)
         message.header.frame_id, message.child_frame_id = target, source
-        to, turn = message.transform.translation, message.transform.rotation
-        to.x, to.y, to.z, turn.x, turn.y, turn.z, turn.w = pose
+        to, rotation = message.transform.translation, message.transform.rotation
+        to.x, to.y, to.z, rotation.x, rotation.y, rotation.z, rotation.w = pose
         return message
 
     return make
@@ -174,13 +174,13 @@ def _by_fields() -> Maker:
 
     def make(target: str, source: str, stamp_ns: int, pose: PoseTuple) -> Any:
         message, head, stamp = stamped.__new__(stamped), header.__new__(header), time.__new__(time)
-        moved, to, turn = transform.__new__(transform), vector.__new__(vector), quaternion.__new__(quaternion)
+        moved, to, rotation = transform.__new__(transform), vector.__new__(vector), quaternion.__new__(quaternion)
         message._check_fields = head._check_fields = stamp._check_fields = checked  # noqa: SLF001
-        moved._check_fields = to._check_fields = turn._check_fields = checked  # noqa: SLF001
+        moved._check_fields = to._check_fields = rotation._check_fields = checked  # noqa: SLF001
         stamp._sec, stamp._nanosec = divmod(stamp_ns, _SECOND_NS)  # noqa: SLF001
         head._stamp, head._frame_id = stamp, target  # noqa: SLF001
-        to._x, to._y, to._z, turn._x, turn._y, turn._z, turn._w = pose  # noqa: SLF001
-        moved._translation, moved._rotation = to, turn  # noqa: SLF001
+        to._x, to._y, to._z, rotation._x, rotation._y, rotation._z, rotation._w = pose  # noqa: SLF001
+        moved._translation, moved._rotation = to, rotation  # noqa: SLF001
         message._header, message._child_frame_id, message._transform = head, source, moved  # noqa: SLF001
         return message
 
@@ -201,19 +201,23 @@ def do_transform_point(point: Any, transform: Any) -> Any:
 def do_transform_vector3(vector: Any, transform: Any) -> Any:
     """Return a Vector3Stamped in the transform's frame: turned, and not moved."""
     moved = _headed(vector, transform)
-    to, turn = moved.vector, (0.0, 0.0, 0.0, *pose_of(transform)[3:])
-    to.x, to.y, to.z = product(turn, (to.x, to.y, to.z, 0.0, 0.0, 0.0, 1.0))[:3]
+    to, rotation = moved.vector, (0.0, 0.0, 0.0, *pose_of(transform)[3:])
+    to.x, to.y, to.z = product(rotation, (to.x, to.y, to.z, 0.0, 0.0, 0.0, 1.0))[:3]
     return moved
 
 
 def do_transform_pose(pose: Any, transform: Any) -> Any:
     """Return a Pose, which has no header, in the transform's frame; a quaternion of zeros counts as no rotation."""
     moved = deepcopy(pose)
-    at, turn = moved.position, moved.orientation
-    length = hypot(turn.x, turn.y, turn.z, turn.w)
-    quat = tuple(part / length for part in (turn.x, turn.y, turn.z, turn.w)) if length else (0.0, 0.0, 0.0, 1.0)
+    at, rotation = moved.position, moved.orientation
+    length = hypot(rotation.x, rotation.y, rotation.z, rotation.w)
+    quat = (
+        tuple(part / length for part in (rotation.x, rotation.y, rotation.z, rotation.w))
+        if length
+        else (0.0, 0.0, 0.0, 1.0)
+    )
     given = (at.x, at.y, at.z, quat[0], quat[1], quat[2], quat[3])
-    at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w = unit(product(pose_of(transform), given))
+    at.x, at.y, at.z, rotation.x, rotation.y, rotation.z, rotation.w = unit(product(pose_of(transform), given))
     return moved
 
 
@@ -238,7 +242,7 @@ def transform_covariance(covariance: Sequence[float], transform: Any) -> list[fl
     Each of its four 3×3 blocks is turned by itself.
     """
     _, _, _, x, y, z, w = pose_of(transform)
-    turn = matrix_from_quat((x, y, z, w))
+    rotation = matrix_from_quat((x, y, z, w))
     moved = [0.0] * 36
     for top in (0, 3):
         for left in (0, 3):
@@ -246,7 +250,7 @@ def transform_covariance(covariance: Sequence[float], transform: Any) -> list[fl
             for i in range(3):
                 for j in range(3):
                     moved[6 * (top + i) + left + j] = sum(
-                        turn[i][k] * block[k][m] * turn[j][m] for k in range(3) for m in range(3)
+                        rotation[i][k] * block[k][m] * rotation[j][m] for k in range(3) for m in range(3)
                     )
     return moved
 
@@ -296,8 +300,8 @@ def require_numpy() -> None:
 def pose_of(transform: Any) -> PoseTuple:
     """Return the pose of a TransformStamped, or of a Transform, as numbers; its quaternion is brought to length 1."""
     inner = getattr(transform, "transform", transform)
-    to, turn = inner.translation, inner.rotation
-    return unit((to.x, to.y, to.z, turn.x, turn.y, turn.z, turn.w))
+    to, rotation = inner.translation, inner.rotation
+    return unit((to.x, to.y, to.z, rotation.x, rotation.y, rotation.z, rotation.w))
 
 
 def _headed(message: Any, transform: Any) -> Any:

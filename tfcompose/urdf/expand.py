@@ -147,7 +147,7 @@ def _refused(error: Exception, file: str) -> Finding:
     reason = _reason(chain) or type(error).__name__
     found = finding("TF018", f"xacro: {reason}", Span(file))
     files, macros = list(xacro.filestack or ()), list(xacro.macrostack or ())
-    placed = _seen_from(file, _placed(found, root, files, macros))
+    placed = _relative_to(file, _placed(found, root, files, macros))
     others = [name for name in files[-1:] if name and Path(name).absolute() != Path(file).absolute()]
     if others and placed.span == found.span:
         return replace(placed, message=f"{placed.message} (in {os.path.relpath(others[0])})")
@@ -217,7 +217,7 @@ def _position(text: str, index: int) -> tuple[int, int]:
     return text.count("\n", 0, index) + 1, index - text.rfind("\n", 0, index)
 
 
-def _seen_from(file: str, found: Finding) -> Finding:
+def _relative_to(file: str, found: Finding) -> Finding:
     """Return the finding with its places in files as seen from the working folder, and ``file`` as it is named."""
 
     def shown(span: Span | None) -> Span | None:

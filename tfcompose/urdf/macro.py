@@ -12,7 +12,7 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.files import AS_WRITTEN
+from tfcompose.files import AS_IN_SOURCE
 from tfcompose.urdf.write import Writer, block_lines, quoted
 from tfcompose.urdf.xacro import NAMESPACE
 
@@ -35,7 +35,7 @@ def macro_name(robot: str) -> str:
     return f"{robot}_robot" if robot in _TAGS or keyword.iskeyword(robot) else robot
 
 
-def macro(robot: Robot, target: Target = AS_WRITTEN) -> str:
+def macro(robot: Robot, target: Target = AS_IN_SOURCE) -> str:
     """Return the file with the robot's macro; ``target`` says how files are addressed."""
     name, base = macro_name(robot.name), robot.base or ""
     writer = _MacroWriter(robot, target)

@@ -102,11 +102,11 @@ def _of_joint(there: yourdfpy.Joint, edge: Edge, kind: str) -> Iterator[str]:
         yield f"axis is {axis}, not {joint.axis}"
     for tag, meant in _values(joint).items():
         found = getattr(there, tag)
-        said = None if found is None else _given(found)
-        if (said is None) != (meant is None):
-            yield f"{tag} is {'missing' if said is None else 'new'}"
-        elif said != meant:
-            yield f"{tag} is {said}, not {meant}"
+        actual = None if found is None else _given(found)
+        if (actual is None) != (meant is None):
+            yield f"{tag} is {'missing' if actual is None else 'new'}"
+        elif actual != meant:
+            yield f"{tag} is {actual}, not {meant}"
 
 
 def _given(values: Any) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from textwrap import dedent, indent
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import escape, quoteattr
 
-from tfcompose.files import AS_WRITTEN
+from tfcompose.files import AS_IN_SOURCE
 from tfcompose.geometry import Pose
 from tfcompose.model import BOUNDED, JOINTS, STATIC
 from tfcompose.numbers import clean_rpy, clean_tensor, clean_xyz, number, numbers
@@ -43,7 +43,7 @@ _IDENTITY = Pose()
 quoted = lru_cache(maxsize=1 << 16)(quoteattr)
 
 
-def urdf(robot: Robot, target: Target = AS_WRITTEN) -> tuple[str, str]:
+def urdf(robot: Robot, target: Target = AS_IN_SOURCE) -> tuple[str, str]:
     """Return the URDF of everything below ``robot.base``, which must be there, in a right tree: in full, and for stock.
 
     In full it holds every edge as it is, whoever publishes it. For a stock robot_state_publisher edges of other owners
@@ -64,7 +64,7 @@ def block_lines(blocks: Iterable[Block]) -> list[str]:
 class Writer:
     """Writes links, joints and hardware as lines; how names and values are spelt is for subclasses to change."""
 
-    def __init__(self, target: Target = AS_WRITTEN) -> None:
+    def __init__(self, target: Target = AS_IN_SOURCE) -> None:
         self.target = target
 
     def name(self, text: str) -> str:

@@ -62,9 +62,9 @@ def data_beyond_tf(state: TreeState) -> Iterator[Finding]:
     for each in state.stamped:
         sender = listed(each.nodes) or "somebody"
         for lack_s, age_s, edge in _latest_above(state, each):
-            said = _off_clock(state, each, edge, age_s, simulated=simulated)
-            if said:
-                message = f"{each.topic} from {sender} {said}: no lookup brings it together with {edge.name}"
+            fault = _off_clock(state, each, edge, age_s, simulated=simulated)
+            if fault:
+                message = f"{each.topic} from {sender} {fault}: no lookup brings it together with {edge.name}"
                 yield finding("TF841", message, None, help=_clock_help(each, age_s))
             elif lack_s > LACK_S:
                 message = f"{each.topic} from {sender} is stamped {duration(lack_s)} after the newest {edge.name}"
@@ -82,7 +82,7 @@ def data_beyond_tf(state: TreeState) -> Iterator[Finding]:
 
 def late_stamps(state: TreeState) -> Iterator[Finding]:
     """An edge's stamps are old when they come: lookups of new data extrapolate into the future."""
-    told = keeps_data_waiting(state)
+    waiting = keeps_data_waiting(state)
 
     def late_s(edge: EdgeState) -> float:
         under_way_s = -state.skews_s.get(edge.stream.gid or b"", 0.0)
@@ -91,7 +91,7 @@ def late_stamps(state: TreeState) -> Iterator[Finding]:
         )  # that part is a finding of its own
 
     def is_late(edge: EdgeState) -> bool:
-        return LATE_S <= late_s(edge) <= KEPT_S and (edge.parent, edge.child) not in told
+        return LATE_S <= late_s(edge) <= KEPT_S and (edge.parent, edge.child) not in waiting
 
     for edges in by_publisher(state, is_late):
         late = duration(late_s(edges[0]))
@@ -125,8 +125,8 @@ def _off_clock(state: TreeState, each: StampedData, edge: EdgeState, age_s: floa
         return ""  # a recording that is played without its clock, perhaps
     if each.stamp_ns == 0:
         return "has no stamp"
-    said = other_clock(each.stamp_ns, each.received_ns, state.clock_ns, simulated=simulated)
-    return f"is {said}" if said else ""
+    fault = other_clock(each.stamp_ns, each.received_ns, state.clock_ns, simulated=simulated)
+    return f"is {fault}" if fault else ""
 
 
 def _clock_help(each: StampedData, age_s: float) -> str:
@@ -219,9 +219,9 @@ def _joint_topics(state: TreeState) -> list[Topic]:
     """
     own = _namespace(state.topics[0])
     spaces = {_namespace(topic.name) for topic in state.typed(TF_MESSAGE) if topic.publishers}
-    beside = tuple(f"{space}/" for space in spaces if space != own and space.startswith(f"{own}/"))
+    neighbours = tuple(f"{space}/" for space in spaces if space != own and space.startswith(f"{own}/"))
     named = [topic for topic in state.typed(JOINT_STATE) if topic.name.endswith("/joint_states")]
-    return [topic for topic in named if topic.name.startswith(f"{own}/") and not topic.name.startswith(beside)]
+    return [topic for topic in named if topic.name.startswith(f"{own}/") and not topic.name.startswith(neighbours)]
 
 
 def _namespace(topic: str) -> str:

@@ -151,7 +151,7 @@ class SentPoses:
     def __init__(self, plan: Plan, publishers: Publishers) -> None:
         self._publishers = publishers
         self._expected = expected_of(plan)
-        self._seen: set[tuple[bytes, str]] = set()
+        self._received: set[tuple[bytes, str]] = set()
         self._waiting: list[SentPose] = []
 
     def take(self, message: Message) -> None:
@@ -160,9 +160,14 @@ class SentPoses:
             return
         for (parent, child), pose in zip(message.edges, message.poses, strict=False):
             expected, key = self._expected.get(child), (message.gid, child)
-            if expected is None or key in self._seen or parent != expected.edge.parent or len(self._seen) >= _MOST:
+            if (
+                expected is None
+                or key in self._received
+                or parent != expected.edge.parent
+                or len(self._received) >= _MOST
+            ):
                 continue
-            self._seen.add(key)
+            self._received.add(key)
             self._waiting.append(SentPose(expected, pose, message.gid, message.static))
 
     def judge(self) -> Iterator[Finding]:

@@ -207,8 +207,8 @@ def _message(found: Sequence[Violation], plan: Plan) -> str:
         by = "" if first.recorded else f"its owner {first.who}"
         return publishers.topics_message(named, [(topics[0], by)], declared=topics[1], several=bool(more))
     owners = list(dict.fromkeys(f"{one.edge.owner} ({one.edge.node})" for one in found if one.edge))
-    said = f"the owner is {owners[0]}" if len(owners) == 1 else f"the owners are {', '.join(owners)}"
-    return f"{named} {are} published by {first.who}; {said}"
+    owned_by = f"the owner is {owners[0]}" if len(owners) == 1 else f"the owners are {', '.join(owners)}"
+    return f"{named} {are} published by {first.who}; {owned_by}"
 
 
 def _help(first: Violation, plan: Plan, child: str) -> str:
@@ -292,8 +292,8 @@ def _runs(first: Violation, where: str) -> list[Note]:
 # Violations message by message.
 
 
-class Turns:
-    """Who sent each frame last, and before: two that take turns are told from one that was started anew."""
+class LastSenders:
+    """Who sent each frame last, and before: tells two that alternate from one that was restarted."""
 
     def __init__(self) -> None:
         self._gids: OrderedDict[str, tuple[bytes, bytes | None]] = OrderedDict()
@@ -361,7 +361,7 @@ class KnownTree:
 
 @dataclass(slots=True)
 class Start:
-    """When the look before the start began, and when it was over; in monotonic seconds, and by the system's clock."""
+    """When the observation before the start began and ended; in monotonic seconds, and by the system's clock."""
 
     begun: float
     begun_ns: int
@@ -369,7 +369,7 @@ class Start:
     cleared_ns: int = 0
 
     def clear(self, now: float) -> None:
-        """Note that the look is over."""
+        """Note that the observation is over."""
         self.cleared = now
         self.cleared_ns = self.begun_ns + int((now - self.begun) * 1e9)
 
@@ -389,13 +389,13 @@ class OwnershipRules:
 
     def __init__(self, plan: Plan, senders: Senders, start: Start) -> None:
         self.changes = 0
-        self.owners = Turns()
+        self.owners = LastSenders()
         self.planned: dict[str, PlanEdge] = {edge.child: edge for edge in plan.edges}
         self.started = {process.name: process.kind != "external" for process in plan.processes}
         self._plan = plan
         self._senders = senders
         self._start = start
-        self._others = Turns()
+        self._others = LastSenders()
         self._tree = KnownTree(plan)
 
     def violation(self, sent: SentEdge, nodes: tuple[str, ...], now: float) -> Violation | None:

@@ -42,10 +42,10 @@ DEFAULT_TOLERANCE = Offset(1e-3, math.radians(0.1))
 _NO_MM, _NO_RAD = 1e-6, 1e-6
 
 
-def offset_of(expected: Pose, seen: Pose) -> Offset:
-    """Return how far ``seen`` is from ``expected``; quaternions need not be of length 1."""
-    angle = angle_between(normalised(expected.quat_xyzw), normalised(seen.quat_xyzw))
-    return Offset(math.dist(expected.xyz, seen.xyz), angle)
+def offset_of(expected: Pose, observed: Pose) -> Offset:
+    """Return how far ``observed`` is from ``expected``; quaternions need not be of length 1."""
+    angle = angle_between(normalised(expected.quat_xyzw), normalised(observed.quat_xyzw))
+    return Offset(math.dist(expected.xyz, observed.xyz), angle)
 
 
 def shown(pose: Pose) -> str:
@@ -56,9 +56,9 @@ def shown(pose: Pose) -> str:
     return f"xyz {xyz} m, rpy {rpy} deg"
 
 
-def compared(expected: Pose, seen: Pose) -> str:
+def compared(expected: Pose, observed: Pose) -> str:
     """Return both poses as people read them."""
-    return f"seen {shown(seen)}; expected {shown(expected)}"
+    return f"seen {shown(observed)}; expected {shown(expected)}"
 
 
 def pose_differs(off: Sequence[tuple[PlanEdge, str, Pose]], publisher: str, place: Span | None = None) -> Finding:

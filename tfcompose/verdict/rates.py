@@ -38,7 +38,7 @@ NAMED_AT_MOST = 6
 # Edges of a plan; ``place`` is where the first one stands in the robot's file.
 
 
-def never_seen(edges: Sequence[PlanEdge], advice: str, place: Span | None = None) -> Finding:
+def never_received(edges: Sequence[PlanEdge], advice: str, place: Span | None = None) -> Finding:
     """Return the finding for edges of one owner that did not come."""
     several = len(edges) > 1
     named = with_more(edges[0].name, len(edges) - 1)
@@ -47,7 +47,7 @@ def never_seen(edges: Sequence[PlanEdge], advice: str, place: Span | None = None
 
 
 def silent(
-    edges: Sequence[PlanEdge], quiet_s: float, place: Span | None = None, *, over: bool = False, gone: bool = False
+    edges: Sequence[PlanEdge], silence_s: float, place: Span | None = None, *, over: bool = False, gone: bool = False
 ) -> Finding:
     """Return the finding for edges of one owner that did not come for so long.
 
@@ -55,7 +55,9 @@ def silent(
     """
     first = edges[0]
     names = [edge.name for edge in edges]
-    return _silence(_owner(first), first.node, names, quiet_s, place, over=over, gone=gone, notes=_rated(first, place))
+    return _silence(
+        _owner(first), first.node, names, silence_s, place, over=over, gone=gone, notes=_rated(first, place)
+    )
 
 
 def left(edges: Sequence[PlanEdge], place: Span | None = None) -> Finding:
@@ -78,7 +80,7 @@ def _silence(  # noqa: PLR0913 (a finding has that many parts; the others are na
     publisher: str,
     node: str,
     names: Sequence[str],
-    quiet_s: float,
+    silence_s: float,
     place: Span | None = None,
     *,
     over: bool = False,
@@ -86,7 +88,7 @@ def _silence(  # noqa: PLR0913 (a finding has that many parts; the others are na
     notes: Sequence[Note] = (),
 ) -> Finding:
     what = "was silent" if over else "has left" if gone else "fell silent"
-    message = f"{publisher} {what}: nothing on {listed(names)} for {duration(quiet_s)}"
+    message = f"{publisher} {what}: nothing on {listed(names)} for {duration(silence_s)}"
     advice = f"is {node} still running, and does it get its data?"
     if gone:
         advice = f"start {node} again, and look why it ended"

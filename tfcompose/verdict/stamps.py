@@ -242,9 +242,9 @@ def wrong_clock(state: TreeState) -> Iterator[Finding]:
 
 
 def _stamp_finding(code: str, edges: Sequence[EdgeState], detail: str, notes: Sequence[Note] = ()) -> Finding:
-    said = message(code, who(edges[0]), names_of(edges), detail)
+    sentence = message(code, who(edges[0]), names_of(edges), detail)
     severity = "error" if code == WRONG_CLOCK else "warning"
-    return finding(code, said, None, severity=severity, notes=notes, help=advice(code, detail))  # type: ignore[arg-type]
+    return finding(code, sentence, None, severity=severity, notes=notes, help=advice(code, detail))  # type: ignore[arg-type]
 
 
 def host_clock_off(state: TreeState) -> Iterator[Finding]:

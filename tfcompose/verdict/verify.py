@@ -21,7 +21,7 @@ from tfcompose.plan.topics import parts_of
 from tfcompose.verdict.drivers import Expected, driver_pose_differs, drives_of, expected_of, is_off, sensor_of
 from tfcompose.verdict.ownership import SELF, Violation, code_of, may_be_owners, relays_of, violation_finding
 from tfcompose.verdict.poses import DEFAULT_TOLERANCE, Offset, offset_of, pose_differs
-from tfcompose.verdict.rates import left, never_seen, silent, slow
+from tfcompose.verdict.rates import left, never_received, silent, slow
 from tfcompose.verdict.tree import rejected_transforms
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class Difference:
 
     ``edge`` is the planned one, None where nobody declared it, ``live`` what came, None where nothing did. What else
     there is depends on the code: an ``violation``; a ``driver``'s frame that is elsewhere; how far a pose is ``off``,
-    whoever sent it; the ``quiet_s`` in which nothing came, which are ``over`` or not.
+    whoever sent it; the ``silence_s`` in which nothing came, which are ``over`` or not.
     """
 
     code: str
@@ -59,7 +59,7 @@ class Difference:
     violation: Violation | None = None
     driver: Expected | None = None
     off: Offset | None = None
-    quiet_s: float = 0.0
+    silence_s: float = 0.0
     over: bool = False
 
 
@@ -184,18 +184,20 @@ def _times(edge: PlanEdge, one: EdgeState, *, simulated: bool) -> Iterator[Diffe
     """Judge whether it comes, and often enough; a simulation may go slower than the time of day."""
     rate, limit_s = edge.rate, edge.silent_after_s
     if one.present is False:
-        yield Difference("TF804", edge, one, quiet_s=one.age_s)
+        yield Difference("TF804", edge, one, silence_s=one.age_s)
         return
     if one.stream.static or rate is None or limit_s is None:
         return
     speed = min(1.0, one.stream.speed) if simulated else 1.0
     limit_s /= speed
-    gap_s, seen_rate = one.timing.longest_gap_s, one.timing.rate
+    gap_s, observed_rate = one.timing.longest_gap_s, one.timing.rate
     if one.age_s > limit_s:
-        yield Difference("TF804", edge, one, quiet_s=one.age_s)
+        yield Difference("TF804", edge, one, silence_s=one.age_s)
     elif gap_s is not None and gap_s > limit_s:
-        yield Difference("TF804", edge, one, quiet_s=gap_s, over=True)
-    elif seen_rate is not None and one.stream.arrivals.count >= FEWEST and seen_rate < SLOW_BELOW * rate * speed:
+        yield Difference("TF804", edge, one, silence_s=gap_s, over=True)
+    elif (
+        observed_rate is not None and one.stream.arrivals.count >= FEWEST and observed_rate < SLOW_BELOW * rate * speed
+    ):
         yield Difference("TF805", edge, one)
 
 
@@ -243,7 +245,7 @@ def _difference_finding(group: Group, state: TreeState, plan: Plan, place: Span 
     first = group[0]
     edges = [one.edge for one in group if one.edge is not None]
     if first.live is None:
-        return never_seen(edges, missing_help(state, plan, edges[0]), place)
+        return never_received(edges, missing_help(state, plan, edges[0]), place)
     stream = first.live.stream
     if first.driver is not None:
         off = [(one.driver, one.live.stream.pose) for one in group if one.driver is not None and one.live is not None]
@@ -255,7 +257,7 @@ def _difference_finding(group: Group, state: TreeState, plan: Plan, place: Span 
     if stream.static:
         return left(edges, place)
     gone = first.live.present is False
-    return silent(edges, max(one.quiet_s for one in group), place, over=first.over, gone=gone)
+    return silent(edges, max(one.silence_s for one in group), place, over=first.over, gone=gone)
 
 
 def _key(one: Difference) -> tuple[object, ...]:
@@ -340,11 +342,11 @@ def verify(
         for one in differences(state, part, tolerance):
             # The parts of a plan differ in their edges only; a process is looked up in the whole.
             place = (places or {}).get(one.edge.child) if one.edge else None
-            said = group_finding([one], state, plan, place, slow_is="error")
+            reported = group_finding([one], state, plan, place, slow_is="error")
             if one.edge is None and one.live is not None:
-                extra.append(Verdict(one.live.name, None, (said,)))
+                extra.append(Verdict(one.live.name, None, (reported,)))
             elif one.edge is not None:
-                found[one.edge.child].append(said)
+                found[one.edge.child].append(reported)
     return [*(Verdict(edge.name, edge.owner, tuple(found[edge.child])) for edge in plan.edges), *extra]
 
 

@@ -50,13 +50,13 @@ def run(arguments: Namespace) -> int:
     if trouble:
         return _print([trouble], arguments.format)
     from tfcompose.cli.live import check_early_end
-    from tfcompose.live.snapshot import look
+    from tfcompose.live.snapshot import observe
     from tfcompose.plan.topics import namespace_options
     from tfcompose.verdict.doctor import examine
 
     with Stop() as stop:
         try:
-            found = examine(look(_expected(plan, arguments.namespace), arguments.duration, stop))
+            found = examine(observe(_expected(plan, arguments.namespace), arguments.duration, stop))
         except RosError as error:
             return _print([finding("TF901", str(error), None)], arguments.format)
         if stop.requested:

@@ -79,13 +79,13 @@ def _explain_chain(robot: Robot, sources: Sequence[Source], a: str, b: str) -> N
 
 
 def _line(edge: Edge, sources: Sequence[Source]) -> str:
-    from tfcompose.cli.provenance import written_values
+    from tfcompose.cli.provenance import source_values
     from tfcompose.render.tree import edge_facts
 
     facts = edge_facts(edge)
     inside = f" (inside {edge.sensor})" if edge.sensor and not edge.given else ""
     measured = f"          {_measured(edge.calibration)}\n" if edge.calibration else ""
-    values = "".join(f"          {line}\n" for line in written_values(edge, sources))
+    values = "".join(f"          {line}\n" for line in source_values(edge, sources))
     at = f"          {edge.at}{inside}\n" if inside or not values else ""
     return f"{edge.name}\n          {facts}\n{measured}{at}{values}"
 

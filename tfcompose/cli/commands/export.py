@@ -102,16 +102,16 @@ def _exported(plan: Plan, file: Path, folder: Path, arguments: Namespace) -> tup
     """Return the files, and what is not as with ``up``."""
     from tfcompose.export.supervisors import Machine
 
-    beside = Path(os.path.relpath(file.parent, folder)).as_posix()
+    relative = Path(os.path.relpath(file.parent, folder)).as_posix()
     if arguments.kind == "launch":
         from tfcompose.cli.reading import read_text
         from tfcompose.export.launch import launch
 
-        return launch(plan, Machine(beside), read_text(str(file.parent / "robot.urdf")))
+        return launch(plan, Machine(relative), read_text(str(file.parent / "robot.urdf")))
     if arguments.kind == "compose":
         from tfcompose.export.compose import compose
 
-        return compose(plan, Machine(beside, image=arguments.image))
+        return compose(plan, Machine(relative, image=arguments.image))
     from tfcompose.export.systemd import systemd
 
     own = {} if arguments.setup else {name: os.environ[name] for name in ROS_VARIABLES if os.environ.get(name)}

@@ -66,14 +66,14 @@ def run(arguments: Namespace) -> int:
 def _place(robot: str | None) -> RuntimeDir:
     """Return the robot that runs, or the one that has run last."""
     from tfcompose.cli.runs import chosen_run, running
-    from tfcompose.launcher.logs import last_written
+    from tfcompose.launcher.logs import last_modified
     from tfcompose.launcher.runtime_dir import runtime_dirs
 
     if robot is None and len(alive := running()) == 1:
         return alive[0][0]
     there = [place for place in runtime_dirs(os.environ) if place.logs.is_dir()]
     if robot is None and there and not alive:
-        return max(there, key=lambda place: last_written(place.logs))
+        return max(there, key=lambda place: last_modified(place.logs))
     return chosen_run(robot, among=lambda: there)
 
 

@@ -45,8 +45,8 @@ def run(arguments: Namespace) -> int:
     if arguments.bag and arguments.duration:
         fail("a recording is always read to its end: leave out --for", UNREADABLE)
     topics = topics_below(arguments.namespace)
-    whole = arguments.bag or arguments.duration
-    observer = TreeObserver(0.0 if whole else WINDOW_S, 0.0 if arguments.bag else SETTLE_S)
+    covers_all = arguments.bag or arguments.duration
+    observer = TreeObserver(0.0 if covers_all else WINDOW_S, 0.0 if arguments.bag else SETTLE_S)
     if arguments.bag:
         read_bag(arguments.bag, {topics: observer})
         _show(arguments, observer, None, observer.end_ns)
@@ -64,7 +64,7 @@ def _show(arguments: Namespace, observer: TreeObserver, live: LiveLines | None, 
     from tfcompose.cli.live import names_of
     from tfcompose.plan.topics import topics_below
 
-    edges = sorted(observer.edges(now_ns), key=lambda seen: seen.stream.static)  # what moves first
+    edges = sorted(observer.edges(now_ns), key=lambda state: state.stream.static)  # what moves first
     if arguments.format == "json":
         sys.stdout.write(objects_of(edges, observer, now_ns))
         sys.stdout.flush()

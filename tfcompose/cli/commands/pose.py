@@ -50,6 +50,6 @@ def _moving(edges: list[Edge]) -> str:
     """Return the line that says what moves on the way, and where it was taken; nothing if nothing does."""
     joints = [edge.joint_name for edge in edges if edge.kind == "joint"]
     others = [edge.name for edge in edges if edge.kind == "dynamic"]
-    said = [f"{'joints' if joints[1:] else 'joint'} {', '.join(joints)} at 0"] if joints else []
-    said += [f"{', '.join(others)} at {'their nominal poses' if others[1:] else 'its nominal pose'}"] if others else []
-    return f"  with       {' and '.join(said)}\n" if said else ""
+    parts = [f"{'joints' if joints[1:] else 'joint'} {', '.join(joints)} at 0"] if joints else []
+    parts += [f"{', '.join(others)} at {'their nominal poses' if others[1:] else 'its nominal pose'}"] if others else []
+    return f"  with       {' and '.join(parts)}\n" if parts else ""

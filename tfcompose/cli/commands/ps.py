@@ -112,10 +112,10 @@ def _print_table(rows: list[tuple[str, ...]]) -> None:
 
 
 def _time(seconds: float) -> str:
-    whole = int(seconds)
-    if whole < 60:  # noqa: PLR2004 (seconds of a minute)
-        return f"{whole} s"
-    minutes, rest = divmod(whole, 60)
+    total_s = int(seconds)
+    if total_s < 60:  # noqa: PLR2004 (seconds of a minute)
+        return f"{total_s} s"
+    minutes, rest = divmod(total_s, 60)
     if minutes < 60:  # noqa: PLR2004 (minutes of an hour)
         return f"{minutes}:{rest:02d} min"
     hours, minutes = divmod(minutes, 60)

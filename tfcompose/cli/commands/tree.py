@@ -129,14 +129,14 @@ def _row(branch: Branch, *, plan: Plan | None) -> tuple[str, ...]:
     from tfcompose.cli.edge_table import duration
 
     name = branch.indent + printable(branch.frame)
-    if not branch.seen:
+    if not branch.observed:
         planned = branch.planned
         if planned is None:
             return (name, "", "", "", "", "")
         return (name, planned.kind, "", "", "", f"missing: owner {planned.owner} ({planned.node})")
-    one = branch.seen[0]
+    one = branch.observed[0]
     others = [
-        f"also {printable(other.name)} from {printable(other.publisher) or 'somebody'}" for other in branch.seen[1:]
+        f"also {printable(other.name)} from {printable(other.publisher) or 'somebody'}" for other in branch.observed[1:]
     ]
     remarks = [_status(branch, plan)] if plan else []
     rate = "" if one.stream.static else f"{one.timing.rate:.1f} Hz" if one.timing.rate is not None else "–"
@@ -149,7 +149,7 @@ def _owner(branch: Branch, plan: Plan | None) -> str:
     """Return who publishes the frame: the owner with its node where it is the owner, else the node."""
     from tfcompose.verdict.ownership import may_be_owners, relays_of
 
-    planned, one = branch.planned, branch.seen[0]
+    planned, one = branch.planned, branch.observed[0]
     if plan is None or planned is None or not may_be_owners(planned, one.nodes, relays_of(plan)):
         return one.publisher
     through = "" if planned.node in one.nodes else "through "
@@ -159,7 +159,7 @@ def _owner(branch: Branch, plan: Plan | None) -> str:
 def _status(branch: Branch, plan: Plan) -> str:
     from tfcompose.verdict.ownership import code_of, may_be_owners, relays_of
 
-    planned, one = branch.planned, branch.seen[0] if branch.seen else None
+    planned, one = branch.planned, branch.observed[0] if branch.observed else None
     if one is None:
         return "missing"
     if planned is None:
@@ -197,5 +197,5 @@ def _edge_object(branch: Branch, plan: Plan | None) -> dict[str, Any]:
         "parent": branch.parent,
         "child": branch.frame,
         **status,
-        "seen": [object_of(one) for one in branch.seen],
+        "seen": [object_of(one) for one in branch.observed],
     }

@@ -11,7 +11,7 @@ _RELATIVE = re.compile(
 )
 
 
-def with_whole_addresses(urdf: str, folder: Path) -> str:
+def with_absolute_addresses(urdf: str, folder: Path) -> str:
     """Return the URDF in which paths that begin in ``folder``, where it was built, are absolute ``file://`` addresses.
 
     Who reads the description from a topic does not know that folder. Only the machine that runs the plan does, so that

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.ros.graph import UNKNOWN_NODE, writers
 from tfcompose.ros.node import LATCHED, TextSubscription, latch
 from tfcompose.run.own import say
-from tfcompose.run.publishing.addresses import with_whole_addresses
+from tfcompose.run.publishing.addresses import with_absolute_addresses
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 TOPIC = "robot_description"
 #: How often a process looks while something is awaited, in seconds.
-LOOK_EVERY_S = 0.5
+CHECK_EVERY_S = 0.5
 _MOST_NAMED = 16
 _NAMED_WITHIN_S = 3.0
 
@@ -40,16 +40,16 @@ class Description:
             say(f"no robot_description: {error}")
             self._text = ""
         else:
-            self._text = with_whole_addresses(text, own.description.parent)
+            self._text = with_absolute_addresses(text, own.description.parent)
             self._publisher = latch(node, TOPIC, self._text)
         self.subscription = TextSubscription(node, TOPIC, LATCHED)
 
     @property
-    def looks(self) -> bool:
-        """Whether ``look`` should be called again soon: a publisher is known before its node's name is."""
+    def is_waiting(self) -> bool:
+        """Whether ``check`` should be called again soon: a publisher is known before its node's name is."""
         return bool(self._unnamed)
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Take what has come, and say once of each publisher that it has another description."""
         for received, text in self.subscription.take_texts():
             if text != self._text and received.gid not in self._named and len(self._named) < _MOST_NAMED:

@@ -23,7 +23,7 @@ _MOST_LINES = 64
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class PublishOptions:
     """How joint states are published; the words are robot_state_publisher's.
 
     ``publish_frequency`` in Hz is the most of those with the same names, or 0 for all. ``ignore_timestamp`` says that
@@ -56,7 +56,7 @@ class JointMover:
         edges: Sequence[PlanEdge],
         say: Callable[[str], None],
         now_ns: Callable[[int], int | None],
-        told: Told | None = None,
+        options: PublishOptions | None = None,
     ) -> None:
         pairs = [(edge, edge.joint) for edge in edges if edge.joint]
         movable = [(edge, joint) for edge, joint in pairs if joint.type in TURNING + SLIDING]
@@ -65,11 +65,11 @@ class JointMover:
         self._joints = Joints(self._all_joints)
         self._say = say
         self._now_ns = now_ns
-        told = told or Told()
-        self._ignores_time = told.ignore_timestamp
-        self._period_ns = round(_SECOND_NS / told.publish_frequency) if told.publish_frequency else 0
+        options = options or PublishOptions()
+        self._ignores_time = options.ignore_timestamp
+        self._period_ns = round(_SECOND_NS / options.publish_frequency) if options.publish_frequency else 0
         self._sources: list[_Source] = []
-        self._said: set[str] = set()
+        self._reported: set[str] = set()
         self._moved: set[int] = set()
         for edge, joint in pairs:
             if joint.type not in TURNING + SLIDING:
@@ -141,6 +141,6 @@ class JointMover:
         return True
 
     def _once(self, line: str) -> None:
-        if line not in self._said and len(self._said) < _MOST_LINES:
-            self._said.add(line)
+        if line not in self._reported and len(self._reported) < _MOST_LINES:
+            self._reported.add(line)
             self._say(line)

@@ -12,8 +12,8 @@ from tfcompose.ros.node import TFPublisher, open_node, parameter, wait
 from tfcompose.run.clock_watch import CLOCK_AFTER_S, no_clock
 from tfcompose.run.notify import ready
 from tfcompose.run.own import count, say
-from tfcompose.run.publishing.description import LOOK_EVERY_S, Description
-from tfcompose.run.publishing.joint_mover import JointMover, Told
+from tfcompose.run.publishing.description import CHECK_EVERY_S, Description
+from tfcompose.run.publishing.joint_mover import JointMover, PublishOptions
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -28,26 +28,28 @@ _NAMED_AT_MOST = 8
 def joints(own: Own, stop: Stop) -> None:
     """Publish the moving edges of each message on ``joint_states``, with its stamp, and latch the description."""
     with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
-        told = Told(parameter(node, "publish_frequency", 0.0), parameter(node, "ignore_timestamp", default=False))
+        options = PublishOptions(
+            parameter(node, "publish_frequency", 0.0), parameter(node, "ignore_timestamp", default=False)
+        )
         clock = _Clock(own, node)
-        mover = JointMover(own.edges, say, clock.now_ns, told)
+        mover = JointMover(own.edges, say, clock.now_ns, options)
         publisher = TFPublisher(node, static=False)
         description = Description(own, node)
         states = JointStateSubscription(node)
-        at_most = f", at most {told.publish_frequency:g} Hz" if told.publish_frequency else ""
+        at_most = f", at most {options.publish_frequency:g} Hz" if options.publish_frequency else ""
         say(f"{count(len(mover), 'edge')} on /tf, from {states.topic}{at_most}")
         ready()
         missing = _Missing(node, mover, states.topic)
         while not stop.requested:
-            looks = missing.looks or clock.looks or description.looks
-            wait(node, [states, description.subscription], LOOK_EVERY_S if looks else None, stop)
+            is_waiting = missing.is_waiting or clock.is_waiting or description.is_waiting
+            wait(node, [states, description.subscription], CHECK_EVERY_S if is_waiting else None, stop)
             for received in states.take():
                 message = mover.answer(received.data, received.received_ns)
                 if message is not None:
                     publisher.publish(message)
-            description.look()
-            missing.look()
-            clock.look()
+            description.check()
+            missing.check()
+            clock.check()
 
 
 class _Clock:
@@ -58,20 +60,20 @@ class _Clock:
         self._sim = own.plan.ros.clock == "sim"
         self._clock: SimClock | None = None
         self._due = 0.0
-        self.looks = False
+        self.is_waiting = False
 
     def now_ns(self, received_ns: int) -> int | None:
         if not self._sim:
             return received_ns
         if self._clock is None:
             self._clock = SimClock(self._node)
-            self._due, self.looks = time.monotonic() + CLOCK_AFTER_S, True
+            self._due, self.is_waiting = time.monotonic() + CLOCK_AFTER_S, True
         return self._clock.now_ns()
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Say after some seconds that the time does not come."""
-        if self.looks and self._clock and (self._clock.now_ns() is not None or time.monotonic() > self._due):
-            self.looks = False
+        if self.is_waiting and self._clock and (self._clock.now_ns() is not None or time.monotonic() > self._due):
+            self.is_waiting = False
             if self._clock.now_ns() is None:
                 say(f"joint states have no time of their own, and {no_clock(self._node)}")
 
@@ -82,12 +84,12 @@ class _Missing:
     def __init__(self, node: Node, mover: JointMover, topic: str) -> None:
         self._node, self._mover, self._topic = node, mover, topic
         self._due = time.monotonic() + MISSING_AFTER_S
-        self.looks = len(mover) > 0
+        self.is_waiting = len(mover) > 0
 
-    def look(self) -> None:
-        if not self.looks or time.monotonic() < self._due:
+    def check(self) -> None:
+        if not self.is_waiting or time.monotonic() < self._due:
             return
-        self.looks = False
+        self.is_waiting = False
         names = self._mover.missing
         if names:
             more = f" and {len(names) - _NAMED_AT_MOST} more" if len(names) > _NAMED_AT_MOST else ""

@@ -27,10 +27,10 @@ def swept(sweep: Sweep, start: float, time_s: float) -> float:
     To and fro it is a sine about the middle, which sets out upwards: the position and its speed have no steps, and the
     speed is π · (upper - lower) / period at most. Round and round the angle is between -π and π.
     """
-    turn = math.tau * time_s / sweep.period_s
+    phase = math.tau * time_s / sweep.period_s
     if sweep.lower is None or sweep.upper is None:
-        return math.remainder(start + turn, math.tau)
+        return math.remainder(start + phase, math.tau)
     middle, half = (sweep.lower + sweep.upper) / 2, (sweep.upper - sweep.lower) / 2
     if half <= 0:
         return middle
-    return middle + half * math.sin(turn + math.asin(max(-1.0, min(1.0, (start - middle) / half))))
+    return middle + half * math.sin(phase + math.asin(max(-1.0, min(1.0, (start - middle) / half))))

@@ -46,11 +46,11 @@ class Moving:
         self._quat_at = self._message.quat_at[:turning]
         self._xyz_at = self._message.xyz_at[turning:]
         poses = [(edge.pose, joint.axis) for edge, joint in moved]
-        turns, slides = poses[:turning], poses[turning:]
-        self._at_0 = _rows([pose.quat_xyzw for pose, _ in turns], 4)
-        self._turned = _rows([multiply(pose.quat_xyzw, (*axis, 0.0)) for pose, axis in turns], 4)
-        self._start = _rows([pose.xyz for pose, _ in slides], 3)
-        self._along = _rows([rotate(pose.quat_xyzw, axis) for pose, axis in slides], 3)
+        rotating, sliding = poses[:turning], poses[turning:]
+        self._at_0 = _rows([pose.quat_xyzw for pose, _ in rotating], 4)
+        self._turned = _rows([multiply(pose.quat_xyzw, (*axis, 0.0)) for pose, axis in rotating], 4)
+        self._start = _rows([pose.xyz for pose, _ in sliding], 3)
+        self._along = _rows([rotate(pose.quat_xyzw, axis) for pose, axis in sliding], 3)
 
     def message(self, positions: NDArray[np.float64], stamp_ns: int) -> bytes:
         """Return the TFMessage for these positions, in the order of the names, at this time in nanoseconds.

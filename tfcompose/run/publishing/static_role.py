@@ -9,7 +9,7 @@ from tfcompose.ros.node import TFPublisher, open_node, wait
 from tfcompose.ros.tf_codec import Transform, encode
 from tfcompose.run.notify import ready
 from tfcompose.run.own import count, say
-from tfcompose.run.publishing.description import LOOK_EVERY_S, Description
+from tfcompose.run.publishing.description import CHECK_EVERY_S, Description
 
 if TYPE_CHECKING:
     from tfcompose.ros.stop import Stop
@@ -34,8 +34,8 @@ def static(own: Own, stop: Stop) -> None:
             return
         description = Description(own, node)
         while not stop.requested:
-            wait(node, [description.subscription], LOOK_EVERY_S if description.looks else None, stop)
-            description.look()
+            wait(node, [description.subscription], CHECK_EVERY_S if description.is_waiting else None, stop)
+            description.check()
 
 
 def _joints_of(own: Own) -> str:

@@ -1,13 +1,15 @@
-"""Golden wording: what findings of files say, in one file for each family of codes; other tests assert code and place.
+"""Golden wording: what findings say, in one file for each family of codes; other tests assert code, place and names.
 
 They come from what people wrote for these tests, not from mutations: marked specs, bad input, values, calibrations,
-presets, and URDFs of others. After an intended change: ``python -m tests.golden.test_wording --write``.
+presets, URDFs of others, and histories of live trees and processes (``scenes``). After an intended change:
+``python -m tests.golden.test_wording --write``.
 """
 
 from __future__ import annotations
 
 import difflib
 import os
+import re
 import sys
 from functools import cache
 from pathlib import Path
@@ -15,7 +17,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.golden.scenes import SCENES
 from tests.golden.test_findings import CORPORA, ROOT, in_the_repository, refusals, within
+from tfcompose.catalogue import CATALOGUE
 from tfcompose.cli.disk import disk
 from tfcompose.render.text import render_text
 from tfcompose.urdf.lint import lint_urdf
@@ -31,7 +35,7 @@ WRITTEN = ("robots", "specs", "bad_input", "values")
 #: What marked specs leave out: parts, sweeps, claims of nodes.
 TEXTS = [GOLDEN / "texts" / f"{name}.yaml" for name in ("claims", "fleet", "parts", "same_names", "sweeps")]
 URDFS = sorted((ROOT / "tests/urdf/urdfs").glob("*.urdf"))
-FAMILIES = ("TF0", "TF1", "TF2", "TF3", "TF4", "TF5", "TF6", "TF7", "TF8")
+FAMILIES = ("TF0", "TF1", "TF2", "TF3", "TF4", "TF5", "TF6", "TF7", "TF8", "TF9")
 
 
 def findings() -> Iterator[Finding]:
@@ -45,6 +49,8 @@ def findings() -> Iterator[Finding]:
         os.chdir(ROOT)
         for file in URDFS:
             yield from lint_urdf(file.relative_to(ROOT).as_posix(), Packages(disk()))
+        for scene in SCENES:
+            yield from scene()
 
 
 @cache
@@ -60,15 +66,18 @@ def texts() -> dict[str, str]:
 def text_of(found: Finding) -> str:
     """Return the finding as ``lint`` prints it, but for its places: those stand in the golden findings."""
     lines = render_text([found], lambda _file, _line: None, colour=False).splitlines(keepends=True)
-    return lines[0].removeprefix(f"{found.span}: ") + "".join(lines[1:])
+    return (lines[0].removeprefix(f"{found.span}: ") + "".join(lines[1:])).replace(f"{ROOT}/", "")
 
 
-@pytest.mark.parametrize("family", FAMILIES)
-def test_findings_say_what_the_golden_file_says(family: str) -> None:
-    golden = (GOLDEN / f"{family}xx.txt").read_text("utf-8").splitlines(keepends=True)
-    difference = list(difflib.unified_diff(golden, texts()[family].splitlines(keepends=True), "golden", "now", n=0))
+def test_findings_say_what_the_golden_files_say_and_every_code_is_there() -> None:
+    """All in one test, since all families come from one look at everything."""
+    difference: list[str] = []
+    for family, text in texts().items():
+        golden = (GOLDEN / f"{family}xx.txt").read_text("utf-8").splitlines(keepends=True)
+        difference += difflib.unified_diff(golden, text.splitlines(keepends=True), f"golden {family}xx", "now", n=0)
     if difference:
         pytest.fail(f"{len(difference)} lines of difference\n{''.join(difference)}", pytrace=False)
+    assert {code for text in texts().values() for code in re.findall(r"\[(TF\d+)\]", text)} == set(CATALOGUE)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,599 @@
+"""Histories and inputs in which each code of the guard, the doctor, verify and the launcher is found, for its wording.
+
+No process runs: what judges is given what it would have seen.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+from unittest import mock
+
+from tests.support import guard_history as guarded
+from tests.support.bags import drive, write_bag
+from tests.support.machine_history import GUARD, SLAM, STATIC, begin, run_process
+from tests.support.plans import compiled_plan
+from tests.support.presets import MAST, WRONG_IN_MAST
+from tests.support.robots import ROVER
+from tests.support.tree_history import (
+    BEGUN_NS,
+    END_NS,
+    SECOND_NS,
+    SECONDS,
+    TreeHistory,
+    late,
+    row,
+    since_start,
+    sound_plan,
+    sound_tree,
+)
+from tfcompose.bags import BagError
+from tfcompose.check.check import check
+from tfcompose.check.rule import rule
+from tfcompose.cli import building, live
+from tfcompose.cli.commands import echo
+from tfcompose.cli.compiling import library
+from tfcompose.cli.parser import main
+from tfcompose.compile import compile_robot
+from tfcompose.emit import emit
+from tfcompose.files import Target
+from tfcompose.findings import Finding, RejectedError, Span, finding
+from tfcompose.geometry import Pose
+from tfcompose.ipc import Alive, Clear, Found, GateShut, Live, ProcessRequest
+from tfcompose.language import set_value
+from tfcompose.launcher.events import Exited, StartFailed, TimeUp
+from tfcompose.launcher.preflight import commands_of
+from tfcompose.live.messages import Message
+from tfcompose.live.publishers import Publisher, Senders
+from tfcompose.live.state import MovingJoint, RosProcess, StampedData, Topic, TreeState
+from tfcompose.model import Robot
+from tfcompose.model.body import Asset
+from tfcompose.plan import (
+    Claim,
+    Driven,
+    EdgePattern,
+    GuardPolicy,
+    Plan,
+    PlanEdge,
+    PlanProcess,
+    Ready,
+    RosSettings,
+    SourceLine,
+)
+from tfcompose.plan.file import read_plan
+from tfcompose.plan.hosts import share_of
+from tfcompose.ros import environment
+from tfcompose.ros.tf_codec import TF_MESSAGE
+from tfcompose.run.own import read_own
+from tfcompose.urdf.inertia import UnmeasurableError
+from tfcompose.urdf.packages import Disk
+from tfcompose.verdict.doctor import diagnose
+from tfcompose.verdict.drivers import SentPoses, not_taken
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
+AN_EXAMPLE = finding("TF801", "an example's", None)
+JOINT_STATE, CLOCK = "sensor_msgs/msg/JointState", "rosgraph_msgs/msg/Clock"
+
+
+# The doctor.
+
+
+def doctor() -> Iterator[Finding]:
+    """Judge trees at the end, without a plan."""
+    for state in (*_trees(), *_stamps(), *_graphs(), *_data(), *_setups()):
+        yield from diagnose(state)
+
+
+def _trees() -> Iterator[TreeState]:
+    yield sound_tree().fixed("base_lnk camera").seen()
+    yield sound_tree().fixed("robot1/base_link camera").seen()
+    yield sound_tree().fixed("world table").seen()
+    arm = MovingJoint("shoulder", "base_link", "arm")
+    yield sound_tree().fixed("arm hand").seen(moving_joints=(arm,))
+    yield TreeHistory().moving("a b").moving("b a").seen()
+    yield TreeHistory().moving("a b").moving("b a", b"x").fixed("world a").seen()
+    yield sound_tree().moving("map base_link", b"x").seen()
+    yield TreeHistory().moving("table cup", b"x", parents=lambda tick: ("table", "hand")[tick % 2]).seen()
+    many = TreeHistory()
+    for number in range(60):
+        many.fixed(f"parent{number:02} cup")
+    yield many.seen()
+    yield sound_tree().moving("base_link base_link", b"x").seen()
+    yield sound_tree().moving("/odom /gps", b"x").seen()
+    for quaternion_w, x in ((0.9, 0.0), (0.0, 0.0), (1.0, float("nan"))):
+        yield sound_tree().takes(row("base_link arm", END_NS, x, quaternion_w), b"x").seen()
+        yield sound_tree().takes(row("odom base_link", END_NS, x, quaternion_w)).seen()
+    yield sound_tree().moving("odom base_link", b"x").seen()
+    yield sound_tree().moving("odom base_link", b"e").seen()
+    yield sound_tree().fixed("odom base_link", b"x").seen()
+    yield TreeHistory().moving("odom base_link", until_s=2.0).seen()
+    yield sound_tree().knows(b"s").seen()
+    yield sound_tree().knows(b"d").seen()
+    yield TreeHistory().moving("odom base_link", hz=4).seen()
+    yield TreeHistory().moving("odom base_link", hz=15).seen()
+    paused = TreeHistory().moving("odom base_link", until_s=1.0)
+    for tick in range(100):
+        now = BEGUN_NS + 3 * SECOND_NS + tick * SECOND_NS // 50
+        paused.takes(row("odom base_link", now), at_ns=now)
+    yield paused.seen()
+
+
+def _stamps() -> Iterator[TreeState]:
+    yield TreeHistory().moving("odom base_link", stamp=late(0.7)).seen()
+    yield TreeHistory().moving("odom base_link", stamp=late(-0.3)).seen()
+    yield TreeHistory().moving("odom base_link", stamp=lambda _: BEGUN_NS).seen()
+    yield TreeHistory().moving("odom base_link", stamp=lambda now: now - now // 20_000_000 % 2 * SECOND_NS).seen()
+    yield TreeHistory().moving("odom base_link", stamp=lambda _: 0).seen()
+    yield TreeHistory().moving("odom base_link", stamp=since_start).seen()
+    yield TreeHistory().moving("odom base_link", stamp=late(3600)).seen()
+    yield sound_tree().moving("base_link arm", b"x", stamp=since_start).seen(clock_ns=5 * SECOND_NS)
+    simulated = TreeHistory().moving("odom base_link")
+    for edge in ("map odom", "base_link arm"):
+        simulated.moving(edge, b"x", stamp=since_start)
+    yield simulated.seen(clock_ns=5 * SECOND_NS, clock_moves=True)
+    yield sound_tree().seen(skews_s={b"d": 3.2})
+    yield sound_tree().seen(skews_s={b"d": -0.4})
+    clock = Topic("/clock", CLOCK, ("/gazebo",), ("/nav",))
+    yield sound_tree().seen(graph=(clock,))
+    yield sound_tree().seen(graph=(clock,), clock_ns=5 * SECOND_NS)
+    yield sound_tree().seen(graph=(replace(clock, publishers=()),))
+    plan = sound_plan(ros=RosSettings(clock="sim"))
+    yield sound_tree().seen(graph=(replace(clock, publishers=(), readers=()),), plan=plan)
+    yield sound_tree().seen(graph=(replace(clock, publishers=("/bag", "/gazebo")),), clock_ns=1, clock_moves=True)
+
+
+def _graphs() -> Iterator[TreeState]:
+    yield sound_tree().seen(publishers=(Publisher(b"s", "/static", static=True, latched=False),), plan=sound_plan())
+    yield sound_tree().seen(publishers=(Publisher(b"d", "/drive", static=False, reliable=False),))
+    yield sound_tree().seen(volatile_readers=("/rviz",))
+    yield sound_tree().seen(volatile_readers=("/rviz", "/viewer"))
+    yield sound_tree().seen(graph=(Topic("/tf", "std_msgs/msg/String", ("/old",)),))
+    yield sound_tree().seen(malformed={b"d": 3, None: 1})
+    both = (Topic("/robot1/tf", TF_MESSAGE, ("/robot1/drive",)), Topic("/tf", TF_MESSAGE, ("/robot1/ekf",)))
+    yield sound_tree().seen(graph=both)
+    yield sound_tree().seen(publishers=tuple(Publisher(bytes([n]), f"/n{n}", static=True) for n in range(101)))
+    joints = (MovingJoint("shoulder", "base_link", "arm"),)
+    states = Topic("/joint_states", JOINT_STATE, ("/broadcaster",), ())
+    yield sound_tree().seen(graph=(states,))
+    yield sound_tree().seen(graph=(states,), moving_joints=joints)
+    yield sound_tree().seen(graph=(replace(states, publishers=(), readers=("/drive",)),), moving_joints=joints)
+    heard = replace(states, readers=("/drive",))
+    yield sound_tree().seen(graph=(heard,), moving_joints=joints, joint_names=frozenset({"sholder"}))
+
+
+def _data() -> Iterator[TreeState]:
+    def data(frame: str, delay_s: float = 0.0, *stamps: int) -> tuple[StampedData]:
+        return (StampedData("/scan", frame, ("/lidar",), (delay_s,) * 5, *stamps),)
+
+    for frame in ("", "lasr", "elsewhere", "/laser"):
+        yield sound_tree().seen(stamped=data(frame))
+    prefixed = TreeHistory().moving("robot1/odom robot1/base_link").fixed("robot1/base_link robot1/laser")
+    yield prefixed.seen(stamped=data("laser"))
+    yield TreeHistory().moving("odom base_link", stamp=late(0.4)).seen(stamped=data("base_link"))
+    yield sound_tree().seen(stamped=data("laser", 12.0))
+    yield sound_tree().seen(stamped=data("laser", -1.0))
+    for stamp in (0, 1234 * SECOND_NS, END_NS + 7200 * SECOND_NS):
+        yield sound_tree().seen(stamped=data("laser", (END_NS - stamp) / 1e9, stamp, END_NS))
+    simulated = TreeHistory().moving("odom base_link", stamp=since_start).fixed("base_link laser")
+    yield simulated.seen(stamped=data("laser", 0.0, END_NS, END_NS), clock_ns=5 * SECOND_NS, clock_moves=True)
+
+
+def _setups() -> Iterator[TreeState]:
+    nothing = TreeState(SECONDS, settings={"ROS_DOMAIN_ID": "7", "RMW_IMPLEMENTATION": "b"})
+    yield nothing
+    yield replace(nothing, nodes=("/talker",))
+    yield replace(nothing, nodes=("/listener", "/talker"), plan=sound_plan())
+    yield replace(nothing, plan=sound_plan())
+    yield replace(nothing, graph=(Topic("/robot1/tf", TF_MESSAGE, ("/robot1/drive",)),))
+    other = {"ROS_DOMAIN_ID": "8", "RMW_IMPLEMENTATION": "a"}
+    yield replace(nothing, processes=(RosProcess(9, "nav", other),))
+    yield replace(nothing, processes=tuple(RosProcess(pid, "nav", other) for pid in range(5)))
+    for settings in (
+        {"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"},
+        {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LAN"},
+        {"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"},
+    ):
+        yield sound_tree().seen(settings=settings)
+
+
+def with_a_plan() -> Iterator[Finding]:
+    """Judge trees at the end by a plan, as verify and the doctor do, of live trees and of recordings."""
+    two = (
+        *sound_plan().edges,
+        PlanEdge("base_link", "imu", "static", "static", "/static", Pose(), None, SourceLine("rover.yaml", 10)),
+    )
+    for tree, plan in (
+        (TreeHistory().moving("odom base_link"), sound_plan()),
+        (TreeHistory().moving("odom base_link"), sound_plan(*two)),
+        (TreeHistory().moving("odom base_link").fixed("base_link lasr"), sound_plan()),
+        (TreeHistory().moving("odom base_link", b"x").fixed("base_link laser"), sound_plan()),
+        (sound_tree().fixed("base_link laser", b"x", x=0.25), sound_plan()),
+        (sound_tree().moving("map base_link", b"x"), sound_plan()),
+        (TreeHistory().moving("map base_link").fixed("base_link laser"), sound_plan()),
+        (sound_tree().moving("base_link arm", b"x"), sound_plan()),
+        (TreeHistory().moving("odom base_link", until_s=3.0).fixed("base_link laser"), sound_plan()),
+        (sound_tree().knows(b"s"), sound_plan()),
+        (sound_tree().knows(b"d"), sound_plan()),
+        (TreeHistory().moving("odom base_link", hz=20.0).fixed("base_link laser"), sound_plan()),
+        (TreeHistory().moving("odom base_link").moving("base_link laser", b"s"), sound_plan()),
+        (TreeHistory().moving("odom base_link").fixed("base_link laser", x=0.02), sound_plan()),
+        (sound_tree().moving("odom base_link", b"e"), sound_plan()),
+    ):
+        yield from diagnose(tree.seen(plan=plan))
+        yield from diagnose(replace(tree.seen(plan=plan), recorded=True))
+
+
+# The guard.
+
+
+def guard() -> Iterator[Finding]:
+    """Judge message by message."""
+    for history in (*_strangers(), *_shapes(), *_settings(), *_clocks(), *_lost()):
+        yield from history.found()
+    yield from _drivers()
+
+
+def _running(**more: Any) -> guarded.History:
+    return guarded.History(**more).clear()
+
+
+def _sent(node: str | None, sent: str, times: int = 5, *, static: bool = False, **more: Any) -> guarded.History:
+    """Return the history in which a node sends these edges so often."""
+    history = _running(**more)
+    return history.repeat(history.joins(node, static=static), sent, times)
+
+
+def _strangers() -> Iterator[guarded.History]:
+    yield _sent("/rogue", "map odom")
+    yield _sent("/rogue", "base lidar, base camera", static=True)
+    yield _sent("/rogue", "map odom, odom base")
+    yield _sent(None, "map odom", 60)
+    yield _sent("/rogue", "map odom", guard=GuardPolicy("strict"))
+    for switch in ("enable_odom_tf: false", ""):
+        yield _sent("/diff", "odom base", claims=(Claim("/diff", "odom", "base", switch),))
+    nodes = tuple(replace(one, nodes=(f"/{one.name}er",)) for one in guarded.PROCESSES)
+    yield _sent("/slamer", "odom base", processes=nodes)
+    yield _sent("/slamer", "map base", processes=nodes)
+    twice = _running()
+    one, other = twice.joins("/slam"), twice.joins("/slam")
+    for _ in range(10):
+        twice.send(one, "map odom").wait(0.1).send(other, "map odom").wait(0.1)
+    yield twice
+    unsure = _running(gids=False)
+    unsure.joins("/drive")
+    yield unsure.repeat(unsure.joins("/rogue"), "map odom, base cup", 10)
+    misnamed = _running(processes=tuple(PlanProcess(name, "run", nodes=(f"/{name}",)) for name in ("slam", "drive")))
+    other = misnamed.joins("/other")
+    misnamed.send(other, "map odom")
+    writer = Publisher(other.gid, "/other", static=False, ours=True, process="slam", where="on this machine as pid 7")
+    misnamed.events += misnamed.judge.graph([writer], misnamed.now)
+    misnamed.events += misnamed.judge.tick(misnamed.now + 0.2)
+    yield misnamed
+    yield _sent("/tracker", "map person")
+    yield _sent("/tracker", "base tag_1, base tag_2", guard=GuardPolicy(unknown_edges="error"))
+    for sent in ("/rogue map odom", "/slam map odom", "/rogue world odom", "/rogue base map"):
+        early, (node, _, edges) = guarded.History(), sent.partition(" ")
+        yield early.repeat(early.joins(node), edges, 20)
+
+
+def _shapes() -> Iterator[guarded.History]:
+    yield _sent("/rogue", "base_footprint base")
+    yield _sent("/drive", "odom base, map base")
+    yield _sent("/changer", "table tool", edges=(*guarded.EDGES, guarded.TOOL))
+    yield _sent("/rogue", "base map")
+    yield _sent("/slam", "odom odom")
+    yield _sent("/slam", "map odom", static=True)
+    for names in (("/a", "/b"), ("/a", "/a")):
+        both = _running(guard=GuardPolicy(allow=(EdgePattern("*", "person_*"),)))
+        one, other = (both.joins(name) for name in names)
+        for _ in range(10):
+            both.send(one, "map person_1").send(other, "map person_1").wait(0.1)
+        yield both
+
+
+def _settings() -> Iterator[guarded.History]:
+    history = _running()
+    history.joins("/static", static=True, volatile=True)
+    yield history.wait(5)
+    history = _running()
+    history.events += history.judge.graph([Publisher(b"w" * 16, "/slam", static=False, reliable=False)], history.now)
+    yield history
+    history = _running()
+    writers = [Publisher(b"w" * 16, "/slam", static=static) for static in (False, True)]
+    history.judge.plan = replace(history.judge.plan, ros=RosSettings("/rover"))
+    inside = [replace(one, node="/rover/slam") for one in writers]
+    judge = type(history.judge)(history.judge.plan, 1.0, 0.0, 0)
+    history.events += judge.leaks(inside, ("/rover/tf", "/rover/tf_static"))
+    yield history
+    history = _running()
+    static = history.joins("/static", static=True)
+    static.sent = 1
+    yield history.send(static, "base camera").wait(5)
+
+
+def _clocks() -> Iterator[guarded.History]:
+    def stamped(of: Callable[[guarded.History, int], float], **more: Any) -> guarded.History:
+        history = _running(**more)
+        slam = history.joins("/slam")
+        for number in range(30):
+            if more:
+                history.judge.clock(round((100 + number / 10) * 1e9), history.now)
+            history.send(slam, "map odom", stamp_s=of(history, number)).wait(0.1)
+        return history
+
+    begun = guarded.wall(_running())
+    yield stamped(lambda _, number: 5 + number / 10)
+    yield stamped(lambda _, __: 0)
+    yield stamped(lambda history, _: guarded.wall(history) + 3600)
+    yield stamped(lambda history, _: guarded.wall(history), clock="sim")
+    yield stamped(lambda _, number: 70 + number / 10, clock="sim")
+    yield stamped(lambda _, number: begun + min(number, 5) / 10)
+    yield stamped(lambda history, number: guarded.wall(history) - 3 * (number == 20))
+
+
+def _lost() -> Iterator[guarded.History]:
+    edges = (guarded.edge("map odom", "slam", rate=10.0), guarded.edge("odom base", "slam", rate=10.0))
+    for names in ("map odom", "map odom, odom base"):
+        history = _running(edges=edges)
+        yield history.repeat(history.joins("/slam"), names, 30).wait(2)
+        history = _running(edges=edges)
+        yield history.repeat(history.joins("/slam"), names, 30, every=0.2)
+    history = _running()
+    static = history.joins("/static", static=True)
+    history.send(static, guarded.FIXED).wait(1).leaves(static)
+    yield history.wait(5)
+
+
+def _drivers() -> Iterator[Finding]:
+    driven = Driven(
+        "front",
+        "realsense/d435i",
+        publishes=True,
+        switch={"publish_tf": False},
+        frames={"lens": "nominal", "optical": "exact"},
+    )
+    node, line = "/front/front", SourceLine("rover.yaml", 7)
+    edges = tuple(
+        PlanEdge(parent, child, "static", "front", node, Pose(), None, line)
+        for parent, child in (("link", "lens"), ("lens", "optical"))
+    )
+    for drives in (driven, replace(driven, publishes=False)):
+        process = PlanProcess("front", "run", nodes=(node,), drives=(drives,))
+        both = (process, PlanProcess("static", "static"))
+        planned = edges if drives.publishes else (guarded.edge("link lens", "static", "static"),)
+        for sent in ("link depth", "base lens", "link lens"):
+            yield from _sent(node, sent, static=True, edges=planned, processes=both).found()
+    front = PlanProcess("front", "run", nodes=(node,), drives=(driven,))
+    plan = Plan("rover", "0", "link", RosSettings(), edges, (front,))
+    for count in (1, 2):
+        senders = Senders()
+        senders.update([Publisher(b"g" * 16, node, static=True)])
+        sent_poses = SentPoses(plan, senders)
+        sent_edges = tuple((one.parent, one.child) for one in edges[:count])
+        off = [Pose((0.0, 0.1, 0.0))] * count
+        sent_poses.take(Message(sent_edges, static=True, gid=b"g" * 16, source_ns=0, sequence=1, poses=off))
+        yield from sent_poses.judge()
+    for value in (True, None):
+        yield from not_taken(node, {"publish_tf": False}, {"publish_tf": value}, (driven,))
+
+
+# The launcher.
+
+
+def launcher() -> Iterator[Finding]:
+    """Replay histories to the process machine, and look at plans before a start."""
+    for history in _machines():
+        yield from (*history.found(), *history.late)
+    with TemporaryDirectory() as folder, inside(folder):
+        for plan, env in _unfit():
+            base, file = {"PATH": "/nowhere", **env}, Path(folder, "plan.json")
+            found = commands_of(plan, list(plan.processes), file, base, environment.child_environment)[1]
+            yield from (_without(one, folder) for one in found)
+
+
+def _without(found: Finding, folder: str) -> Finding:
+    """Return the finding with the name of a folder that stays the same."""
+    notes = tuple(replace(note, message=note.message.replace(folder, "FOLDER")) for note in found.notes)
+    return replace(found, message=found.message.replace(folder, "FOLDER"), notes=notes)
+
+
+def _machines() -> Iterator[Any]:
+    drive = PlanProcess("drive", "external", owns=(("odom", "base_link"),))
+    yield begin(STATIC, SLAM).feed(Exited("slam", 3, ("one", "two")))
+    yield begin(STATIC, SLAM).feed(Exited("slam", -11))
+    yield begin(STATIC, replace(run_process("a"), required=True)).feed(Exited("a", 0))
+    restarted = begin(replace(run_process("a", restart="on-failure"), max_restarts=2))
+    for _ in range(3):
+        restarted.feed(Exited("a", 1)).wait(20)
+    yield restarted
+    yield begin(STATIC, run_process("camera", required=False)).feed(Exited("camera", 3, ("no device",)))
+    yield begin(STATIC, SLAM).feed(StartFailed("slam", "Permission denied"))
+    yield begin(GUARD, SLAM).wait(20)
+    yield begin(GUARD, SLAM).feed(Exited("guard", 1, ("no rclpy",)))
+    for mode in ("watch", "strict"):
+        policy = GuardPolicy(mode)
+        yield begin(GUARD, STATIC, guard=policy).feed(Clear(), Exited("guard", -9))
+        hangs = begin(GUARD, STATIC, guard=policy).feed(Clear(), Alive())
+        hangs.sleep_until_due()
+        hangs.sleep_until_due()
+        yield hangs
+    stops = GuardPolicy(on_violation="stop-offender")
+    offender = begin(GUARD, STATIC, drive, SLAM, guard=stops).feed(
+        Clear(), Found(AN_EXAMPLE, "drive"), Found(AN_EXAMPLE, "slam")
+    )
+    yield offender.feed(Exited("slam", -2), Found(AN_EXAMPLE, "slam"))
+    lidar = PlanProcess("lidar", "run", nodes=("/lidar",))
+    gates = {"topic": "/scan", "service": "/reset", "lifecycle": "active", "log": "ready [0-9]+", "exit": ""}
+    for kind, text in gates.items():
+        gate: Any = Ready(kind, text, timeout_s=3.0)  # type: ignore[arg-type]
+        yield begin(GUARD, replace(lidar, ready=gate)).feed(Clear(), GateShut("lidar", "topics /tf")).wait(3)
+    gate = Ready("edges", timeout_s=3.0)
+    shut = GateShut("slam", "/tf is published by nobody")
+    yield begin(GUARD, STATIC, replace(SLAM, ready=gate)).feed(Clear(), shut).wait(3)
+    after = run_process("b", after={"lidar": "ready"})
+    yield begin(GUARD, STATIC, replace(lidar, ready=Ready("topic", "/scan")), after).feed(Clear(), Exited("lidar", 0))
+    slam = replace(SLAM, argv=("slam",))
+    yield begin(GUARD, STATIC, slam).feed(Clear(), Live("static", ("laser",)), TimeUp())
+    stopped = begin(GUARD, STATIC, slam).feed(Clear(), Live("static", ("laser",)), Live("slam", ("odom",)))
+    yield stopped.feed(ProcessRequest("stop", "slam"), Exited("slam", -2), TimeUp())
+    yield begin(GUARD, STATIC, replace(slam, after={"drive": "ready"}), drive).feed(Clear(), TimeUp())
+
+
+def _unfit() -> Iterator[tuple[Plan, dict[str, str]]]:
+    def plan(*processes: PlanProcess, guard: GuardPolicy | None = None, ros: RosSettings | None = None) -> Plan:
+        edges = tuple(
+            PlanEdge(parent, child, "dynamic", one.name, f"/{one.name}", Pose(), None, SourceLine("rover.yaml", 1))
+            for one in processes
+            for parent, child in one.owns
+        )
+        return Plan("rover", "", None, ros or RosSettings(), edges, processes, guard or GuardPolicy())
+
+    true = ("/bin/true",)
+
+    def run(name: str, *argv: str, **more: Any) -> PlanProcess:
+        return PlanProcess(name, "run", argv=argv or true, **more)
+
+    yield plan(run("lidar", "${executable:sllidar_ros2/sllidar_node}")), {}
+    yield plan(run("lidar", "${executable:sllidar_ros2/sllidar_node}")), {"AMENT_PREFIX_PATH": "/opt/ros/none"}
+    yield plan(run("lidar", "${executable:sllidar_ros2/sllidar_node}"), run("a", "no_a")), {}
+    yield plan(run("lidar", "bin/lidar")), {}
+    yield plan(run("a", cwd="maps")), {}
+    yield plan(PlanProcess("lidar", "run")), {}
+    yield plan(run("a", after={"nobody": "started"})), {}
+    yield plan(run("a", after={"static": "done"}), PlanProcess("static", "static", argv=true)), {}
+    yield plan(run("a", after={"b": "started"}), run("b", after={"a": "started"})), {}
+    guard_process = PlanProcess("guard", "guard", argv=true)
+    owner = run("slam", owns=(("map", "odom"),), nodes=("/slam",))
+    partition, remap = (GuardPolicy("strict", fence=fence) for fence in ("partition", "remap"))
+    yield plan(owner, guard_process, guard=partition), {"RMW_IMPLEMENTATION": "rmw_x"}
+    yield plan(replace(owner, remap={"/tf": "tf"}), guard_process, guard=partition), {}
+    yield plan(owner, guard_process, guard=partition), {"FASTRTPS_DEFAULT_PROFILES_FILE": "/no/such.xml"}
+    shell = replace(owner, argv=("/bin/sh", "-c", "slam | tee log"))
+    yield plan(shell, replace(shell, name="more", owns=(("odom", "a"),)), guard_process, guard=remap), {}
+    yield plan(run("nav", "${launch:nav2/nav.launch.py}")), {}
+
+
+# What surrounds them.
+
+
+def surroundings() -> Iterator[Finding]:
+    """Look at plans, hosts, bags and installations that are not as they should be."""
+    yield from _refused(partial(read_own, [], "static"))
+    for text in ("nonsense", "[]", '{"version": 0, "edges": [], "processes": []}', '{"edges": 1, "processes": []}'):
+        yield from _refused(partial(read_plan, text, "plan.json"))
+    plan = compiled_plan(ROVER)
+    elsewhere = replace(plan, processes=tuple(replace(one, host="jetson") for one in plan.processes))
+    strict = replace(elsewhere, guard=GuardPolicy("strict"))
+    shares = ((plan, "jetson"), (elsewhere, "jetsn"), (elsewhere, None), (strict, None))
+    yield from (found for some, host in shares if isinstance(found := share_of(some, host, "laptop"), Finding))
+    with mock.patch.object(environment, "find_spec", return_value=None):
+        yield environment.no_ros() or AN_EXAMPLE
+    with mock.patch.object(environment, "no_ros", return_value=None), mock.patch.dict(os.environ, LD_LIBRARY_PATH=""):
+        for settings in ({"ROS_DOMAIN_ID": "300"}, {"RMW_IMPLEMENTATION": "rmw_none_cpp"}):
+            yield environment.ros_trouble(settings) or AN_EXAMPLE
+    yield from check(Robot("r", "r.yaml", {}, (), {}, (), None), [two_parents])
+    with mock.patch.object(live, "reject", side_effect=_rejected):
+        with mock.patch.object(live, "missing_rosbags", return_value="rosbags is not installed: pip install it"):
+            yield from _refused(partial(live.from_bag, list))
+        yield from _refused(partial(live.from_bag, _no_bag))
+
+
+def _no_bag() -> None:
+    raise BagError("bag is no bag: it has no metadata.yaml", "ros2 bag reindex bag")
+
+
+def _rejected(found: list[Finding], *_: object) -> None:
+    raise RejectedError(found)
+
+
+@rule("TF201")
+def two_parents(robot: Robot) -> list[Finding]:
+    """Crash."""
+    raise ZeroDivisionError(robot.name)
+
+
+def _refused(work: Callable[[], object]) -> list[Finding]:
+    try:
+        work()
+    except RejectedError as error:
+        return list(error.findings)
+    return []
+
+
+# What the file's findings in ``test_findings`` leave out: presets of one's own, settings, and what a build refuses.
+
+
+def compiled() -> Iterator[Finding]:
+    """Compile robots with presets that are wrong, and with what is not installed."""
+    for setting in ("a", "=1"):
+        yield from _refused(partial(set_value, setting))
+    robot = f"{HEAD}preset_path: presets\nsensors: {{s: {{preset: %s, parent: base_link}}}}\n"
+    with TemporaryDirectory() as folder, inside(folder):
+        for name, text in {"realsense/d435i": "preset: 1\nextends: realsense/d435i\n", "me/mast": MAST}.items():
+            yield from _with_preset(name, text, robot % name)
+        for old, new in WRONG_IN_MAST:
+            yield from _with_preset("me/mast", MAST.replace(old, new, 1), robot % "me/mast")
+    mass = "tfcompose: 1\nrobot: r\nlinks: {base_link: {visual: {mesh: a.stl}, inertial: {mass: 6 kg}}}\n"
+    for code, why in (("TF905", "trimesh, which computes its volume, is not installed"), ("TF725", "it is flat")):
+        moments = mock.Mock(side_effect=UnmeasurableError(code, why, "pip install 'tfcompose[mesh]'"))
+        here = Disk(mock.Mock(return_value=""), lambda _: True, lambda _: True, moments=moments)
+        yield from compile_robot(mass, "r.yaml", library(), read=mock.Mock(), disk=here).found
+    for form in ("package", "file"):
+        yield building._without_address(Asset("meshes/a.stl", Span("r.yaml", 7, 16, 7, 29)), form)
+    sound = compile_robot(ROVER, "rover.yaml", library()).robot
+    assert sound
+    files = [replace(file, text=file.text.replace("0 0 0.3", "0 0 0.4")) for file in emit(sound)]
+    yield from building._differences(sound, files, Target())
+
+
+@contextlib.contextmanager
+def inside(folder: str) -> Iterator[None]:
+    """Work in this folder."""
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        yield
+    finally:
+        os.chdir(before)
+
+
+def _with_preset(name: str, text: str, robot: str) -> Iterator[Finding]:
+    file = Path("presets", f"{name}.yaml")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(text, encoding="utf-8")
+    yield from compile_robot(robot, "r.yaml", library()).found
+
+
+def recordings() -> Iterator[Finding]:
+    """Read bags that are none, or hold no TF, and ask them for poses that they do not have."""
+    refuse = partial(mock.patch.object, attribute="reject", side_effect=_rejected)
+    with TemporaryDirectory() as folder, inside(folder), refuse(live), refuse(echo):
+        for name, sent in {"bag": drive(), "below": drive(topic="/robot1/tf"), "empty": []}.items():
+            write_bag(Path(name), sent)
+        Path("folder").mkdir()
+        files = ("old.bag", "whole.mcap.zstd", "notes.txt")
+        for name in files:
+            Path(name).write_bytes(bytes(64))
+        for bag in ("none", "folder", "empty", "below", *files):
+            yield from _refused(partial(main, ["echo", "odom", "base_link", "--bag", bag, "--once"]))
+        for words in (["odom", "base_lnk"], ["odom", "base_link", "--at", "1000000000.5"]):
+            yield from _refused(partial(main, ["echo", *words, "--bag", "bag", "--once"]))
+
+
+SCENES: tuple[Callable[[], Iterator[Finding]], ...] = (
+    doctor,
+    with_a_plan,
+    guard,
+    launcher,
+    surroundings,
+    compiled,
+    recordings,
+)

@@ -212,7 +212,7 @@ def parts_in(modules: set[str]) -> set[str]:
 def test_help_loads_the_commands_and_nothing_of_their_work(bare: set[str]) -> None:
     loaded = loaded_by(command("--help")) - bare
     assert not foreign(loaded, bare)
-    assert parts_in(loaded) == {"cli", "geometry", "interrupt"}
+    assert parts_in(loaded) == {"cli", "geometry", "interrupt", "render"}
     assert {name for name in loaded if name.startswith("tfcompose.cli.") and ".commands" not in name} == {
         f"tfcompose.cli.{name}" for name in ("options", "parser", "terminal")
     }

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tfcompose.cli.terminal import LiveLines, can_redraw
+from tfcompose.cli.tables import LiveLines
+from tfcompose.cli.terminal import can_redraw
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -6,7 +6,9 @@ import json
 from collections import Counter
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.cli.tables import Table
 from tfcompose.cli.terminal import counted, printable
+from tfcompose.render.text import YELLOW
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,42 +17,24 @@ if TYPE_CHECKING:
 
 #: A stamp that is farther off is taken to be of another clock.
 _CLOCKS_AGREE_S = 1e6
-_HEADS = ("edge", "publisher", "kind", "rate", "jitter", "gap", "age", "delay", "")
-_RIGHT = ("rate", "jitter", "gap", "age", "delay")
-#: What a narrow window does without, in this order: a row of a fixed edge has no numbers, whatever its kind says.
-_SPARED = ("jitter", "gap", "kind")
-#: So much of an edge's and of a publisher's name is readable, and so much of a remark, in characters.
-_READABLE = (20, 20, *(0,) * 6, 16)
+HEADS = ("edge", "publisher", "kind", "rate", "jitter", "gap", "age", "delay", "")
+#: A narrow terminal goes without jitter, gap and kind: a row of a fixed edge has no numbers, whatever its kind says.
+TABLE = Table(
+    right=frozenset(range(3, 8)),
+    spare=(4, 5, 2),
+    least={8: 16, 1: 16, 0: 24},
+    colour=lambda column, _: YELLOW if HEADS[column] == "" else "",
+)
 
 
-def lines_of(edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int, width: int | None = None) -> list[str]:
-    """Return a line about all, and a table with a line for each edge of each publisher.
-
-    Where the table is wider than ``width``, columns are left out and names are cut.
-    """
+def lines_of(
+    edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int, width: int | None = None, *, coloured: bool = False
+) -> list[str]:
+    """Return a line about all, and a table with a line for each edge of each publisher, fitted to the width."""
     several = _several(edges)
-    rows = [_HEADS, *(_row(state, several) for state in edges)]
-    widths = {column: max(len(row[column]) for row in rows) for column in range(len(_HEADS))}
-    if width is not None:
-        _narrow(widths, width)
-    table = [_line(row, widths) for row in rows] if edges else []
+    rows = [HEADS, *(_row(state, several) for state in edges)]
+    table = TABLE.lines(rows, width, coloured=coloured) if edges else []
     return [_summary(edges, observer, now_ns), *table]
-
-
-def _narrow(widths: dict[int, int], width: int) -> None:
-    """Leave columns out until what is readable fits, then cut remarks and names."""
-    least = {column: min(widths[column], least) if least else widths[column] for column, least in enumerate(_READABLE)}
-    for spared in map(_HEADS.index, _SPARED):
-        if _over(least, width) <= 0:
-            break
-        del widths[spared], least[spared]
-    for column in (8, 1, 0):
-        widths[column] = max(widths[column] - max(_over(widths, width), 0), least[column])
-
-
-def _over(widths: dict[int, int], width: int) -> int:
-    """Return how many characters are too many; the terminal's last column stays free."""
-    return sum(widths.values()) + 2 * (len(widths) - 1) - (width - 1)
 
 
 def _several(edges: Sequence[EdgeState]) -> set[str]:
@@ -103,15 +87,6 @@ def duration(seconds: float | None) -> str:
     if abs(seconds) > _CLOCKS_AGREE_S:
         return "other clock"
     return f"{seconds * 1e3:.1f} ms" if abs(seconds) < 1 else f"{seconds:.2f} s"
-
-
-def _line(row: Sequence[str], widths: dict[int, int]) -> str:
-    cells = []
-    for column, width in widths.items():
-        cell = row[column]
-        text = cell if len(cell) <= width else f"{cell[: width - 1]}…"
-        cells.append(f"{text:>{width}}" if _HEADS[column] in _RIGHT else f"{text:<{width}}")
-    return "  ".join(cells).rstrip()
 
 
 def objects_of(edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int) -> str:

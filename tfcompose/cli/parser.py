@@ -42,7 +42,7 @@ from tfcompose.cli.commands import (
     verify,
     wait,
 )
-from tfcompose.cli.terminal import INTERRUPTED, OUTPUT_CLOSED, UNREADABLE, columns_of
+from tfcompose.cli.terminal import INTERRUPTED, OUTPUT_CLOSED, UNREADABLE, size_of
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -150,7 +150,7 @@ def _run_command(name: str, words: list[str]) -> int:
 
 def parser_of(name: str) -> ArgumentParser:
     """Return the parser of one command."""
-    width = min(100, columns_of(1) - 2)
+    width = min(100, size_of(1)[0] - 2)
     parser = ArgumentParser(
         prog=f"tfcompose {name}",
         description=(COMMANDS[name].__doc__ or "").partition("\n\n")[2],

@@ -14,7 +14,7 @@ from tfcompose.cli.console import Console, StatusLine, vanished
 from tfcompose.cli.plans import PLAN, built_plan, copy_plan, is_plan, plan_to_start
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.runs import complain_of_leftovers, hidden_run, request, since, wait_until_ready
-from tfcompose.cli.terminal import FAILED, UNREADABLE, can_redraw, coloured, columns_of, complain, fail, reject
+from tfcompose.cli.terminal import FAILED, UNREADABLE, can_redraw, coloured, complain, fail, reject, size_of
 from tfcompose.findings import RejectedError
 from tfcompose.ipc import PlanChange, UpdateRequest
 from tfcompose.launcher.control import listen
@@ -78,7 +78,7 @@ def _build(arguments: Namespace) -> Path:
 def _run(plan: Plan, place: RuntimeDir, session: Session, output: NonBlockingOutput, duration_s: float | None) -> int:
     """Run the plan on this terminal until it ends, and return the exit code."""
     logs = Logs(place.logs)
-    status = StatusLine(plan, lambda: columns_of(output.fd)) if can_redraw(sys.stdout) else None
+    status = StatusLine(plan, lambda: size_of(output.fd)[0]) if can_redraw(sys.stdout) else None
     console = Console(plan, output, colour=coloured(sys.stdout), keep=logs.write, status=status)
     session.refresh = console.refresh if status else None
     complain_of_leftovers(place, session.run_id)

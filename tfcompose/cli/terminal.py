@@ -1,4 +1,4 @@
-"""What commands write to: exit codes, findings and complaints, colours, and lines that are drawn again in place."""
+"""What commands write to: exit codes, findings and complaints, the terminal's size and colours, readers that leave."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import select
 import sys
 from contextlib import suppress
 from typing import TYPE_CHECKING, NoReturn
+
+from tfcompose.render.text import PLAIN, render_text
 
 if TYPE_CHECKING:
     import socket
@@ -19,8 +21,6 @@ if TYPE_CHECKING:
 #: Exit codes: findings, or a process that failed; wrong use, or what cannot be read; and as a shell has them for a
 #: program that was ended by Ctrl-C, or by writing where nobody reads.
 FAILED, UNREADABLE, INTERRUPTED, OUTPUT_CLOSED = 1, 2, 130, 141
-
-BOLD, PLAIN = "\033[1m", "\033[0m"
 
 #: Control sequences (ECMA-48): those that end in m set colours, the others do something; and titles and links.
 _SEQUENCE = re.compile(r"(\033\[[0-?]*[ -/]*[@-~]|\033\][^\033\a]*(?:\a|\033\\)?|\033[ -/]*[0-~])")
@@ -45,7 +45,6 @@ def fail(message: str, code: int = FAILED) -> NoReturn:
 def print_findings(found: Sequence[Finding], stream: TextIO) -> None:
     """Print findings for people, with the lines that they are about."""
     from tfcompose.cli.reading import line_of
-    from tfcompose.render.text import render_text
 
     stream.write(render_text(found, line_of, colour=coloured(stream)))
 
@@ -75,12 +74,13 @@ def can_redraw(stream: TextIO) -> bool:
     return stream.isatty() and os.environ.get("TERM", "dumb") != "dumb"
 
 
-def columns_of(fd: int) -> int:
-    """Return the width of the terminal behind the descriptor, 80 if there is none."""
-    return _size_of(fd)[0]
+def table_width(stream: TextIO) -> int | None:
+    """Return the width that tables are fitted to: the terminal's, or None into a file or a pipe."""
+    return size_of(stream.fileno())[0] if can_redraw(stream) else None
 
 
-def _size_of(fd: int) -> tuple[int, int]:
+def size_of(fd: int) -> tuple[int, int]:
+    """Return the columns and rows of the terminal behind the descriptor, 80 and 24 if there is none."""
     try:
         size = os.get_terminal_size(fd)
     except OSError:
@@ -152,36 +152,3 @@ def _first_ready(stream: TextIO, connection: socket.socket | None, timeout_ms: f
         found.remove(connection.fileno())
         return stream if found else connection
     return stream if found else None
-
-
-class LiveLines:
-    """Some lines at the end of a terminal's output; each drawing replaces the last one, without flicker."""
-
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-        self._drawn = 0
-        self._columns = 0
-
-    @property
-    def width(self) -> int:
-        """The terminal's width in characters."""
-        return columns_of(self._stream.fileno())
-
-    def draw(self, lines: Sequence[str]) -> None:
-        """Draw the lines where the last ones were; those that the terminal has no room for are counted only."""
-        columns, rows = _size_of(self._stream.fileno())
-        room = max(rows - 1, 2)
-        shown = list(lines)
-        if len(shown) > room:
-            shown = [*shown[: room - 1], f"… {len(shown) - room + 1} more; a larger window shows them, or a pipe"]
-        up = f"\r\033[{self._drawn}A" if self._drawn else ""
-        if columns < self._columns:  # what was drawn takes more lines now, and how many is the terminal's secret
-            up = "\033[H\033[2J"
-        body = "".join(f"{_shortened(line, columns - 1)}\033[K\n" for line in shown)
-        self._stream.write(f"{up}{body}\033[J")  # what was below the last line goes
-        self._stream.flush()
-        self._drawn, self._columns = len(shown), columns
-
-
-def _shortened(line: str, columns: int) -> str:
-    return line if len(line) <= columns else f"{line[: columns - 1]}…"

@@ -13,7 +13,8 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_robot, count
-from tfcompose.cli.terminal import PLAIN, coloured, fail, has_reader
+from tfcompose.cli.terminal import coloured, fail, has_reader
+from tfcompose.render.text import PLAIN
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace

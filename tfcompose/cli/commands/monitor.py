@@ -14,11 +14,12 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_bag, add_for, add_format, add_namespace, positive
-from tfcompose.cli.terminal import UNREADABLE, LiveLines, can_redraw, fail
+from tfcompose.cli.terminal import UNREADABLE, can_redraw, coloured, fail, table_width
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
+    from tfcompose.cli.tables import LiveLines
     from tfcompose.live.edges import TreeObserver
 
 #: Of the running tree the last 5 to 10 s are told.
@@ -39,6 +40,7 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Monitor until a signal comes; exit code 1 if no TF came at all, 2 if a bag cannot be read."""
     from tfcompose.cli.live import observe, read_bag
+    from tfcompose.cli.tables import LiveLines
     from tfcompose.live.edges import SETTLE_S, TreeObserver
     from tfcompose.plan.topics import topics_below
 
@@ -69,7 +71,7 @@ def _show(arguments: Namespace, observer: TreeObserver, live: LiveLines | None, 
         sys.stdout.write(objects_of(edges, observer, now_ns))
         sys.stdout.flush()
         return
-    lines = lines_of(edges, observer, now_ns, width=live.width if live else None)
+    lines = lines_of(edges, observer, now_ns, table_width(sys.stdout), coloured=coloured(sys.stdout))
     if not observer.heard:
         lines = [f"no TF yet on {names_of([topics_below(arguments.namespace)])}"]
     if live is not None:

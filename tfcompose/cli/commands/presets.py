@@ -12,7 +12,7 @@ import sys
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.cli.terminal import complain, print_findings
+from tfcompose.cli.terminal import complain, print_findings, table_width
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -62,6 +62,7 @@ def _show(facts: dict[str, Any], form: str) -> int:
 
 def _list(only: str | None, known: Library, form: str) -> int:
     from tfcompose.cli import node_page
+    from tfcompose.cli.tables import shortened
     from tfcompose.findings import did_you_mean
 
     presets = {name: known.get(name) for name in known.names}
@@ -80,9 +81,11 @@ def _list(only: str | None, known: Library, form: str) -> int:
         sys.stdout.write(json.dumps(rows, indent=2, ensure_ascii=False) + "\n")
         return 0
     width = max((len(row["name"]) for row in rows), default=0)
+    columns = table_width(sys.stdout)
     blocks = []
     for vendor, group in groupby(rows, lambda row: row["vendor"]):
         lines = [f"  {row['name']:<{width}}  {row['kind']:<10}  {_about(row)}" for row in group]
+        lines = [shortened(line, columns - 1, at_end=True) for line in lines] if columns else lines
         blocks.append("\n".join([vendor, *lines]))
     count = f"{len(rows)} preset{'s' if len(rows) != 1 else ''}"
     sys.stdout.write("\n\n".join(blocks) + f"\n\n{count}; tfcompose presets NAME shows one\n")

@@ -11,7 +11,8 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.options import add_format, add_robot
-from tfcompose.cli.terminal import FAILED, UNREADABLE, fail
+from tfcompose.cli.terminal import FAILED, UNREADABLE, coloured, fail, table_width
+from tfcompose.render.text import GREEN, RED, YELLOW
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -34,8 +35,10 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Print the table; exit code 0, 1 where no robot runs."""
+    from tfcompose.cli.tables import Table
     from tfcompose.launcher.processes import usage_of
 
+    table = Table(least={1: 20, 0: 16}, spare=(5, 4, 3), colour=_colour)
     robots, code = _robots(arguments.robot)
     used = usage_of([process.pid for status in robots.values() for process in status.processes if process.pid])
     if arguments.format == "json":
@@ -48,7 +51,8 @@ def run(arguments: Namespace) -> int:
         failed = [process.name for process in status.processes if process.failed]
         state += f", without {', '.join(failed)}" if failed else ""
         print(f"{name}: {state}, launcher {status.launcher}, since {_time(status.uptime)}")
-        _print_table([HEAD, *(_row(process, used) for process in status.processes)])
+        rows = [HEAD, *(_row(process, used) for process in status.processes)]
+        print(*table.lines(rows, table_width(sys.stdout), coloured=coloured(sys.stdout), indent="  "), sep="\n")
     return code
 
 
@@ -104,11 +108,12 @@ def _state(process: ProcessStatus) -> str:
     return f"{state}{why}{', failed' if process.failed and state != 'fatal' else ''}"
 
 
-def _print_table(rows: list[tuple[str, ...]]) -> None:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        line = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-        sys.stdout.write(f"  {line.rstrip()}\n")
+def _colour(column: int, text: str) -> str:
+    if HEAD[column] != "STATE" or text == "STATE":
+        return ""
+    if text == "running":
+        return GREEN
+    return RED if text.startswith("fatal") or text.endswith("failed") else YELLOW
 
 
 def _time(seconds: float) -> str:

@@ -13,7 +13,8 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.options import DEFAULT_FILE, add_bag, add_for, add_format, add_namespace, add_variant
-from tfcompose.cli.terminal import printable
+from tfcompose.cli.terminal import coloured, printable, table_width
+from tfcompose.render.text import RED, YELLOW
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
     from tfcompose.plan import Plan, PlanEdge
 
     Topics = tuple[str, str]
+
+#: The column of what there is to say about a published frame.
+REMARK = 5
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -103,25 +107,23 @@ def _print_published(arguments: Namespace) -> None:
 
 
 def _drawn(trees: list[Tree], *, plan: Plan | None) -> str:
-    rows = [[_row(branch, plan=plan) for branch in tree.branches] for tree in trees]
-    widths = [max((len(row[column]) for some in rows for row in some), default=0) for column in range(5)]
+    from tfcompose.cli.tables import Table
+
+    table = Table(right=frozenset({3, 4}), spare=(1, 4), least={5: 16, 2: 14, 0: 44}, colour=_colour)
+    rows = [_row(branch, plan=plan) for tree in trees for branch in tree.branches]
+    lines = iter(table.lines(rows, table_width(sys.stdout), coloured=coloured(sys.stdout)))
     parts = []
-    if len(trees) > 1:
-        parts.append(f"{len(trees)} disconnected trees:\n\n")
-    for tree, some in zip(trees, rows, strict=True):
-        if tree.loop:
-            parts.append(f"a loop, which breaks tf2 lookups: {printable(' → '.join(tree.loop))}\n")
-        parts += [_line(row, widths) for row in some]
-        parts.append("\n")
-    return "".join(parts[:-1])
+    for tree in trees:
+        loop = [f"a loop, which breaks tf2 lookups: {printable(' → '.join(tree.loop))}"] if tree.loop else []
+        parts.append("\n".join([*loop, *(next(lines) for _ in tree.branches)]))
+    head = [f"{len(trees)} disconnected trees:"] if len(trees) > 1 else []
+    return "\n\n".join([*head, *parts]) + "\n"
 
 
-def _line(row: tuple[str, ...], widths: list[int]) -> str:
-    cells = [
-        f"{cell:>{width}}" if column in {3, 4} else f"{cell:<{width}}"
-        for column, (cell, width) in enumerate(zip(row, widths, strict=False))
-    ]
-    return "  ".join([*cells, row[5]]).rstrip() + "\n"
+def _colour(column: int, text: str) -> str:
+    if column != REMARK or text in {"", "expected", "allowed"}:
+        return ""
+    return YELLOW if text.startswith("also ") else RED
 
 
 def _row(branch: Branch, *, plan: Plan | None) -> tuple[str, ...]:

@@ -1,0 +1,103 @@
+"""Tables of text: as wide as they are for files and pipes; for a terminal fitted, coloured and drawn again in place.
+
+A pipe gets the same bytes whatever the terminal is. On a narrow terminal the columns that matter least are left out,
+and names are shortened after their first third: their ends tell them apart. rich would cut numbers there, too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.terminal import plain, size_of
+from tfcompose.render.text import PLAIN
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from typing import TextIO
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """How the columns of a table are laid out; they go by their numbers, from 0.
+
+    Columns in ``right`` are aligned to the right. To fit a width, those in ``spare`` are left out, in their order,
+    until those in ``least`` can be shortened enough; these are shortened in their order, to no fewer characters than
+    it says. ``colour`` returns the colour of a cell, or nothing, for its column and text.
+    """
+
+    right: frozenset[int] = frozenset()
+    spare: tuple[int, ...] = ()
+    least: Mapping[int, int] = field(default_factory=dict)
+    colour: Callable[[int, str], str] | None = None
+
+    def lines(
+        self, rows: Sequence[Sequence[str]], width: int | None = None, *, coloured: bool = False, indent: str = ""
+    ) -> list[str]:
+        """Return a line for each row, narrower than ``width`` where possible: a terminal's last column stays free."""
+        widths = {column: max(map(len, cells)) for column, cells in enumerate(zip(*rows, strict=True))}
+        if width is not None:
+            self._fit(widths, width - 1 - len(indent))
+        colour = self.colour if coloured else None
+        return [indent + self._line(row, widths, colour) for row in rows]
+
+    def _fit(self, widths: dict[int, int], width: int) -> None:
+        least = {column: min(wide, self.least.get(column, wide)) for column, wide in widths.items()}
+        for column in self.spare:
+            if _excess(least, width) <= 0:
+                break
+            del widths[column], least[column]
+        for column in self.least:
+            widths[column] = max(widths[column] - max(_excess(widths, width), 0), least[column])
+
+    def _line(self, row: Sequence[str], widths: dict[int, int], colour: Callable[[int, str], str] | None) -> str:
+        cells, last = [], max(widths)
+        for column, width in widths.items():
+            text = shortened(row[column], width, at_end=column == last)
+            code = colour(column, row[column]) if colour else ""
+            blank = " " * (width - len(text))
+            shown = f"{code}{text}{PLAIN}" if code else text
+            cells.append(f"{blank}{shown}" if column in self.right else f"{shown}{blank}")
+        return "  ".join(cells).rstrip()
+
+
+def _excess(widths: dict[int, int], width: int) -> int:
+    """Return how many characters are too many."""
+    return sum(widths.values()) + 2 * (len(widths) - 1) - width
+
+
+def shortened(text: str, width: int, *, at_end: bool = False) -> str:
+    """Return the text in so many characters: with an ellipsis at its end, or after its first third."""
+    if len(text) <= width:
+        return text
+    head = width - 1 if at_end else (width - 1) // 3
+    return f"{text[:head]}…{text[len(text) - (width - 1 - head) :]}"
+
+
+class LiveLines:
+    """Some lines at the end of a terminal's output; each drawing replaces the last one, without flicker."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._drawn = 0
+        self._columns = 0
+
+    def draw(self, lines: Sequence[str]) -> None:
+        """Draw the lines where the last ones were; those that the terminal has no room for are counted only."""
+        columns, rows = size_of(self._stream.fileno())
+        room = max(rows - 1, 2)
+        shown = list(lines)
+        if len(shown) > room:
+            shown = [*shown[: room - 1], f"… {len(shown) - room + 1} more; a larger window shows them, or a pipe"]
+        up = f"\r\033[{self._drawn}A" if self._drawn else ""
+        if columns < self._columns:  # what was drawn takes more lines now, and how many is the terminal's secret
+            up = "\033[H\033[2J"
+        body = "".join(f"{_fitted(line, columns - 1)}\033[K\n" for line in shown)
+        self._stream.write(f"{up}{body}\033[J")  # what was below the last line goes
+        self._stream.flush()
+        self._drawn, self._columns = len(shown), columns
+
+
+def _fitted(line: str, width: int) -> str:
+    text = plain(line)
+    return line if len(text) <= width else shortened(text, width, at_end=True)

@@ -9,6 +9,7 @@ import pytest
 from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
+from tfcompose.plan import EdgePattern
 from tfcompose.plan.file import read_plan
 
 ROBOT = """
@@ -92,7 +93,7 @@ def test_the_driver_is_told_the_prefix_and_only_where_there_is_one() -> None:
 
 def test_what_the_guard_allows_is_allowed_under_the_final_name() -> None:
     plan = read_plan(built("isolate: frames")["plan.json"], "plan.json")
-    assert plan.guard.allow == (("robot1/camera_link", "tag:*"), ("*", "thing"))
+    assert plan.guard.allow == (EdgePattern("robot1/camera_link", "tag:*"), EdgePattern("*", "thing"))
 
 
 def test_urdf_keeps_the_plain_names() -> None:

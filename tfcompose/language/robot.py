@@ -5,6 +5,7 @@ The descriptions and examples here are what an editor shows and what ``tfcompose
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
@@ -12,7 +13,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
 from tfcompose.language.bodies import LinkSpec
 from tfcompose.language.pose import EdgeKeys, MountKeys, Parents, Posed, Rotated
 from tfcompose.language.process import Driver, ProcessSpec
-from tfcompose.language.spec import Checked, Spec, below, key, measure_of, several
+from tfcompose.language.spec import Checked, Spec, below, inherited, key, measure_of, several
 from tfcompose.language.values import (
     Axis,
     Boolean,
@@ -27,17 +28,8 @@ from tfcompose.language.values import (
     Xyz,
 )
 from tfcompose.model import Dynamics, Limit, ReferencePositions, SafetyController
-from tfcompose.plan import (
-    Clock,
-    Discovery,
-    FenceWay,
-    GuardMode,
-    Isolation,
-    OnViolation,
-    SensorPublisher,
-    StatePublisher,
-    UnknownEdges,
-)
+from tfcompose.plan import GuardPolicy, Isolation, RosSettings, SensorPublisher, StatePublisher
+from tfcompose.plan.codec import documented
 from tfcompose.units import (
     NUMBER,
     JointPosition,
@@ -329,43 +321,18 @@ class PartSpec(MountKeys):
 # The robot
 
 
-class AllowedEdge(Spec):
-    """Edges that need no declaration; * and ? are wildcards."""
-
-    child: Text = key("*", "the child frame", "tag36h11:*")
-    parent: Text = key("*", "the parent frame", "camera_color_optical_frame")
-
-
-class GuardSpec(Spec):
-    """What watches the live tree."""
-
-    mode: GuardMode = key("watch", "strict: what a process of the plan sends and does not own is held back")
-    unknown_edges: UnknownEdges = key("warn", "what to do about an edge that nobody declared")
-    on_violation: OnViolation = key(
-        "report", "stop-offender: stop the plan's own process that is proven to have done it; stop: stop everything"
-    )
-    allow: tuple[AllowedEdge, ...] = key((), "edges that need no declaration", [{"child": "tag36h11:*"}])
-    fence: FenceWay = key(
-        "auto",
-        "how strict fences processes off: by a DDS partition, which needs Fast DDS, or by remapping /tf and /tf_static",
-    )
-
-
-class RosSpec(Spec):
+@dataclass(frozen=True, slots=True)
+class RosSpec(RosSettings):
     """What all processes share."""
 
-    namespace: Namespace = key("", "the namespace of nodes and topics without a leading slash", "robot1")
-    frame_prefix: Text = key("", "written in front of every frame as it is, with its slash", "robot1/")
-    shared_frames: Texts = key((), "frames that never get the prefix", ["map"])
-    isolate: Isolation = key(
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    namespace: Namespace = inherited(RosSettings, "namespace")
+    domain_id: Annotated[int, Strict(), Field(ge=0, le=232), Whole] | None = inherited(RosSettings, "domain_id")
+    isolate: Isolation = documented(
         "none", "topics: /tf moves below the namespace; frames: the namespace is the prefix, unless one is given"
     )
-    domain_id: Annotated[int, Strict(), Field(ge=0, le=232), Whole] | None = key(
-        None, "the ROS domain; default: the environment's", 7
-    )
-    discovery: Discovery | None = key(None, "how far discovery reaches; default: the environment's")
-    clock: Clock = key("wall", "one clock for the whole plan; sim: the time of /clock")
-    state_publisher: StatePublisher = key(
+    state_publisher: StatePublisher = documented(
         "tfcompose", "stock: a robot_state_publisher publishes what tfcompose would publish below base"
     )
 
@@ -422,7 +389,7 @@ class RobotSpec(Spec):
     profiles: Parameters = key(
         {}, "named overlays, chosen with --profile", {"demo": {"sensors": {"laser": {"driver": "none"}}}}
     )
-    guard: GuardSpec = key(GuardSpec(), "what watches the live tree", {"mode": "strict"})
+    guard: GuardPolicy = key(GuardPolicy(), "what watches the live tree", {"mode": "strict"})
     preset_path: OneOrMore = key(
         (), "folders with presets of your own, VENDOR/MODEL.yaml, relative to this file", ["presets"]
     )

@@ -84,6 +84,12 @@ def key(default: Any = ..., about: str = "", *examples: Any) -> Any:
     return Field(default, description=about or None, examples=list(examples) or None)
 
 
+def inherited(of: type, name: str) -> Any:
+    """Return a dataclass's field for a subclass that narrows its type: default and description stay."""
+    base = next(one for one in dataclasses.fields(of) if one.name == name)
+    return dataclasses.field(default=base.default, default_factory=base.default_factory, metadata=base.metadata)
+
+
 def kinds_of(annotation: Any) -> Iterator[Any]:
     """Yield the types that an annotation allows, without ``None``, ``Annotated`` and unions."""
     origin = get_origin(annotation)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import MISSING, dataclass
 from typing import TYPE_CHECKING, ClassVar
 
+from tfcompose.plan.codec import documented
 from tfcompose.units import JointDamping, JointEffort, JointPosition, JointVelocity, Number  # noqa: TC001 (read by them)
 
 if TYPE_CHECKING:
@@ -25,12 +26,10 @@ class Limit:
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    lower: JointPosition | None = field(default=None, metadata={"description": "the lowest position"})
-    upper: JointPosition | None = field(default=None, metadata={"description": "the highest position"})
-    effort: JointEffort | None = field(
-        default=None, metadata={"description": "the largest torque, or force of a prismatic joint"}
-    )
-    velocity: JointVelocity | None = field(default=None, metadata={"description": "the largest speed"})
+    lower: JointPosition | None = documented(None, "the lowest position")
+    upper: JointPosition | None = documented(None, "the highest position")
+    effort: JointEffort | None = documented(None, "the largest torque, or force of a prismatic joint")
+    velocity: JointVelocity | None = documented(None, "the largest speed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +38,8 @@ class Dynamics:
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    damping: JointDamping = field(default=0.0, metadata={"description": "the damping"})
-    friction: JointEffort = field(default=0.0, metadata={"description": "the static friction"})
+    damping: JointDamping = documented(0.0, "the damping")
+    friction: JointEffort = documented(0.0, "the static friction")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,12 +48,10 @@ class SafetyController:
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    soft_lower_limit: JointPosition = field(default=0.0, metadata={"description": "where the lower soft limit begins"})
-    soft_upper_limit: JointPosition = field(default=0.0, metadata={"description": "where the upper soft limit begins"})
-    k_position: Number = field(
-        default=0.0, metadata={"description": "the gain from position to velocity inside the soft limits"}
-    )
-    k_velocity: Number = field(metadata={"description": "the gain from velocity to effort", "examples": [10]})
+    soft_lower_limit: JointPosition = documented(0.0, "where the lower soft limit begins")
+    soft_upper_limit: JointPosition = documented(0.0, "where the upper soft limit begins")
+    k_position: Number = documented(0.0, "the gain from position to velocity inside the soft limits")
+    k_velocity: Number = documented(MISSING, "the gain from velocity to effort", 10)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +60,8 @@ class ReferencePositions:
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    rising: JointPosition | None = field(default=None, metadata={"description": "where the switch goes on"})
-    falling: JointPosition | None = field(default=None, metadata={"description": "where the switch goes off"})
+    rising: JointPosition | None = documented(None, "where the switch goes on")
+    falling: JointPosition | None = documented(None, "where the switch goes off")
 
 
 @dataclass(frozen=True, slots=True)

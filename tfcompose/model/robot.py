@@ -104,8 +104,8 @@ class Robot:
             return self
         final = self.final
         allow = tuple(
-            EdgePattern(*(final(pattern) if pattern in self.frames else pattern for pattern in edge))
-            for edge in self.guard.allow
+            EdgePattern(*(final(name) if name in self.frames else name for name in (one.parent, one.child)))
+            for one in self.guard.allow
         )
         return replace(
             self,

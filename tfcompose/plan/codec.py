@@ -42,6 +42,20 @@ OMITTED: Mapping[str, bool] = types.MappingProxyType({"omitted": True})
 #: Metadata of a field that holds a dataclass or named tuple, whose fields stand beside those of the whole.
 FLAT: Mapping[str, bool] = types.MappingProxyType({"flat": True})
 
+
+def documented(default: Any, about: str, *examples: Any, **metadata: Any) -> Any:
+    """Return a field of a dataclass that users write as well: what an editor and the reference say of the key."""
+    more = {"examples": list(examples)} if examples else {}
+    return field(default=default, metadata={**metadata, "description": about, **more})
+
+
+def narrowed(kind: type[T], value: T, **changes: Any) -> T:
+    """Return a dataclass ``kind`` with what ``value``, of one of its subclasses, has in its fields, but for changes."""
+    of: Any = kind
+    same = {one.name: getattr(value, one.name) for one in fields_of_dataclass(of) if one.init}
+    return kind(**same | changes)
+
+
 _NONE = type(None)
 _PLAIN: dict[Any, str] = {str: "a text", int: "a whole number", float: "a finite number", bool: "true or false"}
 #: So much of a value is shown in an error, in characters.
@@ -79,8 +93,9 @@ class Field:
     name: str
     kind: Any
     default: Any
-    omitted: bool
-    flat: bool
+    omitted: bool = False
+    flat: bool = False
+    description: str = ""
 
 
 @cache
@@ -88,13 +103,15 @@ def fields_of(cls: type) -> tuple[Field, ...]:
     """Return the fields of a dataclass or named tuple, in their order."""
     hints = get_type_hints(cls, include_extras=True)
     if not is_dataclass(cls):
-        return tuple(Field(name, hints[name], MISSING, omitted=False, flat=False) for name in cls._fields)  # type: ignore[attr-defined]
+        return tuple(Field(name, hints[name], MISSING) for name in cls._fields)  # type: ignore[attr-defined]
     found = []
     for one in fields_of_dataclass(cls):
         default = one.default if one.default_factory is MISSING else one.default_factory()
         omitted = "omitted" in one.metadata
         kind = _without_none(hints[one.name]) if omitted and default is None else hints[one.name]
-        found.append(Field(one.name, kind, default if omitted else MISSING, omitted, "flat" in one.metadata))
+        default = default if omitted else MISSING
+        about = one.metadata.get("description", "")
+        found.append(Field(one.name, kind, default, omitted, "flat" in one.metadata, about))
     return tuple(found)
 
 

@@ -6,10 +6,10 @@ import json
 import re
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from tfcompose.geometry import Pose, norm
-from tfcompose.plan.codec import FLAT, OMITTED, Rule
+from tfcompose.plan.codec import FLAT, OMITTED, Rule, documented
 from tfcompose.plan.words import (  # noqa: TC001 (plan.json is read by these types)
     Clock,
     Discovery,
@@ -60,11 +60,14 @@ class SourceLine(NamedTuple):
     line: int
 
 
-class EdgePattern(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class EdgePattern:
     """Edges by the names of their frames, in which ``*`` and ``?`` are wildcards."""
 
-    parent: str
-    child: str
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    parent: str = documented("*", "the parent frame", "camera_color_optical_frame")
+    child: str = documented("*", "the child frame", "tag36h11:*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,28 +256,33 @@ def known_at_launch(value: Any) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class RosSettings:
-    """What every process of the plan shares. ``shared_frames`` are those that do not begin with ``frame_prefix``."""
+    """What all processes share."""
 
-    namespace: str = ""
-    domain_id: int | None = None
-    discovery: Discovery | None = None
-    clock: Clock = "wall"
-    frame_prefix: str = ""
-    shared_frames: tuple[str, ...] = ()
+    namespace: str = documented("", "the namespace of nodes and topics without a leading slash", "robot1")
+    domain_id: int | None = documented(None, "the ROS domain; default: the environment's", 7)
+    discovery: Discovery | None = documented(None, "how far discovery reaches; default: the environment's")
+    clock: Clock = documented("wall", "one clock for the whole plan; sim: the time of /clock")
+    frame_prefix: str = documented("", "written in front of every frame as it is, with its slash", "robot1/")
+    shared_frames: tuple[str, ...] = documented((), "frames that never get the prefix", ["map"])
 
 
 @dataclass(frozen=True, slots=True)
 class GuardPolicy:
-    """What the guard does. ``allow`` holds patterns of edges that need no declaration.
+    """What watches the live tree."""
 
-    ``fence`` says how a strict guard fences processes off.
-    """
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
-    mode: GuardMode = "watch"
-    unknown_edges: UnknownEdges = "warn"
-    on_violation: OnViolation = "report"
-    allow: tuple[EdgePattern, ...] = ()
-    fence: FenceWay = field(default="auto", metadata=OMITTED)
+    mode: GuardMode = documented("watch", "strict: what a process of the plan sends and does not own is held back")
+    unknown_edges: UnknownEdges = documented("warn", "what to do about an edge that nobody declared")
+    on_violation: OnViolation = documented(
+        "report", "stop-offender: stop the plan's own process that is proven to have done it; stop: stop everything"
+    )
+    allow: tuple[EdgePattern, ...] = documented((), "edges that need no declaration", [{"child": "tag36h11:*"}])
+    fence: FenceWay = documented(
+        "auto",
+        "how strict fences processes off: by a DDS partition, which needs Fast DDS, or by remapping /tf and /tf_static",
+        **OMITTED,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -348,7 +356,7 @@ class Plan:
         if ros.frame_prefix and not child.startswith(ros.frame_prefix) and child not in ros.shared_frames:
             return True
         return policy.unknown_edges == "ignore" or any(
-            fnmatchcase(parent, parents) and fnmatchcase(child, children) for parents, children in policy.allow
+            fnmatchcase(parent, one.parent) and fnmatchcase(child, one.child) for one in policy.allow
         )
 
     def edges_of(self, owner: str) -> tuple[PlanEdge, ...]:

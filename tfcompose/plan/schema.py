@@ -42,7 +42,8 @@ def _object(cls: Any, made: dict[str, dict[str, Any]]) -> dict[str, Any]:
             properties |= inner["properties"]
             required += inner["required"]
         else:
-            properties[field.name] = _of(field.kind, made)
+            about = {"description": field.description} if field.description else {}
+            properties[field.name] = about | _of(field.kind, made)
             required += [] if field.omitted else [field.name]
     description = inspect.cleandoc(cls.__doc__ or "")
     return {"type": "object", "description": description, "properties": properties, "required": required}

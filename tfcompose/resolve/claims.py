@@ -218,7 +218,7 @@ class _Work:
         self.claims.append(Claim(told.node.name, parent, child, claim.off))
         guard = self.robot.guard
         owns = any(edge.owner == told.process.name for edge in self.robot.edges)
-        allowed = any(fnmatchcase(one, child) or fnmatchcase(child, one) for _, one in guard.allow)
+        allowed = any(fnmatchcase(one.child, child) or fnmatchcase(child, one.child) for one in guard.allow)
         if owns or allowed or guard.unknown_edges == "ignore" or not told.is_published(claim):
             return
         message = f"{told.process.name} publishes {parent} → {child} by default, which the guard does not allow"

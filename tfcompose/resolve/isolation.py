@@ -15,6 +15,7 @@ from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.load import path_named
 from tfcompose.model import SHELL
 from tfcompose.plan import RosSettings, known_at_launch
+from tfcompose.plan.codec import narrowed
 
 if TYPE_CHECKING:
     from tfcompose.language.robot import RobotSpec, RosSpec
@@ -32,7 +33,7 @@ def settings_of(ros: RosSpec) -> RosSettings:
     prefix = ros.frame_prefix
     if not prefix and ros.isolate in {"frames", "both"} and namespace:
         prefix = f"{namespace}/"
-    return RosSettings(namespace, ros.domain_id, ros.discovery, ros.clock, prefix, tuple(ros.shared_frames))
+    return narrowed(RosSettings, ros, namespace=namespace, frame_prefix=prefix)
 
 
 def topics_below(namespace: str, isolate: str) -> dict[str, str]:

@@ -15,6 +15,7 @@ from tfcompose.language import composed, lay_over, validate, with_includes
 from tfcompose.load import Place, Source, load, path_named
 from tfcompose.model import Part
 from tfcompose.plan import RosSettings
+from tfcompose.plan.codec import narrowed
 from tfcompose.resolve.foreign import foreign
 from tfcompose.resolve.renamed import Names, renamed
 from tfcompose.resolve.subtree import subtree
@@ -211,8 +212,7 @@ class PartEntry:
         ros = self.spec.ros
         parts = (ros.namespace, self.said.namespace or "")
         namespace = "/".join(part.strip("/") for part in parts if part.strip("/"))
-        prefix = f"{self.outer_prefix}{self.prefix}"
-        return RosSettings(namespace, ros.domain_id, ros.discovery, ros.clock, prefix, tuple(ros.shared_frames))
+        return narrowed(RosSettings, ros, namespace=namespace, frame_prefix=f"{self.outer_prefix}{self.prefix}")
 
     def laid_over(self, inner: Source) -> Source:
         """Return the part's source with what the holder says about all its parts laid over it."""

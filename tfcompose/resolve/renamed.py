@@ -173,7 +173,7 @@ def _policy(policy: GuardPolicy, robot: Robot, names: Names) -> GuardPolicy:
     def final(pattern: str) -> str:
         return names.frame(pattern) if pattern in robot.frames else pattern
 
-    return replace(policy, allow=tuple(EdgePattern(final(parent), final(child)) for parent, child in policy.allow))
+    return replace(policy, allow=tuple(EdgePattern(final(one.parent), final(one.child)) for one in policy.allow))
 
 
 def _names_of(section: str, name: str, names: Names) -> tuple[str, ...]:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.findings import Finding, finding
 from tfcompose.load import path_named
 from tfcompose.model import Edge, Process, Robot
-from tfcompose.plan import EdgePattern, GuardPolicy
 from tfcompose.resolve.bodies import Bodies, with_colours
 from tfcompose.resolve.calibration import calibrated
 from tfcompose.resolve.completed import completed
@@ -34,9 +33,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tfcompose.language import Validated
-    from tfcompose.language.robot import GuardSpec, RobotSpec
+    from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Source
     from tfcompose.model import Block
+    from tfcompose.plan import GuardPolicy
     from tfcompose.resolve.parts import Joined
     from tfcompose.resolve.poses import Draft
     from tfcompose.resolve.presets import Library
@@ -250,10 +250,10 @@ def _written(source: Source, joined: list[Joined]) -> dict[str, Any]:
     return source.data | ({"in parts": {part.name: part.robot.written for part in joined}} if joined else {})
 
 
-def _guard(said: GuardSpec, parts: list[Robot]) -> GuardPolicy:
-    allow = tuple(EdgePattern(edge.parent, edge.child) for edge in said.allow)
-    allow += tuple(pattern for part in parts for pattern in part.guard.allow if pattern not in allow)
-    return GuardPolicy(said.mode, said.unknown_edges, said.on_violation, allow, said.fence)
+def _guard(said: GuardPolicy, parts: list[Robot]) -> GuardPolicy:
+    """Return the policy with what the parts allow."""
+    more = (pattern for part in parts for pattern in part.guard.allow if pattern not in said.allow)
+    return replace(said, allow=(*said.allow, *more))
 
 
 def _with_rates(edges: tuple[Edge, ...], processes: list[Process]) -> tuple[Edge, ...]:

@@ -74,7 +74,7 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     except RejectedError as error:
         return Compiled(None, error.findings)
     resolved = resolve(validated, library, read, disk)
-    source, parts = validated.source, resolved.whole
+    source, parts = validated.source, resolved.collected
     found = without_duplicates([*validated.found, *resolved.found, *check(resolved.robot)])
     rules = {word: (level, source.at_key(("rules", word))) for word, level in validated.spec.rules.items()}
     sources = (source, *parts.sources)

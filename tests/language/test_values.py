@@ -14,7 +14,7 @@ from tfcompose.geometry import angle_between
 from tfcompose.language import Validated, composed, validate
 from tfcompose.language.expressions import ExpressionError, evaluate
 from tfcompose.load import load
-from tfcompose.units import LENGTH, NUMBER, TURN_RATE, Quantity, UnitError, quantity
+from tfcompose.units import ANGULAR_VELOCITY, LENGTH, NUMBER, Quantity, UnitError, quantity
 
 HEAD = "tfcompose: 1\nrobot: r\n"
 
@@ -157,7 +157,7 @@ def test_what_cannot_be_computed_is_refused_in_one_short_sentence(text: str) -> 
 def test_dimensions_are_carried_along() -> None:
     assert evaluate("1 m * 1", pytest.fail) == Quantity(1.0, LENGTH)
     assert evaluate("2 m / 1 m", pytest.fail) == Quantity(2.0, NUMBER)
-    assert evaluate("1 rad / 1 s", pytest.fail) == Quantity(1.0, TURN_RATE)
+    assert evaluate("1 rad / 1 s", pytest.fail) == Quantity(1.0, ANGULAR_VELOCITY)
 
 
 @pytest.mark.parametrize(

@@ -73,7 +73,7 @@ def degrees_as_radians(robot: Robot) -> Iterator[Finding]:
     exceed a turn: of these only values that people write in degrees are reported.
     """
     revolute = {edge.joint.name for edge in robot.edges if edge.joint and edge.joint.type == "revolute"}
-    for value in robot.as_written:
+    for value in robot.source_numbers:
         is_limit = value.key == "limit"
         if value.key not in {"rpy", "look", "axis_angle", "limit"} or (is_limit and value.entry not in revolute):
             continue
@@ -100,7 +100,7 @@ def rounded_right_angle(robot: Robot) -> Iterator[Finding]:
     cloud is slightly tilted. Write ``-90 deg``, or ``"${-pi/2}"``. Only roundings of right angles are reported: a
     measured 1.5689 is not.
     """
-    for value in robot.as_written:
+    for value in robot.source_numbers:
         if value.key not in {"rpy", "look", "axis_angle"}:
             continue
         rounded = [(n, index) for index, n in enumerate(value.numbers) if _is_rounded(n)]
@@ -141,7 +141,7 @@ def quaternion_w_first(robot: Robot) -> Iterator[Finding]:
     ``rpy: [180 deg, 0, 0]``. Reported are [1, 0, 0, 0] itself, and quaternions that are a small pitch or yaw with w
     first and a large rotation about an odd axis otherwise.
     """
-    for value in robot.as_written:
+    for value in robot.source_numbers:
         if value.key != "quat_xyzw" or len(value.numbers) != 4:  # noqa: PLR2004 (x, y, z, w)
             continue
         first, second, third, fourth = value.numbers
@@ -238,7 +238,7 @@ def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
     moved = {edge.joint_name: edge.child for edge in robot.edges if edge.joint_name}
     mounted = {sensor.name: sensor.mount for sensor in robot.sensors}
     named: dict[str | int, dict[str, str]] = {"joints": moved, "sensors": mounted, "parts": robot.mounted}
-    for value in robot.as_written:
+    for value in robot.source_numbers:
         if value.path[2:] != ("xyz",) or norm(value.numbers) <= limit or value.path[0] == "processes":
             continue
         child = named.get(value.path[0], {}).get(value.entry, value.entry)

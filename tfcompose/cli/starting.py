@@ -1,4 +1,4 @@
-"""How ``up`` starts a robot here: what it needs is looked at first, all of it; then the run gets its place."""
+"""How ``up`` starts a robot here: it checks first all that the plan needs, then makes the runtime directory."""
 
 from __future__ import annotations
 

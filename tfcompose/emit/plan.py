@@ -81,7 +81,7 @@ def _below(part: str, name: str) -> str:
 
 def _digest(robot: Robot) -> str:
     """Return the digest of what was written: it changes when a key or value does, and not with layout or comments."""
-    text = json.dumps(robot.written, sort_keys=True, ensure_ascii=False)
+    text = json.dumps(robot.source_data, sort_keys=True, ensure_ascii=False)
     return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
 
 

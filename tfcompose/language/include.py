@@ -56,8 +56,8 @@ class _Includer:
         return replace(merged, file=source.file)
 
     def _names(self, source: Source) -> list[tuple[int, str]]:
-        written = source.data["include"]
-        names = written if isinstance(written, list) else [written]
+        included = source.data["include"]
+        names = included if isinstance(included, list) else [included]
         wrong = [index for index, name in enumerate(names) if not isinstance(name, str) or not name]
         if wrong:
             advice = "for example include: [base.yaml]"
@@ -95,8 +95,8 @@ def set_value(setting: str) -> Source:
     read = load(f"value: {value_text.strip() or 'null'}", span.file)
     data: Any = read.data["value"]
     below = read.places.inside["value"]
-    whole = Place(Span(span.file, 1, 1, below.span.end_line, below.span.end_column))
-    place = whole.with_inside(below.inside, below.keys)
+    full = Place(Span(span.file, 1, 1, below.span.end_line, below.span.end_column))
+    place = full.with_inside(below.inside, below.keys)
     for step in reversed(path):
-        data, place = {step: data}, whole.with_inside({step: place}, {str(step): whole})
+        data, place = {step: data}, full.with_inside({step: place}, {str(step): full})
     return Source(span.file, data, place, read.found)

@@ -13,17 +13,17 @@ from tfcompose.language.pose import Posed
 from tfcompose.language.spec import Checked, Spec, key, several
 from tfcompose.language.values import (
     Boolean,
+    Integral,
     Matches,
     Namespace,
     NodeName,
     OnlyTrue,
     Parameters,
     Text,
-    Whole,
     short,
 )
 from tfcompose.plan import LifecycleState, LogLevel, RestartPolicy, StartCondition, StopSignal
-from tfcompose.units import Duration, JointPosition, Quantity, Rate, Size, TurnRate, refused, shown
+from tfcompose.units import AngularVelocity, Duration, JointPosition, Quantity, Rate, Size, refused, shown
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -104,7 +104,7 @@ class Circle(Spec):
     """A body that drives on a circle, counter-clockwise."""
 
     radius: Size = key(1.0, "the circle's radius")
-    speed: TurnRate = key(0.5, "how fast it turns")
+    speed: AngularVelocity = key(0.5, "how fast it turns")
 
 
 SWEEP = "sweep"
@@ -171,7 +171,7 @@ class ReadySpec(Checked):
     log: Annotated[Text, AfterValidator(_is_regular)] | None = key(
         None, "when a line of its output matches this regular expression", "server started"
     )
-    exit: Annotated[int, Strict(), Field(ge=0, le=255), Whole] | None = key(
+    exit: Annotated[int, Strict(), Field(ge=0, le=255), Integral] | None = key(
         None, "when it has ended with this exit code", 0
     )
     time: Duration | None = key(None, "this long after its start", "2 s")
@@ -263,7 +263,7 @@ class Started(Checked):
         "true: its end stops everything; false: the rest goes on when it fails; default: its failure stops everything",
     )
     restart: RestartPolicy = key("no", "when it is started again after it has ended")
-    max_restarts: Annotated[int, Strict(), Field(ge=0, le=1_000_000), Whole] | None = key(
+    max_restarts: Annotated[int, Strict(), Field(ge=0, le=1_000_000), Integral] | None = key(
         None, "how often in a row it is started again before it is given up", 5
     )
     stop: StopSpec | None = key(None, "how it is stopped", {"signal": "SIGTERM", "timeout": "5 s"})

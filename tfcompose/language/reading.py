@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 M = TypeVar("M", bound="Spec")
 
 #: How often the rest is read again at most: no file is nested deeper.
-_MOST_TURNS = 50
+_MAX_ATTEMPTS = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +64,11 @@ def read(model: type[M], data: Any, already: Iterable[Path] = ()) -> tuple[M | N
     refusals: list[Refusal] = []
     gone: set[Path] = set()
     rest = _without(data, already, gone)
-    for turn in range(_MOST_TURNS):
+    for attempt in range(_MAX_ATTEMPTS):
         if rest is None:
             break
         try:
-            return model.model_validate(rest, context=None if turn else FIRST), refusals
+            return model.model_validate(rest, context=None if attempt else FIRST), refusals
         except ValidationError as error:
             errors = [(_path_of(one["loc"], data), one) for one in error.errors(include_url=False)]
         follows = {path[:end] for path in gone for end in range(1, len(path) + 1)}

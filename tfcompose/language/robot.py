@@ -17,6 +17,7 @@ from tfcompose.language.spec import Checked, Spec, below, inherited, key, measur
 from tfcompose.language.values import (
     Axis,
     Boolean,
+    Integral,
     Matches,
     Namespace,
     NoMapping,
@@ -24,7 +25,6 @@ from tfcompose.language.values import (
     Parameters,
     Text,
     Texts,
-    Whole,
     Xyz,
 )
 from tfcompose.model import Dynamics, Limit, ReferencePositions, SafetyController
@@ -178,7 +178,7 @@ class HardwareSpec(Checked):
     plugin: Text = key(..., "the class that drives it", "mock_components/GenericSystem")
     type: Literal["system", "actuator", "sensor"] = key("system", "which kind of component it is")
     params: XmlParameters = key({}, "the plugin's parameters", {"device": "/dev/ttyUSB0"})
-    rw_rate: Annotated[int, Strict(), Field(ge=1, le=100_000), Whole] | None = key(
+    rw_rate: Annotated[int, Strict(), Field(ge=1, le=100_000), Integral] | None = key(
         None, "how many times a second it is read and written; default: as all", 100
     )
     is_async: Boolean | None = key(None, "true: it is read and written in a thread of its own")
@@ -328,7 +328,7 @@ class RosSpec(RosSettings):
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
     namespace: Namespace = inherited(RosSettings, "namespace")
-    domain_id: Annotated[int, Strict(), Field(ge=0, le=232), Whole] | None = inherited(RosSettings, "domain_id")
+    domain_id: Annotated[int, Strict(), Field(ge=0, le=232), Integral] | None = inherited(RosSettings, "domain_id")
     isolate: Isolation = documented(
         "none", "topics: /tf moves below the namespace; frames: the namespace is the prefix, unless one is given"
     )

@@ -100,11 +100,11 @@ def _nulls(source: Source) -> list[Refusal]:
     """Return a refusal of each key and item without a value; null only removes what it is merged over."""
     found: list[Refusal] = []
 
-    def look(value: Any, path: Path) -> None:
+    def visit(value: Any, path: Path) -> None:
         for step, item in value.items() if isinstance(value, dict) else enumerate(value):
             at = (*path, step)
             if isinstance(item, (dict, list)):
-                look(item, at)
+                visit(item, at)
             elif item is None and isinstance(value, list):
                 message = "an item of the list has no value"
                 found.append(Refusal("TF006", at, message, "give a value, or remove the item"))
@@ -113,7 +113,7 @@ def _nulls(source: Source) -> list[Refusal]:
                 found.append(Refusal("TF006", at, message, advice, on_key=True))
 
     if source.has_nulls:
-        look(source.data, ())
+        visit(source.data, ())
     return found
 
 

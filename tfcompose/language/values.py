@@ -82,9 +82,9 @@ def plain(value: Any) -> Any:
     return [plain(item) for item in value] if isinstance(value, list) else value
 
 
-def _whole(value: Any) -> Any:
-    is_whole = isinstance(value, Quantity) and value.dimension == NUMBER and value.value == int(value.value)
-    return int(value.value) if is_whole else value
+def _integral(value: Any) -> Any:
+    is_integral = isinstance(value, Quantity) and value.dimension == NUMBER and value.value == int(value.value)
+    return int(value.value) if is_integral else value
 
 
 def _is_true(value: Any) -> bool:
@@ -119,7 +119,7 @@ Text = Annotated[str, Strict()]
 Boolean = Annotated[bool, Strict()]
 OnlyTrue = Annotated[bool, BeforeValidator(_is_true), Field(json_schema_extra={"const": True})]
 #: Annotates a whole number, which may be computed.
-Whole = BeforeValidator(_whole)
+Integral = BeforeValidator(_integral)
 Name = Annotated[Text, Matches(r"[A-Za-z][A-Za-z0-9_]*", "a name: a letter, then letters, digits and _")]
 Namespace = Annotated[
     Text,

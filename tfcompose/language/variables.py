@@ -31,9 +31,9 @@ def compute(data: dict[str, Any]) -> tuple[dict[str, Any], list[Refusal], list[P
 
 def unused(data: dict[str, Any], aside: Any = None) -> tuple[str, ...]:
     """Return the variables that no ``${…}`` names, in ``data`` or in ``aside``."""
-    written = data.get("vars")
-    used = set(_names(data)) | set(_names(aside)) if isinstance(written, dict) and written else set()
-    return tuple(name for name in written if name not in used) if isinstance(written, dict) else ()
+    declared = data.get("vars")
+    used = set(_names(data)) | set(_names(aside)) if isinstance(declared, dict) and declared else set()
+    return tuple(name for name in declared if name not in used) if isinstance(declared, dict) else ()
 
 
 def _names(value: Any) -> Iterator[str]:
@@ -102,8 +102,8 @@ class _Variables:
                 self.open.pop()
 
     def _names_in(self, name: str) -> Iterator[str]:
-        written = self.given[name]
-        names = names_in(written) if isinstance(written, str) else []
+        value = self.given[name]
+        names = names_in(value) if isinstance(value, str) else []
         return iter([other for other in names if other in self.given])
 
     def _read(self, name: str) -> None:

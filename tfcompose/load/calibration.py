@@ -48,8 +48,8 @@ def load_calibration(text: str, file: str) -> tuple[Form, tuple[Source, ...]]:
     """
     refuse_unreadable(text, file)
     lines = text.splitlines()
-    written = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
-    if 0 < len(written) <= MOST_ROWS and all(map(_is_row, written)):
+    filled = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
+    if 0 < len(filled) <= MOST_ROWS and all(map(_is_row, filled)):
         return "rows", (_rows(lines, file),)
     if PUBLISHER in text and (text.lstrip().startswith("<") or "LaunchDescription" in text):
         return "launch", (_launch(text, file),)
@@ -106,9 +106,9 @@ def _rows(lines: list[str], file: str) -> Source:
         if not line.strip() or line.lstrip().startswith("#"):
             continue
         row = [(m.group(), m.start() + 1, m.end() + 1) for m in _WORD.finditer(line)]
-        whole = Span(file, number, row[0][1], number, row[-1][2])
+        line_span = Span(file, number, row[0][1], number, row[-1][2])
         words = {i: Place(Span(file, number, a, number, b)) for i, (_, a, b) in enumerate(row)}
-        places[len(data)] = Place(whole, words)
+        places[len(data)] = Place(line_span, words)
         data.append([word for word, _, _ in row])
     first = places[0].span
     return Source(file, data, Place(Span(file, first.line, first.column, len(lines) + 1, 1), places))

@@ -52,16 +52,16 @@ def allows_in_xml(text: str, file: str) -> tuple[Allow, ...]:
                     found[index] = replace(found[index], line=tag[0], last=tag[1])
             waiting.clear()
             continue
-        said = _XML.fullmatch(markup["comment"])
-        if said is None:
+        match = _XML.fullmatch(markup["comment"])
+        if match is None:
             continue
         at = _span(file, starts, markup.start(), markup.end())
         alone = not text[starts[at.line - 1] : markup.start()].strip()
         if alone:
             waiting.append(len(found))
         first, last = (at.end_line + 1, 0) if alone else tag if tag[1] == at.line else (at.line, 0)
-        reason = " ".join((said["reason"] or "").split())
-        found.append(Allow(tuple(_CODE.findall(said["codes"])), first, reason, at, last))
+        reason = " ".join((match["reason"] or "").split())
+        found.append(Allow(tuple(_CODE.findall(match["codes"])), first, reason, at, last))
     return tuple(found)
 
 

@@ -21,8 +21,8 @@ def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Finding:
     line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
     message, advice = ", ".join(filter(None, (error.context, error.problem))), ""
     lines = text.splitlines()
-    written = lines[line - 1] if line <= len(lines) else ""
-    if "\t" in written[: len(written) - len(written.lstrip())]:
+    source_line = lines[line - 1] if line <= len(lines) else ""
+    if "\t" in source_line[: len(source_line) - len(source_line.lstrip())]:
         message, advice = "a tab in the indentation", "indent with spaces; YAML does not allow tabs there"
     notes = []
     if error.context_mark and mark and error.context_mark.line != mark.line:

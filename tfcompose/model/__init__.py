@@ -9,7 +9,7 @@ from tfcompose.model.edge import Calibration, Edge
 from tfcompose.model.hardware import Block, Component, Hardware, Interface
 from tfcompose.model.joint import BOUNDED, FREE, MOVING, Dynamics, Joint, Limit, ReferencePositions, SafetyController
 from tfcompose.model.process import BUILT_IN, GUARD, JOINTS, SHELL, STATIC, AsInFile, Claim, Node, Process
-from tfcompose.model.robot import AsWritten, Part, Robot
+from tfcompose.model.robot import Part, Robot, SourceNumbers
 from tfcompose.model.sensor import OPTICAL_ENDINGS, MountedSensor, is_optical
 
 __all__ = [
@@ -23,7 +23,6 @@ __all__ = [
     "SHELL",
     "STATIC",
     "AsInFile",
-    "AsWritten",
     "Asset",
     "Block",
     "Calibration",
@@ -46,6 +45,7 @@ __all__ = [
     "Robot",
     "SafetyController",
     "Shape",
+    "SourceNumbers",
     "colour_name",
     "is_optical",
     "materials",

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class AsWritten:
-    """The numbers of one value of a pose or joint limit as the file has them, in SI, each with its place.
+class SourceNumbers:
+    """The numbers of one pose or joint limit as the source file gives them, in SI, each with its place.
 
     ``path`` leads to the value (``sensors``, ``camera``, ``rpy``); ``with_unit`` says of each number whether it stands
     there with a unit, and ``place`` where the number of an index stands.
@@ -61,13 +61,13 @@ class Robot:
     """One robot, resolved.
 
     ``frames`` holds every frame that was declared, with its place; ``base`` is where the URDF begins, or None where the
-    tree has no single root; ``sensors`` are those with a known preset, ``as_written`` the numbers of poses and limits
-    before they became poses, ``unused`` the variables that nothing uses; ``written`` is the plain data that the robot
-    was made from, profiles laid over it; ``broken`` holds the entries (section, name) that were refused already, of a
-    part how its names begin; ``refused`` is where the refused entries of the file are. ``parts`` are those that are
-    robots of their own, ``mounted`` the root frame of each part by its name, ``part_notes`` what to add to findings in
-    a part's file. ``foreign`` are the files that somebody else wrote: what those say otherwise than is usual here
-    cannot be fixed here. A robot that ``is_variant`` is a file's with profiles or overlays merged over it.
+    tree has no single root; ``sensors`` are those with a known preset, ``source_numbers`` the numbers of poses and
+    limits before they became poses, ``unused`` the variables that nothing uses; ``source_data`` is the plain data that
+    the robot was made from, profiles laid over it; ``broken`` holds the entries (section, name) that were refused
+    already, of a part how its names begin; ``refused`` is where the refused entries of the file are. ``parts`` are
+    those that are robots of their own, ``mounted`` the root frame of each part by its name, ``part_notes`` what to add
+    to findings in a part's file. ``foreign`` are files of other tools, in which nothing can be fixed here. A robot that
+    ``is_variant`` is a file's with profiles or overlays merged over it.
     """
 
     name: str
@@ -80,9 +80,9 @@ class Robot:
     ros: RosSettings = field(default_factory=RosSettings)
     guard: GuardPolicy = field(default_factory=GuardPolicy)
     sensors: tuple[MountedSensor, ...] = ()
-    as_written: tuple[AsWritten, ...] = field(default=(), compare=False, repr=False)
+    source_numbers: tuple[SourceNumbers, ...] = field(default=(), compare=False, repr=False)
     unused: dict[str, Span] = field(default_factory=dict, compare=False)
-    written: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
+    source_data: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
     broken: frozenset[tuple[str, str]] = frozenset()
     claims: tuple[Claim, ...] = ()
     parts: tuple[Part, ...] = ()

@@ -72,11 +72,11 @@ def _share(plan: Plan, host: str | None) -> Plan:
     processes = tuple(_here(plan, process, host) for process in plan.processes)
     watched = next((one.host for one in plan.processes if one.kind == "guard"), None)
     guard = replace(plan.guard, mode="off") if watched not in (None, host) else plan.guard
-    edges = tuple(_seen_from(plan, edge, host) for edge in plan.edges) if guard.mode == "strict" else plan.edges
+    edges = tuple(_edge_on_host(plan, edge, host) for edge in plan.edges) if guard.mode == "strict" else plan.edges
     return replace(plan, edges=edges, processes=processes, guard=guard, host=host or "")
 
 
-def _seen_from(plan: Plan, edge: PlanEdge, host: str | None) -> PlanEdge:
+def _edge_on_host(plan: Plan, edge: PlanEdge, host: str | None) -> PlanEdge:
     """Return the edge as it is seen on a host: what another machine's process sends, its strict guard passes on."""
     owner = plan.process(edge.owner)
     if owner.kind == "external" or owner.host == host:

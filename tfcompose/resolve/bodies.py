@@ -14,7 +14,7 @@ from tfcompose.urdf.packages import Packages
 
 if TYPE_CHECKING:
     from tfcompose.findings import Span
-    from tfcompose.language import bodies as said
+    from tfcompose.language import bodies as specs
     from tfcompose.load import Path, Source
 
 FORMS = ("box", "cylinder", "sphere", "capsule", "mesh")
@@ -29,7 +29,7 @@ class Bodies:
     found: list[Finding] = field(default_factory=list)
     _known: dict[int, tuple[tuple[Shape, ...], tuple[Shape, ...], Inertial | None]] = field(default_factory=dict)
 
-    def link(self, name: str, body: said.LinkSpec) -> Link:
+    def link(self, name: str, body: specs.LinkSpec) -> Link:
         """Return the link with its shapes and, where it has a mass, its inertia."""
         place = self.source.at_key(("links", name))
         if id(body) not in self._known:  # aliases of one anchor are one object, and have the same shapes
@@ -39,7 +39,7 @@ class Bodies:
             inertial = replace(inertial, at=place)
         return Link(name, place, visuals, collisions, inertial)
 
-    def _parts(self, body: said.LinkSpec, at: Path) -> tuple[tuple[Shape, ...], tuple[Shape, ...], Inertial | None]:
+    def _parts(self, body: specs.LinkSpec, at: Path) -> tuple[tuple[Shape, ...], tuple[Shape, ...], Inertial | None]:
         visuals = self._shapes(body.visual, (*at, "visual"))
         collisions = visuals if body.collision == "same" else self._shapes(body.collision, (*at, "collision"))
         inertial = None
@@ -47,7 +47,7 @@ class Bodies:
             inertial = self._inertial(body.inertial, visuals, collisions, (*at, "inertial"))
         return visuals, collisions, inertial
 
-    def shape(self, shape: said.Shape, at: Path) -> Shape:
+    def shape(self, shape: specs.Shape, at: Path) -> Shape:
         """Return the shape, which must have a form."""
         material = self._material(shape.material, (*at, "material")) if shape.material else None
         pose = pose_of(shape)
@@ -66,14 +66,14 @@ class Bodies:
             return Shape("mesh", shape.mesh.scale, pose, material, mesh)
         raise ValueError("a shape without a form")
 
-    def _shapes(self, shapes: tuple[said.Shape, ...], at: Path) -> tuple[Shape, ...]:
+    def _shapes(self, shapes: tuple[specs.Shape, ...], at: Path) -> tuple[Shape, ...]:
         return tuple(
             self.shape(shape, (*at, index) if self.source.has((*at, index)) else at)
             for index, shape in enumerate(shapes)
             if any(getattr(shape, form) for form in FORMS)
         )
 
-    def _material(self, given: said.Material, at: Path) -> Material:
+    def _material(self, given: specs.Material, at: Path) -> Material:
         """Return the colour with its name; one without is named after its parts, so that URDF keeps them apart."""
         texture = None
         if given.texture is not None:
@@ -87,7 +87,7 @@ class Bodies:
         return Material(name, rgba, texture, self.source.at(at))
 
     def _inertial(
-        self, given: said.Inertial, visuals: tuple[Shape, ...], collisions: tuple[Shape, ...], at: Path
+        self, given: specs.Inertial, visuals: tuple[Shape, ...], collisions: tuple[Shape, ...], at: Path
     ) -> Inertial | None:
         shapes, place = collisions or visuals, self.source.at_key(at[:2])
         pose = Pose(given.xyz or (0.0, 0.0, 0.0), rotation_of(given) or Pose().quat_xyzw)
@@ -95,15 +95,15 @@ class Bodies:
             i = given.inertia
             tensor = (i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz)
             return Inertial(given.mass, pose, tensor, traces(given.mass, visuals, collisions), place)
-        whole = self.moments(shapes, self.source.at_key(at)) if shapes else None
-        if whole is None:
+        moments = self.moments(shapes, self.source.at_key(at)) if shapes else None
+        if moments is None:
             return None
-        density = given.density or (given.mass or 0.0) / whole.volume
+        density = given.density or (given.mass or 0.0) / moments.volume
         if given.inertia:
             i = given.inertia
             tensor = (i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz)
-            return Inertial(density * whole.volume, pose, tensor, (density * trace(whole.tensor),), place)
-        computed = inertial(whole, density, given.mass)
+            return Inertial(density * moments.volume, pose, tensor, (density * trace(moments.tensor),), place)
+        computed = inertial(moments, density, given.mass)
         return replace(computed, pose=Pose(given.xyz)) if given.xyz else computed
 
     def moments(self, shapes: tuple[Shape, ...], at: Span) -> Moments | None:
@@ -152,4 +152,4 @@ def _coloured(link: Link, known: dict[str, Material], bare: set[str]) -> Link:
 
 
 def _word(uri: str) -> str:
-    return "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in uri)
+    return "".join(char if char.isascii() and char.isalnum() else "_" for char in uri)

@@ -68,9 +68,9 @@ class _Files:
             loaded = read_calibration(self.read(path), path, form)
             wrong = loaded.found
         except RejectedError as error:
-            whole = Span(path)  # no place in it
+            file_span = Span(path)  # no place in it
             found = error.findings
-            wrong = tuple(replace(one, code="TF610", span=None if one.span == whole else one.span) for one in found)
+            wrong = tuple(replace(one, code="TF610", span=None if one.span == file_span else one.span) for one in found)
             loaded = CalibrationFile(path, form, (), wrong)
         for one in wrong:
             notes = [Note("it stands here", one.span), *one.notes] if one.span else one.notes
@@ -112,36 +112,36 @@ class _Work:
 
     def own(self, draft: Draft) -> Draft:
         """Return the draft with what its own ``calibration`` says."""
-        said = _said(draft, self.spec)
-        if said is None:
+        declared = _declared(draft, self.spec)
+        if declared is None:
             return draft
         at = self.source.at((*draft.at, "calibration", "file"))
-        file = self.files.get(said.file, at, said.format)
-        match = self._pick(draft, said, file, at)
-        return self._measured(draft, match, file, said, at) if match else draft
+        file = self.files.get(declared.file, at, declared.format)
+        match = self._pick(draft, declared, file, at)
+        return self._measured(draft, match, file, declared, at) if match else draft
 
     def _around(self, draft: Draft) -> tuple[set[str], set[str]]:
         """Return the names of the frames that the edge's parent and child can have in its entry."""
         inside = self.inside[draft.group] if draft.group else {draft.edge.child}
         return {draft.edge.parent, draft.relative_to or draft.edge.parent}, inside
 
-    def _pick(self, draft: Draft, said: CalibrationSpec, file: CalibrationFile, at: Span) -> _Match | None:
+    def _pick(self, draft: Draft, declared: CalibrationSpec, file: CalibrationFile, at: Span) -> _Match | None:
         own_parents, inside = self._around(draft)
         nameless = [one for one in file.entries if one.parent is None]
         if nameless:
-            return _Match(nameless[0], inverted=said.parent in inside or said.child in own_parents)
-        parents = _alias(said.parent) if said.parent else own_parents
-        children = _alias(said.child) if said.child else inside
+            return _Match(nameless[0], inverted=declared.parent in inside or declared.child in own_parents)
+        parents = _alias(declared.parent) if declared.parent else own_parents
+        children = _alias(declared.child) if declared.child else inside
         matches = _matches(file.entries, parents, children)
         if not matches and not file.found:
-            self._missing(said, file, at, draft)
+            self._missing(declared, file, at, draft)
         if len(matches) > 1:
             self._ambiguous(f"{draft.edge.name}: {len(matches)} entries of {file.file} fit", at, matches)
             return None
         return matches[0] if matches else None
 
-    def _missing(self, said: CalibrationSpec, file: CalibrationFile, at: Span, draft: Draft) -> None:
-        child, parent = said.child or draft.place or draft.edge.child, said.parent or draft.edge.parent
+    def _missing(self, declared: CalibrationSpec, file: CalibrationFile, at: Span, draft: Draft) -> None:
+        child, parent = declared.child or draft.place or draft.edge.child, declared.parent or draft.edge.parent
         names = [name for entry in file.entries for name in (entry.child, entry.parent) if name]
         near = next((hint for name in (child, parent) if name not in names and (hint := nearest(name, names))), None)
         shown = [one for one in file.entries if near in {one.child, one.parent}] or list(file.entries)
@@ -158,13 +158,13 @@ class _Work:
         self.found.append(finding("TF613", message, at, help=advice, notes=notes))
 
     def _measured(
-        self, draft: Draft, match: _Match, file: CalibrationFile, said: CalibrationSpec | None, at: Span
+        self, draft: Draft, match: _Match, file: CalibrationFile, declared: CalibrationSpec | None, at: Span
     ) -> Draft:
         self.used.add(id(match.entry))
         parent, child = match.names
-        if parent is None and said:
-            parent, child = (said.child, said.parent) if match.inverted else (said.parent, said.child)
-        limit = said.limit if said else _DEFAULT_LIMIT
+        if parent is None and declared:
+            parent, child = (declared.child, declared.parent) if match.inverted else (declared.parent, declared.child)
+        limit = declared.limit if declared else _DEFAULT_LIMIT
         pose = match.entry.pose.inverse() if match.inverted else match.entry.pose
         calibration = Calibration(
             parent=parent if parent in self.frames and parent else draft.relative_to or draft.edge.parent,
@@ -221,7 +221,7 @@ class _Work:
             self.found.append(finding("TF619", message, at, help=advice, notes=[note]))
 
 
-def _said(draft: Draft, spec: RobotSpec) -> CalibrationSpec | None:
+def _declared(draft: Draft, spec: RobotSpec) -> CalibrationSpec | None:
     if not draft.at or draft.at[0] not in _MEASURABLE:
         return None
     section: dict[str, Any] = getattr(spec, str(draft.at[0]))

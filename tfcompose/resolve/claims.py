@@ -44,12 +44,12 @@ class _Work:
         """Return the process with its nodes told."""
         if process.name not in self.spec.processes or process.kind not in {"run", "external"}:
             return process
-        told = [self._node(process, node) for node in process.nodes]
-        if all(one is not None for one in told):
+        claimants = [self._node(process, node) for node in process.nodes]
+        if all(one is not None for one in claimants):
             self.known.add(process.name)
         nodes = (
-            replace(node, params=node.params | one.computed) if one and one.can_be_told else node
-            for node, one in zip(process.nodes, told, strict=True)
+            replace(node, params=node.params | one.computed) if one and one.takes_parameters else node
+            for node, one in zip(process.nodes, claimants, strict=True)
         )
         return replace(process, nodes=tuple(nodes))
 
@@ -75,22 +75,22 @@ class _Work:
             self.found.append(finding("TF332", message, at, help=advice))
         return edge
 
-    def _node(self, process: Process, node: Node) -> Told | None:
+    def _node(self, process: Process, node: Node) -> Claimant | None:
         """Return what is known of a node and what it is told, or None where nothing is said."""
-        said = self.spec.processes[process.name]
-        inner = said.nodes.get(str(node.path[-1])) if len(node.path) > 2 else None  # noqa: PLR2004 (below nodes)
-        name = inner.preset if inner else said.node.preset if said.node and not said.nodes else None
-        by_hand = inner.publishes if inner else said.publishes
+        declared = self.spec.processes[process.name]
+        inner = declared.nodes.get(str(node.path[-1])) if len(node.path) > 2 else None  # noqa: PLR2004 (below nodes)
+        name = inner.preset if inner else declared.node.preset if declared.node and not declared.nodes else None
+        by_hand = inner.publishes if inner else declared.publishes
         preset = self._preset(name, (*node.path, *(() if inner else ("node",)), "preset")) if name else None
         if preset is None and not by_hand:
             return None
         claims = (*(preset.publishes if preset else ()), *by_hand)
         roles = Roles(self.robot, process.name, preset, claims)
-        told = Told(process, node, claims, preset, roles, flat(node.params))
-        self._tell_names(told)
-        for claim in self._of_one(told) if preset and preset.one_of else claims:
-            self._settle(told, claim)
-        return told
+        claimant = Claimant(process, node, claims, preset, roles, flat(node.params))
+        self._tell_names(claimant)
+        for claim in self._of_one(claimant) if preset and preset.one_of else claims:
+            self._settle(claimant, claim)
+        return claimant
 
     def _preset(self, name: str, path: Path) -> NodePresetSpec | None:
         try:
@@ -103,130 +103,133 @@ class _Work:
             self.found += error.findings
         return None
 
-    def _of_one(self, told: Told) -> tuple[ClaimSpec, ...]:
+    def _of_one(self, claimant: Claimant) -> tuple[ClaimSpec, ...]:
         """Return the claim that a node makes which makes one out of several: its own, or the one that is chosen."""
-        for claim in told.claims:
-            if self._is_own(told, claim):
+        for claim in claimant.claims:
+            if self._is_own(claimant, claim):
                 return (claim,)
-        for claim in told.claims:
-            if told.has({key: told.roles.final(value) for key, value in claim.chosen_by.items()} or claim.on):
+        for claim in claimant.claims:
+            if claimant.has({key: claimant.roles.final(value) for key, value in claim.chosen_by.items()} or claim.on):
                 return (claim,)
-        return told.claims[:1]
+        return claimant.claims[:1]
 
-    def _tell_names(self, told: Told) -> None:
+    def _tell_names(self, claimant: Claimant) -> None:
         """Write the parameters that hold frames' names, and those without which they would mean something else."""
-        preset = told.preset
+        preset = claimant.preset
         if preset is None:
             return
         for role, described in preset.frames.items():
-            frame = told.roles.frames.get(role)
+            frame = claimant.roles.frames.get(role)
             if described.parameter is None or frame is None:
                 continue
-            given = told.given.get(described.parameter)
-            if given is not None and not told.roles.is_bound(role) and self._is_frame(given):
+            given = claimant.given.get(described.parameter)
+            if given is not None and not claimant.roles.is_bound(role) and self._is_frame(given):
                 continue  # the tree leaves it open
-            self._tell(told, described.parameter, self.robot.final(frame))
+            self._tell(claimant, described.parameter, self.robot.final(frame))
         for key, value in preset.set.items():
-            self._tell(told, key, value)
+            self._tell(claimant, key, value)
 
     def _is_frame(self, name: Any) -> bool:
         return any(name == self.robot.final(frame) for frame in self.robot.frames)
 
-    def _tell(self, told: Told, key: str, value: Any) -> None:
-        given = told.given.get(key)
+    def _tell(self, claimant: Claimant, key: str, value: Any) -> None:
+        given = claimant.given.get(key)
         if given is None:
-            told.computed[key] = value
+            claimant.computed[key] = value
         elif given != value:
-            message = f"{key} of {told.process.name} is {given!r}, and by the tree it is {value!r}"
-            self.found.append(finding("TF333", message, self._at(told, key), help="remove it: tfcompose writes it"))
+            message = f"{key} of {claimant.process.name} is {given!r}, and by the tree it is {value!r}"
+            self.found.append(finding("TF333", message, self._at(claimant, key), help="remove it: tfcompose writes it"))
 
-    def _is_own(self, told: Told, claim: ClaimSpec) -> bool:
-        edge = self._edge(*told.ends(claim))
-        return edge is not None and edge.owner == told.process.name
+    def _is_own(self, claimant: Claimant, claim: ClaimSpec) -> bool:
+        edge = self._edge(*claimant.ends(claim))
+        return edge is not None and edge.owner == claimant.process.name
 
     def _edge(self, parent: str, child: str) -> Edge | None:
         edges = (edge for edge in self.robot.edges if edge.child == child)
         return next((edge for edge in edges if parent in {edge.parent, *edge.switched}), None)
 
-    def _settle(self, told: Told, claim: ClaimSpec) -> None:
-        parent, child = told.ends(claim)
+    def _settle(self, claimant: Claimant, claim: ClaimSpec) -> None:
+        parent, child = claimant.ends(claim)
         if "*" in parent + child:
-            self._settle_pattern(told, claim, parent, child)
+            self._settle_pattern(claimant, claim, parent, child)
             return
         edge = self._edge(parent, child)
-        if edge is not None and edge.owner == told.process.name:
-            self._own(told, claim, edge)
+        if edge is not None and edge.owner == claimant.process.name:
+            self._own(claimant, claim, edge)
             return
-        if told.is_published(claim) or claim.by_default:
-            self.claims.append(Claim(told.node.name, parent, child, claim.off))
-        if not told.is_published(claim):
+        if claimant.is_published(claim) or claim.by_default:
+            self.claims.append(Claim(claimant.node.name, parent, child, claim.off))
+        if not claimant.is_published(claim):
             return
         other = edge or self.robot.parent_edge(child)
         if other is None:
-            self._undeclared(told, claim, parent, child)
+            self._undeclared(claimant, claim, parent, child)
         else:
-            self._foreign(told, claim, f"{parent} → {child}", other)
+            self._foreign(claimant, claim, f"{parent} → {child}", other)
 
-    def _own(self, told: Told, claim: ClaimSpec, edge: Edge) -> None:
-        self.publishers[told.process.name, edge.child] = told.node.name
+    def _own(self, claimant: Claimant, claim: ClaimSpec, edge: Edge) -> None:
+        self.publishers[claimant.process.name, edge.child] = claimant.node.name
         for key, value in claim.chosen_by.items():
-            self._tell(told, key, told.roles.final(value))
+            self._tell(claimant, key, claimant.roles.final(value))
         for key, value in claim.on.items() if not claim.by_default else ():
-            self._tell(told, key, value)
-        if told.has(claim.off):
-            message = f"{told.process.name} owns {edge.name}, and is told not to publish it: {switch_text(claim.off)}"
-            place = self._at(told, next(iter(claim.off)))
+            self._tell(claimant, key, value)
+        if claimant.has(claim.off):
+            message = (
+                f"{claimant.process.name} owns {edge.name}, and is told not to publish it: {switch_text(claim.off)}"
+            )
+            place = self._at(claimant, next(iter(claim.off)))
             self.found.append(finding("TF333", message, place, help="remove it, or name another owner"))
 
-    def _foreign(self, told: Told, claim: ClaimSpec, name: str, other: Edge) -> None:
+    def _foreign(self, claimant: Claimant, claim: ClaimSpec, name: str, other: Edge) -> None:
         """Write the switch, or say that it cannot be written."""
-        against = next((key for key, off in claim.off.items() if told.given.get(key, off) != off), None)
-        if against is not None and told.can_be_told and not told.has(claim.on):
-            message = (
-                f"{against} of {told.process.name} is {told.given[against]!r}, and {other.owner} owns {other.name}"
-            )
+        against = next((key for key, off in claim.off.items() if claimant.given.get(key, off) != off), None)
+        if against is not None and claimant.takes_parameters and not claimant.has(claim.on):
+            value = claimant.given[against]
+            message = f"{against} of {claimant.process.name} is {value!r}, and {other.owner} owns {other.name}"
             advice = "remove it: tfcompose writes the switch"
-            self.found.append(finding("TF333", message, self._at(told, against), help=advice))
+            self.found.append(finding("TF333", message, self._at(claimant, against), help=advice))
             return
-        needed = any(self._is_own(told, own) and set(own.off) & set(claim.off) for own in told.claims)
-        if claim.off and told.can_be_told and not needed and not told.has(claim.on):
-            told.computed |= claim.off
+        needed = any(self._is_own(claimant, own) and set(own.off) & set(claim.off) for own in claimant.claims)
+        if claim.off and claimant.takes_parameters and not needed and not claimant.has(claim.on):
+            claimant.computed |= claim.off
             return
         owner = f"{other.owner} owns" if other.name == name else f"{other.owner} owns {other.name}"
-        message = f"{told.process.name} publishes {name} by default, which {other.owner} owns"
+        message = f"{claimant.process.name} publishes {name} by default, which {other.owner} owns"
         if other.name != name:
-            message = f"{told.process.name} publishes {name} by default, and {owner}"
-        self.found.append(finding("TF330", message, told.node.at, help=self._way_out(told, claim, needed=needed)))
+            message = f"{claimant.process.name} publishes {name} by default, and {owner}"
+        self.found.append(
+            finding("TF330", message, claimant.node.at, help=self._way_out(claimant, claim, needed=needed))
+        )
 
-    def _way_out(self, told: Told, claim: ClaimSpec, *, needed: bool) -> str:
-        hint = f"; {told.preset.hint}" if told.preset and told.preset.hint else ""
+    def _way_out(self, claimant: Claimant, claim: ClaimSpec, *, needed: bool) -> str:
+        hint = f"; {claimant.preset.hint}" if claimant.preset and claimant.preset.hint else ""
         if not claim.off:
-            return f"it has no switch: name {told.process.name} as the owner{hint}"
+            return f"it has no switch: name {claimant.process.name} as the owner{hint}"
         if needed:
             return f"its switch, {switch_text(claim.off)}, stops its own edge too: name it as the owner of both{hint}"
-        return f"set {switch_text(claim.off)} where {told.process.name} is started, or name it as the owner{hint}"
+        return f"set {switch_text(claim.off)} where {claimant.process.name} is started, or name it as the owner{hint}"
 
-    def _undeclared(self, told: Told, claim: ClaimSpec, parent: str, child: str) -> None:
+    def _undeclared(self, claimant: Claimant, claim: ClaimSpec, parent: str, child: str) -> None:
         static = ", static: true" if claim.static else ""
-        advice = f"frames: {{{child}: {{parent: {parent}, owner: {told.process.name}{static}}}}}"
+        advice = f"frames: {{{child}: {{parent: {parent}, owner: {claimant.process.name}{static}}}}}"
         if claim.off:
             advice += f"; or params: {{{switch_text(claim.off)}}}"
-        message = f"{told.process.name} publishes {parent} → {child} by default, which nobody declared"
-        self.found.append(finding("TF331", message, told.node.at, help=advice))
+        message = f"{claimant.process.name} publishes {parent} → {child} by default, which nobody declared"
+        self.found.append(finding("TF331", message, claimant.node.at, help=advice))
 
-    def _settle_pattern(self, told: Told, claim: ClaimSpec, parent: str, child: str) -> None:
-        self.claims.append(Claim(told.node.name, parent, child, claim.off))
+    def _settle_pattern(self, claimant: Claimant, claim: ClaimSpec, parent: str, child: str) -> None:
+        self.claims.append(Claim(claimant.node.name, parent, child, claim.off))
         guard = self.robot.guard
-        owns = any(edge.owner == told.process.name for edge in self.robot.edges)
+        owns = any(edge.owner == claimant.process.name for edge in self.robot.edges)
         allowed = any(fnmatchcase(one.child, child) or fnmatchcase(child, one.child) for one in guard.allow)
-        if owns or allowed or guard.unknown_edges == "ignore" or not told.is_published(claim):
+        if owns or allowed or guard.unknown_edges == "ignore" or not claimant.is_published(claim):
             return
-        message = f"{told.process.name} publishes {parent} → {child} by default, which the guard does not allow"
+        message = f"{claimant.process.name} publishes {parent} → {child} by default, which the guard does not allow"
         advice = f'guard: {{allow: [{{child: "{child}"}}]}}'
-        self.found.append(finding("TF331", message, told.node.at, help=advice))
+        self.found.append(finding("TF331", message, claimant.node.at, help=advice))
 
-    def _at(self, told: Told, key: str) -> Span:
-        return self.source.at((*told.node.path, "params", *key.split(".")))
+    def _at(self, claimant: Claimant, key: str) -> Span:
+        return self.source.at((*claimant.node.path, "params", *key.split(".")))
 
 
 def flat(params: dict[str, Any], above: str = "") -> dict[str, Any]:
@@ -247,8 +250,8 @@ def _meant(value: Any) -> Any:
 
 
 @dataclass(slots=True)
-class Told:
-    """One node: what is known of it, what the user told it, and what tfcompose tells it."""
+class Claimant:
+    """One node that may publish TF: what is known of it, the parameters a user gave it, and those tfcompose adds."""
 
     process: Process
     node: Node
@@ -271,7 +274,7 @@ class Told:
         return (claim.by_default or self.has(claim.on)) and not self.has(claim.off)
 
     @property
-    def can_be_told(self) -> bool:
+    def takes_parameters(self) -> bool:
         """Return whether parameters that tfcompose writes reach the node: launch files and shells have to pass them."""
         process = self.process
         if process.kind != "run":
@@ -294,7 +297,7 @@ class Roles:
         self, robot: Robot, process: str, preset: NodePresetSpec | None, claims: tuple[ClaimSpec, ...]
     ) -> None:
         self._robot = robot
-        self._usual = {role: said.default for role, said in preset.frames.items()} if preset else {}
+        self._usual = {role: declared.default for role, declared in preset.frames.items()} if preset else {}
         self._bound: dict[str, str] = {}
         self.frames: dict[str, str] = {}
         """role → frame of the tree"""
@@ -317,11 +320,11 @@ class Roles:
 
     def final(self, value: Any) -> Any:
         """Return a parameter's value; a role in it is the frame's name on the live tree."""
-        whole = _HOLE.fullmatch(value) if isinstance(value, str) else None
-        if whole is None:
+        hole = _HOLE.fullmatch(value) if isinstance(value, str) else None
+        if hole is None:
             return value
-        frame = self.frames.get(whole[1])
-        return self._robot.final(frame) if frame else self._usual.get(whole[1], value)
+        frame = self.frames.get(hole[1])
+        return self._robot.final(frame) if frame else self._usual.get(hole[1], value)
 
     def _bind(self, edge: Edge, claims: tuple[ClaimSpec, ...]) -> None:
         """Give an owned edge's ends the roles of the claim that fits it best."""
@@ -331,19 +334,19 @@ class Roles:
             return
         claim = max(fitting, key=lambda one: one[:2])[2]
         for template, frame in ((claim.parent, edge.parent), (claim.child, edge.child)):
-            whole = _HOLE.fullmatch(template)
-            if whole:
-                self._bound.setdefault(whole[1], frame)
+            hole = _HOLE.fullmatch(template)
+            if hole:
+                self._bound.setdefault(hole[1], frame)
 
     def _fit(self, edge: Edge, claim: ClaimSpec) -> int:
         """Return how well an edge fits a claim: by its ends' names, and by what hangs below; negative if not at all."""
         score = 0
         for template, frame in ((claim.parent, edge.parent), (claim.child, edge.child)):
-            whole = _HOLE.fullmatch(template)
-            usual = self._usual.get(whole[1]) if whole else None
-            if whole is None and _HOLE.sub("", template) == template and template != frame:
+            hole = _HOLE.fullmatch(template)
+            usual = self._usual.get(hole[1]) if hole else None
+            if hole is None and _HOLE.sub("", template) == template and template != frame:
                 return -1
-            if whole is None and _HOLE.search(template) and self.fill(template) != frame:
+            if hole is None and _HOLE.search(template) and self.fill(template) != frame:
                 return -1
             score += 4 * (usual == frame)
         ends = _HOLE.fullmatch(claim.child)

@@ -17,18 +17,18 @@ from tfcompose.model import (
     FREE,
     JOINTS,
     STATIC,
-    AsWritten,
     Edge,
     Joint,
     Limit,
     Link,
     MountedSensor,
     Process,
+    SourceNumbers,
     is_optical,
 )
 from tfcompose.resolve.optical_edits import optical_edits
 from tfcompose.resolve.poses import Draft, pose_of
-from tfcompose.units import Written
+from tfcompose.units import WithUnit
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -116,10 +116,10 @@ class Drafts:
             self.frames.setdefault(name, place)
         for name, link in robot.links.items():
             self.links.setdefault(name, link)
-        if part.said.parent is not None and part.root is not None:
-            switched = len(part.said.parent) > 1  # then the part's owner is who carries it about
-            owner = part.said.owner if switched else STATIC
-            self.add(at, part.said.parent, part.root, part.said, owner=owner, part=part.name)
+        if part.declared.parent is not None and part.root is not None:
+            switched = len(part.declared.parent) > 1  # then the part's owner is who carries it about
+            owner = part.declared.owner if switched else STATIC
+            self.add(at, part.declared.parent, part.root, part.declared, owner=owner, part=part.name)
         self.edges += [Draft(edge, part=part.name) for edge in robot.edges]
         self.sensors += robot.sensors
         return True
@@ -127,7 +127,7 @@ class Drafts:
     def _refuse_names(self, taken: list[str], part: Joined) -> None:
         first = taken[0]
         more = f"; or ros: {{shared_frames: [{first}]}}"
-        root = not part.said.prefix and len(taken) == 1 and first != part.root and part.said.root is None
+        root = not part.declared.prefix and len(taken) == 1 and first != part.root and part.declared.root is None
         before = f"root: {first}, if the part begins there; or " if root else ""
         self._refuse("frame", taken, self.frames, part.robot.frames, part, (before, more))
 
@@ -208,27 +208,27 @@ _IDLE = {
 }
 
 
-def joint_of(name: str, written: JointSpec, at: Span) -> Joint | None:
+def joint_of(name: str, spec: JointSpec, at: Span) -> Joint | None:
     """Return the joint with a unit axis, or None where it is fixed."""
-    kind: Any = written.type
+    kind: Any = spec.type
     if kind == "fixed":
         return None
-    length = norm(written.axis)
-    x, y, z = written.axis
-    mimic = written.mimic
+    length = norm(spec.axis)
+    x, y, z = spec.axis
+    mimic = spec.mimic
     return Joint(
         name=name,
         type=kind,
         at=at,
         axis=(x / length, y / length, z / length),
-        limit=written.limit,
+        limit=spec.limit,
         mimic=mimic.joint if mimic else None,
         multiplier=mimic.multiplier if mimic else 1.0,
         offset=mimic.offset if mimic else 0.0,
         axis_length=length,
-        dynamics=written.dynamics,
-        safety=written.safety_controller,
-        reference=written.calibration,
+        dynamics=spec.dynamics,
+        safety=spec.safety_controller,
+        reference=spec.calibration,
     )
 
 
@@ -255,7 +255,7 @@ _MAPPINGS = {
 }
 
 
-def as_written(spec: RobotSpec, source: Source) -> tuple[AsWritten, ...]:
+def source_numbers(spec: RobotSpec, source: Source) -> tuple[SourceNumbers, ...]:
     """Return the numbers of every pose and joint limit of the spec."""
     return tuple(
         found
@@ -265,7 +265,7 @@ def as_written(spec: RobotSpec, source: Source) -> tuple[AsWritten, ...]:
     )
 
 
-def _of(spec: Spec, path: Path, source: Source) -> Iterator[AsWritten]:
+def _of(spec: Spec, path: Path, source: Source) -> Iterator[SourceNumbers]:
     for key in spec.model_fields_set:
         value, here = getattr(spec, key), (*path, key)
         if key in _LISTS and value is not None:
@@ -281,7 +281,7 @@ def _of(spec: Spec, path: Path, source: Source) -> Iterator[AsWritten]:
             yield from _inside(value, here, source)
 
 
-def _inside(value: Any, path: Path, source: Source) -> Iterator[AsWritten]:
+def _inside(value: Any, path: Path, source: Source) -> Iterator[SourceNumbers]:
     """Yield the numbers in a list or mapping; one item may stand for a list of it."""
     for step, item in value.items() if isinstance(value, dict) else enumerate(value):
         if isinstance(item, Spec):
@@ -289,8 +289,8 @@ def _inside(value: Any, path: Path, source: Source) -> Iterator[AsWritten]:
             yield from _of(item, here if source.has(here) else path, source)
 
 
-def _numbers(numbers: dict[Any, float], path: Path, source: Source) -> AsWritten:
+def _numbers(numbers: dict[Any, float], path: Path, source: Source) -> SourceNumbers:
     steps = list(numbers)
     values = tuple(numbers.values())
-    with_unit = tuple(isinstance(value, Written) for value in values)
-    return AsWritten(path, tuple(map(float, values)), with_unit, lambda index: source.at((*path, steps[index])))
+    with_unit = tuple(isinstance(value, WithUnit) for value in values)
+    return SourceNumbers(path, tuple(map(float, values)), with_unit, lambda index: source.at((*path, steps[index])))

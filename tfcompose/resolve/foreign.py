@@ -52,7 +52,7 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
     Raises:
         RejectedError: if the file is not there, is none, or xacro refuses it.
     """
-    spec = part.said
+    spec = part.declared
     key = "urdf" if spec.urdf is not None else "xacro"
     at = part.source.at((*part.at, key))
     file = _address(spec.urdf or spec.xacro or "", at, packages)
@@ -69,7 +69,7 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
     parents = {edge.parent for edge in robot.edges}
     implied = frozenset(parents - robot.frames.keys()) if spec.macro is not None else frozenset[str]()
     digest = hashlib.sha256(text.encode()).hexdigest()
-    own = _with_base(replace(robot, ros=part.settings, processes=_own(part), written={"urdf": digest}))
+    own = _with_base(replace(robot, ros=part.settings, processes=_own(part), source_data={"urdf": digest}))
     if part.alone and part.spec.ros.state_publisher == "stock":
         own, refused = with_stock(own)
         found = (*found, *refused)
@@ -93,7 +93,7 @@ def _address(named: str, at: Span, packages: Packages) -> str:
 
 
 def _expanded(part: PartEntry, file: str, at: Span, packages: Packages) -> str:
-    disk, spec = packages.disk, part.said
+    disk, spec = packages.disk, part.declared
     if disk is None:
         raise RejectedError([finding("TF001", f"{file}: files cannot be read here", at)])
     call = _call(part, file, packages)
@@ -108,11 +108,11 @@ def _expanded(part: PartEntry, file: str, at: Span, packages: Packages) -> str:
 
 def _in_call(part: PartEntry, file: str, found: Finding, read: Callable[[str], str]) -> Finding:
     """Return the finding about a call of a macro, at the parameter that it names, with what the macro takes."""
-    macro = part.said.macro or ""
+    macro = part.declared.macro or ""
     place = part.source.at((*part.at, "macro"))
     if found.code != "TF018":
         return _at(place, found)
-    named = [word for word in _WORD.findall(found.message) if word in part.said.params]
+    named = [word for word in _WORD.findall(found.message) if word in part.declared.params]
     macros = macros_in(read(file))
     if macro in macros:
         advice = f"{macro} takes {macros[macro] or 'nothing'}"
@@ -133,7 +133,7 @@ def _at(place: Span, found: Finding) -> Finding:
 
 def _call(part: PartEntry, file: str, packages: Packages) -> Call | None:
     """Return the call of the part's macro; None where the file itself is the robot."""
-    spec = part.said
+    spec = part.declared
     if spec.macro is None:
         return None
     places = (part.source.at((*part.at, "include", index)) for index in range(len(spec.include)))

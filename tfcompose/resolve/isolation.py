@@ -107,18 +107,18 @@ class Filler:
     def needless(self, process: Process) -> list[Finding]:
         """Return what is said and reaches nobody: a file of no parameters, and keys beside a shell's text."""
         at: Path = ("processes", process.name, "run")
-        asked = any("${params_file}" in word for word in (*process.argv, *process.env.values()))
+        names_params_file = any("${params_file}" in word for word in (*process.argv, *process.env.values()))
         if process.argv[:2] == SHELL:
-            return self._not_reached(process, asked=asked)
-        if not asked or any(node.params for node in process.nodes) or not self.source.has(at):
+            return self._not_reached(process, names_params_file=names_params_file)
+        if not names_params_file or any(node.params for node in process.nodes) or not self.source.has(at):
             return []
         message = f"{process.name} is given ${{params_file}}, and has no parameters"
         return [finding("TF816", message, self.source.at(at), help="params: {…}")]
 
-    def _not_reached(self, process: Process, *, asked: bool) -> list[Finding]:
+    def _not_reached(self, process: Process, *, names_params_file: bool) -> list[Finding]:
         """Return a warning for each key that would be told by arguments, which end before the text's programs."""
         found = []
-        for key in ("remap", "log_level", "namespace", *(() if asked else ("params",))):
+        for key in ("remap", "log_level", "namespace", *(() if names_params_file else ("params",))):
             at: Path = ("processes", process.name, key)
             if getattr(process, key) and self.source.has(at):
                 message = f"{key} does not reach {process.name}, which a shell reads"

@@ -24,8 +24,8 @@ def with_param_files(robot: Robot, source: Source, read: Callable[[str], str] | 
     """Return the robot whose nodes have the parameters of the files that they name, and what is wrong with these."""
     work = _Work(source, read, robot.ros.namespace)
     processes = tuple(work.process(process) for process in robot.processes)
-    written = robot.written | ({"parameter files": work.digests} if work.digests else {})
-    return replace(robot, processes=processes, written=written), work.found
+    source_data = robot.source_data | ({"parameter files": work.digests} if work.digests else {})
+    return replace(robot, processes=processes, source_data=source_data), work.found
 
 
 @dataclass(slots=True)
@@ -49,13 +49,13 @@ class _Work:
         for file, path in files:
             place = self.source.at(path)
             if isinstance(file, str) and file:
-                params = _laid_over(params, self._said(file, place, node, process))
+                params = _laid_over(params, self._params_in(file, place, node, process))
             else:
                 self.found.append(finding("TF103", "params: file takes the names of files", place))
         inline = {key: value for key, value in node.params.items() if key != FILE_KEY}
         return replace(node, params=_laid_over(params, inline))
 
-    def _said(self, file: str, at: Span, node: Node, process: Process) -> dict[str, Any]:
+    def _params_in(self, file: str, at: Span, node: Node, process: Process) -> dict[str, Any]:
         """Return what a file says to the node; a file that says nothing to it is a finding."""
         path = path_named(file, at)
         loaded = self._load(path, at)

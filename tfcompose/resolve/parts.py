@@ -43,8 +43,8 @@ _TELLING = frozenset({"TF723", "TF724"})
 
 
 @dataclass(slots=True)
-class Whole:
-    """What is known of all parts of a robot, and of theirs, together.
+class Collected:
+    """What is collected from all parts of a robot, and from their parts.
 
     ``allows`` are the comments in their files that silence findings. ``notes`` holds, for each file that is a part, a
     note for each use that says as which part; ``sources`` are what the robot files among them were resolved from.
@@ -65,15 +65,15 @@ class Parts:
     disk: Disk | None
     resolve: Callable[..., Resolved]
     files: tuple[str, ...] = ()
-    whole: Whole = field(default_factory=Whole)
+    collected: Collected = field(default_factory=Collected)
     found: list[Finding] = field(default_factory=list)
     missing: list[tuple[str, str]] = field(default_factory=list)
 
     def join(self, validated: Validated, prefix: str, packages: Packages) -> list[Joined]:
         """Return the parts of a robot whose own frames have the prefix; those that cannot be had are findings."""
         spec, source, joined = validated.spec, validated.source, []
-        for name, said in spec.parts.items():
-            part = PartEntry(name, said, spec, source, prefix, ("parts", name) in validated.broken)
+        for name, declared in spec.parts.items():
+            part = PartEntry(name, declared, spec, source, prefix, ("parts", name) in validated.broken)
             try:
                 joined.append(part.joined(*self._robot(part, packages)))
                 self.found += part.found
@@ -84,21 +84,21 @@ class Parts:
 
     def _robot(self, part: PartEntry, packages: Packages) -> tuple[Robot, frozenset[str]]:
         """Return the part under its own names, and the frames of its holder that it hangs on by itself."""
-        self.whole.count += 1
-        if self.read is None or self.whole.count > MOST_PARTS:
+        self.collected.count += 1
+        if self.read is None or self.collected.count > MOST_PARTS:
             message = f"more than {MOST_PARTS} parts" if self.read else "files cannot be read here"
             raise RejectedError([finding("TF008", message, part.place)])
-        if part.said.spec is part.said.urdf is part.said.xacro is None:
+        if part.declared.spec is part.declared.urdf is part.declared.xacro is None:
             raise RejectedError([])  # it was refused already
-        if part.said.xacro is not None and part.is_broken:
+        if part.declared.xacro is not None and part.is_broken:
             raise RejectedError([])  # and so were arguments, which xacro would miss
         try:
-            if part.said.spec is not None:
-                return self._resolved(part, part.said.spec, self.read), frozenset()
+            if part.declared.spec is not None:
+                return self._resolved(part, part.declared.spec, self.read), frozenset()
             made = foreign(part, packages, self.read)
         except RejectedError as error:
             raise RejectedError([_noted(one, part) for one in error.findings]) from None
-        self.whole.notes.setdefault(made.file, []).append(_note(part))
+        self.collected.notes.setdefault(made.file, []).append(_note(part))
         self.found += [_noted(one, part) for one in made.found if one.severity == "error" or one.code in _TELLING]
         return made.robot, made.implied
 
@@ -110,13 +110,13 @@ class Parts:
             raise RejectedError([finding("TF015", f"robots are parts of each other: {circle}", at)])
         inside = replace(self, files=(*self.files, file), found=[], missing=[])
         loaded = with_includes(load(read(file), file), read)
-        self.whole.notes.setdefault(file, []).append(_note(part))
-        validated = validate(part.laid_over(composed(loaded, part.said.profiles)))
+        self.collected.notes.setdefault(file, []).append(_note(part))
+        validated = validate(part.laid_over(composed(loaded, part.declared.profiles)))
         resolved = self.resolve(validated, self.library, self.read, self.disk, inside)
         self.found += [_noted(one, part) for one in (*validated.found, *resolved.found)]
         self.found += _useless(part, file, validated, loaded)
-        self.whole.allows += validated.source.allows
-        self.whole.sources.append(validated.source)
+        self.collected.allows += validated.source.allows
+        self.collected.sources.append(validated.source)
         return resolved.robot
 
 
@@ -133,7 +133,7 @@ def _useless(part: PartEntry, file: str, validated: Validated, loaded: Source) -
     known = loaded.data.get("vars") or {}
     found = []
     for name in validated.unused:
-        if name in part.said.vars and name not in known:
+        if name in part.declared.vars and name not in known:
             at = part.source.at_key((*part.at, "vars", name))
             advice = did_you_mean(name, known, "remove it")
             found.append(finding("TF105", f"{file} has no use for the variable {name}", at, help=advice))
@@ -154,7 +154,7 @@ class Joined:
     """
 
     name: str
-    said: PartSpec
+    declared: PartSpec
     robot: Robot
     root: str | None
     shared: frozenset[str]
@@ -162,7 +162,7 @@ class Joined:
     @property
     def alone(self) -> bool:
         """Whether it is a robot of its own beside the others, with joint states of its own."""
-        return bool((self.said.namespace or "").strip("/"))
+        return bool((self.declared.namespace or "").strip("/"))
 
 
 @dataclass(slots=True)
@@ -170,7 +170,7 @@ class PartEntry:
     """One entry of ``parts`` while it is resolved."""
 
     name: str
-    said: PartSpec
+    declared: PartSpec
     spec: RobotSpec
     source: Source
     outer_prefix: str
@@ -190,27 +190,27 @@ class PartEntry:
     @property
     def alone(self) -> bool:
         """Whether it is a robot of its own beside the others."""
-        return bool((self.said.namespace or "").strip("/"))
+        return bool((self.declared.namespace or "").strip("/"))
 
     @property
     def prefix(self) -> str:
         """What is written in front of its frames: what is said, or the namespace where frames are isolated by it."""
-        if self.said.prefix is not None:
-            return self.said.prefix
-        namespace = (self.said.namespace or "").strip("/")
+        if self.declared.prefix is not None:
+            return self.declared.prefix
+        namespace = (self.declared.namespace or "").strip("/")
         return f"{namespace}/" if namespace and self.spec.ros.isolate in {"frames", "both"} else ""
 
     @property
     def isolate(self) -> str:
         """How it is isolated. Where it has no prefix, its frames are not."""
-        said = self.spec.ros.isolate
-        return said if self.prefix else {"both": "topics", "frames": "none"}.get(said, said)
+        declared = self.spec.ros.isolate
+        return declared if self.prefix else {"both": "topics", "frames": "none"}.get(declared, declared)
 
     @property
     def settings(self) -> RosSettings:
         """What its processes share: the holder's, below its own namespace and with its own prefix."""
         ros = self.spec.ros
-        parts = (ros.namespace, self.said.namespace or "")
+        parts = (ros.namespace, self.declared.namespace or "")
         namespace = "/".join(part.strip("/") for part in parts if part.strip("/"))
         return narrowed(RosSettings, ros, namespace=namespace, frame_prefix=f"{self.outer_prefix}{self.prefix}")
 
@@ -237,8 +237,8 @@ class PartEntry:
         here = Place(self.place)
         inside = {"ros": Place(self.place, dict.fromkeys(settings, here), dict.fromkeys(settings, here))}
         data: dict[str, Any] = {"ros": settings}
-        if self.said.vars:
-            data["vars"] = dict(self.said.vars)
+        if self.declared.vars:
+            data["vars"] = dict(self.declared.vars)
             inside["vars"] = self.source.places.nearest((*self.at, "vars"))
         over = Source(self.source.file, data, Place(self.place, inside, dict.fromkeys(data, here)), has_nulls=False)
         return lay_over(inner, over, is_overlay=False)
@@ -249,16 +249,16 @@ class PartEntry:
             at, advice = self.source.at((*self.at, "prefix")), "letters, digits and _: left_, or left/"
             raise RejectedError([finding("TF501", f"{self.prefix!r} is no good prefix", at, help=advice)])
         shared = frozenset(robot.ros.shared_frames) & robot.frames.keys() | implied
-        if self.said.root is not None:
-            robot = self._subtree(robot, self.said.root)
+        if self.declared.root is not None:
+            robot = self._subtree(robot, self.declared.root)
         names = Names(self.name, self.prefix, shared, self.alone)
         again = renamed(robot, names)
-        if self.said.owner is not None:
+        if self.declared.owner is not None:
             at = self.source.at((*self.at, "owner"))
-            again = replace(again, edges=tuple(_owned(edge, self.said.owner, at) for edge in again.edges))
+            again = replace(again, edges=tuple(_owned(edge, self.declared.owner, at) for edge in again.edges))
         if self.alone:
             again = replace(again, parts=(Part(self.name, self.prefix, robot), *again.parts))
-        return Joined(self.name, self.said, again, self._root(robot, names), shared)
+        return Joined(self.name, self.declared, again, self._root(robot, names), shared)
 
     def _subtree(self, robot: Robot, root: str) -> Robot:
         """Return what is below ``root``."""
@@ -272,7 +272,7 @@ class PartEntry:
     def _root(self, robot: Robot, names: Names) -> str | None:
         """Return the frame that the holder bolts on; to have none, or several, is wrong only if it has to be one."""
         roots = [name for name in robot.roots() if name not in names.shared]
-        if self.said.parent is None or len(roots) == 1:
+        if self.declared.parent is None or len(roots) == 1:
             return names.frame(roots[0]) if len(roots) == 1 else None
         if robot.broken:
             raise RejectedError([])  # what would be the root, or would hang on it, was refused

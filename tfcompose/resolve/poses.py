@@ -129,12 +129,12 @@ class Solver:
         if draft.measured:
             solved = self._measured(draft, draft.measured)
         elif draft.relative_to or draft.place:
-            solved = replace(draft.edge, pose=self._said(draft))
+            solved = replace(draft.edge, pose=self._declared_pose(draft))
         self._open.pop()
         self._solved[index] = solved
         return solved
 
-    def _said(self, draft: Draft) -> Pose:
+    def _declared_pose(self, draft: Draft) -> Pose:
         """Return the pose of the edge's child in its parent, from the pose that is written."""
         pose = draft.edge.pose
         if draft.relative_to:
@@ -155,7 +155,7 @@ class Solver:
             place_at = draft.place_at if measured.child == draft.place else None
             below = self._below(draft, measured.child, place_at or at)
         if draft.has_nominal:
-            measured = replace(measured, nominal=above.inverse() @ self._said(draft) @ below)
+            measured = replace(measured, nominal=above.inverse() @ self._declared_pose(draft) @ below)
         return replace(edge, pose=above @ measured.pose @ below.inverse(), calibration=measured)
 
     def _known(self, frame: str, at: Span) -> str:

@@ -176,8 +176,8 @@ _NAME = re.compile(r"(?!nodes/)[A-Za-z0-9][A-Za-z0-9_.-]*/_?[A-Za-z0-9][A-Za-z0-
 _DEEPEST = 8
 
 
-class Shelves(Protocol):
-    """What a library is told about folders: whether a file is there, what it holds, and which files there are."""
+class Storage(Protocol):
+    """The folders of presets: which files there are, and what they hold."""
 
     def has(self, path: str) -> bool:
         """Return whether the file is there."""
@@ -200,7 +200,7 @@ class Library:
     """Presets in folders; an earlier folder stands before a later one, and packages stand last."""
 
     folders: tuple[str, ...]
-    shelves: Shelves
+    storage: Storage
     own: str = ""
     _sources: dict[str, Source] = field(default_factory=dict)
     _specs: dict[tuple[str, tuple[tuple[str, str], ...]], PresetSpec] = field(default_factory=dict)
@@ -208,12 +208,12 @@ class Library:
 
     def over(self, folders: Iterable[str]) -> Library:
         """Return a library with these folders before its own."""
-        return Library((*map(posixpath.normpath, folders), *self.folders), self.shelves, self.own)
+        return Library((*map(posixpath.normpath, folders), *self.folders), self.storage, self.own)
 
     @property
     def names(self) -> list[str]:
         """The names of all presets, in order."""
-        known = {name for folder in self._all() for name in self.shelves.models(folder)}
+        known = {name for folder in self._all() for name in self.storage.models(folder)}
         return sorted(name for name in known if "/_" not in name and _NAME.fullmatch(name))
 
     def file(self, name: str) -> str | None:
@@ -238,7 +238,7 @@ class Library:
             file = self.file(name)
             if file is None:
                 raise KeyError(name)
-            own = load(self.shelves.read(file), file)
+            own = load(self.storage.read(file), file)
             self._sources[name] = self._extended(own, name, deep)
         return self._sources[name]
 
@@ -267,7 +267,7 @@ class Library:
             raise RejectedError([finding("TF606", f"{name} extends itself, by way of others", at)])
         if base == name:  # it stands before one of the same name, and changes it
             later = self._later(own.file)
-            below = self._extended(load(self.shelves.read(later), later), name, deep + 1) if later else None
+            below = self._extended(load(self.storage.read(later), later), name, deep + 1) if later else None
         else:
             below = self.source(base, deep + 1) if self.file(base) else None
         if below is None:
@@ -277,18 +277,18 @@ class Library:
     def _later(self, file: str) -> str | None:
         """Return the file of the preset that stands behind this file's, under the same name."""
         folder, name = _split(file)
-        behind = (*self.folders, *self.shelves.packages())
+        behind = (*self.folders, *self.storage.packages())
         return self._find(name, behind[behind.index(folder) + 1 :])
 
     def _all(self) -> tuple[str, ...]:
-        return (*self.folders, *self.shelves.packages())
+        return (*self.folders, *self.storage.packages())
 
     def _find(self, name: str, folders: Iterable[str]) -> str | None:
         paths = (posixpath.join(folder, f"{name}.yaml") for folder in folders) if _NAME.fullmatch(name) else ()
-        return next((path for path in paths if self.shelves.has(path)), None)
+        return next((path for path in paths if self.storage.has(path)), None)
 
     def _find_late(self, name: str) -> str | None:
-        return self._find(name, self.shelves.packages()) if _NAME.fullmatch(name) else None
+        return self._find(name, self.storage.packages()) if _NAME.fullmatch(name) else None
 
 
 def _split(file: str) -> tuple[str, str]:

@@ -27,29 +27,29 @@ if TYPE_CHECKING:
     from tfcompose.plan import ProcessKind
 
 
-def user_process(name: str, said: ProcessSpec, validated: Validated) -> tuple[Process | None, list[Finding]]:
+def user_process(name: str, declared: ProcessSpec, validated: Validated) -> tuple[Process | None, list[Finding]]:
     """Return the process that the user describes, or None and what is missing."""
     spec, source = validated.spec, validated.source
     at: Path = ("processes", name)
     place = source.at_key(at)
     if name in BUILT_IN:
-        return None, built_in_keys(name, said, source)
-    namespace = namespace_of(said, spec.ros.namespace)
-    nodes, found = nodes_of(name, said, namespace, source)
-    if said.external:
-        keys = how(said, namespace, EXTERNAL_KEYS)
+        return None, built_in_keys(name, declared, source)
+    namespace = namespace_of(declared, spec.ros.namespace)
+    nodes, found = nodes_of(name, declared, namespace, source)
+    if declared.external:
+        keys = how(declared, namespace, EXTERNAL_KEYS)
         return replace(Process(name, "external", place, nodes), **keys), found
-    if said.simulate:
+    if declared.simulate:
         one = (Node(nodes[0].name, nodes[0].at),)
-        process, refused = _simulated(Process(name, "simulate", place, one), said.simulate, validated)
-        keys = how(said, namespace, SIMULATED_KEYS)
+        process, refused = _simulated(Process(name, "simulate", place, one), declared.simulate, validated)
+        keys = how(declared, namespace, SIMULATED_KEYS)
         return process and replace(process, **keys), [*found, *refused]
-    if said.run and said.run.is_startable:
+    if declared.run and declared.run.is_startable:
         process = Process(name, "run", place, nodes)
-        return replace(process, **how(said, namespace), **program(said.run, shell=bool(said.shell))), found
+        return replace(process, **how(declared, namespace), **program(declared.run, shell=bool(declared.shell))), found
     if _is_run_refused(name, validated):
         return None, found
-    if said.run:
+    if declared.run:
         advice = "run: {package: …, executable: …}, or {launch: package/file.launch.py}"
         at = (*at, "run")
         return None, [finding("TF102", f"{name}: run needs package and executable", source.at_key(at), help=advice)]
@@ -131,23 +131,23 @@ def unknown_names(
 
 
 #: Keys of a process that have the same name in the model.
-_AS_WRITTEN = ("after", "cwd", "env", "host", "log_level", "max_restarts", "remap", "required", "restart")
+_COPIED = ("after", "cwd", "env", "host", "log_level", "max_restarts", "remap", "required", "restart")
 #: All that ``how`` reads, of a process that tfcompose starts.
-KEYS = (*_AS_WRITTEN, "stop", "ready")
+KEYS = (*_COPIED, "stop", "ready")
 #: Those of a process that somebody else starts, and of one that is simulated.
 EXTERNAL_KEYS = ("after", "host", "ready")
 SIMULATED_KEYS = ("after", "env", "host", "max_restarts", "remap", "required", "restart", "stop")
 
 
-def how(said: Started, namespace: str, keys: tuple[str, ...] = KEYS) -> dict[str, Any]:
+def how(declared: Started, namespace: str, keys: tuple[str, ...] = KEYS) -> dict[str, Any]:
     """Return a process's fields from what was written, those of ``keys``; ``namespace`` is that of its nodes."""
-    fields = {key: getattr(said, key) for key in keys if key in _AS_WRITTEN}
-    if said.namespace is not None:
+    fields = {key: getattr(declared, key) for key in keys if key in _COPIED}
+    if declared.namespace is not None:
         fields["namespace"] = namespace
-    if "stop" in keys and said.stop:
-        fields["stop"] = StopRule(said.stop.signal, said.stop.timeout)
-    if "ready" in keys and said.ready:
-        fields["ready"] = _ready(said.ready, namespace)
+    if "stop" in keys and declared.stop:
+        fields["stop"] = StopRule(declared.stop.signal, declared.stop.timeout)
+    if "ready" in keys and declared.ready:
+        fields["ready"] = _ready(declared.ready, namespace)
     return fields
 
 
@@ -157,21 +157,21 @@ def program(run: Run, *, shell: bool) -> dict[str, Any]:
     return {"package": run.package, "executable": run.executable, "launch": run.launch, "argv": argv}
 
 
-def _ready(said: ReadySpec, namespace: str) -> Ready | None:
-    timeout_s = said.timeout
-    if said.topic is not None:
-        return Ready("topic", full_name(namespace, said.topic), timeout_s=timeout_s)
-    if said.service is not None:
-        return Ready("service", full_name(namespace, said.service), timeout_s=timeout_s)
-    if said.lifecycle is not None:
-        return Ready("lifecycle", said.lifecycle, timeout_s=timeout_s)
-    if said.log is not None:
-        return Ready("log", said.log, timeout_s=timeout_s)
-    if said.exit is not None:
-        return Ready("exit", number=float(said.exit), timeout_s=timeout_s)
-    if said.time is not None:
-        return Ready("time", number=said.time, timeout_s=timeout_s)
-    return Ready("edges", timeout_s=timeout_s) if said.edges else None  # what else was said was refused
+def _ready(declared: ReadySpec, namespace: str) -> Ready | None:
+    timeout_s = declared.timeout
+    if declared.topic is not None:
+        return Ready("topic", full_name(namespace, declared.topic), timeout_s=timeout_s)
+    if declared.service is not None:
+        return Ready("service", full_name(namespace, declared.service), timeout_s=timeout_s)
+    if declared.lifecycle is not None:
+        return Ready("lifecycle", declared.lifecycle, timeout_s=timeout_s)
+    if declared.log is not None:
+        return Ready("log", declared.log, timeout_s=timeout_s)
+    if declared.exit is not None:
+        return Ready("exit", number=float(declared.exit), timeout_s=timeout_s)
+    if declared.time is not None:
+        return Ready("time", number=declared.time, timeout_s=timeout_s)
+    return Ready("edges", timeout_s=timeout_s) if declared.edges else None  # what else was said was refused
 
 
 _BUILT_IN_KEYS = frozenset({"rate", "remap", "env", "host", "after"})
@@ -184,30 +184,30 @@ def built_in(spec: RobotSpec, source: Source) -> list[Process]:
     """Return tfcompose's own processes, with what stands of them under ``processes``."""
     own = []
     for name in BUILT_IN:
-        said = spec.processes.get(name)
-        at = source.at_key(("processes", name)) if said else source.at_key(("robot",))
+        declared = spec.processes.get(name)
+        at = source.at_key(("processes", name)) if declared else source.at_key(("robot",))
         path: Path = ("processes", name)
-        params = said.params if said and name == JOINTS else {}
+        params = declared.params if declared and name == JOINTS else {}
         node = Node(full_name(spec.ros.namespace, f"tfcompose_{name}"), at, path, params)
         process = Process(name, _KINDS[name], at, (node,))
-        if said:
-            given = {key: getattr(said, key) for key in _BUILT_IN_KEYS}
+        if declared:
+            given = {key: getattr(declared, key) for key in _BUILT_IN_KEYS}
             process = replace(process, **given)
         own.append(process)
     return own
 
 
-def built_in_keys(name: str, said: ProcessSpec, source: Source) -> list[Finding]:
+def built_in_keys(name: str, declared: ProcessSpec, source: Source) -> list[Finding]:
     """Return findings about what stands under the name of one of tfcompose's own processes."""
     at: Path = ("processes", name)
     known = _BUILT_IN_KEYS | ({"params"} if name == JOINTS else set())
-    wrong = said.model_fields_set - known
+    wrong = declared.model_fields_set - known
     advice = f"its keys can be: {', '.join(sorted(known))}"
     found = [
         finding("TF101", f"{name} is built in and has no {key}", source.at_key((*at, key)), help=advice)
         for key in wrong
     ]
-    return found + (_joints_params(said.params, source) if name == JOINTS else [])
+    return found + (_joints_params(declared.params, source) if name == JOINTS else [])
 
 
 def _joints_params(params: dict[str, Any], source: Source) -> list[Finding]:
@@ -244,11 +244,11 @@ _READ = {
 
 def idle_keys(spec: RobotSpec, source: Source) -> list[Finding]:
     """Return a finding for each key of a process that does nothing there."""
-    said: dict[Path, tuple[str, Started | None]] = {}
-    said |= {("processes", name): (name, process) for name, process in spec.processes.items()}
-    said |= {("sensors", name, "driver"): (f"the driver of {name}", s.driver) for name, s in spec.sensors.items()}
+    declared: dict[Path, tuple[str, Started | None]] = {}
+    declared |= {("processes", name): (name, process) for name, process in spec.processes.items()}
+    declared |= {("sensors", name, "driver"): (f"the driver of {name}", s.driver) for name, s in spec.sensors.items()}
     found: list[Finding] = []
-    for path, (name, process) in said.items():
+    for path, (name, process) in declared.items():
         if process is not None:
             found += _idle_rate(path, name, process, source)
             found += _idle(path, name, process, source)
@@ -293,16 +293,19 @@ def full_name(namespace: str, name: str) -> str:
     return "/" + "/".join(part for part in (namespace.strip("/"), name) if part)
 
 
-def namespace_of(said: Started | None, namespace: str) -> str:
+def namespace_of(declared: Started | None, namespace: str) -> str:
     """Return the namespace of a process's nodes, without a leading slash: its own, or the robot's ``namespace``."""
-    if said is None or said.namespace is None:
+    if declared is None or declared.namespace is None:
         return namespace
-    return full_name(namespace, said.namespace).strip("/")
+    return full_name(namespace, declared.namespace).strip("/")
 
 
 def has_claims(spec: RobotSpec) -> bool:
     """Return whether anything is said of what nodes publish, or a process has several nodes."""
-    return any(said.nodes or said.publishes or (said.node and said.node.preset) for said in spec.processes.values())
+    return any(
+        declared.nodes or declared.publishes or (declared.node and declared.node.preset)
+        for declared in spec.processes.values()
+    )
 
 
 def names_files(params: dict[str, Any]) -> bool:
@@ -310,26 +313,28 @@ def names_files(params: dict[str, Any]) -> bool:
     return isinstance(params.get(FILE_KEY), (str, list))
 
 
-def _usual(said: ProcessSpec) -> str | None:
+def _usual(declared: ProcessSpec) -> str | None:
     """Return the name that a known node has where tfcompose cannot give it another."""
-    if said.node is None or said.node.preset is None or (said.run and said.run.package):
+    if declared.node is None or declared.node.preset is None or (declared.run and declared.run.package):
         return None
-    return node_preset(said.node.preset).node if said.node.preset in node_preset_names() else None
+    return node_preset(declared.node.preset).node if declared.node.preset in node_preset_names() else None
 
 
-def nodes_of(name: str, said: ProcessSpec, namespace: str, source: Source) -> tuple[tuple[Node, ...], list[Finding]]:
+def nodes_of(
+    name: str, declared: ProcessSpec, namespace: str, source: Source
+) -> tuple[tuple[Node, ...], list[Finding]]:
     """Return the nodes of a process, at least one, and what is wrong with them."""
     at: Path = ("processes", name)
-    if not said.nodes:
-        place = source.at(("processes", name, "node")) if said.node else source.at_key(at)
-        own_name = (said.node.name if said.node else None) or _usual(said) or name
-        return (Node(full_name(namespace, own_name), place, at, said.params, said.lifecycle),), []
+    if not declared.nodes:
+        place = source.at(("processes", name, "node")) if declared.node else source.at_key(at)
+        own_name = (declared.node.name if declared.node else None) or _usual(declared) or name
+        return (Node(full_name(namespace, own_name), place, at, declared.params, declared.lifecycle),), []
     found = []
-    for key in ("publishes",) if said.publishes else ():
+    for key in ("publishes",) if declared.publishes else ():
         message = f"{name} has nodes, and {key} names none of them"
         found.append(finding("TF107", message, source.at_key((*at, key)), help="write it under one of its nodes"))
-    for key in said.params:
-        advice = f"write it under nodes: {{{next(iter(said.nodes))}: {{params: {{{key}: …}}}}}}"
+    for key in declared.params:
+        advice = f"write it under nodes: {{{next(iter(declared.nodes))}: {{params: {{{key}: …}}}}}}"
         message = f"{name} has nodes, and the parameter {key} names none of them"
         found.append(finding("TF107", message, source.at_key((*at, "params", key)), help=advice))
     nodes = [
@@ -340,7 +345,7 @@ def nodes_of(name: str, said: ProcessSpec, namespace: str, source: Source) -> tu
             own.params,
             own.lifecycle,
         )
-        for node, own in said.nodes.items()
+        for node, own in declared.nodes.items()
     ]
     return tuple(nodes), found
 
@@ -357,8 +362,8 @@ def with_positions(
     A joint that mimics another is left out: it follows, and the process computes it. Where nothing is said a joint is
     at 0, or in the middle between its limits if 0 is not between them, as joint_state_publisher has it.
     """
-    said = spec.processes.get(process.name)
-    wanted = said.simulate.joints if said and said.simulate else None
+    declared = spec.processes.get(process.name)
+    wanted = declared.simulate.joints if declared and declared.simulate else None
     if process.simulate is None or process.simulate.kind != "joints" or wanted is None:
         return process
     all_joints = {edge.joint.name: edge.joint for edge in edges if edge.joint}

@@ -11,10 +11,10 @@ from tfcompose.model import Edge, Process, Robot
 from tfcompose.resolve.bodies import Bodies, with_colours
 from tfcompose.resolve.calibration import calibrated
 from tfcompose.resolve.completed import completed
-from tfcompose.resolve.edges import Drafts, as_written
+from tfcompose.resolve.edges import Drafts, source_numbers
 from tfcompose.resolve.isolation import settings_of
 from tfcompose.resolve.param_files import with_param_files
-from tfcompose.resolve.parts import Parts, Whole
+from tfcompose.resolve.parts import Collected, Parts
 from tfcompose.resolve.poses import Solver
 from tfcompose.resolve.presets import sensor_of
 from tfcompose.resolve.processes import (
@@ -49,7 +49,7 @@ class Resolved:
 
     robot: Robot
     found: tuple[Finding, ...]
-    whole: Whole = field(default_factory=Whole)
+    collected: Collected = field(default_factory=Collected)
 
 
 def resolve(
@@ -83,7 +83,7 @@ class _Work:
     found: list[Finding] = field(default_factory=list)
     of_parts: list[Finding] = field(default_factory=list)
     broken: set[tuple[str, str]] = field(default_factory=set)
-    whole: Whole = field(default_factory=Whole)
+    collected: Collected = field(default_factory=Collected)
     joined: list[Joined] = field(default_factory=list)
 
     @property
@@ -113,7 +113,7 @@ class _Work:
             robot = self._take(with_param_files(robot, self.source, self.read))
         robot = self._take(completed(robot, self.spec, self.source, self.disk))
         found = [one for one in self.found if not self._may_follow(one)] if self.broken else self.found
-        return Resolved(robot, (*self.of_parts, *found), self.whole)
+        return Resolved(robot, (*self.of_parts, *found), self.collected)
 
     def _may_follow(self, found: Finding) -> bool:
         """Return whether it may be there only because an edge on the way, or a part with that name, was refused."""
@@ -133,7 +133,7 @@ class _Work:
         """Resolve the parts; few robots have any, and what joins them is loaded only then."""
         if not self.spec.parts:
             return
-        parts = self.holder or Parts(self.library, self.read, self.disk, resolve, (self.source.file,), self.whole)
+        parts = self.holder or Parts(self.library, self.read, self.disk, resolve, (self.source.file,), self.collected)
         self.joined = parts.join(self.validated, settings_of(self.spec.ros).frame_prefix, packages)
         self.of_parts = parts.found
         self.broken |= {*parts.missing, *(entry for part in self.joined for entry in part.robot.broken)}
@@ -147,8 +147,8 @@ class _Work:
         drafts.add_links()
         drafts.add_joints()
         presets = self._presets()
-        for name, said in self.spec.sensors.items():
-            sensor, refused = sensor_of(name, said, presets, self.source)
+        for name, declared in self.spec.sensors.items():
+            sensor, refused = sensor_of(name, declared, presets, self.source)
             self.found += refused
             if sensor:
                 add_sensor(drafts, sensor)
@@ -168,7 +168,7 @@ class _Work:
         self.found += [
             finding("TF001", f"preset_path: no folder {folder}", at)
             for folder, at in zip(folders, places, strict=True)
-            if not self.library.shelves.is_folder(folder)
+            if not self.library.storage.is_folder(folder)
         ]
         return self.library.over(folders)
 
@@ -192,8 +192,8 @@ class _Work:
 
     def _robot(self, drafts: Drafts, edges: tuple[Edge, ...], everybody: list[Process]) -> Robot:
         parts = [part.robot for part in self.joined]
-        in_tree = [part.robot for part in self.joined if not part.said.namespace]
-        written = as_written(self.spec, self.source)
+        in_tree = [part.robot for part in self.joined if not part.declared.namespace]
+        numbers = source_numbers(self.spec, self.source)
         return Robot(
             name=self.spec.robot,
             file=self.source.file,
@@ -206,9 +206,9 @@ class _Work:
             guard=_guard(self.spec.guard, parts),
             sensors=tuple(drafts.sensors),
             claims=tuple(one for part in parts for one in part.claims),
-            as_written=written + tuple(one for part in parts for one in part.as_written),
+            source_numbers=numbers + tuple(one for part in parts for one in part.source_numbers),
             unused={name: self.source.at_key(("vars", name)) for name in self.validated.unused},
-            written=_written(self.source, self.joined),
+            source_data=_source_data(self.source, self.joined),
             broken=frozenset(self.broken),
             parts=tuple(alone for part in parts for alone in part.parts),
             mounted={part.name: part.root for part in self.joined if part.root is not None},
@@ -216,7 +216,7 @@ class _Work:
             blocks=_blocks(in_tree),
             foreign=frozenset(file for part in parts for file in part.foreign),
             refused=tuple(at for entry in sorted(self.validated.broken) if (at := self.source.exactly_at(entry))),
-            part_notes=self.whole.notes,
+            part_notes=self.collected.notes,
             is_variant=self.source.is_variant,
         )
 
@@ -237,23 +237,23 @@ def _has_calibrations(spec: RobotSpec) -> bool:
 
 def _processes(validated: Validated, found: list[Finding]) -> list[Process]:
     processes = built_in(validated.spec, validated.source)
-    for name, said in validated.spec.processes.items():
-        process, refused = user_process(name, said, validated)
+    for name, declared in validated.spec.processes.items():
+        process, refused = user_process(name, declared, validated)
         found += refused
         if process:
             processes.append(process)
     return processes
 
 
-def _written(source: Source, joined: list[Joined]) -> dict[str, Any]:
+def _source_data(source: Source, joined: list[Joined]) -> dict[str, Any]:
     """Return what the robot was made from, with what its parts were made from."""
-    return source.data | ({"in parts": {part.name: part.robot.written for part in joined}} if joined else {})
+    return source.data | ({"in parts": {part.name: part.robot.source_data for part in joined}} if joined else {})
 
 
-def _guard(said: GuardPolicy, parts: list[Robot]) -> GuardPolicy:
+def _guard(declared: GuardPolicy, parts: list[Robot]) -> GuardPolicy:
     """Return the policy with what the parts allow."""
-    more = (pattern for part in parts for pattern in part.guard.allow if pattern not in said.allow)
-    return replace(said, allow=(*said.allow, *more))
+    more = (pattern for part in parts for pattern in part.guard.allow if pattern not in declared.allow)
+    return replace(declared, allow=(*declared.allow, *more))
 
 
 def _with_rates(edges: tuple[Edge, ...], processes: list[Process]) -> tuple[Edge, ...]:

@@ -77,17 +77,17 @@ class _Mounting:
 
     def pose_of(self, name: str, frame: PresetFrame, own: FrameOverride | None) -> tuple[Pose, bool]:
         """Return the frame's pose in its parent, and whether it is the unit's own; note what nobody knows."""
-        at, written = frame.xyz, rotation_of(frame, name)
+        at, rotation = frame.xyz, rotation_of(frame, name)
         if frame.by_driver and self.sensor.tf == DRIVER:
-            at, written = frame.by_driver.xyz or at, rotation_of(frame.by_driver, name) or written
+            at, rotation = frame.by_driver.xyz or at, rotation_of(frame.by_driver, name) or rotation
         turned = rotation_of(own, name) if own else None
         unknown = ["xyz: [x, y, z]"] if at is None and not (own and own.xyz) else []
-        if at is None and written is None and turned is None:
+        if at is None and rotation is None and turned is None:
             unknown.append("rpy: [roll, pitch, yaw]")
         if unknown:
             self.unknown[name] = f"{name}: {{{', '.join(unknown)}}}"
         xyz = (own.xyz if own else None) or at or (0.0, 0.0, 0.0)
-        return Pose(xyz, turned or written or Pose().quat_xyzw), bool(own and (own.xyz or turned))
+        return Pose(xyz, turned or rotation or Pose().quat_xyzw), bool(own and (own.xyz or turned))
 
     def ask(self) -> None:
         """Note where nobody knows where frames are, with what to write."""
@@ -103,8 +103,8 @@ class _Mounting:
 
     def publisher(self) -> str:
         """Return who publishes the frames inside the sensor that a driver can publish; note what cannot be."""
-        sensor, said, driver = self.sensor, self.sensor.spec, self.sensor.preset.driver
-        named = said.driver.process if said.driver else None
+        sensor, declared, driver = self.sensor, self.sensor.spec, self.sensor.preset.driver
+        named = declared.driver.process if declared.driver else None
         process, found = driver_process(sensor, self.drafts.validated)
         self.drafts.found += found
         if process:
@@ -113,13 +113,13 @@ class _Mounting:
             return STATIC
         if sensor.tf == DRIVER:
             return named or sensor.name
-        if said.tf == DRIVER:
-            why = "driver is none" if named == "none" else f"{said.preset} has no driver"
+        if declared.tf == DRIVER:
+            why = "driver is none" if named == "none" else f"{declared.preset} has no driver"
             if driver and named != "none":
-                why = f"that of {said.preset} publishes none" + (" with these options" if _can(sensor) else "")
+                why = f"that of {declared.preset} publishes none" + (" with these options" if _can(sensor) else "")
             self.refuse(f"{sensor.name}: the driver cannot publish its frames: {why}", "tf: tfcompose")
-        elif said.tf == TFCOMPOSE and driver and named is None and driver.off is None and sensor.driven():
-            message = f"{sensor.name}: the driver of {said.preset} has no switch for its frames"
+        elif declared.tf == TFCOMPOSE and driver and named is None and driver.off is None and sensor.driven():
+            message = f"{sensor.name}: the driver of {declared.preset} has no switch for its frames"
             self.refuse(message, "tf: driver; or driver: none, where there is no device")
         return STATIC
 
@@ -128,13 +128,13 @@ class _Mounting:
 
     def mounted(self, mount: str) -> MountedSensor:
         """Return what the rules see of the sensor."""
-        sensor, said, preset = self.sensor, self.sensor.spec, self.sensor.preset
-        named = said.driver.process if said.driver else None
+        sensor, declared, preset = self.sensor, self.sensor.spec, self.sensor.preset
+        named = declared.driver.process if declared.driver else None
         own = sensor.name if any(process.name == sensor.name for process in self.drafts.drivers) else ""
         serial = next((option for option in ("serial", "serial_number") if option in preset.options), "")
         return MountedSensor(
             sensor.name,
-            said.preset,
+            declared.preset,
             preset.kind,
             self.place(),
             mount,
@@ -197,32 +197,32 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
 
     It is the preset's with the user's keys over it, the user's alone where the preset has none, or None.
     """
-    driver, said = sensor.preset.driver, sensor.spec.driver
+    driver, declared = sensor.preset.driver, sensor.spec.driver
     spec, source = validated.spec, validated.source
     at: Path = ("sensors", sensor.name, "driver")
-    if said and said.process is not None:
-        return None, _named_driver(sensor, said.process, validated)
-    if said and said.simulate:
+    if declared and declared.process is not None:
+        return None, _named_driver(sensor, declared.process, validated)
+    if declared and declared.simulate:
         advice = "driver: none, and tf: tfcompose, where there is no device"
         return None, [finding("TF604", "a driver cannot be simulated", source.at_key((*at, "simulate")), help=advice)]
-    run, external = (said.run, bool(said.external)) if said else (None, False)
-    if driver is None and said is None:
+    run, external = (declared.run, bool(declared.external)) if declared else (None, False)
+    if driver is None and declared is None:
         return None, []
     if not external and not (run and run.is_startable) and (run or driver is None):
         place, advice = source.at_key((*at, "run")), "run: {package: …, executable: …}, or external: true"
         return None, [finding("TF102", f"the driver of {sensor.name} does not say how it runs", place, help=advice)]
     launched = driver is not None and driver.launch is not None and run is None
     computed = driver_parameters(sensor, settings_of(spec.ros).frame_prefix)
-    params = (said.params if said else {}) | _node_parameters(sensor, computed, launched=launched)
+    params = (declared.params if declared else {}) | _node_parameters(sensor, computed, launched=launched)
     place = source.at_key(at[:2])
     state = driver.lifecycle if driver and run is None else None
-    node = Node(driver_node(sensor, spec), place, at, params, (said.lifecycle if said else None) or state)
+    node = Node(driver_node(sensor, spec), place, at, params, (declared.lifecycle if declared else None) or state)
     process = Process(sensor.name, "external" if external else "run", place, (node,))
-    if said:
-        keys = how(said, namespace_of(said, spec.ros.namespace), EXTERNAL_KEYS if external else KEYS)
+    if declared:
+        keys = how(declared, namespace_of(declared, spec.ros.namespace), EXTERNAL_KEYS if external else KEYS)
         process = replace(process, **keys)
     if run:
-        process = replace(process, **program(run, shell=bool(said and said.shell)))
+        process = replace(process, **program(run, shell=bool(declared and declared.shell)))
     elif driver and launched:
         args = {key: value for key, value in computed.items() if params or value != PARAMS_FILE}
         process = replace(process, launch=f"{driver.package}/{driver.launch}", argv=tuple(arguments(args)))
@@ -233,10 +233,10 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
 
 def driver_node(sensor: Sensor, spec: RobotSpec) -> str:
     """Return the full name of the driver's node."""
-    driver, said = sensor.preset.driver, sensor.spec.driver
+    driver, declared = sensor.preset.driver, sensor.spec.driver
     own = f"{sensor.named(driver.namespace)}/{sensor.named(driver.node)}".strip("/") if driver else sensor.name
-    namespace = namespace_of(said, spec.ros.namespace)
-    return full_name(namespace, (said.node.name if said and said.node else None) or own)
+    namespace = namespace_of(declared, spec.ros.namespace)
+    return full_name(namespace, (declared.node.name if declared and declared.node else None) or own)
 
 
 def driver_parameters(sensor: Sensor, prefix: str = "") -> dict[str, Any]:
@@ -253,9 +253,9 @@ def driver_parameters(sensor: Sensor, prefix: str = "") -> dict[str, Any]:
 
 def claims_of(sensor: Sensor) -> tuple[DriverClaim, ...]:
     """Return the edges outside the sensor that its driver publishes by default, unless it owns the mount's."""
-    driver, said = sensor.preset.driver, sensor.spec
-    own = {sensor.name, said.driver.process if said.driver else None}
-    return () if driver is None or (said.owner and said.owner in own) else driver.claims
+    driver, declared = sensor.preset.driver, sensor.spec
+    own = {sensor.name, declared.driver.process if declared.driver else None}
+    return () if driver is None or (declared.owner and declared.owner in own) else driver.claims
 
 
 def _node_parameters(sensor: Sensor, computed: dict[str, Any], *, launched: bool) -> dict[str, Any]:
@@ -310,8 +310,8 @@ def _plain(value: Any) -> str:
 
 def _unreached(sensor: Sensor, spec: RobotSpec, source: Source) -> list[Finding]:
     """Return findings about names that the driver makes itself, and that the spec wants otherwise."""
-    driver, said = sensor.preset.driver, sensor.spec
-    if driver is None or (said.driver and (said.driver.run or said.driver.external)):
+    driver, declared = sensor.preset.driver, sensor.spec
+    if driver is None or (declared.driver and (declared.driver.run or declared.driver.external)):
         return []
     settings = settings_of(spec.ros)
     named = {sensor.named(frame) for frame in driver.naming.values()}
@@ -319,18 +319,17 @@ def _unreached(sensor: Sensor, spec: RobotSpec, source: Source) -> list[Finding]
     own = (stamped | ({*sensor.driven()} if sensor.tf == DRIVER else set())) - named
     at: Path = ("sensors", sensor.name)
     found = []
-    for name in sorted(own & {frame for frame, one in said.frames.items() if one.name}):
-        message = (
-            f"the driver of {said.preset} makes the name {name} itself, and cannot call it {said.frames[name].name}"
-        )
+    for name in sorted(own & {frame for frame, one in declared.frames.items() if one.name}):
+        wanted = declared.frames[name].name
+        message = f"the driver of {declared.preset} makes the name {name} itself, and cannot call it {wanted}"
         place = source.at((*at, "frames", name, "name"))
         found.append(finding("TF604", message, place, help=f"rename the sensor {sensor.name}, or keep the name"))
     if settings.frame_prefix and not driver.prefixed and own & {*sensor.frames(), sensor.named(sensor.preset.mount)}:
-        message = f"the driver of {said.preset} cannot write {settings.frame_prefix} in front of its frames"
+        message = f"the driver of {declared.preset} cannot write {settings.frame_prefix} in front of its frames"
         advice = "ros: {isolate: topics} keeps robots apart without a prefix"
         found.append(finding("TF604", message, source.at_key(at), help=advice))
-    if driver.launch and said.driver and said.driver.params and PARAMS_FILE not in driver.args.values():
-        message = f"{driver.launch} of {said.preset} takes no file of parameters"
+    if driver.launch and declared.driver and declared.driver.params and PARAMS_FILE not in driver.args.values():
+        message = f"{driver.launch} of {declared.preset} takes no file of parameters"
         place = source.at_key((*at, "driver", "params"))
         found.append(finding("TF604", message, place, help="driver: {run: {package: …, executable: …}}"))
     return found

@@ -84,9 +84,9 @@ class Packages:
     def not_found(self, name: str, at: Span | None) -> Finding:
         """Return the finding that a package is not found, with the list of where it was looked for."""
         folders = self.candidates(name)
-        looked = f"looked in {', '.join(folders)}" if folders else "AMENT_PREFIX_PATH is empty"
+        searched = f"looked in {', '.join(folders)}" if folders else "AMENT_PREFIX_PATH is empty"
         near = slip_of(name, self.named) or nearest(name, self.named, _NEAR)
-        advice = f"{looked}; {f'did you mean {near}?' if near else self.advice.format(name=name)}"
+        advice = f"{searched}; {f'did you mean {near}?' if near else self.advice.format(name=name)}"
         return finding("TF724", f"package {name} not found", at, help=advice, severity="warning")
 
     def asset(self, uri: str, at: Span) -> tuple[Asset, Finding | None]:

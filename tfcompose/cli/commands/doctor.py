@@ -63,9 +63,9 @@ def run(arguments: Namespace) -> int:
             check_early_end(found.seconds, arguments.duration, heard=bool(found.edges))
     code = _print(found.findings, arguments.format)
     if arguments.format == "text":
-        looked = f"{counted(found.edges, 'edge')} from {counted(found.nodes, 'node')}"
-        looked += f" below {printable(', '.join(found.roots[:MOST_ROOTS]))}" if found.roots else ""
-        print(f"looked for {found.seconds:.1f} s at {looked}: {_summary(found.findings)}")
+        observed = f"{counted(found.edges, 'edge')} from {counted(found.nodes, 'node')}"
+        observed += f" below {printable(', '.join(found.roots[:MOST_ROOTS]))}" if found.roots else ""
+        print(f"looked for {found.seconds:.1f} s at {observed}: {_summary(found.findings)}")
         if found.edges and found.elsewhere:
             words = namespace_options(found.elsewhere)
             print(f"there is TF on {', '.join(found.elsewhere[:MOST_ROOTS])} too: {words}")

@@ -150,18 +150,18 @@ def lint_file(file: str, presets: Library, arguments: Namespace, read: Callable[
     if arguments.profiles or overlays:
         return list(compile_source(source, presets, arguments.profiles, overlays, read, disk()).found)
     alone = compile_source(source, presets, read=read, disk=disk())
-    found, used, looked = list(alone.found), set(alone.used), alone.robot is not None
+    found, used, complete = list(alone.found), set(alone.used), alone.robot is not None
     for profile in profiles_of(source):
         note = Note(f"with --profile {profile}")
         known = {(one.code, one.message, one.span) for one in found}
         variant = compile_source(source, presets, [profile], read=read, disk=disk())
         used |= variant.used
-        looked = looked and variant.robot is not None
+        complete = complete and variant.robot is not None
         found += [
             replace(one, notes=(*one.notes, note))
             for one in variant.found
             if (one.code, one.message, one.span) not in known
         ]
-    if looked:  # else a comment may be about what was not looked at
+    if complete:  # else a comment may be about what was not looked at
         found += unused_allows(source.allows, used)
     return sorted(found, key=lambda one: one.sort_key)

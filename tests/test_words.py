@@ -1,0 +1,223 @@
+"""The words of the project: the field's word for each idea, and words that no name in the code may contain."""
+
+from __future__ import annotations
+
+import ast
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+ROOT = Path(__file__).parents[1]
+
+#: The word for each idea, and what it means here. One word, one meaning.
+GLOSSARY = {
+    # the tree
+    "frame": "a named coordinate frame of TF; frame_id in messages",
+    "edge": "a parent frame, a child frame and the pose of the child in the parent; static, dynamic or a joint's",
+    "parent, child": "the two ends of an edge; parent_from_child is the pose that maps the child's points",
+    "root": "a frame without a parent; base is the root of the URDF",
+    "mount": "the frame with which a sensor is bolted to the robot",
+    "optical frame": "a camera's frame with z forward, x right, y down (REP-103)",
+    "pose": "a translation in metres and a unit quaternion, xyz and quat_xyzw",
+    "joint": "an edge that moves with one variable, of a URDF type",
+    "body": "what a link is made of: visuals, collisions, inertia",
+    "part": "another robot file, URDF or xacro that a robot file includes under a name",
+    # the file and what becomes of it
+    "source": "a file's text as data, with the span of each key and value",
+    "span": "file, line and column from and to; where a finding points",
+    "spec": "what the user declared, as pydantic models",
+    "preset": "what is known of a model of sensor, or of a ROS node",
+    "overlay, profile": "a file, or a section of it, that is merged over a robot file",
+    "robot": "the resolved model: all edges, links, joints and processes",
+    "plan": "what launcher, publishers, guard and live tools know of a robot: plan.json",
+    "place": "the key of the language that names the frame to which a pose applies; and where a finding points",
+    "finding": "a code, a message, a span, notes, help and edits",
+    "severity": "error, warning or note",
+    "rule": "a check of the robot model, with its code; its docstring is its page",
+    # who publishes
+    "owner": "the process that publishes an edge; each edge has exactly one",
+    "publisher, subscriber": "an endpoint of a topic in the ROS graph, with its GID",
+    "claim": "an edge that a node publishes by its parameters, and the parameter that switches it off",
+    "stamp": "the time in a message's header",
+    "latched": "transient local durability: late subscribers get the last message",
+    "guard": "the process that reports or blocks whoever publishes another's edge",
+    "watchdog": "what restarts a process whose edges stop coming",
+    # what runs
+    "process": "a program that the launcher starts, or that runs elsewhere: external",
+    "node": "a ROS node; a process has one or more",
+    "supervisor": "the part of the launcher that starts, watches and restarts processes",
+    "event, state, transition": "the process machine: a state, an event, and the next state with its effects",
+    "backoff": "the growing delay before a restart",
+    "readiness": "when a process counts as started: at a topic, a service, a lifecycle state or a log line",
+    "runtime directory": "where a running robot keeps its socket, its lock and its state",
+    "lock": "the file lock by which one launcher holds a robot",
+    # what is observed
+    "observe, received": "what came from the live tree, a bag or the ROS graph",
+    "expected": "what the plan says should come",
+    "request, answer": "a question to a process or service, and what it sent back",
+}
+
+#: Words that were a dialect of this project, with what to write instead.
+FORBIDDEN = {
+    "law": "rule",
+    "eye": "camera, observer",
+    "ear": "listener, subscription",
+    "voice": "publisher",
+    "told": "described, given, options",
+    "said": "text, declared, stated",
+    "seen": "observed, received, visited",
+    "asked": "requested, queried",
+    "strand": "stream, edge",
+    "sideline": "exclude",
+    "census": "count, summary",
+    "tally": "count",
+    "bulletin": "report, status",
+    "heed": "handle",
+    "quiet": "silent",
+    "turn": "rotation, phase",
+    "lives": "lifetimes",
+    "vigil": "watch",
+    "teller": "reporter",
+    "outlet": "publisher, output",
+    "keeper": "owner, holder",
+    "bury": "reap, remove",
+    "look": "check, inspect, observe, scan",
+    "whole": "complete, entire, full",
+    "written": "source_…, declared",
+    "cut": "truncated, trimmed",
+    "beside": "next_to, neighbour",
+    "shelf": "folder, storage",
+    "keeping": "holding",
+    "standing_in": "substitute",
+    "misfit": "mismatch",
+    "letter": "char",
+}
+#: Other forms of the same words.
+FORMS = {
+    "laws": "law",
+    "eyes": "eye",
+    "ears": "ear",
+    "voices": "voice",
+    "strands": "strand",
+    "sidelines": "sideline",
+    "sidelined": "sideline",
+    "tallies": "tally",
+    "bulletins": "bulletin",
+    "heeds": "heed",
+    "heeded": "heed",
+    "heeding": "heed",
+    "quietly": "quiet",
+    "turns": "turn",
+    "tellers": "teller",
+    "outlets": "outlet",
+    "keepers": "keeper",
+    "buried": "bury",
+    "buries": "bury",
+    "looks": "look",
+    "looked": "look",
+    "looking": "look",
+    "cuts": "cut",
+    "shelves": "shelf",
+    "misfits": "misfit",
+    "letters": "letter",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Exempt:
+    """Names that may contain a forbidden word in some files, with the reason."""
+
+    names: frozenset[str]
+    files: str
+    reason: str
+
+
+EXEMPT = (
+    Exempt(
+        frozenset({"look", "Look", "LookAngles", "_look_form"}),
+        "tfcompose/(language/pose|resolve/poses)",
+        "look: is the key of the language that gives a camera its direction",
+    ),
+    Exempt(
+        frozenset({"EyeInHand", "EyeOnBase"}),
+        "tfcompose/language/calibration",
+        "hand-eye calibration has these two set-ups, by these names",
+    ),
+    Exempt(frozenset({"camera_looks_away"}), "tfcompose/check/poses", "a rule's function has the rule's name"),
+    Exempt(
+        frozenset({"seen"}),
+        "tfcompose/(ipc|launcher/answers|cli/console|cli/runs)",
+        "a key of ps --format json and of the launcher's events",
+    ),
+)
+
+
+def words_in(name: str) -> list[str]:
+    """Return the words of an identifier: split at underscores, digits and capitals."""
+    return [word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name)]
+
+
+def forbidden_in(name: str) -> set[str]:
+    """Return the forbidden words in a name, in their first form."""
+    words = words_in(name)
+    found = {FORMS.get(word, word) for word in words} & FORBIDDEN.keys()
+    return found | {phrase for phrase in FORBIDDEN if "_" in phrase and phrase in "_".join(words)}
+
+
+def names_in(tree: ast.AST) -> Iterator[tuple[str, int]]:
+    """Yield every name that the module defines or uses, with its line."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name) | ast.ClassDef(name=name):
+                yield name, node.lineno
+            case ast.arg(arg=name) | ast.Name(id=name) | ast.Attribute(attr=name) | ast.keyword(arg=str(name)):
+                yield name, node.lineno
+            case ast.alias(name=name, asname=other):
+                yield other or name, node.lineno
+            case _:
+                pass
+
+
+def faults(folder: str) -> Iterator[str]:
+    """Yield file, line and name wherever a name contains a forbidden word."""
+    for file in sorted((ROOT / folder).rglob("*.py")):
+        path = file.relative_to(ROOT).with_suffix("").as_posix()
+        exempt = {name for one in EXEMPT if re.fullmatch(one.files, path) for name in one.names}
+        names = [(path.rpartition("/")[2], 1), *names_in(ast.parse(file.read_text("utf-8")))]
+        for name, line in names:
+            for word in sorted(forbidden_in(name)) if name not in exempt else ():
+                yield f"{path}.py:{line}: {name} ({word}: {FORBIDDEN[word]})"
+
+
+@pytest.mark.parametrize("folder", ["tfcompose"])
+def test_no_name_contains_a_forbidden_word(folder: str) -> None:
+    assert not list(faults(folder))
+
+
+def test_every_exemption_is_needed() -> None:
+    modules = [file.relative_to(ROOT).with_suffix("").as_posix() for file in ROOT.glob("t*/**/*.py")]
+    for one in EXEMPT:
+        files = [ROOT / f"{path}.py" for path in modules if re.fullmatch(one.files, path)]
+        used = {name for file in files for name, _ in names_in(ast.parse(file.read_text("utf-8")))}
+        assert one.names <= used, one
+        assert all(forbidden_in(name) for name in one.names), one
+
+
+def test_forbidden_words_are_found_in_every_form_of_name() -> None:
+    assert forbidden_in("_seen_from") == {"seen"}
+    assert forbidden_in("QUIET_S") == {"quiet"}
+    assert forbidden_in("LookAngles") == {"look"}
+    assert forbidden_in("standing_in_for") == {"standing_in"}
+    assert not forbidden_in("return_early")
+    assert not forbidden_in("outlook")
+
+
+def test_no_word_is_both_in_the_glossary_and_forbidden() -> None:
+    terms = {word for term in GLOSSARY for word in re.findall(r"\w+", term)}
+    assert not terms & (FORBIDDEN.keys() | FORMS.keys())

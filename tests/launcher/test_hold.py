@@ -14,8 +14,8 @@ from tests.support.launcher import LISTEN, SLEEPER, plan_of, program
 from tests.support.waiting import TIMEOUT_S, gone, until
 from tfcompose.ipc import GO, GUARD_EVENTS, HOLD_FD, Clear, LogLine, Notice, ProcessState
 from tfcompose.launcher.supervisor import supervise
+from tfcompose.process import wait_for_go
 from tfcompose.ros.stop import Stop
-from tfcompose.run.hold import wait_for_go
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -100,4 +100,14 @@ def test_one_that_dies_while_it_is_held_has_failed_when_it_is_started(tmp_path: 
     assert supervise(plan, tmp_path / "plan.json", report=told.append) == 1
     states = [one.state for one in told if isinstance(one, ProcessState) and one.process == "static"]
     assert states == ["STARTING", "RUNNING", "EXITED"]
+    assert not psutil.Process().children(recursive=True)
+
+
+def test_one_that_died_while_it_was_held_ends_nothing_when_the_guard_dies_too(tmp_path: Path) -> None:
+    told: list[Notice] = []
+    look = "import os, time\nwhile not os.path.exists('dies'): time.sleep(0.01)\n"
+    dies = program("static", "open('dies', 'w').close(); raise SystemExit(3)", kind="static", cwd=".")
+    plan = plan_of(program("guard", f"{look}raise SystemExit(4)", kind="guard", cwd="."), dies)
+    assert supervise(plan, tmp_path / "plan.json", report=told.append) == 1
+    assert {one.process for one in told if isinstance(one, ProcessState) and one.state == "EXITED"} == {"guard"}
     assert not psutil.Process().children(recursive=True)

@@ -131,7 +131,8 @@ class Children:
     def reap(self) -> None:
         """Take leave of those that have ended."""
         for child in [child for child in self._children.values() if has_ended(child.popen.pid)]:
-            if child.name not in self._held:
+            # The guard's end dismisses those that are held, so that one of these may be gone by now.
+            if child.name not in self._held and self._children.get(child.name) is child:
                 self._ended(child)
         if self._run_id:
             reap_adopted(self._groups() | {self._reaper.pid})

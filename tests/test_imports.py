@@ -45,9 +45,10 @@ MAY_IMPORT: dict[str, set[str]] = {
     "live": {"geometry", "plan", "ros", "tf2", "tree"},
     "bags": {"geometry", "live", "plan", "ros", "tf2"},
     "verdict": {"catalogue", "findings", "geometry", "live", "plan", "ros", "text", "tree"},
-    "guard": {"findings", "geometry", "ipc", "live", "plan", "ros", "run", "text", "verdict"},
+    "process": {"findings", "ipc", "plan", "ros"},
+    "guard": {"findings", "geometry", "ipc", "live", "plan", "process", "ros", "text", "verdict"},
     "launcher": {"findings", "interrupt", "ipc", "plan", "ros"},
-    "run": {"findings", "ipc", "interrupt", "plan", "geometry", "guard", "launcher", "ros"},
+    "publishers": {"geometry", "plan", "process", "ros", "text"},
     "tf2": {"geometry", "ros"},
     "compile": FOUNDATIONS | STAGES,
     "pages": {"catalogue", "check"},
@@ -61,7 +62,7 @@ ONLY_IN: dict[str, set[str]] = {
     "yaml": {"load"},
     "pydantic": {"language"},
     "pydantic_core": {"language", "units"},
-    "numpy": {"ros", "run", "tf2", "urdf"},  # urdf: what trimesh gives are its arrays
+    "numpy": {"publishers", "ros", "tf2", "urdf"},  # urdf: what trimesh gives are its arrays
     "xacro": {"urdf"},
     "trimesh": {"urdf"},
     "yourdfpy": {"urdf"},
@@ -145,7 +146,7 @@ def test_a_stage_is_imported_by_its_own_name_from_outside(file: Path) -> None:
 
 def test_launcher_guard_and_publishers_do_not_know_each_other() -> None:
     """They are processes of their own: what they tell each other stands in ``ipc``."""
-    rooms = ("tfcompose.launcher", "tfcompose.guard", "tfcompose.run.publishing")
+    rooms = ("tfcompose.launcher", "tfcompose.guard", "tfcompose.publishers")
     for room in rooms:
         files = list((PACKAGE.parent / room.replace(".", "/")).rglob("*.py"))
         assert files
@@ -165,7 +166,7 @@ def test_a_command_is_imported_by_the_parser_alone() -> None:
 
 
 #: Parts that import in a function what is optional, or heavy and rarely needed.
-LATE_IMPORTS = {"bags", "cli", "guard", "ros", "run", "tf2"}
+LATE_IMPORTS = {"bags", "cli", "guard", "publishers", "ros", "tf2"}
 
 
 def test_nothing_is_imported_inside_a_function() -> None:
@@ -240,7 +241,7 @@ def test_commands_before_the_plan_load_yaml_and_pydantic_and_nothing_else_from_e
     loaded = loaded_by(command(words[0], robot, *words[1:], *more))
     pydantic = {"pydantic", "pydantic_core", "annotated_types", "typing_extensions", "typing_inspection"}
     assert foreign(loaded, bare) - {"cython_runtime"} == {"yaml", *pydantic}
-    assert not loaded & {"tfcompose.ros", "tfcompose.run", "tfcompose.launcher", "tfcompose.guard", "tfcompose.live"}
+    assert not loaded & {f"tfcompose.{name}" for name in ("ros", "process", "publishers", "launcher", "guard", "live")}
 
 
 def test_reading_and_supervising_a_plan_loads_nothing_from_elsewhere_and_no_compiler(bare: set[str]) -> None:
@@ -263,7 +264,9 @@ def test_the_buffer_stands_on_its_own() -> None:
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("module", ["run.publishing.static_role", "run.publishing.simulate_role", "guard.process"])
+@pytest.mark.parametrize("module", ["publishers.static", "publishers.simulate", "guard.process"])
 def test_processes_that_need_no_arrays_load_no_numpy_and_no_pydantic(module: str) -> None:
     """Each is a fifth of their memory."""
-    assert not {"numpy", "pydantic", "pydantic_core"} & loaded_by(f"import tfcompose.{module}")
+    loaded = loaded_by(f"import tfcompose.{module}, tfcompose.publishers.description, tfcompose.ros.clock")
+    assert not {"numpy", "pydantic", "pydantic_core"} & loaded
+    assert "rclpy" in loaded

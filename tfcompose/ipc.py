@@ -27,7 +27,7 @@ LAUNCHER = "TFCOMPOSE_LAUNCHER"
 EVENTS_FD = "TFCOMPOSE_EVENTS_FD"
 #: The descriptor of the pipe for what the launcher tells the guard.
 ORDERS_FD = "TFCOMPOSE_ORDERS_FD"
-#: The descriptor of what the guard before this one left, in JSON; see ``tfcompose.run.guard.memory``.
+#: The descriptor of what the guard before this one left, in JSON; see ``tfcompose.guard.channel``.
 MEMORY_FD = "TFCOMPOSE_MEMORY_FD"
 #: For how many seconds the guard is to look before it says that all is clear.
 SETTLE = "TFCOMPOSE_SETTLE_S"

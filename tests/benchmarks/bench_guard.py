@@ -69,7 +69,7 @@ def measure() -> list[float]:
         file, said = Path(folder, "plan.json"), Path(folder, "said.txt")
         file.write_text(write_plan(plan()), encoding="utf-8")
         with said.open("wb") as out:
-            guard = subprocess.Popen([sys.executable, "-m", "tfcompose.run.guard", str(file), "guard"], stdout=out)
+            guard = subprocess.Popen([sys.executable, "-m", "tfcompose.guard", str(file), "guard"], stdout=out)
         owner = subprocess.Popen([sys.executable, "-c", OWNER])
         try:
             return _rounds(psutil.Process(guard.pid), said)

@@ -83,7 +83,7 @@ def measure(joints: int, seconds: float = SECONDS, *, plain: bool = False) -> tu
     from tfcompose.ros.node import open_node  # noqa: PLC0415 (after ROS's variables are set)
 
     with tempfile.TemporaryDirectory() as folder, open_node("bench", "/rover") as node:
-        words = ["-m", "tfcompose.run.joints", str(plan_file(Path(folder), joints)), "joints"]
+        words = ["-m", "tfcompose.publishers.joints", str(plan_file(Path(folder), joints)), "joints"]
         command = [sys.executable, *(["-c", PLAIN] if plain else words)]
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
         try:

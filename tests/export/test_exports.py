@@ -96,7 +96,7 @@ def test_a_unit_restarts_stops_and_waits_as_the_plan_says() -> None:
     assert (slam["Service"]["Restart"], slam["Unit"]["StartLimitBurst"]) == (["on-failure"], ["4"])
     assert drive["Service"]["Restart"] == ["always"]
     assert (drive["Service"]["KillSignal"], drive["Service"]["TimeoutStopSec"]) == (["SIGTERM"], ["2"])
-    assert slam["Service"]["ExecStart"] == ["/usr/bin/python3 -m tfcompose.run.process /opt/rover/plan.json slam"]
+    assert slam["Service"]["ExecStart"] == ["/usr/bin/python3 -m tfcompose.launcher.exec /opt/rover/plan.json slam"]
 
 
 def test_a_process_that_is_waited_for_until_it_is_done_is_oneshot() -> None:
@@ -313,7 +313,7 @@ def test_a_driver_is_a_node_with_its_name_parameters_and_remappings(
     assert drive.additional_env == {"GREETING": '100 % "sure" $HOME'}
     assert drive.respawn
     (slam,) = (action for action in actions if action.kind == "ExecuteProcess")
-    assert slam.cmd[1:] == ["-m", "tfcompose.run.process", str(tmp_path / "plan.json"), "slam"]
+    assert slam.cmd[1:] == ["-m", "tfcompose.launcher.exec", str(tmp_path / "plan.json"), "slam"]
     handlers = [action for action in actions if action.kind == "RegisterEventHandler"]
     assert len(handlers) == 2, "configured when it was started, and activated when it is inactive"
     variables = [action.words for action in actions if action.kind == "SetEnvironmentVariable"]

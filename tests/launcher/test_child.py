@@ -104,7 +104,7 @@ def test_a_sighup_that_is_ignored_as_below_nohup_stays_ignored() -> None:
 def test_an_own_process_that_is_told_to_end_while_it_starts_ends_by_its_own_rules(
     number: int, seconds: float, tmp_path: Path
 ) -> None:
-    argv = (sys.executable, "-m", "tfcompose.run.static", str(tmp_path / "plan.json"), "static")
+    argv = (sys.executable, "-m", "tfcompose.publishers.static", str(tmp_path / "plan.json"), "static")
     popen = spawn(Command(argv, dict(os.environ), tmp_path, own=True), ())
     time.sleep(seconds)
     popen.send_signal(number)

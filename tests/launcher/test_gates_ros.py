@@ -49,7 +49,7 @@ try:
 except BaseException:
     pass
 """
-GUARD = PlanProcess("guard", "guard", ("${python}", "-m", "tfcompose.run.guard", "${plan}", "guard"), nodes=("/guard",))
+GUARD = PlanProcess("guard", "guard", ("${python}", "-m", "tfcompose.guard", "${plan}", "guard"), nodes=("/guard",))
 
 
 def node(
@@ -65,7 +65,7 @@ def script(name: str, text: str, ready: Ready | None, **more: Any) -> PlanProces
 
 def simulated(ready: Ready) -> PlanProcess:
     """Return the owner of odom → base_link, which stands still there."""
-    argv = ("${python}", "-m", "tfcompose.run.simulate", "${plan}", "drive")
+    argv = ("${python}", "-m", "tfcompose.publishers.simulate", "${plan}", "drive")
     owns = (("odom", "base_link"),)
     still = Simulation("fixed", 20.0, pose=Pose())
     return PlanProcess("drive", "simulate", argv, ready=ready, nodes=("/robot/drive",), owns=owns, simulate=still)

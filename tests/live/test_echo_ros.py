@@ -48,7 +48,7 @@ def rover(write: Callable[..., Path], start: Callable[..., Started], edge: Calla
     drive = PlanProcess("drive", "simulate", simulate=Simulation("fixed", 50.0, pose=Pose((2.0, 0.0, 0.0))))
     plan = write(edges, PlanProcess("static", "static"), drive)
     for module, name in (("static", "static"), ("simulate", "drive")):
-        started = start(f"tfcompose.run.{module}", plan, name)
+        started = start(f"tfcompose.publishers.{module}", plan, name)
         started.until_says("edge")
 
 
@@ -129,7 +129,7 @@ def test_when_the_owner_falls_silent_it_says_so_and_ends(
     plan = write([edge("odom base_link", "drive")], drive)
     command = [sys.executable, "-m", "tfcompose", "echo", "odom", "base_link", "--rate", "20", "--timeout"]
     for timeout in TIMEOUTS_S:
-        owner = start("tfcompose.run.simulate", plan, "drive")
+        owner = start("tfcompose.publishers.simulate", plan, "drive")
         owner.until_says("edge")
         words = [*command, str(timeout)]
         with processes.start(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:

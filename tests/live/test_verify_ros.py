@@ -34,7 +34,7 @@ def running(write: Callable[..., Path], start: Callable[..., Started], edge: Cal
     drive = PlanProcess("drive", "simulate", simulate=Simulation("fixed", 50.0))
     plan = write(edges, PlanProcess("static", "static"), drive)
     for module, name in (("static", "static"), ("simulate", "drive")):
-        start(f"tfcompose.run.{module}", plan, name).until_says("edge")
+        start(f"tfcompose.publishers.{module}", plan, name).until_says("edge")
     return plan
 
 

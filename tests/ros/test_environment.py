@@ -76,5 +76,5 @@ def test_without_rclpy_one_sentence_says_what_to_install(monkeypatch: pytest.Mon
 def test_the_parts_that_need_no_ros_import_none() -> None:
     names = ["environment", "fence", "joint_codec", "processes", "stop", "tf_codec"]
     code = "import sys; " + "; ".join(f"import tfcompose.ros.{name}" for name in names)
-    code += "; import tfcompose.run.begin, tfcompose.run.publishing.motion; sys.exit('rclpy' in sys.modules)"
+    code += "; import tfcompose.publishers.simulate, tfcompose.guard.__main__; sys.exit('rclpy' in sys.modules)"
     assert processes.run([sys.executable, "-c", code]).returncode == 0

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 #: Read by each Python that starts.
 _SITE = """
 import sys
-if "tfcompose.run.guard" in sys.orig_argv:
+if "tfcompose.guard" in sys.orig_argv:
     import dataclasses
     import tfcompose.ros.graph as graph
     gid_of = graph.gid_of

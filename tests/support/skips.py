@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 ACCEPTED = {
     "tests/tf2/test_tf2_oracle.py": "tf2_py comes with a distribution only; tf2_answers.jsonl holds its answers",
     "tests/launcher/test_launch_file_ros.py": "ros2 launch comes with a distribution only",
-    "tests/run/test_exports_ros.py::test_ros2_launch_starts_the_tree": "ros2 launch comes with a distribution only",
+    "tests/export/test_exports_ros.py::test_ros2_launch_starts_the_tree": "ros2 launch comes with a distribution only",
     "tests/cli/test_importing.py": "pybullet_data has no wheel for every Python",
     "tests/cli/test_bad_input.py::test_what_cannot_be_read": "root may read everything",
 }

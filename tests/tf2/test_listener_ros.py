@@ -52,7 +52,7 @@ def rover(write: Callable[..., Path], start: Callable[..., Any], edge: Callable[
     drive = PlanProcess("drive", "simulate", simulate=Simulation("fixed", 50.0, pose=Pose((2.0, 0.0, 0.0))))
     plan = write(edges, PlanProcess("static", "static"), drive)
     for module, name in (("static", "static"), ("simulate", "drive")):
-        start(f"tfcompose.run.{module}", plan, name).until_says("edge")
+        start(f"tfcompose.publishers.{module}", plan, name).until_says("edge")
 
 
 @pytest.fixture

@@ -24,9 +24,9 @@ from tfcompose.emit import emit
 from tfcompose.geometry import Pose
 from tfcompose.plan import RosSettings
 from tfcompose.plan.file import read_plan
+from tfcompose.publishers.joint_mover import JointMover, PublishOptions
 from tfcompose.ros.joint_codec import encode_names, fill
 from tfcompose.ros.tf_codec import decode
-from tfcompose.run.publishing.joint_mover import JointMover, PublishOptions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

@@ -15,7 +15,7 @@ BY_CODE = {"TF801", "TF802", "TF803", "TF809", "TF821", "TF823", "TF824", "TF825
 #: Without ROS there are no real nodes; some only the guard can report.
 ELSEWHERE = {
     "TF901": "live/test_verify_bag.py",
-    "TF807": "run/test_hosts_ros.py",
+    "TF807": "cli/test_hosts_ros.py",
     "TF829": "presets/test_driver_ros.py",
     "TF850": "guard/test_guard_faults_ros.py",
 }

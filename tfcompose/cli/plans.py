@@ -16,7 +16,7 @@ from tfcompose.ipc import SETTLE
 from tfcompose.plan import Plan
 from tfcompose.plan.file import read_plan, write_plan
 from tfcompose.plan.hosts import share_of
-from tfcompose.run.publishing.addresses import with_absolute_addresses
+from tfcompose.publishers.addresses import with_absolute_addresses
 
 if TYPE_CHECKING:
     from argparse import Namespace

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 #: The modules behind tfcompose's own processes.
 MODULES = {
-    "static": "tfcompose.run.static",
-    "joints": "tfcompose.run.joints",
-    "simulate": "tfcompose.run.simulate",
-    "guard": "tfcompose.run.guard",
+    "static": "tfcompose.publishers.static",
+    "joints": "tfcompose.publishers.joints",
+    "simulate": "tfcompose.publishers.simulate",
+    "guard": "tfcompose.guard",
 }
 #: The file of parameters, which is named once.
 _PARAMS_FILE = "${params_file}"

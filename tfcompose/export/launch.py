@@ -42,7 +42,7 @@ BUILD = (Path(__file__).resolve().parent / {folder!r}).resolve()
 
 def process(name, **more):
     """One of tfcompose's own, or one that only the plan knows how to start."""
-    command = [sys.executable, "-m", "tfcompose.run.process", str(BUILD / "plan.json"), name]
+    command = [sys.executable, "-m", "tfcompose.launcher.exec", str(BUILD / "plan.json"), name]
     return ExecuteProcess(cmd=command, name=name, output="screen", **more)
 
 

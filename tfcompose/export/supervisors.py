@@ -55,7 +55,7 @@ def plain_names(plan: Plan) -> dict[str, str]:
 
 def command_of(process: PlanProcess, python: str, plan_file: str) -> list[str]:
     """Return the words that start the process as ``tfcompose up`` does."""
-    return [python, "-m", "tfcompose.run.process", plan_file, process.name]
+    return [python, "-m", "tfcompose.launcher.exec", plan_file, process.name]
 
 
 def restart_of(process: PlanProcess) -> str:

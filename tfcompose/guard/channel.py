@@ -35,7 +35,7 @@ from tfcompose.ipc import (
     Remember,
     Silent,
 )
-from tfcompose.run.own import say
+from tfcompose.process import say
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

@@ -6,8 +6,8 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tfcompose.process import say
 from tfcompose.ros.diagnostics import ERROR, OK, STALE, WARN, DiagnosticsPublisher, Status
-from tfcompose.run.own import say
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

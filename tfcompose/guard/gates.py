@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tfcompose.ipc import Gate, GateOpen, GateShut
+from tfcompose.process import say
 from tfcompose.ros.graph import is_offered, services, writers
-from tfcompose.run.own import say
 
 if TYPE_CHECKING:
     from collections.abc import Callable

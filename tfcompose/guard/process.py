@@ -18,11 +18,10 @@ from tfcompose.guard.switches import Switches
 from tfcompose.guard.watch import CHECK_EVERY_S, TopicWatch, held_back, plans_by_topics, together
 from tfcompose.ipc import JOINS, ORDERS_FD, REMAPPED, SETTLE
 from tfcompose.plan.topics import GLOBAL, private_topics
+from tfcompose.process import ready, say
+from tfcompose.ros.clock import ClockWatch
 from tfcompose.ros.graph import ids_say_who
 from tfcompose.ros.node import open_node, wait
-from tfcompose.run.clock_watch import ClockWatch
-from tfcompose.run.notify import ready
-from tfcompose.run.own import say
 from tfcompose.text import counted
 
 if TYPE_CHECKING:
@@ -33,8 +32,8 @@ if TYPE_CHECKING:
 
     from tfcompose.ipc import GuardEvent
     from tfcompose.plan import Plan
+    from tfcompose.process import Own
     from tfcompose.ros.stop import Stop
-    from tfcompose.run.own import Own
 
     Topics = tuple[str, str]
 
@@ -75,7 +74,7 @@ def guard(own: Own, stop: Stop) -> None:
         ]
         steps += [switches.check] if switches else []
         steps += [] if ORDERS_FD in os.environ else [LifecycleDriver(node, own.plan).check]
-        steps += [ClockWatch(own, node).check, *(watch.report for watch in watches)]
+        steps += [ClockWatch(node, say, sim=own.plan.ros.clock == "sim").check, *(watch.report for watch in watches)]
         subscriptions = [each for watch in watches for each in watch.data.subscriptions]
         while not stop.requested:
             wait(node, subscriptions, CHECK_EVERY_S, stop)

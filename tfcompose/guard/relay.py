@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.live.messages import Message
+from tfcompose.process import say
 from tfcompose.ros.node import TFPublisher
 from tfcompose.ros.tf_codec import Transform, decode, encode
-from tfcompose.run.own import say
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping

@@ -17,8 +17,8 @@ from tfcompose.ipc import PROCESS, RUN_ID, Clear, Complete
 from tfcompose.live.messages import MessageReader
 from tfcompose.live.topics import TFGraph, TFTopics
 from tfcompose.plan.topics import parts_of
+from tfcompose.process import say
 from tfcompose.ros.clock import SimClock
-from tfcompose.run.own import say
 from tfcompose.verdict.drivers import expected_of
 
 if TYPE_CHECKING:

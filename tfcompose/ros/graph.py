@@ -61,6 +61,11 @@ def writers(node: Node, topic: str) -> list[Writer]:
     return _sorted(node.get_publishers_info_by_topic(topic))
 
 
+def publishing_nodes(node: Node, topic: str) -> list[str]:
+    """Return the names of the nodes that publish the topic, each once, sorted."""
+    return sorted({writer.node for writer in writers(node, topic)})
+
+
 def writers_unmapped(node: Node, topic: str) -> list[Writer]:
     """Return the same for exactly this absolute topic, whatever the node's remappings are.
 

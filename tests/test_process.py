@@ -6,8 +6,8 @@ import pytest
 
 from tfcompose.findings import RejectedError
 from tfcompose.plan import PlanProcess, Simulation
-from tfcompose.run import joints, static
-from tfcompose.run.own import read_own
+from tfcompose.process import read_own
+from tfcompose.publishers import joints, static
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,7 +22,7 @@ def _last_error(capsys: pytest.CaptureFixture[str]) -> str:
 
 def test_wrong_arguments_end_with_code_2_and_the_usage(capsys: pytest.CaptureFixture[str]) -> None:
     assert static.main(["plan.json"]) == 2
-    assert "usage: python -m tfcompose.run.static PLAN_FILE PROCESS_NAME" in _last_error(capsys)
+    assert "usage: python -m tfcompose.publishers.static PLAN_FILE PROCESS_NAME" in _last_error(capsys)
 
 
 def test_a_missing_plan_ends_with_code_2_and_its_name(capsys: pytest.CaptureFixture[str]) -> None:
@@ -61,6 +61,6 @@ def test_a_node_has_the_name_and_the_namespace_of_the_plan(write: Callable[..., 
 def test_without_ros_it_ends_with_code_1_and_says_what_to_install(
     write: Callable[..., Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tfcompose.run.begin.missing_ros", lambda: "rclpy cannot be imported: install it")
+    monkeypatch.setattr("tfcompose.process.missing_ros", lambda: "rclpy cannot be imported: install it")
     assert static.main([str(write([], PlanProcess("static", "static"))), "static"]) == 1
     assert _last_error(capsys) == "rclpy cannot be imported: install it\n"

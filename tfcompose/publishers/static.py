@@ -1,23 +1,32 @@
-"""What the static process does: the fixed edges are latched, and the description where nobody else sends it."""
+"""The process that latches the fixed edges on /tf_static, and the description where nobody else sends it.
+
+``python -m tfcompose.publishers.static PLAN_FILE PROCESS_NAME``
+"""
 
 from __future__ import annotations
 
+import sys
 import time
 from typing import TYPE_CHECKING
 
-from tfcompose.ros.node import TFPublisher, open_node, wait
+from tfcompose.process import ready, say, start, wait_for_go
 from tfcompose.ros.tf_codec import Transform, encode
-from tfcompose.run.notify import ready
-from tfcompose.run.own import count, say
-from tfcompose.run.publishing.description import CHECK_EVERY_S, Description
+from tfcompose.text import counted
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tfcompose.process import Own
     from tfcompose.ros.stop import Stop
-    from tfcompose.run.own import Own
 
 
 def static(own: Own, stop: Stop) -> None:
     """Latch all fixed edges in one message on /tf_static, and the description where no joints process does."""
+    from tfcompose.publishers.description import CHECK_EVERY_S, Description  # noqa: PLC0415 (ROS, once signals are handled)
+    from tfcompose.ros.node import TFPublisher, open_node, wait  # noqa: PLC0415 (ROS, once signals are handled)
+
+    if not wait_for_go(stop):
+        return
     # A fixed edge holds at every time and tf2 does not look at its stamp; simulated time may not have begun.
     stamp_ns = 0 if own.plan.ros.clock == "sim" else time.time_ns()
     edges = [Transform(stamp_ns, e.parent, e.child, e.pose.xyz, e.pose.quat_xyzw) for e in own.edges]
@@ -25,7 +34,7 @@ def static(own: Own, stop: Stop) -> None:
         publisher = TFPublisher(node, static=True)
         if edges:
             publisher.publish(encode(edges))
-        say(f"{count(len(edges), 'edge')} on /tf_static")
+        say(f"{counted(len(edges), 'edge')} on /tf_static")
         ready()
         if _joints_of(own) in {
             process.name for process in own.plan.processes if process.kind in ("joints", "external")
@@ -41,3 +50,12 @@ def static(own: Own, stop: Stop) -> None:
 def _joints_of(own: Own) -> str:
     """Return the name of the process that sends the description in this one's place, where there is one."""
     return f"{own.process.name.removesuffix('static')}joints"
+
+
+def main(argv: Sequence[str]) -> int:
+    """Run it until a signal comes and return the exit code; ``process.start`` says which."""
+    return start(argv, "static", static)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

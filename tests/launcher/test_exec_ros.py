@@ -62,7 +62,7 @@ def test_what_cannot_be_started_is_said(
     plan = units.parent / "plan.json"
     text = plan.read_text("utf-8").replace('"hello"', '"missing"').replace('["sh", ', '["no-such-program", ')
     plan.write_text(text, "utf-8")
-    one = start("tfcompose.run.process", plan, name)
+    one = start("tfcompose.launcher.exec", plan, name)
     assert one.process.wait(60) == code
     assert until(lambda: said in "".join(one.errors)), one.errors
     assert "Traceback" not in "".join(one.errors)

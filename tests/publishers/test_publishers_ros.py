@@ -84,7 +84,7 @@ def test_a_late_joiner_gets_all_fixed_edges_in_one_message(
 ) -> None:
     edges = [edge(f"base_link frame_{n}", "static", Pose((n, 0.0, 0.0))) for n in range(150)]
     other = [edge("odom base_link", "wheels")]
-    process = start("tfcompose.run.static", write(edges + other, PlanProcess("static", "static")), "static")
+    process = start("tfcompose.publishers.static", write(edges + other, PlanProcess("static", "static")), "static")
     process.until_says("150 edges on /tf_static")
     ((received, transforms),) = ears.tf(1, static=True)
     assert [(t.parent, t.child, t.xyz[0]) for t in transforms] == [("base_link", f"frame_{n}", n) for n in range(150)]
@@ -96,7 +96,7 @@ def test_a_late_joiner_gets_all_fixed_edges_in_one_message(
 
 
 def test_joint_states_move_the_wheels_and_what_mimics_them(start: Callable[..., Any], ears: Ears, rover: Any) -> None:
-    start("tfcompose.run.joints", rover, "joints").until_says("4 edges on /tf, from /rover/joint_states")
+    start("tfcompose.publishers.joints", rover, "joints").until_says("4 edges on /tf, from /rover/joint_states")
     subscription = TFSubscription(ears.node, static=False)
     message = JointState(name=["left", "gripper", "right"], position=[0.7, math.nan, -1.2])
     message.header.stamp.sec, message.header.stamp.nanosec = 12, 34
@@ -113,7 +113,7 @@ def test_joint_states_move_the_wheels_and_what_mimics_them(start: Callable[..., 
 
 
 def test_joint_states_that_hold_some_joints_move_those(start: Callable[..., Any], ears: Ears, rover: Any) -> None:
-    start("tfcompose.run.joints", rover, "joints").until_says("edges")
+    start("tfcompose.publishers.joints", rover, "joints").until_says("edges")
     subscription = TFSubscription(ears.node, static=False)
     before = time.time_ns()
     found = _answer(ears, subscription, JointState(name=["right"], position=[1.0]))
@@ -124,7 +124,7 @@ def test_joint_states_that_hold_some_joints_move_those(start: Callable[..., Any]
 def test_joint_states_that_cannot_be_believed_are_dropped_with_one_line(
     start: Callable[..., Any], ears: Ears, rover: Any
 ) -> None:
-    process = start("tfcompose.run.joints", rover, "joints")
+    process = start("tfcompose.publishers.joints", rover, "joints")
     process.until_says("edges")
     publisher = ears.node.create_publisher(JointState, "/rover/joint_states", 10)
     subscription = TFSubscription(ears.node, static=False)
@@ -148,7 +148,7 @@ def test_joint_states_that_cannot_be_believed_are_dropped_with_one_line(
 def test_drivers_that_send_their_own_joints_each_move_them_all(
     start: Callable[..., Any], ears: Ears, rover: Any
 ) -> None:
-    start("tfcompose.run.joints", rover, "joints").until_says("edges")
+    start("tfcompose.publishers.joints", rover, "joints").until_says("edges")
     subscription = TFSubscription(ears.node, static=False)
     drivers = [ears.node.create_publisher(JointState, "/rover/joint_states", 10) for _ in range(2)]
     seen: set[frozenset[str]] = set()
@@ -169,7 +169,7 @@ def test_joints_that_no_joint_state_speaks_of_are_named_once_with_who_sends_the_
 ) -> None:
     right = JointState(name=["right"], position=[1.0])
     publisher = ears.node.create_publisher(JointState, "/rover/joint_states", 10)
-    process = start("tfcompose.run.joints", rover, "joints")
+    process = start("tfcompose.publishers.joints", rover, "joints")
 
     def told() -> bool:
         publisher.publish(right)  # from before its start on, so that it is heard in its first 5 s
@@ -181,14 +181,14 @@ def test_joints_that_no_joint_state_speaks_of_are_named_once_with_who_sends_the_
 
 
 def test_without_any_joint_state_it_says_that_nobody_publishes_them(start: Callable[..., Any], rover: Any) -> None:
-    process = start("tfcompose.run.joints", rover, "joints")
+    process = start("tfcompose.publishers.joints", rover, "joints")
     process.until_says("no joint state after 5 s for left, right: nobody publishes /rover/joint_states\n")
 
 
 def test_publish_frequency_is_said_and_leaves_nothing_out_in_silence(
     start: Callable[..., Any], ears: Ears, rover: Any
 ) -> None:
-    process = start("tfcompose.run.joints", rover, "joints", "--ros-args", "-p", "publish_frequency:=10.0")
+    process = start("tfcompose.publishers.joints", rover, "joints", "--ros-args", "-p", "publish_frequency:=10.0")
     process.until_says("4 edges on /tf, from /rover/joint_states, at most 10 Hz")
     subscription = TFSubscription(ears.node, static=False)
     publisher = ears.node.create_publisher(JointState, "/rover/joint_states", 10)
@@ -205,7 +205,7 @@ def test_publish_frequency_is_said_and_leaves_nothing_out_in_silence(
 
 
 def test_a_parameter_of_another_type_is_refused_with_a_sentence(start: Callable[..., Any], rover: Any) -> None:
-    process = start("tfcompose.run.joints", rover, "joints", "--ros-args", "-p", "publish_frequency:=fast")
+    process = start("tfcompose.publishers.joints", rover, "joints", "--ros-args", "-p", "publish_frequency:=fast")
     assert process.process.wait(UNTIL_S) == 1
     process.close()
     (line,) = process.errors
@@ -216,7 +216,7 @@ def test_a_parameter_of_another_type_is_refused_with_a_sentence(start: Callable[
 def test_another_description_changes_nothing_and_is_said_with_its_publisher(
     start: Callable[..., Any], ears: Ears, write: Callable[..., Any], name: Literal["static", "joints"]
 ) -> None:
-    process = start(f"tfcompose.run.{name}", write([], PlanProcess(name, name)), name)
+    process = start(f"tfcompose.publishers.{name}", write([], PlanProcess(name, name)), name)
     process.until_says("edges on")
     same = latch(ears.node, "/rover/robot_description", "<robot name='rover'/>")
     other = latch(ears.node, "/rover/robot_description", "<robot name='stranger'/>")
@@ -231,7 +231,7 @@ def test_another_description_changes_nothing_and_is_said_with_its_publisher(
 def test_the_description_is_latched(
     start: Callable[..., Any], ears: Ears, write: Callable[..., Any], name: Literal["static", "joints"]
 ) -> None:
-    start(f"tfcompose.run.{name}", write([], PlanProcess(name, name)), name).until_says("edges on")
+    start(f"tfcompose.publishers.{name}", write([], PlanProcess(name, name)), name).until_says("edges on")
     subscription = Subscription(ears.node, String, "/rover/robot_description", LATCHED)
     (received,) = take(ears.node, subscription, 1)
     assert deserialize_message(received.data, String).data == "<robot name='rover'/>"
@@ -241,7 +241,7 @@ def test_the_description_is_left_to_the_joints_process_where_there_is_one(
     start: Callable[..., Any], ears: Ears, edge: Callable[..., Any], write: Callable[..., Any]
 ) -> None:
     file = write([edge("a b")], PlanProcess("static", "static"), PlanProcess("joints", "joints"))
-    start("tfcompose.run.static", file, "static").until_says("1 edge on /tf_static")
+    start("tfcompose.publishers.static", file, "static").until_says("1 edge on /tf_static")
     subscription = Subscription(ears.node, String, "/rover/robot_description", LATCHED)
     ears.tf(1, static=True)
     assert take_for(ears.node, subscription, 0.5) == []
@@ -252,7 +252,7 @@ def test_a_body_drives_on_a_circle(
 ) -> None:
     circle = Simulation("circle", 50.0, radius=2.0, speed=0.8)
     file = write([edge("odom base_link", "wheels")], PlanProcess("wheels", "simulate", simulate=circle))
-    start("tfcompose.run.simulate", file, "wheels").until_says("1 edge on /tf, simulated at 50 Hz")
+    start("tfcompose.publishers.simulate", file, "wheels").until_says("1 edge on /tf, simulated at 50 Hz")
     transforms = [transform for _, (transform,) in ears.tf(30)]
     angles = []
     for transform in transforms:
@@ -272,7 +272,7 @@ def test_the_rate_does_not_drift(
 ) -> None:
     pose = Pose((1.0, 2.0, 3.0), normalised((0.0, 0.0, 1.0, 1.0)))
     process = PlanProcess("map", "simulate", simulate=Simulation("fixed", 25.0, pose=pose))
-    start("tfcompose.run.simulate", write([edge("map odom", "map")], process), "map").until_says("simulated")
+    start("tfcompose.publishers.simulate", write([edge("map odom", "map")], process), "map").until_says("simulated")
     transforms = [transform for _, (transform,) in ears.tf(51)]
     assert {(t.parent, t.child, t.xyz, t.quat_xyzw) for t in transforms} == {("map", "odom", pose.xyz, pose.quat_xyzw)}
     # A late tick moves no later one: most stamps lie near whole periods from each other, however busy the machine is.
@@ -286,7 +286,9 @@ def test_the_rate_does_not_drift(
 def test_simulated_joint_states_are_published(start: Callable[..., Any], ears: Ears, write: Callable[..., Any]) -> None:
     simulated = Simulation("joints", 50.0, joints={"left": 0.5, "right": -1.0})
     file = write([], PlanProcess("wheels", "simulate", simulate=simulated))
-    start("tfcompose.run.simulate", file, "wheels").until_says("2 joints on /rover/joint_states, simulated at 50 Hz")
+    start("tfcompose.publishers.simulate", file, "wheels").until_says(
+        "2 joints on /rover/joint_states, simulated at 50 Hz"
+    )
     subscription = Subscription(ears.node, JointState, "/rover/joint_states", JOINT_STATES)
     message = deserialize_message(take(ears.node, subscription, 3)[-1].data, JointState)
     assert dict(zip(message.name, message.position, strict=True)) == {"left": 0.5, "right": -1.0}
@@ -298,7 +300,9 @@ def test_swept_joints_move_within_their_limits_and_the_others_stay(
 ) -> None:
     simulated = Simulation("joints", 50.0, joints={"lift": 0.2, "grip": 0.5}, sweep={"lift": Sweep(1.0, 0.1, 0.5)})
     file = write([], PlanProcess("wheels", "simulate", simulate=simulated))
-    start("tfcompose.run.simulate", file, "wheels").until_says("2 joints on /rover/joint_states, simulated at 50 Hz")
+    start("tfcompose.publishers.simulate", file, "wheels").until_says(
+        "2 joints on /rover/joint_states, simulated at 50 Hz"
+    )
     subscription = Subscription(ears.node, JointState, "/rover/joint_states", JOINT_STATES)
     messages = [deserialize_message(each.data, JointState) for each in take(ears.node, subscription, 75)]
     assert {tuple(message.name) for message in messages} == {("lift", "grip")}
@@ -319,7 +323,7 @@ def test_simulated_time_comes_from_the_clock_topic(
 ) -> None:
     circle = Simulation("circle", 10.0, radius=1.0, speed=1.0)
     process = PlanProcess("wheels", "simulate", simulate=circle)
-    start("tfcompose.run.simulate", write([edge("odom base", "wheels")], process, clock="sim"), "wheels")
+    start("tfcompose.publishers.simulate", write([edge("odom base", "wheels")], process, clock="sim"), "wheels")
     subscription = TFSubscription(ears.node, static=False)
     clock = ears.node.create_publisher(Clock, "/clock", 10)
     # Whoever has just started may hear the clock before somebody hears it on /tf, and answers each time once.
@@ -335,13 +339,13 @@ def test_simulated_time_comes_from_the_clock_topic(
         assert math.atan2(found.xyz[1], found.xyz[0]) == pytest.approx(expected)
 
 
-@pytest.mark.parametrize("kind", ["simulate", "guard"])
+@pytest.mark.parametrize("module", ["publishers.simulate", "guard"])
 def test_that_simulated_time_does_not_come_is_said_once(
-    start: Callable[..., Any], ears: Ears, edge: Callable[..., Any], write: Callable[..., Any], kind: str
+    start: Callable[..., Any], ears: Ears, edge: Callable[..., Any], write: Callable[..., Any], module: str
 ) -> None:
-    simulated = Simulation("fixed", 10.0)
-    process = PlanProcess(kind, kind, simulate=simulated)  # type: ignore[arg-type]
-    started = start(f"tfcompose.run.{kind}", write([edge("odom base", kind)], process, clock="sim"), kind)
+    kind = module.rpartition(".")[2]
+    process = PlanProcess(kind, kind, simulate=Simulation("fixed", 10.0))  # type: ignore[arg-type]
+    started = start(f"tfcompose.{module}", write([edge("odom base", kind)], process, clock="sim"), kind)
     started.until_says("no time on /clock after 5 s: the plan's clock is sim, and nobody publishes it\n")
     take_for(ears.node, TFSubscription(ears.node, static=False), 1.0)
     assert started.output.count("/clock") == 1
@@ -352,7 +356,7 @@ def test_joint_states_without_a_time_get_simulated_time(
 ) -> None:
     left = edge("base left", "joints", None, Joint("left", "continuous", Y))
     file = write([left], PlanProcess("joints", "joints"), clock="sim")
-    start("tfcompose.run.joints", file, "joints").until_says("1 edge on /tf")
+    start("tfcompose.publishers.joints", file, "joints").until_says("1 edge on /tf")
     subscription = TFSubscription(ears.node, static=False)
     states = ears.node.create_publisher(JointState, "/rover/joint_states", 10)
     clock = ears.node.create_publisher(Clock, "/clock", 10)
@@ -374,7 +378,7 @@ def test_every_process_ends_before_its_next_message_and_quietly(
     processes = [PlanProcess(k, k, simulate=simulated) for k in ("static", "joints", "simulate")]
     file = write([edge("map odom", "simulate"), edge("a b")], *processes, clock=clock)
 
-    running = [start(f"tfcompose.run.{process.kind}", file, process.name) for process in processes]
+    running = [start(f"tfcompose.publishers.{process.kind}", file, process.name) for process in processes]
     for each in running:
         each.until_says("edge")
     for each in running:
@@ -385,10 +389,10 @@ def test_every_process_ends_before_its_next_message_and_quietly(
 
 def test_an_interrupt_during_the_start_ends_quietly_too(start: Callable[..., Any], write: Callable[..., Any]) -> None:
     file = write([], PlanProcess("static", "static"))
-    process = start("tfcompose.run.static", file, "static", PYTHONVERBOSE="1")
+    process = start("tfcompose.publishers.static", file, "static", PYTHONVERBOSE="1")
     end = time.monotonic() + UNTIL_S
     while time.monotonic() < end and not any(
-        "import 'tfcompose.run.publishing.static_role'" in e or "import 'rclpy'" in e for e in process.errors
+        "import 'tfcompose.publishers.description'" in e or "import 'rclpy'" in e for e in process.errors
     ):
         time.sleep(0.001)
     code = process.end(signal.SIGINT)
@@ -404,7 +408,7 @@ def test_a_node_is_called_as_the_plan_says_and_its_topics_move_with_it(
     write: Callable[..., Any],
 ) -> None:
     process = PlanProcess("static", "static", nodes=("/fleet/r1/frames",), remap={"/tf_static": "tf_static"})
-    start("tfcompose.run.static", write([edge("a b")], process), "static", "--ros-args", "-r", "__node:=frames2")
+    start("tfcompose.publishers.static", write([edge("a b")], process), "static", "--ros-args", "-r", "__node:=frames2")
     assert until(lambda: [w.node for w in writers(ears.node, "/fleet/r1/tf_static")] == ["/fleet/r1/frames2"])
 
 

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from tfcompose.plan import Joint, Simulation, Sweep
-from tfcompose.run.publishing.joint_source import JointSource
-from tfcompose.run.publishing.motion import circle, swept
+from tfcompose.publishers.simulate import JointSource, circle, swept
 
 
 @given(st.floats(0.1, 5), st.floats(-3, 3).filter(lambda speed: abs(speed) > 0.01), st.floats(0, 100))

@@ -105,7 +105,7 @@ def test_a_share_that_is_live_on_another_machine_is_refused(start: Callable[...,
     file = tmp_path / "rover.yaml"
     file.write_text(ON_TWO_HOSTS.replace("robot: rover", "robot: rover\nros: {discovery: localhost}"), "utf-8")
     assert start("tfcompose", "build", file, "-o", tmp_path / "a").process.wait(60) == 0
-    elsewhere = start("tfcompose.run.process", tmp_path / "a" / "plan.json", "drive")
+    elsewhere = start("tfcompose.launcher.exec", tmp_path / "a" / "plan.json", "drive")
     elsewhere.until_says("simulated at")
     up = start("tfcompose", "up", file, "-o", tmp_path / "b", "--settle", 10)
     assert up.process.wait(60) == 1

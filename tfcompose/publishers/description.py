@@ -5,18 +5,18 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.process import say
+from tfcompose.publishers.addresses import with_absolute_addresses
 from tfcompose.ros.graph import UNKNOWN_NODE, writers
 from tfcompose.ros.node import LATCHED, TextSubscription, latch
-from tfcompose.run.own import say
-from tfcompose.run.publishing.addresses import with_absolute_addresses
 
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-    from tfcompose.run.own import Own
+    from tfcompose.process import Own
 
 TOPIC = "robot_description"
-#: How often a process looks while something is awaited, in seconds.
+#: How often a process checks while something is awaited, in seconds.
 CHECK_EVERY_S = 0.5
 _MOST_NAMED = 16
 _NAMED_WITHIN_S = 3.0

@@ -14,9 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from tfcompose.geometry import Pose, angle_between, normalised
 from tfcompose.plan import Joint, PlanEdge, SourceLine
+from tfcompose.publishers.joint_mover import JointMover, PublishOptions
 from tfcompose.ros.joint_codec import encode_names, fill
 from tfcompose.ros.tf_codec import Transform, decode
-from tfcompose.run.publishing.joint_mover import JointMover, PublishOptions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

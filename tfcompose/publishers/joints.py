@@ -1,0 +1,89 @@
+"""The process that turns joint states into edges on /tf, and names the joints that none speaks of.
+
+``python -m tfcompose.publishers.joints PLAN_FILE PROCESS_NAME``
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import TYPE_CHECKING
+
+from tfcompose.process import ready, say, start, wait_for_go
+from tfcompose.text import counted, listed
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from tfcompose.process import Own
+    from tfcompose.publishers.joint_mover import JointMover
+    from tfcompose.ros.stop import Stop
+
+MISSING_AFTER_S = 5.0
+_NAMED_AT_MOST = 8
+
+
+def joints(own: Own, stop: Stop) -> None:
+    """Publish the moving edges of each message on ``joint_states``, with its stamp, and latch the description."""
+    from tfcompose.publishers.description import CHECK_EVERY_S, Description  # noqa: PLC0415 (ROS, once signals are handled)
+    from tfcompose.publishers.joint_mover import JointMover, PublishOptions  # noqa: PLC0415 (ROS, once signals are handled)
+    from tfcompose.ros.clock import StampClock  # noqa: PLC0415 (ROS, once signals are handled)
+    from tfcompose.ros.graph import publishing_nodes  # noqa: PLC0415 (ROS, once signals are handled)
+    from tfcompose.ros.joint_states import JointStateSubscription  # noqa: PLC0415 (ROS, once signals are handled)
+    from tfcompose.ros.node import TFPublisher, open_node, parameter, wait  # noqa: PLC0415 (ROS, once signals are handled)
+
+    if not wait_for_go(stop):
+        return
+    with open_node(own.node_name, own.namespace, args=own.ros_args) as node:
+        options = PublishOptions(
+            parameter(node, "publish_frequency", 0.0), parameter(node, "ignore_timestamp", default=False)
+        )
+        clock = StampClock(node, say, sim=own.plan.ros.clock == "sim")
+        mover = JointMover(own.edges, say, clock.now_ns, options)
+        publisher = TFPublisher(node, static=False)
+        description = Description(own, node)
+        states = JointStateSubscription(node)
+        at_most = f", at most {options.publish_frequency:g} Hz" if options.publish_frequency else ""
+        say(f"{counted(len(mover), 'edge')} on /tf, from {states.topic}{at_most}")
+        ready()
+        missing = _Missing(mover, states.topic, lambda: publishing_nodes(node, states.topic))
+        while not stop.requested:
+            is_waiting = missing.is_waiting or clock.is_waiting or description.is_waiting
+            wait(node, [states, description.subscription], CHECK_EVERY_S if is_waiting else None, stop)
+            for received in states.take():
+                message = mover.answer(received.data, received.received_ns)
+                if message is not None:
+                    publisher.publish(message)
+            description.check()
+            missing.check()
+            clock.check()
+
+
+class _Missing:
+    """Names once, after some seconds, the joints that no joint state speaks of."""
+
+    def __init__(self, mover: JointMover, topic: str, publishers: Callable[[], list[str]]) -> None:
+        self._mover, self._topic, self._publishers = mover, topic, publishers
+        self._due = time.monotonic() + MISSING_AFTER_S
+        self.is_waiting = len(mover) > 0
+
+    def check(self) -> None:
+        if not self.is_waiting or time.monotonic() < self._due:
+            return
+        self.is_waiting = False
+        names = self._mover.missing
+        if names:
+            say(f"no joint state after {MISSING_AFTER_S:g} s for {listed(names, _NAMED_AT_MOST)}: {self._senders()}")
+
+    def _senders(self) -> str:
+        names = self._publishers()
+        return f"{self._topic} comes from {', '.join(names)}" if names else f"nobody publishes {self._topic}"
+
+
+def main(argv: Sequence[str]) -> int:
+    """Run it until a signal comes and return the exit code; ``process.start`` says which."""
+    return start(argv, "joints", joints)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,1 +1,0 @@
-"""tfcompose's own publishers: fixed edges, moving joints, stand-ins, and the robot's description."""

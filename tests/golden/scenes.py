@@ -67,9 +67,9 @@ from tfcompose.plan import (
 )
 from tfcompose.plan.file import read_plan
 from tfcompose.plan.hosts import share_of
+from tfcompose.process import read_own
 from tfcompose.ros import environment
 from tfcompose.ros.tf_codec import TF_MESSAGE
-from tfcompose.run.own import read_own
 from tfcompose.urdf.inertia import UnmeasurableError
 from tfcompose.urdf.packages import Disk
 from tfcompose.verdict.doctor import diagnose

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from tests.support.findings import expect
 from tests.support.guard_history import History
 from tfcompose.ipc import Clear, Found, Taken
 
@@ -14,20 +15,18 @@ def test_a_planned_edge_that_is_published_before_the_start_is_taken_and_the_node
     history.repeat(history.joins("/rogue"), "map odom", 20)
     (event,) = history.all(Taken)
     assert history.events[0] == event
-    assert history.said() == ["TF807 map → odom is already published by /rogue"]
-    assert "node: /rogue" in history.found()[0].help
+    expect(history.only(), "TF807", "map → odom", "node: /rogue")
 
 
 def test_a_namesake_of_what_the_plan_starts_is_refused_before_the_start(history: History) -> None:
     history.repeat(history.joins("/slam"), "map odom", 10)
-    assert history.said() == ["TF807 map → odom is already published by another /slam"]
-    assert "is the robot running already?" in history.found()[0].help
+    expect(history.only(), "TF807", "map → odom", "another /slam")
     assert "external" not in history.found()[0].help
 
 
 def test_a_second_parent_before_the_start_is_taken_and_says_so(history: History) -> None:
     history.repeat(history.joins("/rogue"), "world odom", 10)
-    assert history.said() == ["TF807 world → odom is already published by /rogue; in the plan odom is a child of map"]
+    expect(history.only(), "TF807", "world → odom", "/rogue", "map")
 
 
 def test_an_undeclared_edge_before_the_start_keeps_nothing_from_starting(history: History) -> None:

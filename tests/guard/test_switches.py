@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from tests.support.findings import expect
 from tfcompose.guard import switches
 from tfcompose.guard.channel import SwitchMemory, recalled
 from tfcompose.guard.switches import Switches
@@ -50,11 +51,9 @@ def test_a_parameter_is_told_exactly_where_it_is_another_value(
 
 def test_the_finding_names_the_node_the_parameter_and_both_values() -> None:
     (one,) = not_taken("/front/front", {"publish_tf": False}, {"publish_tf": True}, DRIVEN)
-    assert one.message == (
-        "/front/front has publish_tf: true, and the plan wrote publish_tf: false for front (realsense/d455)"
-    )
+    expect(one, "TF829", "/front/front", "publish_tf: true", "publish_tf: false", "front (realsense/d455)")
     (one,) = not_taken("/drive", {"enable_odom_tf": False}, {"enable_odom_tf": None})
-    assert one.message == "/drive has no parameter enable_odom_tf, and the plan wrote enable_odom_tf: false"
+    expect(one, "TF829", "/drive", "no parameter enable_odom_tf", "enable_odom_tf: false")
 
 
 # Guards that follow each other.

@@ -15,3 +15,9 @@ def words(found: Finding) -> set[str]:
 
 def words_of(text: str) -> set[str]:
     return {word.rstrip(",;:.?") for word in text.split()}
+
+
+def expect(found: Finding, code: str, *names: str) -> None:
+    """Hold that a finding has this code, and names all of these in its message, its notes or its help."""
+    text = "\n".join([found.message, *(note.message for note in found.notes), found.help])
+    assert (found.code, [name for name in names if name not in text]) == (code, []), text

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.geometry import Pose
 from tfcompose.guard.judge import Judge
-from tfcompose.ipc import Clear, Found, GuardEvent, Taken
+from tfcompose.ipc import Clear, Found, GuardEvent, Recovered, Taken
 from tfcompose.live.messages import Message
 from tfcompose.live.publishers import Publisher as TFPublisher
 from tfcompose.plan import Claim, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
@@ -166,6 +166,15 @@ class History:
         return [
             f"{event.found.code} {event.found.message}" for event in self.events if isinstance(event, (Found, Taken))
         ]
+
+    def over(self) -> list[str]:
+        """Return what is said to have ended."""
+        return [event.message for event in self.events if isinstance(event, Recovered)]
+
+    def only(self) -> Finding:
+        """Return what was found, which is one thing."""
+        (found,) = self.found()
+        return found
 
     def all(self, kind: type[GuardEvent]) -> list[GuardEvent]:
         return [event for event in self.events if isinstance(event, kind)]

@@ -17,7 +17,7 @@ SECOND_NS = 1_000_000_000
 BEGUN_NS = 1_800_000_000 * SECOND_NS
 SECONDS = 5.0
 END_NS = BEGUN_NS + int(SECONDS * SECOND_NS)
-SENDERS = {b"d": "/drive", b"e": "/drive", b"s": "/static", b"x": "/ekf"}
+SENDERS = {b"d": "/drive", b"e": "/drive", b"s": "/static", b"t": "/static", b"x": "/ekf"}
 
 
 class TreeHistory:
@@ -25,11 +25,11 @@ class TreeHistory:
 
     def __init__(self) -> None:
         self.observer = TreeObserver()
-        self.knows(*SENDERS)
+        self.knows(b"d", b"e", b"s", b"x")
 
     def knows(self, *gids: bytes) -> TreeHistory:
         """Let the graph show these publishers, and no others."""
-        self.observer.take_graph([Publisher(gid, SENDERS[gid], static=gid == b"s") for gid in gids])
+        self.observer.take_graph([Publisher(gid, SENDERS[gid], static=gid in b"st") for gid in gids])
         return self
 
     def fixed(self, edge: str, gid: bytes = b"s", x: float = 0.0) -> TreeHistory:

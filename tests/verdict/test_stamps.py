@@ -11,27 +11,29 @@ NOW, SIM = 1_800_000_000 * S, 100 * S
 
 
 @pytest.mark.parametrize(
-    ("stamp_ns", "sim_ns", "simulated", "said"),
+    ("stamp_ns", "sim_ns", "simulated", "values"),
     [
-        (NOW, None, False, ""),
-        (NOW - 10 * S, None, False, ""),
-        (NOW - 11 * S, None, False, "stamped 11 s behind the system's time"),
-        (NOW + 7200 * S, None, False, "stamped 2 h ahead of the system's time"),
-        (0, None, False, "without a stamp"),
-        (SIM, None, False, "stamped 100.0 s, which is simulated time, or time since a start"),
-        (SIM + S, SIM, False, "stamped with simulated time (101.0 s), unlike others"),
-        (SIM, SIM, True, ""),
-        (SIM - 10 * S, SIM, True, ""),
-        (SIM - 30 * S, SIM, True, "stamped 70.0 s, 30 s behind /clock"),
-        (NOW, SIM, True, "stamped with the system's time, while /clock says 100.0 s"),
-        (0, SIM, True, "without a stamp"),
-        (NOW, None, True, ""),
+        (NOW, None, False, []),
+        (NOW - 10 * S, None, False, []),
+        (NOW - 11 * S, None, False, ["11 s behind"]),
+        (NOW + 7200 * S, None, False, ["2 h ahead"]),
+        (0, None, False, ["without"]),
+        (SIM, None, False, ["100.0 s", "simulated"]),
+        (SIM + S, SIM, False, ["101.0 s", "simulated"]),
+        (SIM, SIM, True, []),
+        (SIM - 10 * S, SIM, True, []),
+        (SIM - 30 * S, SIM, True, ["70.0 s", "30 s behind /clock"]),
+        (NOW, SIM, True, ["the system's time", "/clock", "100.0 s"]),
+        (0, SIM, True, ["without"]),
+        (NOW, None, True, []),
     ],
 )
 def test_a_stamp_is_compared_with_the_clock_that_it_should_be_of(
-    stamp_ns: int, sim_ns: int | None, said: str, *, simulated: bool
+    stamp_ns: int, sim_ns: int | None, values: list[str], *, simulated: bool
 ) -> None:
-    assert other_clock(stamp_ns, NOW, sim_ns, simulated=simulated) == said
+    said = other_clock(stamp_ns, NOW, sim_ns, simulated=simulated)
+    assert bool(said) == bool(values)
+    assert [value for value in values if value not in said] == []
 
 
 def test_where_nobody_knows_when_it_came_nothing_is_said_of_the_systems_time() -> None:

@@ -210,9 +210,9 @@ def test_a_driver_that_does_nothing_until_it_is_active_is_made_active() -> None:
         ("hokuyo/utm-30lx", {"driver": "urg_node"}, None),
         ("realsense/d435", {}, None),
     ):
-        assert driver_of(robot_of(preset, options=options)).nodes[0].lifecycle == state
+        assert driver_of(robot_of(preset, options=options)).ros_nodes[0].lifecycle == state
     own = {"run": {"package": "mine", "executable": "lidar"}}
-    assert driver_of(robot_of("ouster/os1", driver=own)).nodes[0].lifecycle is None
+    assert driver_of(robot_of("ouster/os1", driver=own)).ros_nodes[0].lifecycle is None
 
 
 def test_a_unit_whose_cameras_hang_otherwise_says_on_what() -> None:

@@ -305,7 +305,7 @@ def parameters_of_another_node(robot: Robot) -> Iterator[Finding]:
     number of them. Inline parameters do not repeat the node's name and ``ros__parameters``: tfcompose adds these.
     """
     for process in robot.processes:
-        for node in process.nodes:
+        for node in process.ros_nodes:
             for key, value in node.params.items():
                 if key == _PARAMETERS or (isinstance(value, dict) and _PARAMETERS in value):
                     message = f"the node of {process.name} does not get the parameters under {key}"
@@ -326,7 +326,7 @@ def clocks_mixed(robot: Robot) -> Iterator[Finding]:
     """
     sim = robot.ros.clock == "sim"
     for process in robot.processes:
-        for node in process.nodes:
+        for node in process.ros_nodes:
             value = node.params.get("use_sim_time")
             if value is None or (str(value).lower() in _TRUE) == sim:
                 continue

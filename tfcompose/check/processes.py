@@ -73,7 +73,7 @@ def required_without_role(robot: Robot) -> Iterator[Finding]:
     awaited = {name for process in robot.processes for name in process.after}
     publishers = {claim.node for claim in robot.claims}
     for process in robot.processes:
-        needed = process.name in owners | drivers | awaited or any(node.name in publishers for node in process.nodes)
+        needed = process.name in owners | drivers | awaited or any(node in publishers for node in process.nodes)
         if process.required and not needed and not robot.excuses(process.name):
             message = f"{process.name} is required, but owns no edge, and nothing waits for it"
             advice = f"remove required, or write after: {{{process.name}: ready}} on the process that needs it"

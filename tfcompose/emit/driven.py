@@ -22,7 +22,7 @@ def switches_of(process: Process, robot: Robot) -> dict[str, dict[str, Any]]:
     """Return, by node, the parameters that are written for it and decide what it publishes."""
     keys = {key for sensor in _sensors(process, robot) for key in _switch(sensor)}
     found = {}
-    for node in process.nodes if process.kind in {"run", "external"} else ():
+    for node in process.ros_nodes if process.kind in {"run", "external"} else ():
         wanted = keys | {key for claim in robot.claims if claim.node == node.name for key in claim.switch}
         switches = {key: value for key, value in node.params.items() if key in wanted}
         if switches:

@@ -20,7 +20,7 @@ def file_params(process: Process) -> dict[str, dict[str, Any]]:
     """Return what the process's parameter file holds, by node: all but the paths that only the launcher knows."""
     if process.kind != "run":
         return {}
-    nodes = {node.name: _known(node.params) for node in process.nodes}
+    nodes = {node.name: _known(node.params) for node in process.ros_nodes}
     return {node: params for node, params in nodes.items() if params}
 
 

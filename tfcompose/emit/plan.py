@@ -15,12 +15,13 @@ from tfcompose.emit.params import file_params
 from tfcompose.files import AS_IN_SOURCE, Target
 from tfcompose.model import JOINTS, STATIC
 from tfcompose.numbers import clean
-from tfcompose.plan import DESCRIPTION, Claim, Joint, Plan, PlanEdge, PlanProcess, SourceLine, switch_text
+from tfcompose.plan import DESCRIPTION, Claim, Joint, Plan, PlanEdge, SourceLine, switch_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tfcompose.model import Edge, Process, Robot
+    from tfcompose.plan import PlanProcess
 
 _FILE = re.compile(r"\$\{file:([^{}]*)\}")
 
@@ -122,30 +123,15 @@ def _process(process: Process, robot: Robot, owned: list[tuple[str, str]], names
     simulation = process.simulate
     if simulation:
         simulation = replace(simulation, pose=clean(simulation.pose))
-    return PlanProcess(
-        name=process.name,
-        kind=process.kind,
+    return process.planned(
         argv=argv_of(process, robot, has_params=has_params, owns=bool(owned)),
-        env=process.env,
-        cwd=process.cwd,
         params_file=f"params/{process.name}.yaml" if has_params else None,
-        remap=process.remap,
-        nodes=tuple(node.name for node in process.nodes),
-        restart=process.restart,
-        max_restarts=process.max_restarts,
-        required=process.required,
-        stop=process.stop,
-        log_level=process.log_level,
-        lifecycle={node.name: node.lifecycle for node in process.nodes if node.lifecycle},
         after={name: when for name, when in process.after.items() if name in names},
-        ready=process.ready,
-        host=process.host,
         owns=tuple(owned),
         simulate=simulation,
         description=f"{process.part}/{DESCRIPTION}" if process.part and process.kind in _PUBLISHERS else None,
         drives=driven_of(process, robot),
         switches=switches_of(process, robot),
-        namespace=process.namespace,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag
 
@@ -22,7 +22,16 @@ from tfcompose.language.values import (
     Text,
     short,
 )
-from tfcompose.plan import LifecycleState, LogLevel, RestartPolicy, StartCondition, StopSignal
+from tfcompose.plan import (
+    LifecycleState,
+    LogLevel,
+    PlanProcess,
+    ReadyKind,
+    RestartPolicy,
+    SimulationKind,
+    StartCondition,
+    StopSignal,
+)
 from tfcompose.units import AngularVelocity, Duration, JointPosition, Quantity, Rate, Size, refused, shown
 
 if TYPE_CHECKING:
@@ -31,6 +40,10 @@ if TYPE_CHECKING:
     from pydantic_core import PydanticCustomError
 
     from tfcompose.load import Path
+
+
+#: What a process of the plan is where nothing is said.
+DEFAULTS = PlanProcess("", "run")
 
 
 def _inserted(value: Any) -> Any:
@@ -121,7 +134,7 @@ SimulatedJoints = Annotated[
     Annotated[Literal["zero", "sweep"], Tag("[word]")] | Annotated[dict[str, SimulatedJoint], Tag("[other]")],
     Discriminator(lambda value: "[word]" if isinstance(value, str) else "[other]"),
 ]
-SIMULATIONS = frozenset({"circle", "fixed", "joints"})
+SIMULATIONS = frozenset[str](get_args(SimulationKind))
 
 
 class Simulate(Checked):
@@ -140,7 +153,7 @@ class Simulate(Checked):
 class StopSpec(Spec):
     """How a process is stopped: a first signal to its whole group, then firmer ones."""
 
-    signal: StopSignal = key("SIGINT", "the first signal")
+    signal: StopSignal = key(DEFAULTS.stop.signal, "the first signal")
     timeout: Duration | None = key(None, "how long until the next, firmer one", "5 s")
 
 
@@ -152,7 +165,7 @@ def _is_regular(value: str) -> str:
     return value
 
 
-READY_WAYS = frozenset({"edges", "topic", "service", "lifecycle", "log", "exit", "time"})
+READY_WAYS = frozenset[str](get_args(ReadyKind))
 
 
 class ReadySpec(Checked):
@@ -262,7 +275,7 @@ class Started(Checked):
         None,
         "true: its end stops everything; false: the rest goes on when it fails; default: its failure stops everything",
     )
-    restart: RestartPolicy = key("no", "when it is started again after it has ended")
+    restart: RestartPolicy = key(DEFAULTS.restart, "when it is started again after it has ended")
     max_restarts: Annotated[int, Strict(), Field(ge=0, le=1_000_000), Integral] | None = key(
         None, "how often in a row it is started again before it is given up", 5
     )

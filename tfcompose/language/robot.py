@@ -28,7 +28,7 @@ from tfcompose.language.values import (
     Xyz,
 )
 from tfcompose.model import Dynamics, Limit, ReferencePositions, SafetyController
-from tfcompose.plan import GuardPolicy, Isolation, RosSettings, SensorPublisher, StatePublisher
+from tfcompose.plan import GuardPolicy, Isolation, JointType, RosSettings, SensorPublisher, StatePublisher
 from tfcompose.plan.codec import documented
 from tfcompose.units import (
     NUMBER,
@@ -83,9 +83,7 @@ class JointSpec(EdgeKeys):
     Planar and floating joints need an owner: joint states say nothing about them.
     """
 
-    type: Literal["fixed", "revolute", "continuous", "prismatic", "planar", "floating"] = key(
-        ..., "how the joint moves", "revolute"
-    )
+    type: Literal["fixed", JointType] = key(..., "how the joint moves", "revolute")
     parent: Annotated[Texts, BeforeValidator(_only_one, Text)] = key(..., "the parent link", "base_link")
     child: Text = key(..., "the child link, which moves", "wheel_left_link")
     axis: Axis = key(

@@ -5,16 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.plan import (
-    LifecycleState,
-    LogLevel,
-    ProcessKind,
-    Ready,
-    RestartPolicy,
-    Simulation,
-    StartCondition,
-    StopRule,
-)
+from tfcompose.plan import PlanProcess
+from tfcompose.plan.codec import narrowed
 
 STATIC, JOINTS, GUARD = "static", "joints", "guard"
 BUILT_IN = (STATIC, JOINTS, GUARD)
@@ -23,6 +15,7 @@ SHELL = ("/bin/sh", "-c")
 
 if TYPE_CHECKING:
     from tfcompose.findings import Span
+    from tfcompose.plan import LifecycleState
 
 
 class AsInFile(str):
@@ -46,48 +39,44 @@ class Node:
 
 
 @dataclass(frozen=True, slots=True)
-class Process:
-    """A process of the plan, before it is a command line.
+class Process(PlanProcess):
+    """A process of the plan, with what only the compiler knows of it.
 
     It runs a ``package``'s ``executable``, a ``launch`` file (``package/file``), or else the command ``argv``, which
-    for the others holds the arguments. ``part`` is the ``Part`` that it belongs to, if any. ``describes`` says that its
-    parameter ``robot_description`` is the URDF for a stock robot_state_publisher.
+    for the others holds the arguments, until ``planned`` makes the whole command of them. ``part`` is the ``Part`` that
+    it belongs to, if any. ``describes`` says that its parameter ``robot_description`` is the URDF for a stock
+    robot_state_publisher. ``rate`` is that of the joint states that it sends.
     """
 
-    name: str
-    kind: ProcessKind
-    at: Span
-    nodes: tuple[Node, ...] = ()
-    package: str | None = None
-    executable: str | None = None
-    launch: str | None = None
-    argv: tuple[str, ...] = ()
-    remap: dict[str, str] = field(default_factory=dict)
-    env: dict[str, str] = field(default_factory=dict)
-    cwd: str | None = None
-    log_level: LogLevel | None = None
-    host: str | None = None
-    required: bool | None = None
-    restart: RestartPolicy = "no"
-    max_restarts: int | None = None
-    stop: StopRule = field(default_factory=StopRule)
-    ready: Ready | None = None
-    after: dict[str, StartCondition] = field(default_factory=dict)
-    simulate: Simulation | None = None
-    rate: float | None = None
-    part: str = ""
-    describes: bool = False
-    namespace: str | None = None
+    nodes: tuple[str, ...] = field(init=False)
+    lifecycle: dict[str, LifecycleState] = field(init=False)
+    at: Span = field(kw_only=True)
+    ros_nodes: tuple[Node, ...] = field(default=(), kw_only=True)
+    package: str | None = field(default=None, kw_only=True)
+    executable: str | None = field(default=None, kw_only=True)
+    launch: str | None = field(default=None, kw_only=True)
+    rate: float | None = field(default=None, kw_only=True)
+    part: str = field(default="", kw_only=True)
+    describes: bool = field(default=False, kw_only=True)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "nodes", tuple(node.name for node in self.ros_nodes))
+        states = {node.name: node.lifecycle for node in self.ros_nodes if node.lifecycle}
+        object.__setattr__(self, "lifecycle", states)
+
+    def planned(self, **made: Any) -> PlanProcess:
+        """Return the process as the plan has it, with fields that follow from the whole robot."""
+        return narrowed(PlanProcess, self, **made)
 
     @property
     def node(self) -> str:
         """The full name of the first node, which is the only one of most processes."""
-        return self.nodes[0].name if self.nodes else ""
+        return self.nodes[0] if self.nodes else ""
 
     @property
     def params(self) -> dict[str, Any]:
         """The parameters of the first node."""
-        return self.nodes[0].params if self.nodes else {}
+        return self.ros_nodes[0].params if self.ros_nodes else {}
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,14 +44,14 @@ class _Work:
         """Return the process with its nodes told."""
         if process.name not in self.spec.processes or process.kind not in {"run", "external"}:
             return process
-        claimants = [self._node(process, node) for node in process.nodes]
+        claimants = [self._node(process, node) for node in process.ros_nodes]
         if all(one is not None for one in claimants):
             self.known.add(process.name)
         nodes = (
             replace(node, params=node.params | one.computed) if one and one.takes_parameters else node
-            for node, one in zip(process.nodes, claimants, strict=True)
+            for node, one in zip(process.ros_nodes, claimants, strict=True)
         )
-        return replace(process, nodes=tuple(nodes))
+        return replace(process, ros_nodes=tuple(nodes))
 
     def edge(self, edge: Edge) -> Edge:
         """Return the edge with its publisher; an owner of whose nodes none is known to publish it is a finding."""

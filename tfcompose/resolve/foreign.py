@@ -183,8 +183,8 @@ def _own(part: PartEntry) -> tuple[Process, ...]:
         Process(
             name,
             name,  # type: ignore[arg-type]  # the built-in processes are called by their kinds
-            part.place,
-            (Node(full_name(settings.namespace, f"tfcompose_{name}"), part.place),),
+            at=part.place,
+            ros_nodes=(Node(full_name(settings.namespace, f"tfcompose_{name}"), part.place),),
             remap=remap,
         )
         for name in BUILT_IN

@@ -94,13 +94,13 @@ class Filler:
             section = ("sensors", process.name, "driver")
         done = replace(
             process,
-            nodes=tuple(replace(n, params=self._fill(n.params, (*n.path, "params"))) for n in process.nodes),
+            ros_nodes=tuple(replace(n, params=self._fill(n.params, (*n.path, "params"))) for n in process.ros_nodes),
             argv=self._fill(process.argv, (*section, "run")),
             remap=self._fill(process.remap, (*section, "remap")),
             env=self._fill(process.env, (*section, "env")),
             cwd=self._folder(process.cwd, (*section, "cwd")),
         )
-        for node in done.nodes:
+        for node in done.ros_nodes:
             self._check_paths(done, node)
         return done
 
@@ -110,7 +110,7 @@ class Filler:
         names_params_file = any("${params_file}" in word for word in (*process.argv, *process.env.values()))
         if process.argv[:2] == SHELL:
             return self._not_reached(process, names_params_file=names_params_file)
-        if not names_params_file or any(node.params for node in process.nodes) or not self.source.has(at):
+        if not names_params_file or any(node.params for node in process.ros_nodes) or not self.source.has(at):
             return []
         message = f"{process.name} is given ${{params_file}}, and has no parameters"
         return [finding("TF816", message, self.source.at(at), help="params: {…}")]

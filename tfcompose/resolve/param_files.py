@@ -38,8 +38,8 @@ class _Work:
     _known: dict[str, ParamsFile] = field(default_factory=dict)
 
     def process(self, process: Process) -> Process:
-        nodes = tuple(self._node(node, process) if names_files(node.params) else node for node in process.nodes)
-        return replace(process, nodes=nodes)
+        nodes = tuple(self._node(node, process) if names_files(node.params) else node for node in process.ros_nodes)
+        return replace(process, ros_nodes=nodes)
 
     def _node(self, node: Node, process: Process) -> Node:
         named = node.params[FILE_KEY]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, did_you_mean, finding
 from tfcompose.language.process import RUNNING, SIMULATIONS, SWEEP
-from tfcompose.model import BUILT_IN, GUARD, JOINTS, SHELL, STATIC, Node, Process
+from tfcompose.model import BUILT_IN, GUARD, JOINTS, MOVING, SHELL, STATIC, Node, Process
 from tfcompose.plan import Ready, Simulation, StopRule, Sweep
 from tfcompose.resolve.poses import pose_of
 from tfcompose.resolve.presets import node_preset, node_preset_names
@@ -38,14 +38,14 @@ def user_process(name: str, declared: ProcessSpec, validated: Validated) -> tupl
     nodes, found = nodes_of(name, declared, namespace, source)
     if declared.external:
         keys = how(declared, namespace, EXTERNAL_KEYS)
-        return replace(Process(name, "external", place, nodes), **keys), found
+        return replace(Process(name, "external", at=place, ros_nodes=nodes), **keys), found
     if declared.simulate:
         one = (Node(nodes[0].name, nodes[0].at),)
-        process, refused = _simulated(Process(name, "simulate", place, one), declared.simulate, validated)
+        process, refused = _simulated(Process(name, "simulate", at=place, ros_nodes=one), declared.simulate, validated)
         keys = how(declared, namespace, SIMULATED_KEYS)
         return process and replace(process, **keys), [*found, *refused]
     if declared.run and declared.run.is_startable:
-        process = Process(name, "run", place, nodes)
+        process = Process(name, "run", at=place, ros_nodes=nodes)
         return replace(process, **how(declared, namespace), **program(declared.run, shell=bool(declared.shell))), found
     if _is_run_refused(name, validated):
         return None, found
@@ -90,7 +90,7 @@ def name_clashes(processes: list[Process], spec: RobotSpec, source: Source) -> l
     for name, sensor in spec.sensors.items():
         driven_by_it = sensor.driver is not None and sensor.driver.process == name
         if name in spec.processes and not driven_by_it:
-            first[name] = Process(name, "external", source.at_key(("sensors", name)))
+            first[name] = Process(name, "external", at=source.at_key(("sensors", name)))
     for process in processes:
         other = first.setdefault(process.name, process)
         if other.at != process.at:
@@ -189,7 +189,7 @@ def built_in(spec: RobotSpec, source: Source) -> list[Process]:
         path: Path = ("processes", name)
         params = declared.params if declared and name == JOINTS else {}
         node = Node(full_name(spec.ros.namespace, f"tfcompose_{name}"), at, path, params)
-        process = Process(name, _KINDS[name], at, (node,))
+        process = Process(name, _KINDS[name], at=at, ros_nodes=(node,))
         if declared:
             given = {key: getattr(declared, key) for key in _BUILT_IN_KEYS}
             process = replace(process, **given)
@@ -398,7 +398,7 @@ def _findings(wanted: dict[str, Any], joints: dict[str, Joint], process: Process
 
 def _has_position(joint: Joint) -> bool:
     """Whether the joint has a single position, and one of its own."""
-    return joint.mimic is None and joint.type in {"revolute", "continuous", "prismatic"}
+    return joint.mimic is None and joint.type in MOVING
 
 
 def _rest(joint: Joint) -> float:

@@ -109,7 +109,7 @@ class _Work:
         own = [with_positions(one, self.spec, edges, self.source, self.found) for one in (*own, *drafts.drivers)]
         self.found += [*drafts.found, *bodies.found, *solver.found, *self._wrong_names(own)]
         robot = self._robot(drafts, edges, self._everybody(own))
-        if any(names_files(node.params) for process in own for node in process.nodes):
+        if any(names_files(node.params) for process in own for node in process.ros_nodes):
             robot = self._take(with_param_files(robot, self.source, self.read))
         robot = self._take(completed(robot, self.spec, self.source, self.disk))
         found = [one for one in self.found if not self._may_follow(one)] if self.broken else self.found

@@ -217,7 +217,7 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
     place = source.at_key(at[:2])
     state = driver.lifecycle if driver and run is None else None
     node = Node(driver_node(sensor, spec), place, at, params, (declared.lifecycle if declared else None) or state)
-    process = Process(sensor.name, "external" if external else "run", place, (node,))
+    process = Process(sensor.name, "external" if external else "run", at=place, ros_nodes=(node,))
     if declared:
         keys = how(declared, namespace_of(declared, spec.ros.namespace), EXTERNAL_KEYS if external else KEYS)
         process = replace(process, **keys)

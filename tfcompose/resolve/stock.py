@@ -64,7 +64,7 @@ def _stock(joints: Process, robot: Robot) -> Process:
         kind="run",
         package=NAME,
         executable=NAME,
-        nodes=(node,),
+        ros_nodes=(node,),
         remap={"robot_description": "~/robot_description"} | joints.remap,
         describes=True,
     )

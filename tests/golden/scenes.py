@@ -14,8 +14,6 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 from unittest import mock
 
-from tfcompose.run.own import read_own
-
 from tests.support import guard_history as guarded
 from tests.support.bags import drive, write_bag
 from tests.support.machine_history import GUARD, SLAM, STATIC, begin, run_process

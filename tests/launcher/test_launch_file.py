@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.support.findings import expect
 from tfcompose.ipc import LogLine, Notice
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.supervisor import supervise
@@ -106,28 +107,22 @@ def test_what_the_nodes_say_comes_to_the_log_unless_the_user_said_where_it_goes(
 def test_without_ros2_it_says_what_brings_it(tmp_path: Path, env: dict[str, str]) -> None:
     _, found = look(tmp_path, env | {"PATH": "/nowhere"})
     assert found
-    assert found.code == "TF810"
-    assert found.message == "the executable ros2 (for launch nav2_bringup/navigation_launch.py) of nav2 was not found"
-    assert "ros2launch" in found.help
+    expect(found, "TF810", "ros2 (for launch nav2_bringup/navigation_launch.py) of nav2", "ros2launch")
 
 
 @pytest.mark.parametrize(
     ("word", "advice"),
-    [
-        ("nav2_bringup/navigaton_launch.py", "did you mean navigation_launch.py?"),
-        ("nav2/navigation_launch.py", "install the package nav2"),
-    ],
+    [("nav2_bringup/navigaton_launch.py", "navigation_launch.py?"), ("nav2/navigation_launch.py", "package nav2")],
 )
 def test_a_launch_file_that_is_not_there_is_named_with_what_is(
     tmp_path: Path, env: dict[str, str], word: str, advice: str
 ) -> None:
     _, found = look(tmp_path, env, PlanProcess("nav2", "run", (f"${{launch:{word}}}",)))
     assert found
-    assert found.message == f"the executable launch file {word} of nav2 was not found"
-    assert found.help == advice
+    expect(found, "TF810", f"{word} of nav2", advice)
 
 
 def test_a_word_that_is_no_argument_is_refused(tmp_path: Path, env: dict[str, str]) -> None:
     _, found = look(tmp_path, env, PlanProcess("nav2", "run", (*NAV2.argv, "--debug")))
     assert found
-    assert found.message == "nav2: --debug is no argument of a launch file"
+    expect(found, "TF902", "nav2", "--debug")

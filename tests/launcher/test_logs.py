@@ -92,7 +92,8 @@ def test_a_full_disk_is_said_once_costs_lines_and_stops_nobody(tmp_path: Path, m
 
     monkeypatch.setattr(os, "write", full)
     said = [logs.write("a", "lost") for _ in range(100)]
-    assert said == [f"logs are not written to {tmp_path}: No space left on device", *[None] * 99]
+    assert str(tmp_path) in (said[0] or "")
+    assert said[1:] == [None] * 99
     monkeypatch.setattr(os, "write", write)
     monkeypatch.setattr("tfcompose.launcher.logs.LEFT_ALONE_S", 0.0)
     logs.write("a", "after")

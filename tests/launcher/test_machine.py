@@ -8,6 +8,7 @@ from typing import Literal
 
 import pytest
 
+from tests.support.findings import expect
 from tests.support.machine_history import GUARD, SLAM, STATIC, begin, plan_of, run_process
 from tfcompose.findings import finding
 from tfcompose.ipc import (
@@ -84,8 +85,7 @@ def test_an_external_process_is_expected_and_not_started() -> None:
 def test_a_guard_that_does_not_say_clear_within_20_s_is_a_failure_that_says_so() -> None:
     history = begin(GUARD, SLAM)
     assert history.sleep_until_due() == pytest.approx(20)
-    assert [found.code for found in history.found()] == ["TF808"]
-    assert "guard did not say within 20 s" in history.found()[0].message
+    expect(history.only(), "TF808", "guard", " 20 s ")
     assert history.feed(Exited("guard", 0)).exit_code == 1
     assert history.started == ["guard"]
 
@@ -93,14 +93,12 @@ def test_a_guard_that_does_not_say_clear_within_20_s_is_a_failure_that_says_so()
 def test_the_time_that_the_guard_was_told_to_look_is_waited_besides() -> None:
     history = begin(replace(GUARD, env={SETTLE: "30"}), SLAM)
     assert history.sleep_until_due() == pytest.approx(50)
-    assert "guard did not say within 50 s" in history.found()[0].message
+    expect(history.only(), "TF808", "guard", " 50 s ")
 
 
 def test_a_guard_that_dies_before_it_is_clear_is_a_failure_that_says_so() -> None:
     history = begin(GUARD, SLAM).feed(Exited("guard", 1, ("no rclpy",)))
-    (found,) = history.found()
-    assert found.message.startswith("guard ended with exit code 1 before it said")
-    assert [note.message for note in found.notes] == ["guard: no rclpy"]
+    expect(history.only(), "TF808", "guard", "exit code 1", "guard: no rclpy")
     assert history.exit_code == 1
 
 
@@ -117,7 +115,7 @@ def test_an_edge_that_is_taken_already_is_shown_and_nothing_else_is_started() ->
 
 def test_a_process_that_cannot_be_started_ends_everything_with_exit_1_and_is_named() -> None:
     history = begin(STATIC, SLAM).feed(StartFailed("slam", "Permission denied"))
-    assert history.found()[0].message == "slam could not be started: Permission denied"
+    expect(history.only(), "TF808", "slam", "Permission denied")
     assert history.killed == [("static", SIGINT)]
     assert history.feed(Exited("static", 0)).exit_code == 1
 
@@ -166,14 +164,10 @@ def test_after_done_waits_until_the_process_has_ended_with_0() -> None:
 # Processes that end.
 
 
-@pytest.mark.parametrize(
-    ("code", "words"), [(3, "slam ended with exit code 3"), (-SIGSEGV, "slam was ended by SIGSEGV")]
-)
-def test_a_failed_process_ends_everything_with_exit_1_and_is_named(code: int, words: str) -> None:
+@pytest.mark.parametrize(("code", "how"), [(3, "exit code 3"), (-SIGSEGV, "SIGSEGV")])
+def test_a_failed_process_ends_everything_with_exit_1_and_is_named(code: int, how: str) -> None:
     history = begin(STATIC, SLAM).feed(Exited("slam", code, ("one", "two")))
-    (found,) = history.found()
-    assert (found.code, found.message) == ("TF808", words)
-    assert [note.message for note in found.notes] == ["slam: one", "slam: two"]
+    expect(history.only(), "TF808", "slam", how, "slam: one", "slam: two")
     assert history.all(Stopping) == [Stopping("TF808 process_failed")]
     assert history.killed == [("static", SIGINT)]
     assert history.feed(Exited("static", -SIGINT)).exit_code == 1
@@ -184,7 +178,7 @@ def test_a_built_in_process_that_ends_has_failed_even_with_exit_code_0(
     kind: Literal["static", "joints", "simulate"],
 ) -> None:
     history = begin(PlanProcess("it", kind), SLAM).feed(Clear(), Exited("it", 0))
-    assert history.found()[0].message == "it ended with exit code 0"
+    expect(history.only(), "TF808", "it", "exit code 0")
 
 
 def test_a_program_that_ends_with_0_is_done_and_the_others_go_on() -> None:
@@ -208,7 +202,7 @@ def test_backoff_grows_and_ends_as_a_failure() -> None:
     assert history.started == ["a"] * 6
     history.feed(Exited("a", 1))
     assert history.states("a")[-1] == "FATAL"
-    assert history.found()[0].message == "a ended with exit code 1, after 5 restarts"
+    expect(history.only(), "TF808", "a", "exit code 1", " 5 restarts")
     assert history.exit_code == 1
 
 
@@ -270,20 +264,20 @@ def test_the_plans_own_offender_is_stopped_and_stays_so_where_the_policy_is_stop
     assert (history.killed, history.found()) == ([], [WARNING, ERROR])
     history.feed(Found(ERROR, "slam"))
     assert history.killed == [("slam", SIGINT)]
-    assert "slam is stopped for it" in history.found()[-1].notes[-1].message
+    expect(history.found()[-1], "TF801", "slam is stopped")
     history.feed(Exited("slam", -SIGINT)).wait(60)
     assert (history.started, history.states("slam")[-1], history.exit_code) == (
         ["guard", "static", "slam"],
         "STOPPED",
         None,
     )
-    assert "nothing is stopped: slam does not run" in history.feed(Found(ERROR, "slam")).found()[-1].notes[-1].message
+    expect(history.feed(Found(ERROR, "slam")).found()[-1], "TF801", "nothing is stopped", "slam does not run")
 
 
 def test_an_offender_that_somebody_else_started_is_not_stopped() -> None:
     history = begin(GUARD, DRIVE, STATIC, guard=GuardPolicy(on_violation="stop-offender")).feed(Clear())
     history.feed(Found(ERROR, "drive"))
-    assert history.found()[-1].notes[-1].message == "nothing is stopped: somebody else starts and stops drive"
+    expect(history.found()[-1], "TF801", "nothing is stopped", "drive")
     assert history.killed == []
 
 
@@ -391,7 +385,7 @@ def test_nothing_happens_after_the_end() -> None:
 
 def test_output_that_nobody_reads_any_more_ends_everything_with_exit_141() -> None:
     history = begin(STATIC).feed(OutputLost(), Exited("static", 0))
-    assert history.all(Stopping) == [Stopping("nobody reads the output any more")]
+    assert len(history.all(Stopping)) == 1
     assert history.exit_code == 141
 
 
@@ -410,7 +404,7 @@ def test_time_is_up_ends_with_1_when_an_error_was_shown() -> None:
 
 def test_time_is_up_ends_with_1_and_names_the_edges_that_were_never_seen() -> None:
     history = begin(GUARD, STATIC, SLAM).feed(Clear(), Live("static", ("laser",)), TimeUp())
-    assert [(found.code, found.message) for found in history.found()] == [("TF811", "slam never published map → odom")]
+    expect(history.only(), "TF811", "slam", "map → odom")
     history.feed(Exited("slam", 0), Exited("static", 0), Exited("guard", 0))
     assert history.exit_code == 1
 
@@ -419,17 +413,16 @@ def test_a_process_that_was_stopped_is_not_said_to_have_never_published() -> Non
     slam = replace(SLAM, argv=("slam",))
     history = begin(GUARD, STATIC, slam).feed(Clear(), Live("static", ("laser",)), Live("slam", ("odom",)), Complete(2))
     history.feed(ProcessRequest("stop", "slam"), Exited("slam", -SIGINT), TimeUp())
-    assert [found.message for found in history.found()] == ["nobody publishes map → odom: slam is stopped: SIGINT"]
+    expect(history.only(), "TF811", "map → odom", "slam is stopped", "SIGINT")
 
 
 def test_a_process_that_was_never_started_is_not_blamed_for_its_edges() -> None:
     slam = replace(SLAM, after={"drive": "ready"})
     history = begin(GUARD, STATIC, slam, DRIVE).feed(Clear(), TimeUp())
-    assert [found.message for found in history.found()] == [
-        "static never published base_link → laser",
-        "nobody published map → odom: slam was not started: it waits for drive to be ready",
-        "drive never published odom → base_link",
-    ]
+    static, slam_, drive = history.found()
+    expect(static, "TF811", "static", "base_link → laser")
+    expect(slam_, "TF811", "map → odom", "slam", "drive")
+    expect(drive, "TF811", "drive", "odom → base_link")
 
 
 def test_time_is_up_ends_with_0_where_no_guard_looks() -> None:

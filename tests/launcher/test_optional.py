@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from tests.support.findings import expect
 from tests.support.machine_history import GUARD, SLAM, STATIC, History, begin, run_process
 from tfcompose.ipc import AllReady, AllStarted, Clear, Ended, Live, OwnerReady, ProcessRequest, Waiting
 from tfcompose.launcher.answers import status
@@ -33,11 +34,8 @@ def test_an_optional_process_that_fails_is_named_with_its_last_lines_and_the_res
     history = begin(STATIC, replace(optional(), restart=restart, max_restarts=0)).feed(
         Exited("camera", 3, ("no device",))
     )
-    (found,) = history.found()
-    assert (found.code, found.severity) == ("TF808", "warning")
-    assert found.message.startswith("camera ended with exit code 3")
-    assert [note.message for note in found.notes] == ["camera: no device"]
-    assert "tfcompose start camera" in (found.help or "")
+    expect(history.only(), "TF808", "camera", "exit code 3", "camera: no device", "tfcompose start camera")
+    assert history.only().severity == "warning"
     assert (history.state.stop, history.killed, history.exit_code) == (None, [], None)
     assert history.state.given_up == ("camera",)
 
@@ -52,7 +50,7 @@ def test_it_is_first_started_again_as_often_as_the_plan_says() -> None:
 
 def test_one_that_the_operating_system_does_not_start_is_given_up_too() -> None:
     history = begin(STATIC, optional()).feed(StartFailed("camera", "no such program"))
-    assert history.found()[0].message == "camera could not be started: no such program"
+    expect(history.only(), "TF808", "camera", "no such program")
     assert (history.states("camera")[-1], history.state.stop) == ("FATAL", None)
 
 
@@ -78,14 +76,13 @@ def test_what_else_is_missing_is_still_waited_for() -> None:
 
 
 def test_one_that_waits_for_it_fails_with_the_reason_and_ends_everything_unless_it_is_optional_too() -> None:
-    reason = "nav is not started: it waits for camera to be ready, and camera has failed"
     gate = Ready("log", "up")
     camera = replace(optional(), ready=gate)
     history = begin(STATIC, camera, run_process("nav", after={"camera": "ready"})).feed(Exited("camera", 1))
-    assert history.found()[1].message == reason
+    expect(history.found()[1], "TF808", "nav", "camera to be ready", "failed")
     assert history.feed(Exited("static", 0)).exit_code == 1
     history = begin(STATIC, camera, optional("nav", after={"camera": "ready"})).feed(Exited("camera", 1))
-    assert history.found()[1].message == reason
+    expect(history.found()[1], "TF808", "nav", "camera to be ready", "failed")
     assert (history.state.stop, history.state.given_up) == (None, ("camera", "nav"))
 
 
@@ -119,12 +116,14 @@ def test_after_a_signal_the_exit_code_is_0_and_after_a_time_1_with_the_failure_a
     history = failed().feed(Signalled(SIGINT), Exited("static", 0), Exited("guard", 0))
     assert history.exit_code == 0
     history = failed().feed(TimeUp(), Exited("static", 0), Exited("guard", 0))
-    assert history.all(Ended) == [Ended(1, ("camera ended with exit code 3", "camera: no device"))]
+    (found,) = history.found()
+    assert history.all(Ended) == [Ended(1, (found.message, "camera: no device"))]
 
 
 def test_when_all_have_ended_the_exit_code_is_1_and_the_first_that_failed_is_named() -> None:
     history = begin(optional("a"), optional("b")).feed(Exited("b", 2)).wait(1).feed(Exited("a", 1))
-    assert history.all(Ended) == [Ended(1, ("b ended with exit code 2",))]
+    assert history.all(Ended) == [Ended(1, (history.found()[0].message,))]
+    expect(history.found()[0], "TF808", "b", "exit code 2")
 
 
 def test_an_optional_process_does_not_hold_back_that_all_is_started() -> None:
@@ -145,4 +144,4 @@ def test_what_waited_in_vain_is_not_named_as_the_first_that_failed() -> None:
     history = begin(STATIC, nav, optional()).feed(Exited("camera", 3))
     assert history.state.given_up == ("nav", "camera")
     history.feed(TimeUp(), Exited("static", 0))
-    assert history.all(Ended) == [Ended(1, ("camera ended with exit code 3",))]
+    assert [one.because[0].split()[0] for one in history.all(Ended)] == ["camera"]

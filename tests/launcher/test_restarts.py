@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from tests.support.findings import expect
 from tests.support.machine_history import GUARD, SLAM, STATIC, begin, plan_of, run_process
 from tfcompose.ipc import (
     Absent,
@@ -61,18 +62,16 @@ def test_the_guard_looks_at_a_gate_and_what_waits_is_started_when_it_opens(kind:
     history = begin(GUARD, gated(kind=kind, text=text), AFTER).feed(Clear())
     assert history.orders == [gate]
     assert history.started == ["guard", "lidar"]
-    history.wait(2).feed(GateOpen("lidar", "/scan is published by /lidar"))
+    history.wait(2).feed(GateOpen("lidar", "/scan"))
     assert history.started == ["guard", "lidar", "b"]
-    assert history.all(ProcessReady) == [ProcessReady("lidar", "/scan is published by /lidar", 2.0)]
+    assert history.all(ProcessReady) == [ProcessReady("lidar", "/scan", 2.0)]
 
 
 def test_a_gate_that_stays_shut_is_told_once_with_what_was_seen_instead_and_may_still_open() -> None:
     history = begin(GUARD, gated(timeout_s=3.0), AFTER).feed(Clear(), GateShut("lidar", "topics /tf, /scan_raw"))
     assert history.sleep_until_due() == pytest.approx(3)
     (found,) = history.late
-    assert found.code == "TF817"
-    assert found.message == "lidar is not ready after 3 s: nobody publishes /scan"
-    assert [note.message for note in found.notes] == ["seen instead: topics /tf, /scan_raw"]
+    expect(found, "TF817", "lidar", " 3 s", "/scan", "topics /tf, /scan_raw")
     assert len(history.wait(60).late) == 1
     assert history.started == ["guard", "lidar"]
     history.feed(GateOpen("lidar", "/scan"))
@@ -101,17 +100,16 @@ def test_a_line_a_time_and_an_exit_code_open_their_gates() -> None:
 
 def test_an_exit_code_that_is_not_the_one_is_a_failure() -> None:
     history = begin(gated("code", kind="exit", number=3.0), STATIC).feed(Exited("code", 0))
-    assert [found.message for found in history.found()] == ["code ended with exit code 0"]
+    expect(history.only(), "TF808", "code", "exit code 0")
 
 
 def test_who_sends_on_tf_is_looked_at_while_an_edges_gate_is_shut_and_no_longer() -> None:
     slam = replace(SLAM, ready=Ready("edges", timeout_s=3.0))
-    history = begin(GUARD, STATIC, slam).feed(Clear(), GateShut("slam", "/tf is published by nobody"))
+    history = begin(GUARD, STATIC, slam).feed(Clear(), GateShut("slam", "/tf: nobody"))
     assert history.orders == [Gate("slam", writers=("/tf", "/tf_static"))]
     history.wait(3)
     (late,) = history.late
-    assert late.message == "slam is not ready after 3 s: nobody published map → odom"
-    assert late.notes[0].message == "seen instead: /tf is published by nobody"
+    expect(late, "TF817", "slam", " 3 s", "map → odom", "/tf: nobody")
     assert history.feed(OwnerReady("slam")).orders[-1] == Gate("slam")
 
 
@@ -128,7 +126,7 @@ def test_who_waits_for_one_that_ended_before_it_was_ready_fails_with_the_reason(
     history = begin(STATIC, gated(), AFTER).feed(Exited("lidar", 0))
     assert history.started == ["static", "lidar", "b"], "without a guard nobody looks at a topic"
     history = begin(GUARD, STATIC, gated(), AFTER).feed(Clear(), Exited("lidar", 0))
-    assert history.found()[-1].message == "b is not started: it waits for lidar to be ready, and lidar has ended"
+    expect(history.found()[-1], "TF808", "b", "lidar to be ready", "lidar has ended")
     assert history.state.stop
 
 
@@ -163,12 +161,12 @@ def test_max_restarts_is_the_plans() -> None:
     for _ in range(2):
         history.feed(Exited("a", 1)).sleep_until_due()
     assert history.feed(Exited("a", 1)).states("a")[-1] == "FATAL"
-    assert history.found()[0].message == "a ended with exit code 1, after 2 restarts"
+    expect(history.only(), "TF808", "a", "exit code 1", " 2 restarts")
 
 
 def test_a_required_process_that_ends_ends_everything_even_when_it_is_done() -> None:
     history = begin(replace(run_process("a"), required=True), STATIC).feed(Exited("a", 0))
-    assert history.found()[0].message == "a ended with exit code 0, and the plan requires it"
+    expect(history.only(), "TF808", "a", "exit code 0", "requires")
     assert history.killed == [("static", SIGINT)]
 
 
@@ -234,15 +232,15 @@ def test_a_process_that_waits_for_its_restart_can_be_started_at_once_or_stopped(
 @pytest.mark.parametrize(
     ("name", "verb", "why"),
     [
-        ("statik", "stop", "the plan has no process statik; did you mean static?"),
-        ("guard", "stop", "guard watches the others and is not stopped alone"),
-        ("static", "start", "static runs already, with pid 1002"),
-        ("drive", "restart", "somebody else starts and stops drive"),
+        ("statik", "stop", "static?"),
+        ("guard", "stop", "guard "),
+        ("static", "start", "1002"),
+        ("drive", "restart", "drive"),
     ],
 )
 def test_what_cannot_be_done_is_refused_with_the_reason(name: str, verb: Verb, why: str) -> None:
     history = begin(GUARD, STATIC, PlanProcess("drive", "external")).feed(Clear())
-    assert (refusal(history.state, name, verb) or "").startswith(why)
+    assert why in (refusal(history.state, name, verb) or "")
     assert refusal(history.state, "guard", "restart") is None
 
 
@@ -260,10 +258,8 @@ def test_a_guard_that_dies_is_told_and_started_again_with_what_it_said_and_what_
     history.feed(Remember({"a": 1, "b": 1}), Remember({"b": 2}))
     history.told.clear()
     history.feed(Exited("guard", -SIGKILL, ("last words",)))
-    (found,) = history.found()
-    assert (found.code, found.severity) == ("TF808", "warning")
-    assert found.message == "guard was ended by SIGKILL: nobody watches the tree until it is back"
-    assert [note.message for note in found.notes] == ["guard: last words"]
+    expect(history.only(), "TF808", "guard", "SIGKILL", "guard: last words")
+    assert history.only().severity == "warning"
     assert history.states("guard") == ["BACKOFF"]
     assert history.state.live == {"odom"}
     assert history.sleep_until_due() == pytest.approx(1)
@@ -271,7 +267,7 @@ def test_a_guard_that_dies_is_told_and_started_again_with_what_it_said_and_what_
     assert history.orders == [Absent("static"), Present("static")]
     history.wait(0.5).feed(Clear())
     (back,) = history.all(RecoveredShown)
-    assert back.text == "guard watches again after 1.5 s"
+    assert (back.text.split()[0], back.text[-5:]) == ("guard", "1.5 s")
     assert (history.state.stop, history.state.reported, history.killed) == (None, frozenset(), [])
     assert history.state.tracked["guard"].restarts == 1
 
@@ -282,8 +278,8 @@ def test_a_guard_that_hangs_is_told_and_ended_and_its_end_is_that_of_one_that_di
     history.wait(9).feed(Alive())
     assert (history.sleep_until_due(), history.killed) == (10.0, []), "the launcher may have been kept from running"
     assert (history.sleep_until_due(), history.killed) == (5.0, [("guard", SIGKILL)])
-    (found,) = history.found()
-    assert (found.severity, found.message) == ("warning", f"guard hangs: it has {did} for 15 s")
+    expect(history.only(), "TF808", "guard hangs", " 15 s", did)
+    assert history.only().severity == "warning"
     history.wait(60).feed(Exited("guard", -SIGKILL)).wait(2)
     assert history.started[-1] == "guard"
     history.wait(60)
@@ -316,8 +312,7 @@ def test_edges_that_are_silent_are_not_counted_as_live_until_they_are_heard_agai
 def test_a_strict_guard_that_dies_lets_nothing_pass_and_says_so() -> None:
     history = begin(GUARD, STATIC)
     history.state = replace(history.state, plan=replace(history.state.plan, guard=GuardPolicy("strict")))
-    (found,) = history.feed(Clear(), Exited("guard", 1)).found()
-    assert found.message == "guard ended with exit code 1: nothing of the plan passes to /tf until it is back"
+    expect(history.feed(Clear(), Exited("guard", 1)).only(), "TF808", "guard", "exit code 1", "/tf")
 
 
 def test_an_owner_that_ended_while_nobody_watched_is_to_be_seen_anew() -> None:
@@ -336,7 +331,7 @@ def test_a_guard_that_dies_again_and_again_ends_everything_with_1() -> None:
     for _ in range(5):
         history.feed(Exited("guard", 1)).sleep_until_due()
     history.feed(Exited("guard", 1))
-    assert history.found()[-1].message == "guard ended with exit code 1, after 5 restarts"
+    expect(history.found()[-1], "TF808", "guard", "exit code 1", " 5 restarts")
     assert [found.severity for found in history.found()] == ["warning"] * 5 + ["error"]
     assert history.feed(Exited("static", 0)).exit_code == 1
 

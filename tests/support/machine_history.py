@@ -113,6 +113,11 @@ class History:
     def found(self) -> list[Finding]:
         return [notice.found for notice in self.all(FindingShown)]
 
+    def only(self) -> Finding:
+        """Return what was shown, which is one finding."""
+        (found,) = self.found()
+        return found
+
     def states(self, name: str) -> list[str]:
         return [notice.state for notice in self.all(ProcessState) if notice.process == name]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.check import check, silenced, with_replaced
 from tfcompose.findings import Allow, Finding, RejectedError, without_duplicates
-from tfcompose.language import composed, validate, with_includes
+from tfcompose.language import composed, profiles_in, validate, with_includes
 from tfcompose.load import Source, load
 from tfcompose.resolve import Disk, Library, resolve
 
@@ -70,7 +70,7 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
 ) -> Compiled:
     """Return what ``compile_robot`` does, from text that has been loaded, with what it includes."""
     try:
-        validated = validate(composed(source, profiles, overlays), source.data.get("profiles"))
+        validated = validate(composed(source, profiles, overlays), profiles_in(source))
     except RejectedError as error:
         return Compiled(None, error.findings)
     resolved = resolve(validated, library, read, disk)
@@ -81,9 +81,3 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     kept, used = silenced(with_replaced(found, sources), rules, (*source.allows, *parts.allows))
     ordered = sorted(kept, key=lambda one: one.sort_key)
     return Compiled(resolved.robot, tuple(ordered), source.allows, frozenset(used), sources)
-
-
-def profiles_of(source: Source) -> list[str]:
-    """Return the names of the file's profiles."""
-    profiles = source.data.get("profiles")
-    return [name for name, value in profiles.items() if isinstance(value, dict)] if isinstance(profiles, dict) else []

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from tfcompose.cli.compiling import library
-from tfcompose.compile import compile_robot, profiles_of
+from tfcompose.compile import compile_robot
+from tfcompose.language import profiles_in
 from tfcompose.load import load
 
 HERE = Path(__file__).parent
@@ -23,7 +24,7 @@ def findings(text: str, *profiles: str, file: str = "robot.yaml") -> list[str]:
 def test_a_sound_robot_has_no_findings_with_any_of_its_profiles(file: Path) -> None:
     text = file.read_text("utf-8")
     assert findings(text, file=str(file)) == []
-    for profile in profiles_of(load(text, "robot.yaml")):
+    for profile in profiles_in(load(text, "robot.yaml")):
         assert findings(text, profile, file=str(file)) == []
 
 

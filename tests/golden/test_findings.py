@@ -26,9 +26,9 @@ from tfcompose.check import unused_allows
 from tfcompose.cli.compiling import PRESETS, library
 from tfcompose.cli.disk import disk
 from tfcompose.cli.reading import read_text
-from tfcompose.compile import compile_robot, profiles_of
+from tfcompose.compile import compile_robot
 from tfcompose.findings import Edit, Finding, RejectedError, Span
-from tfcompose.language import set_value, validate_node_preset
+from tfcompose.language import profiles_in, set_value, validate_node_preset
 from tfcompose.load import load
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def presets() -> Library:
 
 def profiles(text: str) -> list[str]:
     try:
-        return profiles_of(load(text, "robot.yaml"))
+        return list(profiles_in(load(text, "robot.yaml")))
     except RejectedError:
         return []
 

@@ -125,13 +125,12 @@ def _with_profiles(found: Finding, arguments: Namespace) -> Finding:
 
 def _profiles_that_start(arguments: Namespace) -> list[str]:
     """Return the profiles with which, laid over those that were asked for, every program is there."""
-    from tfcompose.compile import profiles_of
-    from tfcompose.language import with_includes
+    from tfcompose.language import profiles_in, with_includes
     from tfcompose.load import load
 
     try:
         source = with_includes(load(read_text(arguments.file), arguments.file), read_text)
-        names = [name for name in profiles_of(source) if name not in arguments.profiles]
+        names = [name for name in profiles_in(source) if name not in arguments.profiles]
         return [name for name in names if _starts_with(name, arguments)]
     except RejectedError:
         return []

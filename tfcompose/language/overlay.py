@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tfcompose.findings import Span
-    from tfcompose.load.source import Source
+    from tfcompose.language.robot import RosSpec
 
 
 def composed(source: Source, profiles: Sequence[str] = (), overlays: Sequence[Source] = ()) -> Source:
@@ -169,6 +169,69 @@ def _shown(value: Any) -> str:
 
 def _only(source: Source, key: str) -> Source:
     return replace(source, data={key: source.data[key]})
+
+
+#: What all processes of a plan share; a part cannot have its own.
+_SHARED_SETTINGS = ("clock", "domain_id", "discovery")
+
+
+def as_part(  # noqa: PLR0913, PLR0917 (two files, and what the one says of the other)
+    part: Source, holder: Source, path: Path, ros: RosSpec, settings: dict[str, Any], variables: dict[str, Any]
+) -> tuple[Source, list[Finding]]:
+    """Return a robot file as a part of another one, and a finding for each setting of its own that it cannot have.
+
+    ``path`` leads to the part in its ``holder``. Laid over the part are the holder's settings ``ros``, of which the
+    part has some of its own, ``settings``, and the ``variables`` that it is given.
+    """
+    key = holder.at_key(path)
+    own: Any = part.data.get("ros")
+    found = []
+    for name in _SHARED_SETTINGS:
+        wanted = getattr(ros, name)
+        if isinstance(own, dict) and name in own and own[name] != wanted:
+            message = f"{name} of the part {path[-1]} is {own[name]}, and of the robot that holds it {wanted}"
+            notes = [Note("it is said here", part.at(("ros", name)))]
+            advice = f"ros: {{{name}: {own[name]}}} here, or leave it out there"
+            found.append(finding("TF312", message, key, notes=notes, help=advice))
+    frames = _frame_names(part.data)
+    settings = {
+        **settings,
+        "shared_frames": [name for name in ros.shared_frames if name in frames],
+        **{name: getattr(ros, name) for name in _SHARED_SETTINGS if getattr(ros, name) is not None},
+    }
+    here = Place(key)
+    inside = {"ros": Place(key, dict.fromkeys(settings, here), dict.fromkeys(settings, here))}
+    data: dict[str, Any] = {"ros": settings}
+    if variables:
+        data["vars"] = dict(variables)
+        inside["vars"] = holder.places.nearest((*path, "vars"))
+    over = Source(holder.file, data, Place(key, inside, dict.fromkeys(data, here)), has_nulls=False)
+    return lay_over(part, over, is_overlay=False), found
+
+
+def _frame_names(data: dict[str, Any]) -> set[str]:
+    """Return every name that the data use for a frame."""
+    names: set[str] = set()
+    for section in ("frames", "links", "joints", "sensors"):
+        entries = data.get(section)
+        for name, entry in entries.items() if isinstance(entries, dict) else ():
+            names.add(name)
+            if isinstance(entry, dict):
+                names.update(entry[key] for key in ("parent", "child") if isinstance(entry.get(key), str))
+    return names
+
+
+def extended_by(preset: Source) -> str | None:
+    """Return the name of the preset that a preset's file is merged over, or None."""
+    base = preset.data.get("extends")
+    return base if isinstance(base, str) else None
+
+
+def profiles_in(source: Source) -> dict[str, dict[str, Any]]:
+    """Return the file's profiles by name, without those that cannot be laid over anything."""
+    profiles = source.data.get("profiles")
+    known = profiles if isinstance(profiles, dict) else {}
+    return {name: value for name, value in known.items() if isinstance(value, dict)}
 
 
 def without(source: Source, key: str) -> Source:

@@ -34,6 +34,11 @@ class Validated:
     unused: tuple[str, ...] = ()
     broken: frozenset[tuple[str, str]] = field(init=False)
 
+    @property
+    def source_data(self) -> dict[str, Any]:
+        """The plain data that the spec was made from."""
+        return self.source.data
+
     def __post_init__(self) -> None:
         entries = {(str(path[0]), str(path[1])) for path in self.refused if len(path) > 1}
         object.__setattr__(self, "broken", frozenset(entries | set(_children(entries, self.source.data.get("joints")))))

@@ -185,7 +185,7 @@ class Drafts:
             sensor=sensor.name if sensor else None,
             rate_at=self.source.at((*at, "rate")) if keys.rate else None,
             switched=parents[1:],
-            optical_edits=partial(optical_edits, at, self.source) if is_optical(child) else tuple,
+            optical_edits=partial(optical_edits, at, keys, self.source) if is_optical(child) else tuple,
         )
         relative_at = self.source.at((*at, "relative_to")) if keys.relative_to else None
         place_at = self.source.at((*at, "place")) if place else None

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Edit, Span
+from tfcompose.units import quantity
 
 if TYPE_CHECKING:
+    from tfcompose.language.pose import EdgeKeys
     from tfcompose.load import Path, Source
 
 _OPTICAL: dict[str, Any] = {
@@ -23,29 +25,27 @@ _OTHER_POSES = ("relative_to", "place", "calibration")
 _SECTIONS = ("frames", "links", "joints")
 
 
-def optical_edits(path: Path, source: Source) -> tuple[Edit, ...]:
+def optical_edits(path: Path, keys: EdgeKeys, source: Source) -> tuple[Edit, ...]:
     """Return the edits that turn the frame of the entry at ``path``, or none where that would change something else."""
     if path[0] not in _SECTIONS or source.at(path).file != source.at((*path, "parent")).file:
         return ()
-    entry = source.data[str(path[0])][path[1]]
-    rotations = [key for key in _OPTICAL if key in entry]
-    if len(rotations) > 1 or any(key in entry for key in _OTHER_POSES):
+    rotations = [key for key in _OPTICAL if source.has_key((*path, key))]
+    if len(rotations) > 1 or any(source.has_key((*path, key)) for key in _OTHER_POSES):
         return ()
     if rotations:
         key = rotations[0]
-        edits = _replaced(entry[key], _OPTICAL[key], (*path, key), source)
+        edits = _replaced(getattr(keys, key), _OPTICAL[key], (*path, key), source)
     else:
-        edits = [_insertion(path, entry, source)]
+        edits = [_insertion(path, source)]
     spans = [source.at((*path, "parent")), *(edit.span for edit in edits)]
     return tuple(edits) if all(_is_alone(span, path, source) for span in spans) else ()
 
 
-def _insertion(path: Path, entry: dict[str, Any], source: Source) -> Edit:
+def _insertion(path: Path, source: Source) -> Edit:
     """Return the edit that writes the rotation after the parent."""
-    parent = source.at((*path, "parent"))
-    first = min((source.at_key((*path, key)) for key in entry), key=lambda span: (span.line, span.column))
-    begin = source.at(path)
-    if (begin.line, begin.column) < (first.line, first.column):  # in braces
+    parent, entry = source.at((*path, "parent")), source.places.nearest(path)
+    first = min((key.span for key in entry.keys.values()), key=lambda span: (span.line, span.column))
+    if (entry.span.line, entry.span.column) < (first.line, first.column):  # in braces
         at = (parent.end_line, parent.end_column)
         return Edit(Span(parent.file, *at, *at), f", {_RPY}")
     at = (parent.end_line + 1, 1)
@@ -55,15 +55,15 @@ def _insertion(path: Path, entry: dict[str, Any], source: Source) -> Edit:
 
 def _replaced(old: Any, new: Any, path: Path, source: Source) -> list[Edit]:
     """Return the edits that put each scalar of ``new`` in the place of that of ``old``; none where the forms differ."""
-    steps = new.items() if isinstance(new, dict) else enumerate(new) if isinstance(new, list) else None
-    if steps is None:
-        return [] if isinstance(old, (dict, list)) or str(old) == new else [Edit(source.at(path), new)]
-    same = (
-        isinstance(old, type(new)) and len(old) == len(new) and all(not isinstance(old, dict) or k in old for k in new)
-    )
-    if not same:
-        return []
-    return [edit for step, item in steps for edit in _replaced(old[step], item, (*path, step), source)]
+    if isinstance(new, dict):
+        return [
+            edit for key, item in new.items() for edit in _replaced(getattr(old, key, None), item, (*path, key), source)
+        ]
+    if isinstance(new, list):
+        pairs = zip(old, new, strict=True) if isinstance(old, tuple) else ()
+        return [edit for index, pair in enumerate(pairs) for edit in _replaced(*pair, (*path, index), source)]
+    is_same = old == (new if isinstance(old, str) else quantity(new).value)
+    return [Edit(source.at(path), new)] if isinstance(old, (str, float)) and not is_same else []
 
 
 def _is_alone(span: Span, path: Path, source: Source) -> bool:

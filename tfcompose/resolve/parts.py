@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, finding
-from tfcompose.language import composed, lay_over, validate, with_includes
-from tfcompose.load import Place, Source, load, path_named
+from tfcompose.language import as_part, composed, validate, with_includes
+from tfcompose.load import load, path_named
 from tfcompose.model import Part
 from tfcompose.plan import RosSettings
 from tfcompose.plan.codec import narrowed
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     Reader = Callable[[str], str]
     from tfcompose.findings import Allow, Span
     from tfcompose.language.robot import PartSpec, RobotSpec
-    from tfcompose.load import Path
+    from tfcompose.load import Path, Source
     from tfcompose.model import Edge
 
 
@@ -114,7 +114,7 @@ class Parts:
         validated = validate(part.laid_over(composed(loaded, part.declared.profiles)))
         resolved = self.resolve(validated, self.library, self.read, self.disk, inside)
         self.found += [_noted(one, part) for one in (*validated.found, *resolved.found)]
-        self.found += _useless(part, file, validated, loaded)
+        self.found += _useless(part, file, validated)
         self.collected.allows += validated.source.allows
         self.collected.sources.append(validated.source)
         return resolved.robot
@@ -128,12 +128,13 @@ def _note(part: PartEntry) -> Note:
     return Note(f"as the part {part.name}", part.place)
 
 
-def _useless(part: PartEntry, file: str, validated: Validated, loaded: Source) -> list[Finding]:
+def _useless(part: PartEntry, file: str, validated: Validated) -> list[Finding]:
     """Return a finding for each variable that the part is given, does not have, and does not use."""
-    known = loaded.data.get("vars") or {}
+    given, replaced = part.declared.vars, validated.source.replaced
+    known = [name for name in validated.spec.vars if name not in given or ("vars", name) in replaced]
     found = []
     for name in validated.unused:
-        if name in part.declared.vars and name not in known:
+        if name in given and name not in known:
             at = part.source.at_key((*part.at, "vars", name))
             advice = did_you_mean(name, known, "remove it")
             found.append(finding("TF105", f"{file} has no use for the variable {name}", at, help=advice))
@@ -142,8 +143,6 @@ def _useless(part: PartEntry, file: str, validated: Validated, loaded: Source) -
 
 #: What may stand in front of names so that they can be looked up.
 _PREFIX = re.compile(r"([\w.:+@-]+/)*[\w.:+@-]*")
-#: What all processes of a plan share; a part cannot have its own.
-_SHARED_SETTINGS = ("clock", "domain_id", "discovery")
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,32 +215,15 @@ class PartEntry:
 
     def laid_over(self, inner: Source) -> Source:
         """Return the part's source with what the holder says about all its parts laid over it."""
-        ros = self.spec.ros
-        own: Any = inner.data.get("ros")
-        for key in _SHARED_SETTINGS:
-            wanted = getattr(ros, key)
-            if isinstance(own, dict) and key in own and own[key] != wanted:
-                message = f"{key} of the part {self.name} is {own[key]}, and of the robot that holds it {wanted}"
-                notes = [Note("it is said here", inner.at(("ros", key)))]
-                advice = f"ros: {{{key}: {own[key]}}} here, or leave it out there"
-                self.found.append(finding("TF312", message, self.place, notes=notes, help=advice))
-        shared = _named_in(inner.data)
         settings = {
             "namespace": self.settings.namespace,
             "frame_prefix": self.settings.frame_prefix,
-            "shared_frames": [name for name in ros.shared_frames if name in shared],
-            "state_publisher": ros.state_publisher if self.alone else "tfcompose",
+            "state_publisher": self.spec.ros.state_publisher if self.alone else "tfcompose",
             "isolate": self.isolate,
-            **{key: getattr(ros, key) for key in _SHARED_SETTINGS if getattr(ros, key) is not None},
         }
-        here = Place(self.place)
-        inside = {"ros": Place(self.place, dict.fromkeys(settings, here), dict.fromkeys(settings, here))}
-        data: dict[str, Any] = {"ros": settings}
-        if self.declared.vars:
-            data["vars"] = dict(self.declared.vars)
-            inside["vars"] = self.source.places.nearest((*self.at, "vars"))
-        over = Source(self.source.file, data, Place(self.place, inside, dict.fromkeys(data, here)), has_nulls=False)
-        return lay_over(inner, over, is_overlay=False)
+        source, found = as_part(inner, self.source, self.at, self.spec.ros, settings, self.declared.vars)
+        self.found += found
+        return source
 
     def joined(self, robot: Robot, implied: frozenset[str] = frozenset()) -> Joined:
         """Return the part under the names that it has in the holder; ``implied`` are frames that only that has."""
@@ -287,15 +269,3 @@ class PartEntry:
 def _owned(edge: Edge, owner: str, at: Span) -> Edge:
     """Return the edge of another owner, who sends what is fixed on /tf_static and what moves on /tf."""
     return replace(edge, owner=owner, owner_at=at, kind="static" if edge.kind == "static" else "dynamic")
-
-
-def _named_in(data: dict[str, Any]) -> set[str]:
-    """Return every name that the written data use for a frame."""
-    names: set[str] = set()
-    for section in ("frames", "links", "joints", "sensors"):
-        entries = data.get(section)
-        for name, entry in entries.items() if isinstance(entries, dict) else ():
-            names.add(name)
-            if isinstance(entry, dict):
-                names.update(entry[key] for key in ("parent", "child") if isinstance(entry.get(key), str))
-    return names

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from tfcompose.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
 from tfcompose.language import validate_node_preset, validate_preset
-from tfcompose.language.overlay import lay_over, without
+from tfcompose.language.overlay import extended_by, lay_over, without
 from tfcompose.language.preset import PresetSpec
 from tfcompose.load import load
 
@@ -259,8 +259,8 @@ class Library:
         return self._specs[name, taken]
 
     def _extended(self, own: Source, name: str, deep: int) -> Source:
-        base = own.data.get("extends")
-        if not isinstance(base, str):
+        base = extended_by(own)
+        if base is None:
             return own
         at = own.at(("extends",))
         if deep > _DEEPEST:

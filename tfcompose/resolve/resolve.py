@@ -208,7 +208,7 @@ class _Work:
             claims=tuple(one for part in parts for one in part.claims),
             source_numbers=numbers + tuple(one for part in parts for one in part.source_numbers),
             unused={name: self.source.at_key(("vars", name)) for name in self.validated.unused},
-            source_data=_source_data(self.source, self.joined),
+            source_data=_source_data(self.validated, self.joined),
             broken=frozenset(self.broken),
             parts=tuple(alone for part in parts for alone in part.parts),
             mounted={part.name: part.root for part in self.joined if part.root is not None},
@@ -245,9 +245,10 @@ def _processes(validated: Validated, found: list[Finding]) -> list[Process]:
     return processes
 
 
-def _source_data(source: Source, joined: list[Joined]) -> dict[str, Any]:
+def _source_data(validated: Validated, joined: list[Joined]) -> dict[str, Any]:
     """Return what the robot was made from, with what its parts were made from."""
-    return source.data | ({"in parts": {part.name: part.robot.source_data for part in joined}} if joined else {})
+    parts = {part.name: part.robot.source_data for part in joined}
+    return validated.source_data | ({"in parts": parts} if parts else {})
 
 
 def _guard(declared: GuardPolicy, parts: list[Robot]) -> GuardPolicy:

@@ -137,9 +137,9 @@ def lint_file(file: str, presets: Library, arguments: Namespace, read: Callable[
     from tfcompose.check import unused_allows
     from tfcompose.cli.compiling import overlays_of
     from tfcompose.cli.disk import disk
-    from tfcompose.compile import compile_source, profiles_of
+    from tfcompose.compile import compile_source
     from tfcompose.findings import Note, RejectedError
-    from tfcompose.language import with_includes
+    from tfcompose.language import profiles_in, with_includes
     from tfcompose.load import load
 
     try:
@@ -151,7 +151,7 @@ def lint_file(file: str, presets: Library, arguments: Namespace, read: Callable[
         return list(compile_source(source, presets, arguments.profiles, overlays, read, disk()).found)
     alone = compile_source(source, presets, read=read, disk=disk())
     found, used, complete = list(alone.found), set(alone.used), alone.robot is not None
-    for profile in profiles_of(source):
+    for profile in profiles_in(source):
         note = Note(f"with --profile {profile}")
         known = {(one.code, one.message, one.span) for one in found}
         variant = compile_source(source, presets, [profile], read=read, disk=disk())

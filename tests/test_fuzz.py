@@ -15,7 +15,7 @@ from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
 from tfcompose.findings import RejectedError
 from tfcompose.plan.file import read_plan
-from tfcompose.render.json import render_json
+from tfcompose.render.formats import render_json
 from tfcompose.render.text import render_text
 
 ROOT = Path(__file__).parents[1]

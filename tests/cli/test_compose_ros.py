@@ -203,9 +203,9 @@ def test_an_error_in_a_launcher_in_the_background_is_kept_for_who_looks_for_it(
     assert tfc("ps").returncode == 1
     code = """
 import sys
-from tfcompose.cli import background, main
+from tfcompose.cli import main, starting
 def broken(*_, **__): raise ZeroDivisionError("of a launcher")
-background.supervise = broken
+starting.supervise = broken
 sys.exit(main(["up", "-d"]))
 """
     up = processes.run([sys.executable, "-c", code])

@@ -19,8 +19,7 @@ from PIL import Image
 
 from tests.support.tables import for_each
 from tfcompose.draw import Arrow, Graph, Group
-from tfcompose.draw.dot import dot
-from tfcompose.draw.mermaid import mermaid
+from tfcompose.draw.markup import dot, mermaid
 from tfcompose.draw.pdf import pdf
 from tfcompose.draw.picture import Box, Drawing, Text, draw
 from tfcompose.draw.png import png

@@ -21,7 +21,7 @@ from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.findings import Finding, Note, Span
 from tfcompose.pages import page
-from tfcompose.render.sarif import render_sarif
+from tfcompose.render.formats import render_sarif
 
 SPECS = sorted((Path(__file__).parents[1] / "check" / "specs").glob("*.yaml"))
 PAGES = {code: page(code) for code in CATALOGUE}

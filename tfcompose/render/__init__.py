@@ -1,1 +1,1 @@
-"""Findings for people and for programs, one format a file."""
+"""What commands print: findings for people and for programs, a robot's tree, and poses."""

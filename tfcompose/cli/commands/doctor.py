@@ -75,7 +75,7 @@ def run(arguments: Namespace) -> int:
 def _print(found: list[Finding], form: str) -> int:
     """Print the findings and return the exit code."""
     if form == "json":
-        from tfcompose.render.json import render_json
+        from tfcompose.render.formats import render_json
 
         sys.stdout.write(render_json(found))
     else:

@@ -92,11 +92,11 @@ def _check_output(path: Path) -> None:
 def picture(graph: Graph, ending: str) -> bytes:
     """Return the graph as a file with this ending; only what it needs is loaded."""
     if ending == ".mmd":
-        from tfcompose.draw.mermaid import mermaid
+        from tfcompose.draw.markup import mermaid
 
         return mermaid(graph).encode()
     if ending in {".dot", ".gv"}:
-        from tfcompose.draw.dot import dot
+        from tfcompose.draw.markup import dot
 
         return dot(graph).encode()
     from tfcompose.draw.picture import draw

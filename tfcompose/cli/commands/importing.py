@@ -100,7 +100,7 @@ def _robot_file(document: Document, arguments: Namespace, packages: dict[str, st
     from tfcompose.cli.reading import read_text
     from tfcompose.compile import Compiled, compile_robot
     from tfcompose.files import Target
-    from tfcompose.importing.convert import imported, with_findings
+    from tfcompose.importing.robot_file import imported, with_findings
 
     def lint(text: str) -> Compiled:
         return compile_robot(text, arguments.output or "robot.yaml", library(), read=read_text, disk=disk())

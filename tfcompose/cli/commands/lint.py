@@ -116,16 +116,16 @@ def _print(found: list[Finding], form: str, files: int) -> None:
         print_findings(found, sys.stdout)
         sys.stdout.write(summary(found, files))
     elif form == "json":
-        from tfcompose.render.json import render_json
+        from tfcompose.render.formats import render_json
 
         sys.stdout.write(render_json(found))
     elif form == "github":
-        from tfcompose.render.github import render_github
+        from tfcompose.render.formats import render_github
 
         sys.stdout.write(render_github(found))
     else:
         from tfcompose.pages import page
-        from tfcompose.render.sarif import render_sarif
+        from tfcompose.render.formats import render_sarif
 
         sys.stdout.write(render_sarif(found, __version__, {one.code: page(one.code) for one in found}))
 

@@ -75,12 +75,12 @@ def _report(arguments: Namespace, plan: Plan, verdicts: list[Verdict], seconds: 
     failing = frozenset({"error"} if arguments.fail_on == "error" else {"error", "warning"})
     found = [one for verdict in verdicts for one in verdict.found]
     if arguments.format == "junit":
-        from tfcompose.render.junit import render_junit
+        from tfcompose.render.formats import render_junit
 
         cases = [(verdict.owner or "undeclared", verdict.edge, verdict.found) for verdict in verdicts]
         sys.stdout.write(render_junit(plan.robot, cases, failing=failing, seconds=seconds))
     elif arguments.format == "json":
-        from tfcompose.render.json import render_json
+        from tfcompose.render.formats import render_json
 
         sys.stdout.write(render_json(found))
     else:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from tests.support import processes
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
 #: So long it is looked, again and again: where much else runs, publishers are found late, and late in truth.
 LOOKS_S = (3.0, 3.0, 3.0, 6.0, 12.0)
@@ -24,11 +24,11 @@ def doctor(*words: str, seconds: float = 3.0) -> tuple[int, list[dict[str, Any]]
     return done.returncode, json.loads(done.stdout)
 
 
-def doctor_finds(code: str, words: Sequence[str], others: set[str], *arguments: str) -> list[dict[str, Any]]:
-    """Run it until it finds that code in those words, and no codes but the others; a few times: names may come late."""
-    for seconds in LOOKS_S:
-        exit_code, found = doctor(*arguments, seconds=seconds)
-        if says(found, code, words, others):
+def doctor_finds(expected: Mapping[str, Sequence[str]], others: set[str]) -> list[dict[str, Any]]:
+    """Run it until it finds these codes with these names, and no others but ``others``; a few times."""
+    for seconds in LOOKS_S:  # names may come late
+        exit_code, found = doctor(seconds=seconds)
+        if finds(found, expected, others):
             break
     assert exit_code == 1
     return found
@@ -47,10 +47,11 @@ def at_last(claim: Callable[[float], None]) -> None:
     return claim(LOOKS_S[-1])
 
 
-def says(found: list[dict[str, Any]], code: str, words: Sequence[str], others: set[str]) -> bool:
-    """Return whether that code was found, said in all these words, and no codes but the others."""
+def finds(found: list[dict[str, Any]], expected: Mapping[str, Sequence[str]], others: set[str]) -> bool:
+    """Return whether these codes were found, each with all its names, and no others but ``others``."""
     codes = {one["code"] for one in found}
-    return code in codes and codes <= {code, *others} and all(word in said(found, code) for word in words)
+    named = (name in said(found, code) for code, names in expected.items() for name in names)
+    return codes >= expected.keys() and codes <= {*expected, *others} and all(named)
 
 
 def said(found: list[dict[str, Any]], code: str) -> str:

@@ -9,7 +9,7 @@ from tfcompose.model.edge import Calibration, Edge
 from tfcompose.model.hardware import Block, Component, Hardware, Interface
 from tfcompose.model.joint import BOUNDED, FREE, MOVING, Dynamics, Joint, Limit, ReferencePositions, SafetyController
 from tfcompose.model.process import BUILT_IN, GUARD, JOINTS, SHELL, STATIC, AsInFile, Claim, Node, Process
-from tfcompose.model.robot import Part, Robot, SourceNumbers
+from tfcompose.model.robot import Part, Robot, SourceNumbers, may_be_refused
 from tfcompose.model.sensor import OPTICAL_ENDINGS, MountedSensor, is_optical
 
 __all__ = [
@@ -49,4 +49,5 @@ __all__ = [
     "colour_name",
     "is_optical",
     "materials",
+    "may_be_refused",
 ]

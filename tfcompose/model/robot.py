@@ -10,7 +10,7 @@ from tfcompose.plan import EdgePattern, GuardPolicy, RosSettings
 from tfcompose.tree import below, children_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection, Iterable
 
     from tfcompose.findings import Note, Span
     from tfcompose.model.body import Link
@@ -54,6 +54,22 @@ class Part:
     name: str
     prefix: str
     robot: Robot
+
+
+def may_be_refused(name: str, broken: Collection[tuple[str, str]], known: Iterable[str]) -> bool:
+    """Return whether a name is one that an entry among the ``broken`` ones, (section, name), would have brought.
+
+    A part without a prefix may have brought any name; one that is a letter off the ``known`` ones is wrong still.
+    """
+    if ("parts", "") in broken:
+        known = tuple(known)
+        return name in known or slip_of(name, known) is None
+    return any(
+        name == entry
+        or (section == "sensors" and name.startswith(f"{entry}_"))
+        or (section == "parts" and name.startswith(entry))
+        for section, entry in broken
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,19 +141,8 @@ class Robot:
         )
 
     def excuses(self, name: str) -> bool:
-        """Return whether a frame, process or joint may be missing only because an entry was refused already.
-
-        A part without a prefix may have brought any name; one that is a letter off the own ones is wrong still.
-        """
-        if ("parts", "") in self.broken:
-            known = [*self.frames, *(process.name for process in self.processes)]
-            return name in known or slip_of(name, known) is None
-        return any(
-            name == entry
-            or (section == "sensors" and name.startswith(f"{entry}_"))
-            or (section == "parts" and name.startswith(entry))
-            for section, entry in self.broken
-        )
+        """Return whether a frame, process or joint may be missing only because an entry was refused already."""
+        return may_be_refused(name, self.broken, (*self.frames, *(process.name for process in self.processes)))
 
     def is_foreign(self, at: Span | None) -> bool:
         """Return whether the place is in a file that somebody else wrote, a URDF: advice speaks of XML there."""

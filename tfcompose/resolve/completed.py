@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, did_you_mean, finding
@@ -14,10 +15,29 @@ from tfcompose.resolve.stock import with_stock
 from tfcompose.urdf.ros2_control import unknown_joints
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
     from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Source
     from tfcompose.model import Robot
     from tfcompose.urdf.packages import Disk
+
+
+@dataclass(frozen=True, slots=True)
+class Known(Collection[str]):
+    """Names, which count as known too where ``excuses`` says that they may be missing only for a refused entry."""
+
+    names: Sequence[str]
+    excuses: Callable[[str], bool]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names or (isinstance(name, str) and self.excuses(name))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
 
 
 def completed(robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None) -> tuple[Robot, list[Finding]]:
@@ -46,9 +66,8 @@ def _with_blocks(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, 
     hardware = hardware_of(spec.ros2_control, source)
     frames = [frame for frame in robot.frames if frame in robot.links or robot.parent_edge(frame)]
     joints = [edge.joint_name for edge in robot.edges if edge.joint_name]
-    blocks, found = blocks_of(spec.xml, source, frames, joints)
-    known = [*moving, *sorted(name for section, name in robot.broken if section == "joints")]
-    found += unknown_joints(hardware, known)
+    blocks, found = blocks_of(spec.xml, source, Known(frames, robot.excuses), Known(joints, robot.excuses))
+    found += unknown_joints(hardware, Known(moving, robot.excuses))
     return replace(robot, hardware=(*hardware, *robot.hardware), blocks=(*blocks, *robot.blocks)), found
 
 
@@ -57,8 +76,9 @@ def _base(robot: Robot, spec: RobotSpec, source: Source, found: list[Finding]) -
     if spec.base is not None:
         if spec.base in robot.frames:
             return spec.base
-        advice = did_you_mean(spec.base, robot.frames)
-        found.append(finding("TF203", f"no frame {spec.base}", source.at(("base",)), help=advice))
+        if not robot.excuses(spec.base):
+            advice = did_you_mean(spec.base, robot.frames)
+            found.append(finding("TF203", f"no frame {spec.base}", source.at(("base",)), help=advice))
         return None
     if "base_link" in robot.frames:
         above = robot.parent_edge("base_link")

@@ -14,6 +14,8 @@ from tfcompose.geometry import IDENTITY_XYZW, OPTICAL_XYZW, Pose, multiply
 from tfcompose.model import STATIC, is_optical
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Collection
+
     from tfcompose.findings import Span
     from tfcompose.language.pose import Posed, Rotated
     from tfcompose.load import Path
@@ -74,18 +76,25 @@ class _DeeperError(Exception):
 
 
 class _UnsolvableError(Exception):
-    def __init__(self, found: Finding) -> None:
+    """A pose cannot be solved; ``found`` is None where that follows from an entry that was refused."""
+
+    def __init__(self, found: Finding | None) -> None:
         self.found = found
-        super().__init__(found.message)
+        super().__init__(found)
 
 
 @dataclass(slots=True)
 class Solver:
-    """Solves the drafts of one robot; ``found`` holds what could not be solved, ``broken`` the refused entries."""
+    """Solves the drafts of one robot; ``found`` holds what could not be solved.
+
+    ``broken`` are the paths of entries that were refused in part, ``excuses`` tells of a frame whether it, or the edge
+    above it, may be missing because an entry was refused.
+    """
 
     drafts: list[Draft]
     frames: dict[str, Span]
-    broken: frozenset[Path] = frozenset()
+    broken: Collection[Path] = ()
+    excuses: Callable[[str], bool] = lambda _frame: False
     found: list[Finding] = field(default_factory=list)
     _solved: dict[int, Edge] = field(default_factory=dict)
     _open: list[int] = field(default_factory=list)
@@ -111,8 +120,8 @@ class Solver:
                 self._open.clear()
         return tuple(self._solved[index] for index in range(len(self.drafts)))
 
-    def _give_up(self, index: int, found: Finding) -> None:
-        if found not in self.found:
+    def _give_up(self, index: int, found: Finding | None) -> None:
+        if found and found not in self.found:
             self.found.append(found)
         self._solved[index] = self.drafts[index].edge
 
@@ -161,6 +170,8 @@ class Solver:
     def _known(self, frame: str, at: Span) -> str:
         if frame in self.frames:
             return frame
+        if self.excuses(frame):
+            raise _UnsolvableError(None)
         raise _UnsolvableError(finding("TF203", f"no frame {frame}", at, help=did_you_mean(frame, self.frames)))
 
     def _chain(self, frame: str) -> list[tuple[str, int]]:
@@ -176,6 +187,8 @@ class Solver:
         up_a, up_b = self._chain(a), self._chain(b)
         ancestors = {frame for frame, _ in up_a}
         meeting = next((frame for frame, _ in up_b if frame in ancestors), None)
+        if meeting is None and (self.excuses(up_a[-1][0]) or self.excuses(up_b[-1][0])):
+            raise _UnsolvableError(None)
         if meeting is None:
             message = f"{b} and {a} are in two trees, so the pose of the one in the other is not known"
             raise _UnsolvableError(finding("TF404", message, at))
@@ -188,6 +201,8 @@ class Solver:
             if frame == top:
                 break
             edge = self.drafts[index].edge
+            if edge.kind != "static" and self.drafts[index].at in self.broken:
+                raise _UnsolvableError(None)
             if edge.kind != "static" and not (edge.sensor and not edge.given):  # a driver may send it again and again
                 note = Note(f"{edge.name} is published by {edge.owner}", edge.at)
                 what = f"the joint {edge.joint.name} moves" if edge.joint else f"the edge {edge.name} moves"
@@ -202,6 +217,8 @@ class Solver:
         chain = self._chain(place)
         names = [frame for frame, _ in chain]
         mount = draft.edge.child
+        if mount not in names and (draft.at in self.broken or self.excuses(names[-1])):
+            raise _UnsolvableError(None)
         if mount not in names:
             message = f"{place} is not a frame of this sensor" if draft.edge.sensor else f"{place} is not below {mount}"
             inside = [d.edge.child for d in self.drafts if d.group == draft.group]

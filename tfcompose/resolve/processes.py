@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from tfcompose.language.process import ProcessSpec, ReadySpec, Run, Simulate, Started
     from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Path, Source
-    from tfcompose.model import Edge, Joint
+    from tfcompose.model import Joint, Robot
     from tfcompose.plan import ProcessKind
 
 
@@ -354,33 +354,40 @@ def nodes_of(
 PERIOD_S = 6.0
 
 
-def with_positions(
-    process: Process, spec: RobotSpec, edges: tuple[Edge, ...], source: Source, found: list[Finding]
-) -> Process:
-    """Give a stand-in for joint states what it says of every joint that has a position of its own.
+def with_positions(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Finding]]:
+    """Return the robot whose stand-ins for joint states say where every joint is that has a position of its own.
 
     A joint that mimics another is left out: it follows, and the process computes it. Where nothing is said a joint is
     at 0, or in the middle between its limits if 0 is not between them, as joint_state_publisher has it.
     """
-    declared = spec.processes.get(process.name)
-    wanted = declared.simulate.joints if declared and declared.simulate else None
-    if process.simulate is None or process.simulate.kind != "joints" or wanted is None:
-        return process
-    all_joints = {edge.joint.name: edge.joint for edge in edges if edge.joint}
-    joints = {name: joint for name, joint in all_joints.items() if _has_position(joint)}
-    if isinstance(wanted, dict):
-        found += _findings(wanted, all_joints, process, source)
-    each = {name: wanted.get(name, None) if isinstance(wanted, dict) else wanted for name in joints}
+    found: list[Finding] = []
+    processes = []
+    for process in robot.processes:
+        declared = spec.processes.get(process.name)
+        wanted = declared.simulate.joints if declared and declared.simulate else None
+        simulation = process.simulate
+        if simulation and simulation.kind == "joints" and wanted is not None:
+            if isinstance(wanted, dict):
+                found += _wrong_positions(wanted, robot, process, source)
+            processes.append(replace(process, simulate=_with_joints(simulation, wanted, robot)))
+        else:
+            processes.append(process)
+    return replace(robot, processes=tuple(processes)), found
+
+
+def _with_joints(simulation: Simulation, wanted: str | dict[str, Any], robot: Robot) -> Simulation:
+    joints = {edge.joint.name: edge.joint for edge in robot.edges if edge.joint and _has_position(edge.joint)}
+    each = {name: wanted.get(name) if isinstance(wanted, dict) else wanted for name in joints}
     positions = {
         name: _rest(joints[name]) if what is None or isinstance(what, str) else what for name, what in each.items()
     }
     sweeps = {name: _sweep(joints[name]) for name, what in each.items() if what == SWEEP}
-    moving = {name: sweep for name, sweep in sweeps.items() if sweep}
-    return replace(process, simulate=replace(process.simulate, joints=positions, sweep=moving))
+    return replace(simulation, joints=positions, sweep={name: sweep for name, sweep in sweeps.items() if sweep})
 
 
-def _findings(wanted: dict[str, Any], joints: dict[str, Joint], process: Process, source: Source) -> Iterator[Finding]:
-    """Give a finding for each joint that is not there, or cannot move as it should."""
+def _wrong_positions(wanted: dict[str, Any], robot: Robot, process: Process, source: Source) -> Iterator[Finding]:
+    """Yield a finding for each joint that is not there, or cannot move as it should."""
+    joints = {edge.joint.name: edge.joint for edge in robot.edges if edge.joint}
     movable = [name for name, joint in joints.items() if _has_position(joint)]
     for name, what in wanted.items():
         place = source.at_key(("processes", process.name, "simulate", "joints", name))
@@ -389,8 +396,9 @@ def _findings(wanted: dict[str, Any], joints: dict[str, Joint], process: Process
             advice = f"say the position of {joint.mimic}"
             yield finding("TF703", f"{name} has no position of its own: it mimics {joint.mimic}", place, help=advice)
         elif name not in movable:
-            advice = did_you_mean(name, movable, f"there is {', '.join(movable)}" if movable else "no joint moves")
-            yield finding("TF703", f"no moving joint {name}", place, help=advice)
+            if not robot.excuses(name):
+                advice = did_you_mean(name, movable, f"there is {', '.join(movable)}" if movable else "no joint moves")
+                yield finding("TF703", f"no moving joint {name}", place, help=advice)
         elif joint and what == SWEEP and _sweep(joint) is None:
             advice = f"give {name} a limit: {{lower, upper}}, or say a position here"
             yield finding("TF106", f"{name} slides and has no limits to sweep between", place, help=advice)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, finding
 from tfcompose.load import path_named
-from tfcompose.model import Edge, Process, Robot
+from tfcompose.model import Edge, Process, Robot, may_be_refused
 from tfcompose.resolve.bodies import Bodies, with_colours
 from tfcompose.resolve.calibration import calibrated
 from tfcompose.resolve.completed import completed
@@ -67,10 +68,6 @@ def resolve(
     return _Work(validated, library, read, disk, holder).resolved()
 
 
-#: What is found where a name is a frame's, joint's or link's of a part that was refused.
-_UNKNOWN_NAMES = frozenset({"TF203", "TF703"})
-
-
 @dataclass(slots=True)
 class _Work:
     """A robot while it is resolved: what was found, and which entries were refused already."""
@@ -104,21 +101,17 @@ class _Work:
         simulated = frozenset(one.name for one in self._everybody(own) if one.kind == "simulate")
         drafts = Drafts(self.validated, simulated, bodies)
         self._draft(drafts)
-        solver = Solver(self._measured(drafts), drafts.frames, self.validated.broken)
+        names = (*drafts.frames, *(process.name for process in self._everybody(own)))
+        excuses = partial(may_be_refused, broken=frozenset(self.broken), known=names)
+        solver = Solver(self._measured(drafts), drafts.frames, self.validated.broken, excuses)
         edges = solver.solve()
-        own = [with_positions(one, self.spec, edges, self.source, self.found) for one in (*own, *drafts.drivers)]
+        own += drafts.drivers
         self.found += [*drafts.found, *bodies.found, *solver.found, *self._wrong_names(own)]
-        robot = self._robot(drafts, edges, self._everybody(own))
+        robot = self._take(with_positions(self._robot(drafts, edges, self._everybody(own)), self.spec, self.source))
         if any(names_files(node.params) for process in own for node in process.ros_nodes):
             robot = self._take(with_param_files(robot, self.source, self.read))
         robot = self._take(completed(robot, self.spec, self.source, self.disk))
-        found = [one for one in self.found if not self._may_follow(one)] if self.broken else self.found
-        return Resolved(robot, (*self.of_parts, *found), self.collected)
-
-    def _may_follow(self, found: Finding) -> bool:
-        """Return whether it may be there only because an edge on the way, or a part with that name, was refused."""
-        in_parts = any(section == "parts" for section, _ in self.broken)
-        return found.code == "TF404" or (in_parts and found.code in _UNKNOWN_NAMES)
+        return Resolved(robot, (*self.of_parts, *self.found), self.collected)
 
     def _take(self, done: tuple[Robot, list[Finding]]) -> Robot:
         robot, found = done

@@ -92,7 +92,7 @@ def test_matrix_agrees_with_scipy_and_reads_back(quat: Quaternion) -> None:
 
 
 @pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (0, 0, 1)])
-def test_half_turns_survive_the_matrix(axis: Vector) -> None:
+def test_half_rotations_survive_the_matrix(axis: Vector) -> None:
     quat = quat_from_axis_angle(axis, math.pi)
     assert angle_between(quat_from_matrix(matrix_from_quat(quat)), quat) < 1e-12
 
@@ -109,7 +109,7 @@ def test_the_optical_rotation_is_z_forward_x_right_y_down() -> None:
     assert rotate(OPTICAL_XYZW, (0, 1, 0)) == pytest.approx((0, 0, -1))  # optical y is the body's down
 
 
-def test_positive_pitch_looks_down() -> None:
+def test_positive_pitch_points_down() -> None:
     forward = rotate(quat_from_rpy(0, math.radians(15), 0), (1, 0, 0))
     assert forward == pytest.approx((math.cos(math.radians(15)), 0, -math.sin(math.radians(15))))
 

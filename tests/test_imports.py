@@ -250,7 +250,7 @@ def test_reading_and_supervising_a_plan_loads_nothing_from_elsewhere_and_no_comp
     assert not {name for name in loaded for stage in (*STAGES, "emit") if name.startswith(f"tfcompose.{stage}")}
 
 
-def test_the_buffer_loads_neither_ros_nor_numpy_until_arrays_are_asked_for(bare: set[str]) -> None:
+def test_the_buffer_loads_neither_ros_nor_numpy_until_arrays_are_requested(bare: set[str]) -> None:
     one = "from tfcompose.tf2 import Buffer; from tfcompose.geometry import Pose; b = Buffer(); "
     one += "b.set('a', 'b', Pose(), 1, static=False); b.lookup_transform('a', 'b', 0)"
     assert not foreign(loaded_by(one), bare)

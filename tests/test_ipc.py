@@ -40,7 +40,7 @@ def messages(kind: type) -> st.SearchStrategy[Any]:
 
 @given(st.data())
 @settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
-def test_every_message_is_read_as_it_was_written(data: st.DataObject) -> None:
+def test_every_message_is_read_as_it_was_encoded(data: st.DataObject) -> None:
     for union, kinds in UNIONS:
         message = data.draw(st.one_of(*map(messages, get_args(kinds))))
         assert union.read(union.line(message)) == message

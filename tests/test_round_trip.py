@@ -51,8 +51,8 @@ def rotations(draw: st.DrawFn) -> tuple[dict[str, Any], Rotation]:
     if kind == "rpy":
         return {"rpy": [float(angle) for angle in rpy]}, turned
     if kind == "degrees":
-        whole = [round(float(np.degrees(angle)), 3) for angle in rpy]
-        return {"rpy": [f"{angle!r} deg" for angle in whole]}, Rotation.from_euler("xyz", whole, degrees=True)
+        full = [round(float(np.degrees(angle)), 3) for angle in rpy]
+        return {"rpy": [f"{angle!r} deg" for angle in full]}, Rotation.from_euler("xyz", full, degrees=True)
     if kind == "quat_xyzw":
         return {"quat_xyzw": [float(part) for part in turned.as_quat()]}, turned
     if kind == "matrix":
@@ -67,11 +67,11 @@ def rotations(draw: st.DrawFn) -> tuple[dict[str, Any], Rotation]:
 
 @st.composite
 def poses(draw: st.DrawFn) -> tuple[dict[str, Any], Any]:
-    written, turned = draw(rotations())
+    source_text, turned = draw(rotations())
     xyz = draw(vectors)
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = turned.as_matrix(), xyz
-    return {"xyz": xyz, **written}, matrix
+    return {"xyz": xyz, **source_text}, matrix
 
 
 def joint(draw: Any, name: str, masters: list[str]) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -79,12 +79,17 @@ def joint(draw: Any, name: str, masters: list[str]) -> tuple[dict[str, Any], dic
     kind = draw(st.sampled_from(["revolute", "continuous", "prismatic"]))
     axis = draw(axes)
     limit = {"lower": draw(st.floats(-3, 0)), "upper": draw(st.floats(0, 3)), "effort": 5.5, "velocity": 0.25}
-    written: dict[str, Any] = {"type": kind, "axis": axis} | ({} if kind == "continuous" else {"limit": limit})
-    more = {"name": name, "axis": np.array(axis) / np.linalg.norm(axis), "limit": written.get("limit"), "mimic": None}
+    source_text: dict[str, Any] = {"type": kind, "axis": axis} | ({} if kind == "continuous" else {"limit": limit})
+    more = {
+        "name": name,
+        "axis": np.array(axis) / np.linalg.norm(axis),
+        "limit": source_text.get("limit"),
+        "mimic": None,
+    }
     if masters and draw(st.integers(0, 1)):
         more["mimic"] = {"joint": draw(st.sampled_from(masters)), "multiplier": draw(lengths), "offset": draw(lengths)}
-        written["mimic"] = more["mimic"]
-    return written, more
+        source_text["mimic"] = more["mimic"]
+    return source_text, more
 
 
 @st.composite
@@ -100,18 +105,18 @@ def robots(draw: st.DrawFn) -> tuple[dict[str, Any], list[Wanted]]:
     for index in range(draw(st.integers(0, 10))):
         parent, (pose, matrix) = draw(st.sampled_from(names)), draw(poses())
         kind = draw(st.sampled_from(["frames", "links", "joints", "fixed", "sensors", "foreign", "foreign_fixed"]))
-        name, said = f"{kind}_{index}", {"parent": parent} | pose
+        name, output = f"{kind}_{index}", {"parent": parent} | pose
         edge = Wanted(parent, name, matrix, "static", "static")
         if kind in {"frames", "links"}:
-            spec[kind][name] = said
+            spec[kind][name] = output
         elif kind == "foreign":
-            spec["frames"][name] = said | {"owner": "drive", "rate": "5 Hz"}
+            spec["frames"][name] = output | {"owner": "drive", "rate": "5 Hz"}
             edge.owner, edge.kind, edge.joint = "drive", "dynamic", "floating"
         elif kind == "foreign_fixed":
-            spec["frames"][name] = said | {"owner": "drive", "static": True}
+            spec["frames"][name] = output | {"owner": "drive", "static": True}
             edge.owner = "drive"
         elif kind == "sensors":
-            spec["sensors"][name] = said | {"preset": "generic/imu", "driver": "none"}
+            spec["sensors"][name] = output | {"preset": "generic/imu", "driver": "none"}
             edge.child = f"{name}_link"
         else:
             spec["links"][name] = {}
@@ -120,7 +125,7 @@ def robots(draw: st.DrawFn) -> tuple[dict[str, Any], list[Wanted]]:
                 own, edge.more = joint(draw, f"j{index}", masters)
                 edge.owner, edge.kind, edge.joint = "joints", "joint", own["type"]
                 masters += [] if edge.more["mimic"] else [f"j{index}"]
-            spec["joints"][f"j{index}"] = said | own | {"child": name}
+            spec["joints"][f"j{index}"] = output | own | {"child": name}
         names.append(edge.child)
         wanted.append(edge)
     return spec, wanted
@@ -170,9 +175,9 @@ def test_the_plan_holds_every_edge_once_with_its_pose_and_owner(given: tuple[Any
     found = {edge["child"]: edge for edge in plan["edges"]}
     assert len(found) == len(plan["edges"]) == len(wanted)
     for edge in wanted:
-        seen = found[edge.child]
-        assert (seen["parent"], seen["owner"], seen["kind"]) == (edge.parent, edge.owner, edge.kind)
-        assert matrix_of(seen) == pytest.approx(edge.matrix, abs=1e-9)
+        observed = found[edge.child]
+        assert (observed["parent"], observed["owner"], observed["kind"]) == (edge.parent, edge.owner, edge.kind)
+        assert matrix_of(observed) == pytest.approx(edge.matrix, abs=1e-9)
     owned = {process["name"]: {tuple(pair) for pair in process["owns"]} for process in plan["processes"]}
     for owner in {edge.owner for edge in wanted}:
         assert owned[owner] == {(edge.parent, edge.child) for edge in wanted if edge.owner == owner}

@@ -103,14 +103,14 @@ def measure(runs: int = RUNS) -> dict[str, tuple[float, float]]:
         for frames in (*TIMES_FASTER, 10_000):
             (folder / f"{frames}.yaml").write_text(spec_of(frames), encoding="utf-8")
             (folder / f"{frames}.xacro").write_text(xacro_of(frames), encoding="utf-8")
-        for turn in range(runs):
+        for number in range(runs):
             for frames in (*TIMES_FASTER, 10_000):
                 build = ["-c", STARTED, "build", f"{frames}.yaml", "-o", f"out{frames}"]
                 taken.setdefault(f"tfcompose {frames}", []).append(cost(build, folder))
                 taken.setdefault(f"--read-back {frames}", []).append(cost([*build, "--read-back"], folder))
                 read = ["-c", READER, f"out{frames}/robot.full.urdf", f"out{frames}/robot.urdf"]
                 taken.setdefault(f"yourdfpy {frames}", []).append(cost(read, folder))
-                if frames in TIMES_FASTER and (turn == 0 or frames == 1_000):
+                if frames in TIMES_FASTER and (number == 0 or frames == 1_000):
                     run = ["-c", f"import xacro; open('x.urdf', 'w').write(xacro.process('{frames}.xacro'))"]
                     taken.setdefault(f"xacro {frames}", []).append(cost(run, folder))
     return {name: (min(t for t, _ in costs), max(m for _, m in costs)) for name, costs in taken.items()}

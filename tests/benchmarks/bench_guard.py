@@ -66,22 +66,22 @@ def measure() -> list[float]:
         RuntimeError: if the guard did not see every edge, or found something wrong.
     """
     with tempfile.TemporaryDirectory() as folder:
-        file, said = Path(folder, "plan.json"), Path(folder, "said.txt")
+        file, log = Path(folder, "plan.json"), Path(folder, "said.txt")
         file.write_text(write_plan(plan()), encoding="utf-8")
-        with said.open("wb") as out:
+        with log.open("wb") as out:
             guard = subprocess.Popen([sys.executable, "-m", "tfcompose.guard", str(file), "guard"], stdout=out)
         owner = subprocess.Popen([sys.executable, "-c", OWNER])
         try:
-            return _rounds(psutil.Process(guard.pid), said)
+            return _rounds(psutil.Process(guard.pid), log)
         finally:
             for process in (owner, guard):
                 process.terminate()
                 process.wait(20)
 
 
-def _rounds(guard: psutil.Process, said: Path) -> list[float]:
+def _rounds(guard: psutil.Process, log: Path) -> list[float]:
     end = time.monotonic() + 30
-    while '"Complete"' not in said.read_text("utf-8"):
+    while '"Complete"' not in log.read_text("utf-8"):
         if time.monotonic() > end:
             raise RuntimeError("the guard did not see every edge")
         time.sleep(0.1)
@@ -90,7 +90,7 @@ def _rounds(guard: psutil.Process, said: Path) -> list[float]:
         before, begun = sum(guard.cpu_times()[:2]), time.monotonic()
         time.sleep(ROUND_S)
         parts.append((sum(guard.cpu_times()[:2]) - before) / (time.monotonic() - begun))
-    if '"error"' in said.read_text("utf-8"):
+    if '"error"' in log.read_text("utf-8"):
         raise RuntimeError("the guard found something wrong")
     return parts
 

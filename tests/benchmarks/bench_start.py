@@ -29,11 +29,11 @@ def measure(runs: int = RUNS) -> dict[str, float]:
     """Return the median seconds of each command, its own and the kernel's for it."""
     compileall.compile_dir(ROOT / "tfcompose", quiet=2)
     seconds: dict[str, list[float]] = {name: [] for name in COMMANDS}
-    for turn in range(runs + 1):
+    for run in range(runs + 1):
         for name, words in COMMANDS.items():
             began = _spent()
             subprocess.run([sys.executable, *words], check=True, stdout=subprocess.DEVNULL, cwd=ROOT)
-            if turn:  # the first turn warms the disk
+            if run:  # the first run warms the disk
                 seconds[name].append(_spent() - began)
     return {name: statistics.median(taken) for name, taken in seconds.items()}
 

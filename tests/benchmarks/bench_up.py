@@ -177,13 +177,13 @@ def test_100_edges_are_live_soon_after_a_plain_process_and_at_once_for_who_joins
 
 
 if __name__ == "__main__":
-    seen = measure(*map(int, sys.argv[1:]))
-    plain, ours = median(seen["plain"]), median(seen["up"])
+    observed = measure(*map(int, sys.argv[1:]))
+    plain, ours = median(observed["plain"]), median(observed["up"])
     sys.stdout.write(f"{EDGES} edges at a listener: plain {plain:.2f} s, up {ours:.2f} s ({ours - plain:+.2f} s)\n")
-    sys.stdout.write(f"  plain {sorted(round(one, 2) for one in seen['plain'])}\n")
-    sys.stdout.write(f"  up    {sorted(round(one, 2) for one in seen['up'])}\n")
-    late = sum(one > JOINED_S for one in seen["joined"])
-    sys.stdout.write(f"who joins: median {median(seen['joined']):.2f} s, longest {max(seen['joined']):.2f} s, ")
-    sys.stdout.write(f"{late} of {len(seen['joined'])} over {JOINED_S} s\n")
-    sys.stdout.write(f"memory: {sum(seen['memory']):.0f} MB: {[round(one) for one in seen['memory']]}\n")
-    sys.stdout.write(f"dry run: {seen['dry run'][0]:.3f} s\n")
+    sys.stdout.write(f"  plain {sorted(round(one, 2) for one in observed['plain'])}\n")
+    sys.stdout.write(f"  up    {sorted(round(one, 2) for one in observed['up'])}\n")
+    late = sum(one > JOINED_S for one in observed["joined"])
+    sys.stdout.write(f"who joins: median {median(observed['joined']):.2f} s, longest {max(observed['joined']):.2f} s, ")
+    sys.stdout.write(f"{late} of {len(observed['joined'])} over {JOINED_S} s\n")
+    sys.stdout.write(f"memory: {sum(observed['memory']):.0f} MB: {[round(one) for one in observed['memory']]}\n")
+    sys.stdout.write(f"dry run: {observed['dry run'][0]:.3f} s\n")

@@ -47,7 +47,7 @@ def test_what_only_some_profiles_use_is_not_idle(profiles: tuple[str, ...]) -> N
     assert findings(IDLE, *profiles) == []
 
 
-def test_a_misspelt_owner_is_said_once() -> None:
+def test_a_misspelt_owner_is_reported_once() -> None:
     text = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\nframes:\n  odom: {}\n"
     text += "  base_link: {parent: odom, owner: driv}\nprocesses: {drive: {external: true}}\n"
     assert [one[:5] for one in findings(text)] == ["TF302"]

@@ -41,19 +41,19 @@ def everything_below(folder: Path) -> list[str]:
 
 @pytest.mark.parametrize("case", BAD)
 @pytest.mark.parametrize("command", ["lint", "build", "tree"])
-def test_a_bad_file_gives_one_finding_with_its_place_and_nothing_is_written(
+def test_a_bad_file_gives_one_finding_with_its_place_and_nothing_is_emitted(
     case: str, command: str, folder: Path, tmp_path: Path
 ) -> None:
     data, code, (line, column), exit_code = BAD[case]
     (folder / "robot.yaml").write_bytes(data)
     before = everything_below(tmp_path)
     done = tfcompose(command, cwd=folder)
-    said = done.stdout + done.stderr
-    assert done.returncode == exit_code, said
-    assert f"robot.yaml:{line}:{column}: error[{code}]" in said
-    assert said.count("error[") == 1
-    assert "Traceback" not in said
-    assert len(said) < 3000
+    output = done.stdout + done.stderr
+    assert done.returncode == exit_code, output
+    assert f"robot.yaml:{line}:{column}: error[{code}]" in output
+    assert output.count("error[") == 1
+    assert "Traceback" not in output
+    assert len(output) < 3000
     assert everything_below(tmp_path) == before
 
 
@@ -76,10 +76,10 @@ def test_what_cannot_be_read_is_one_finding_and_exit_2(command: str, kind: str, 
             pytest.skip("this user may read everything")
     before = everything_below(tmp_path)
     done = tfcompose(*words, cwd=folder)
-    said = done.stdout + done.stderr
+    output = done.stdout + done.stderr
     assert done.returncode == 2
-    assert said.count("error[TF001]") == 1
-    assert "Traceback" not in said
+    assert output.count("error[TF001]") == 1
+    assert "Traceback" not in output
     assert everything_below(tmp_path) == before
 
 
@@ -139,7 +139,7 @@ def test_output_that_the_terminal_cannot_show_is_escaped(folder: Path) -> None:
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
-def test_output_that_cannot_be_written_is_one_sentence(folder: Path) -> None:
+def test_output_that_cannot_be_saved_is_one_sentence(folder: Path) -> None:
     with Path("/dev/full").open("w") as full:
         done = processes.run(
             [sys.executable, "-m", "tfcompose", "tree", str(ROBOTS / "my_robot.yaml")],
@@ -211,7 +211,7 @@ def test_lint_in_json_without_findings_is_an_empty_list_and_a_missing_file_is_a_
     ]
 
 
-def test_a_warning_fails_lint_only_where_it_is_asked_to(folder: Path) -> None:
+def test_a_warning_fails_lint_only_with_strict(folder: Path) -> None:
     text = GOOD + "sensors: {c: {preset: realsense/d435i, parent: base_link, place: c_color_frame}}\n"
     (folder / "robot.yaml").write_text(text)
     done = tfcompose("lint", cwd=folder)
@@ -251,12 +251,12 @@ def test_pose_in_json_is_the_pose_of_the_second_frame_in_the_first(folder: Path)
 
 @pytest.mark.parametrize("closed", [">&-", "<&-", "2>&-", "<&- >&- 2>&-"])
 def test_a_stream_that_is_closed_is_no_traceback(tmp_path: Path, closed: str) -> None:
-    said = tmp_path / "said"
-    kept = f"2>{said}" if "2>" not in closed else f">{said}" if ">&- 2" not in closed else ""
+    output = tmp_path / "said"
+    kept = f"2>{output}" if "2>" not in closed else f">{output}" if ">&- 2" not in closed else ""
     command = f"{shlex.quote(sys.executable)} -m tfcompose explain TF301 {kept} {closed}; echo $?"
     done = processes.run(["/bin/sh", "-c", command])
     assert done.stdout.splitlines()[-1] == "0"
-    assert "Traceback" not in done.stdout + done.stderr + (said.read_text() if said.exists() else "")
+    assert "Traceback" not in done.stdout + done.stderr + (output.read_text() if output.exists() else "")
 
 
 @pytest.mark.parametrize("command", ["build", "export systemd"])

@@ -85,9 +85,9 @@ def test_each_broken_robot_is_refused_and_the_wrong_part_named(tmp_path: Path) -
     done = check(*files.values())
     assert done.returncode == 1
     for name, (_, part) in BROKEN.items():
-        said = [line for line in done.stdout.splitlines() if str(files[name]) in line]
-        assert said, f"{name} is let through"
-        assert any(part in line for line in said), said
+        output = [line for line in done.stdout.splitlines() if str(files[name]) in line]
+        assert output, f"{name} is let through"
+        assert any(part in line for line in output), output
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.stem)

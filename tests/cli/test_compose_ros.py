@@ -100,7 +100,7 @@ def test_an_edge_whose_owner_hangs_is_not_listed_as_live(tfc: Callable[..., Any]
     assert until(lambda: "tree complete" in tfc("ps").stdout)
 
 
-def test_what_is_missing_when_the_time_is_over_is_said_with_1_and_the_robot_goes_on(
+def test_what_is_missing_when_the_time_is_over_is_reported_with_1_and_the_robot_goes_on(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
     (tmp_path / "robot.yaml").write_text(EXTERNAL)
@@ -133,7 +133,7 @@ def test_one_process_is_restarted_stopped_and_started_and_the_guard_blames_nobod
     assert " drive?" in tfc("restart", "driv").stderr
 
 
-def test_what_waits_for_a_stopped_process_is_said_to_wait_by_ps_and_by_who_starts_it(
+def test_what_waits_for_a_stopped_process_is_reported_to_wait_by_ps_and_by_who_starts_it(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
     late = "  late: {run: [sleep, '1000'], after: {drive: ready}}\n"
@@ -197,7 +197,7 @@ def test_a_robot_whose_folder_was_removed_goes_on_and_refuses_what_cannot_be_sta
     assert ps(tfc)["late"]["pid"] == before["late"]["pid"]
 
 
-def test_an_error_in_a_launcher_in_the_background_is_kept_for_who_looks_for_it(
+def test_an_error_in_a_launcher_in_the_background_is_kept_for_who_searches_it(
     tfc: Callable[..., Any], tmp_path: Path
 ) -> None:
     assert tfc("ps").returncode == 1
@@ -210,9 +210,9 @@ sys.exit(main(["up", "-d"]))
 """
     up = processes.run([sys.executable, "-c", code])
     assert up.returncode == 1
-    (said,) = (tmp_path / "log").rglob("launcher.err")
-    assert str(said) in up.stderr
-    assert "ZeroDivisionError: of a launcher" in said.read_text()
+    (error_file,) = (tmp_path / "log").rglob("launcher.err")
+    assert str(error_file) in up.stderr
+    assert "ZeroDivisionError: of a launcher" in error_file.read_text()
 
 
 @pytest.mark.usefixtures("tfc")
@@ -259,7 +259,9 @@ def test_a_launcher_that_was_killed_leaves_no_process_and_nothing_that_is_in_the
     assert tfc("up", "--wait").returncode == 0
 
 
-def test_events_are_told_from_the_start_and_wait_returns_the_exit_code(tfc: Callable[..., Any], tmp_path: Path) -> None:
+def test_events_are_reported_from_the_start_and_wait_returns_the_exit_code(
+    tfc: Callable[..., Any], tmp_path: Path
+) -> None:
     assert tfc("up", "--wait").returncode == 0
     launcher = psutil.Process(launcher_of(tmp_path))
     alone = len(launcher.net_connections("unix"))
@@ -268,13 +270,13 @@ def test_events_are_told_from_the_start_and_wait_returns_the_exit_code(tfc: Call
     waiting, listening = start([*command, "wait"]), start([*command, "events", "--format", "json"])
     assert until(lambda: len(launcher.net_connections("unix")) >= alone + 2), "both are heard"
     os.kill(ps(tfc)["static"]["pid"], signal.SIGKILL)
-    told = [json.loads(line) for line in listening.communicate(timeout=60)[0].splitlines()]
+    events = [json.loads(line) for line in listening.communicate(timeout=60)[0].splitlines()]
     assert waiting.communicate(timeout=60) == ("", "")
     assert waiting.returncode == 1
-    kinds = [event["event"] for event in told]
+    kinds = [event["event"] for event in events]
     assert kinds[0] == "ProcessState"
     assert kinds[-1] == "Ended"
-    found = [event["found"] for event in told if event["event"] == "FindingShown"]
+    found = [event["found"] for event in events if event["event"] == "FindingShown"]
     (found,) = [one for one in found if one["code"] not in LATE]
     assert (found["code"], found["message"].split()[0], found["message"].split()[-1]) == ("TF808", "static", "SIGKILL")
 
@@ -300,10 +302,10 @@ def test_events_of_a_launcher_that_is_killed_do_not_end_like_those_of_one_that_e
         assert follower.stdout
         assert "started guard" in follower.stdout.readline()
         os.kill(launcher_of(tmp_path), signal.SIGKILL)
-        _, said = follower.communicate(timeout=20)
+        _, error_file = follower.communicate(timeout=20)
     assert follower.returncode == 1
-    assert said.startswith("tfcompose: rover@")
-    assert said.endswith(" was killed\n")
+    assert error_file.startswith("tfcompose: rover@")
+    assert error_file.endswith(" was killed\n")
 
 
 def test_a_dry_run_is_the_same_everywhere_starts_nothing_and_writes_nothing(

@@ -17,15 +17,15 @@ def row(parent: str, child: str, stamp_ns: int) -> tuple[object, ...]:
 
 @pytest.fixture
 def observer() -> TreeObserver:
-    seen = TreeObserver()
+    observed = TreeObserver()
     fixed = [Publisher(gid, "/static", static=True) for gid in (b"2", b"3")]
-    seen.take_graph([Publisher(b"1", "/front/diff_drive_controller", static=False), *fixed])
+    observed.take_graph([Publisher(b"1", "/front/diff_drive_controller", static=False), *fixed])
     for tenth in range(10, 40):
         at = tenth * SECOND // 10
         rows = [row("front/odom", "front/base_footprint", at - 2_000_000)]
-        seen.take(rows, static=False, gid=b"1", received_ns=at)  # type: ignore[arg-type]
-    seen.take([row("base", "lidar", 0)], static=True, gid=b"2", received_ns=0)  # type: ignore[list-item]
-    return seen
+        observed.take(rows, static=False, gid=b"1", received_ns=at)  # type: ignore[arg-type]
+    observed.take([row("base", "lidar", 0)], static=True, gid=b"2", received_ns=0)  # type: ignore[list-item]
+    return observed
 
 
 @pytest.mark.parametrize(
@@ -38,7 +38,7 @@ def observer() -> TreeObserver:
         (70, "edge publisher rate age delay"),
     ],
 )
-def test_a_narrow_window_has_fewer_columns_and_whole_numbers(
+def test_a_narrow_window_has_fewer_columns_and_complete_numbers(
     observer: TreeObserver, width: int | None, heads: str
 ) -> None:
     edges = observer.edges(4 * SECOND)

@@ -20,7 +20,7 @@ def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize("kind", ["systemd", "compose", "launch"])
-def test_a_robot_and_its_built_plan_give_the_same_export_and_the_build_stays_whole(robot: Path, kind: str) -> None:
+def test_a_robot_and_its_built_plan_give_the_same_export_and_the_build_stays_complete(robot: Path, kind: str) -> None:
     assert main(["build"]) == 0
     build = robot / "build" / "rover"
     before = {file.relative_to(build): file.read_bytes() for file in build.rglob("*") if file.is_file()}

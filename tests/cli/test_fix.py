@@ -157,7 +157,7 @@ def test_where_the_answer_is_not_safe_the_file_stays_as_it_is(why: str, tmp_path
     assert lint(str(tmp_path / "r.yaml"), lambda file: Path(file).read_text("utf-8")), "there is something to say"
 
 
-def test_a_slip_of_the_pen_is_one_letter_and_has_one_answer() -> None:
+def test_a_slip_of_the_pen_is_one_character_and_has_one_answer() -> None:
     assert [slip_of(word, ["parent", "xyz"]) for word in ("parnet", "paret", "pparent", "pxrent", "PARENT")] == [
         "parent"
     ] * 5
@@ -192,7 +192,7 @@ def test_it_says_what_it_fixed_and_fails_for_what_remains(tmp_path: Path) -> Non
     assert done.returncode == 1
 
 
-def test_json_holds_what_remains_and_what_was_fixed_is_told_beside_it(tmp_path: Path) -> None:
+def test_json_holds_what_remains_and_stderr_what_was_fixed(tmp_path: Path) -> None:
     file = tmp_path / "r.yaml"
     file.write_text(HEAD + "links: {a: {}, b: {parnet: a, colour: red}}\n")
     done = run(tmp_path, "r.yaml", "--format", "json")
@@ -220,7 +220,7 @@ def test_an_included_file_is_edited_only_where_it_is_named(tmp_path: Path) -> No
     assert "{parent: a}" in base.read_text()
 
 
-def test_a_file_that_cannot_be_written_is_one_sentence_and_exit_2(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_saved_is_one_sentence_and_exit_2(tmp_path: Path) -> None:
     program = (
         "import errno, os, sys\nfrom pathlib import Path\n"
         "def full(_): raise OSError(errno.ENOSPC, 'No space left on device', 'r.yaml')\n"
@@ -269,8 +269,8 @@ def slipped(draw: st.DrawFn) -> str:
             found for found in re.finditer(r"[A-Za-z_]{2,}", text) if text[found.end() : found.end() + 1] in ":,]}"
         ]
         begin, end = draw(st.sampled_from(words)).span()
-        at, letter = draw(st.integers(begin, end - 1)), draw(st.sampled_from("aexyz"))
-        text = draw(st.sampled_from([text[:at] + text[at + 1 :], text[:at] + letter + text[at:]]))
+        at, char = draw(st.integers(begin, end - 1)), draw(st.sampled_from("aexyz"))
+        text = draw(st.sampled_from([text[:at] + text[at + 1 :], text[:at] + char + text[at:]]))
     return text
 
 

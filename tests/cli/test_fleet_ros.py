@@ -34,8 +34,8 @@ def test_each_rover_is_on_its_own_topics_and_what_belongs_to_the_other_is_an_off
     robot = start("tfcompose", "up", ROBOT)
     robot.until_says("tree complete: 11 edges")
     assert robot.output.count("tree complete") == 1
-    seen = start("tfcompose", "echo", "rover1/base_link", "rover1/laser_link", "--once", "--namespace", "rover1")
-    seen.until_says("xyz        [0.1000, 0.0000, 0.2000] m")
+    observed = start("tfcompose", "echo", "rover1/base_link", "rover1/laser_link", "--once", "--namespace", "rover1")
+    observed.until_says("xyz        [0.1000, 0.0000, 0.2000] m")
     missing = start(
         "tfcompose", "echo", "rover2/base_link", "rover2/laser_link", "--once", "--namespace", "rover1", "--timeout", 2
     )

@@ -27,13 +27,13 @@ def graph(*words: object, cwd: Path, without: str = "") -> subprocess.CompletedP
 
 
 @pytest.mark.parametrize("ending", BEGIN)
-def test_the_ending_says_what_is_written(ending: str, tmp_path: Path) -> None:
+def test_the_suffix_decides_the_format(ending: str, tmp_path: Path) -> None:
     done = graph(ROBOT, "-o", f"out.{ending.upper()}", cwd=tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (0, f"wrote out.{ending.upper()}\n", "")
-    (written,) = tmp_path.iterdir()
-    assert written.read_bytes().startswith(BEGIN[ending])
+    (saved,) = tmp_path.iterdir()
+    assert saved.read_bytes().startswith(BEGIN[ending])
     (plain := tmp_path / "plain").touch()
-    assert written.stat().st_mode == plain.stat().st_mode, "as readable as other files of this user's"
+    assert saved.stat().st_mode == plain.stat().st_mode, "as readable as other files of this user's"
 
 
 def test_without_options_it_writes_what_build_writes(tmp_path: Path) -> None:
@@ -42,7 +42,7 @@ def test_without_options_it_writes_what_build_writes(tmp_path: Path) -> None:
     assert (tmp_path / "tree.svg").read_bytes() == golden.read_bytes()
 
 
-def test_poses_are_written_where_they_are_asked_for(tmp_path: Path) -> None:
+def test_poses_are_drawn_on_request(tmp_path: Path) -> None:
     for name, options in (("without.svg", ()), ("with.svg", ("--poses",))):
         graph(ROBOT, "-o", name, *options, cwd=tmp_path)
     assert "xyz 0.1 0 0.2<" in (tmp_path / "with.svg").read_text("utf-8")
@@ -53,7 +53,7 @@ def test_poses_are_written_where_they_are_asked_for(tmp_path: Path) -> None:
     ("name", "named"),
     [("tree.jpg", {".jpg", *BEGIN}), ("tree", {"tree", *BEGIN}), ("no/folder/tree.svg", {"no/folder"})],
 )
-def test_what_cannot_be_written_is_refused_in_one_line(name: str, named: set[str], tmp_path: Path) -> None:
+def test_what_cannot_be_saved_is_refused_in_one_line(name: str, named: set[str], tmp_path: Path) -> None:
     done = graph(ROBOT, "-o", name, cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1

@@ -23,14 +23,14 @@ pytestmark = pytest.mark.ros
 
 def ps() -> dict[str, dict[str, str]]:
     words = [sys.executable, "-m", "tfcompose", "ps", "--format", "json"]
-    said = processes.run(words).stdout
-    robots = json.loads(said or "[]")
+    shown = processes.run(words).stdout
+    robots = json.loads(shown or "[]")
     return {
         robot["name"].partition("@")[0]: {one["name"]: one["state"] for one in robot["processes"]} for robot in robots
     }
 
 
-def test_two_hosts_start_their_shares_and_each_sees_the_whole_tree(
+def test_two_hosts_start_their_shares_and_each_receives_the_entire_tree(
     start: Callable[..., Started], tmp_path: Path
 ) -> None:
     file = tmp_path / "rover.yaml"

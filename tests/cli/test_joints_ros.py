@@ -69,15 +69,15 @@ def test_simulated_joints_move_the_robot_and_a_new_description_comes_while_it_ru
         texts = Subscription(node, String, "/robot_description", LATCHED)
         heard: list[str] = []
 
-        def told(count: int) -> bool:
+        def has_reported(count: int) -> bool:
             heard.extend(deserialize_message(each.data, String).data for each in texts.take())
             return len(heard) == count
 
-        assert until(lambda: told(1))
+        assert until(lambda: has_reported(1))
         agrees(buffer, heard[0], _positions(states))
         (tmp_path / "robot.yaml").write_text(ARM.replace("xyz: [0, 0.3, 0]", "xyz: [0, 0.3, 0.7]"), encoding="utf-8")
         assert "restarted: joints" in tfc("up", "--wait")
-        assert until(lambda: told(2)), "who listens gets the new one"
+        assert until(lambda: has_reported(2)), "who listens gets the new one"
         assert until(lambda: _z(buffer) == pytest.approx(0.7))
         agrees(buffer, heard[1], _positions(states))
 

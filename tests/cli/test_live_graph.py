@@ -22,13 +22,13 @@ def row(parent: str, child: str, second: int, x: float = 0.0, w: float = 1.0) ->
 
 @pytest.fixture
 def observer() -> TreeObserver:
-    seen = TreeObserver()
-    seen.take_graph([Publisher(b"1", "/drive", static=False), Publisher(b"2", "/static", static=True)])
+    observed = TreeObserver()
+    observed.take_graph([Publisher(b"1", "/drive", static=False), Publisher(b"2", "/static", static=True)])
     for second in range(1, 5):
-        seen.take([row("odom", "base", second)], static=False, gid=b"1", received_ns=second * SECOND)  # type: ignore[list-item]
-    seen.take([row("base", "lidar", 1, 0.25)], static=True, gid=b"2", received_ns=4 * SECOND)  # type: ignore[list-item]
-    seen.take([row("mast", "lidar", 1, 0.5, 0.0)], static=True, gid=b"3", received_ns=4 * SECOND)  # type: ignore[list-item]
-    return seen
+        observed.take([row("odom", "base", second)], static=False, gid=b"1", received_ns=second * SECOND)  # type: ignore[list-item]
+    observed.take([row("base", "lidar", 1, 0.25)], static=True, gid=b"2", received_ns=4 * SECOND)  # type: ignore[list-item]
+    observed.take([row("mast", "lidar", 1, 0.5, 0.0)], static=True, gid=b"3", received_ns=4 * SECOND)  # type: ignore[list-item]
+    return observed
 
 
 def test_each_edge_has_its_publisher_its_kind_and_its_rate(observer: TreeObserver) -> None:
@@ -40,13 +40,13 @@ def test_each_edge_has_its_publisher_its_kind_and_its_rate(observer: TreeObserve
     assert second.owner == "somebody"
 
 
-def test_poses_stand_below_and_a_rotation_that_is_none_is_said(observer: TreeObserver) -> None:
+def test_poses_stand_below_and_a_rotation_that_is_none_is_reported(observer: TreeObserver) -> None:
     arrows = {(one.parent, one.child): one for one in graph_of_observers([observer], "/tf", poses=True).arrows}
     assert arrows["base", "lidar"].pose == "xyz 0.25 0 0"
     assert arrows["mast", "lidar"].pose == "no rotation"
 
 
-def test_what_the_plan_expects_and_nobody_publishes_is_said_to_be_missing(observer: TreeObserver) -> None:
+def test_what_the_plan_expects_and_nobody_publishes_is_reported_to_be_missing(observer: TreeObserver) -> None:
     edges = (
         PlanEdge("odom", "base", "dynamic", "drive", "/drive", Pose(), 1.0, SourceLine("rover.yaml", 1)),
         PlanEdge("base", "imu", "static", "static", "/static", Pose(), None, SourceLine("rover.yaml", 2)),
@@ -60,7 +60,7 @@ def test_what_the_plan_expects_and_nobody_publishes_is_said_to_be_missing(observ
     ("words", "named"),
     [(["--live", "--bag", "x"], "--bag"), (["--live", "-o", "none/tree.svg"], "none/tree.svg")],
 )
-def test_what_cannot_be_is_refused_before_anybody_looks(words: list[str], named: str, capsys: Any) -> None:
+def test_what_cannot_be_is_refused_before_ros_is_started(words: list[str], named: str, capsys: Any) -> None:
     assert main(["graph", *words]) == 2
     assert named in capsys.readouterr().err
 

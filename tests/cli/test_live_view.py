@@ -86,7 +86,7 @@ def running(*names: str) -> list[ProcessState]:
     return [ProcessState(name, "RUNNING", 7) for name in names]
 
 
-def test_the_line_stays_below_the_log_and_the_log_is_whole() -> None:
+def test_the_line_stays_below_the_log_and_the_log_is_complete() -> None:
     view = View(plan_of("static", "drive", owner="static"))
     view.tell(*running("static"), LogLine("drive", "stdout", "one"), LogLine("drive", "stdout", "two"))
     assert view.lines == [
@@ -229,7 +229,7 @@ def terminal(tmp_path: Path) -> Iterator[Terminal]:
         os.kill(one.pid, signal.SIGKILL)
 
 
-def test_on_a_real_terminal_the_log_is_whole_the_line_below_it_and_ctrl_c_leaves_nothing(terminal: Terminal) -> None:
+def test_on_a_real_terminal_the_log_is_complete_the_line_below_it_and_ctrl_c_leaves_nothing(terminal: Terminal) -> None:
     assert terminal.shows("41 of 41 processes")
     assert terminal.shows("line 40 end")
     terminal.resize(44, 12)

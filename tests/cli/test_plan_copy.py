@@ -22,14 +22,14 @@ def place(tmp_path: Path) -> RuntimeDir:
 def test_the_loser_copies_again_what_the_winner_takes_for_an_earlier_runs(
     place: RuntimeDir, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    plan, written = compiled_plan(ROVER), Path.write_bytes
+    plan, saved = compiled_plan(ROVER), Path.write_bytes
     removed: list[Path] = []
 
     def late(file: Path, data: Any) -> int:
         if not removed:
             removed.append(file.parent)
             shutil.rmtree(file.parent)
-        return written(file, data)
+        return saved(file, data)
 
     monkeypatch.setattr(Path, "write_bytes", late)
     copy = copy_plan(plan, tmp_path / "plan.json", place, alone=False)
@@ -37,23 +37,23 @@ def test_the_loser_copies_again_what_the_winner_takes_for_an_earlier_runs(
     assert copy.read_text("utf-8")
 
 
-def test_a_copy_is_never_half_written_and_stays_while_its_plan_is_the_one(
+def test_a_copy_is_never_half_done_and_stays_while_its_plan_is_the_one(
     place: RuntimeDir, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    plan, written = compiled_plan(ROVER), Path.write_bytes
+    plan, saved = compiled_plan(ROVER), Path.write_bytes
     copy = copy_plan(plan, tmp_path / "plan.json", place, alone=False)
-    whole = copy.read_bytes()
-    seen: list[bytes] = []
+    full = copy.read_bytes()
+    observed: list[bytes] = []
 
     def slow(file: Path, data: Any) -> int:
-        written(file, data[:10])
-        seen.append(copy.read_bytes())
-        return written(file, data)
+        saved(file, data[:10])
+        observed.append(copy.read_bytes())
+        return saved(file, data)
 
     with monkeypatch.context() as patch:
         patch.setattr(Path, "write_bytes", slow)
         assert copy_plan(plan, tmp_path / "plan.json", place, alone=True) == copy
-    assert seen == [whole]
+    assert observed == [full]
     assert [file.name for file in copy.parent.iterdir()] == ["plan.json"]
     assert copy_plan(compiled_plan(ROVER.replace("lidar", "lamp")), tmp_path / "plan.json", place, alone=True) != copy
     assert not copy.exists()

@@ -51,11 +51,11 @@ def test_the_pose_up_one_branch_and_down_another(robot: str, capsys: pytest.Capt
     mast = step([1, 2, 3], [0.7, -0.8, 0.9])
     hand = step([0, 0, 1], [0.1, 0.2, 0.3]) @ step([0.5, 0, 0], [-0.4, 0.5, 0.6])
     assert main(["pose", robot, "mast", "hand", "--format", "json"]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert (said["parent"], said["child"]) == ("mast", "hand")
+    output = json.loads(capsys.readouterr().out)
+    assert (output["parent"], output["child"]) == ("mast", "hand")
     meant = np.linalg.inv(mast) @ hand
-    assert matrix(said["xyz"], Rotation.from_quat(said["quat_xyzw"])) == pytest.approx(meant, abs=1e-11)
-    assert matrix(said["xyz"], Rotation.from_euler("xyz", said["rpy"])) == pytest.approx(meant, abs=1e-11)
+    assert matrix(output["xyz"], Rotation.from_quat(output["quat_xyzw"])) == pytest.approx(meant, abs=1e-11)
+    assert matrix(output["xyz"], Rotation.from_euler("xyz", output["rpy"])) == pytest.approx(meant, abs=1e-11)
 
 
 @pytest.mark.parametrize(
@@ -69,7 +69,7 @@ def test_the_pose_up_one_branch_and_down_another(robot: str, capsys: pytest.Capt
         ("odom", "hand", "joints pan, tilt at 0 and odom → base_link at its nominal pose"),
     ],
 )
-def test_what_moves_on_the_way_is_said_and_nothing_else(
+def test_what_moves_on_the_way_is_named_and_nothing_else(
     robot: str, a: str, b: str, moving: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["pose", robot, a, b]) == 0
@@ -81,7 +81,7 @@ def test_what_moves_on_the_way_is_said_and_nothing_else(
 @pytest.mark.parametrize("command", ["pose", "explain"])
 def test_between_two_trees_there_is_no_pose(robot: str, command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([command, robot, "mast", "corner"]) == 1
-    said = capsys.readouterr()
-    assert (said.out, said.err) == ("", "tfcompose: mast and corner are in two trees\n")
+    output = capsys.readouterr()
+    assert (output.out, output.err) == ("", "tfcompose: mast and corner are in two trees\n")
     assert main([command, robot, "mast", "conrer"]) == 1
     assert "did you mean corner?" in capsys.readouterr().err

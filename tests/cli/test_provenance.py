@@ -65,14 +65,14 @@ def test_the_values_of_parts_have_their_places_in_the_files_of_the_parts(
     Path("outer.yaml").write_text(CELL.replace("robot.yaml", "cell.yaml").replace(", profiles: [bent]", ""), "utf-8")
     Path("cell.yaml").write_text(CELL.replace(robot, "robot.yaml"), "utf-8")
     assert main(["explain", "outer.yaml", "world", "l_l_head_optical"]) == 0
-    said = capsys.readouterr()
-    lines = [line.strip() for line in said.out.splitlines()]
+    output = capsys.readouterr()
+    lines = [line.strip() for line in output.out.splitlines()]
     assert [line for line in lines if line.startswith("xyz: ")] == [
         "xyz: [1, 0, 0]  outer.yaml:4:65",
         "xyz: [1, 0, 0]  cell.yaml:4:66",
         "xyz: [0, 0, 0.4]  robot.yaml:3:15, over base.yaml:5:34",
     ]
-    assert "note: base.yaml:6:37: " in said.err
+    assert "note: base.yaml:6:37: " in output.err
 
 
 def test_explain_names_the_rotation_that_another_way_to_write_it_replaced(
@@ -105,9 +105,9 @@ def test_a_finding_about_a_replaced_value_names_what_it_replaced(
 
 def test_a_finding_in_a_setting_names_what_it_replaced(robot: str, capsys: pytest.CaptureFixture[str]) -> None:
     main(["build", robot, "-o", "out", "--set", "frames.mast.xyz=[0, 0, 400]"])
-    said = capsys.readouterr().err
-    assert "TF414" in said
-    assert "note: robot.yaml:3:15: " in said
+    output = capsys.readouterr().err
+    assert "TF414" in output
+    assert "note: robot.yaml:3:15: " in output
 
 
 def test_a_finding_about_what_nothing_replaced_has_no_such_note(robot: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -80,7 +80,7 @@ with Stop() as stop, open_node("robot_state_publisher", "", args=sys.argv[at + 1
 """
 
 
-def test_the_tree_is_whole_everybody_publishes_their_own_and_the_description_is_the_full_one(
+def test_the_tree_is_complete_everybody_publishes_their_own_and_the_description_is_the_full_one(
     tmp_path: Path, start: Callable[..., Started], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     program = tmp_path / "prefix/lib/robot_state_publisher/robot_state_publisher"
@@ -101,8 +101,8 @@ def test_the_tree_is_whole_everybody_publishes_their_own_and_the_description_is_
     assert heard == built.replace('"../../mesh.stl"', f'"file://{tmp_path}/mesh.stl"')
     assert 'type="floating"' not in built.partition('name="swing"')[0].partition("<joint")[2]
     assert nodes == {"/rover/tfcompose_static"}
-    said = [line for line in up.lines + up.errors if "error" in line]
-    assert not [line for line in said if "error[TF804]" not in line], "a busy machine is late in truth"
+    lines = [line for line in up.lines + up.errors if "error" in line]
+    assert not [line for line in lines if "error[TF804]" not in line], "a busy machine is late in truth"
 
 
 def description() -> tuple[str, set[str]]:

@@ -22,7 +22,7 @@ TABLE = Table(
 )
 
 
-def test_a_pipe_gets_each_cell_whole() -> None:
+def test_a_pipe_gets_each_cell_in_full() -> None:
     lines = TABLE.lines(ROWS, indent="  ")
     for row, line in zip(ROWS, lines, strict=True):
         assert line.split("  ")[1] == row[0]
@@ -46,7 +46,7 @@ def test_a_terminal_gets_no_line_that_wraps_and_every_number(width: int, heads: 
     assert "50 Hz" in lines[-1]
 
 
-def test_frames_that_differ_are_told_apart_when_they_are_shortened() -> None:
+def test_frames_that_differ_still_differ_when_they_are_shortened() -> None:
     lines = TABLE.lines(ROWS, 60)
     assert len(set(lines)) == len(ROWS)
     assert shortened("camera_link → camera_color_optical_frame", 28) == "camera_li…olor_optical_frame"

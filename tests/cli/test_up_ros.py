@@ -239,7 +239,7 @@ def test_an_edge_that_somebody_publishes_already_is_refused_with_the_nodes_name(
     assert re.findall(r"started (\w+)", robot.text) == ["guard"]
 
 
-def test_an_edge_that_turns_out_to_be_published_while_processes_start_is_refused_as_quietly(
+def test_an_edge_that_proves_to_be_published_while_processes_start_is_refused_as_silently(
     up: Callable[..., Up], rogue: Callable[[], object]
 ) -> None:
     rogue()
@@ -262,7 +262,7 @@ def test_the_same_edges_by_another_robots_name_are_refused(up: Callable[..., Up]
     assert first.popen.poll() is None
 
 
-def test_two_that_start_the_same_edges_at_the_same_time_do_not_live_on_quietly(
+def test_two_that_start_the_same_edges_at_the_same_time_do_not_both_run_unreported(
     up: Callable[..., Up], tmp_path: Path
 ) -> None:
     """Each says it, or the later of the two, which has ended then."""
@@ -279,7 +279,7 @@ def test_two_that_start_the_same_edges_at_the_same_time_do_not_live_on_quietly(
     assert know() or all("another /" in one.text for one in ended()), [one.text for one in both]
 
 
-def test_of_two_that_do_not_look_before_the_start_and_have_the_same_edges_both_say_so_or_one_ends(
+def test_of_two_that_do_not_observe_before_the_start_and_have_the_same_edges_both_report_it_or_one_ends(
     up: Callable[..., Up], tmp_path: Path
 ) -> None:
     (tmp_path / "other.yaml").write_text(ROVER.replace("robot: rover", "robot: other"))
@@ -327,7 +327,7 @@ def test_without_ros_it_says_in_one_sentence_what_to_install_and_writes_nothing(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["output0.txt", "rover.yaml", "runtime", "stubs"]
 
 
-def test_an_owner_whose_node_has_another_name_is_told_what_to_write_and_is_live_when_it_stands_there(
+def test_an_owner_whose_node_has_another_name_gets_the_line_to_write_and_is_live_with_it(
     up: Callable[..., Up], tmp_path: Path
 ) -> None:
     (tmp_path / "driver.py").write_text(ROGUE, encoding="utf-8")
@@ -342,7 +342,7 @@ def test_an_owner_whose_node_has_another_name_is_told_what_to_write_and_is_live_
     assert "TF801" not in robot.text
 
 
-def test_without_a_guard_edges_are_still_said_to_be_live_and_nobody_is_judged(
+def test_without_a_guard_edges_are_still_reported_to_be_live_and_nobody_is_judged(
     up: Callable[..., Up], rogue: Callable[[], object]
 ) -> None:
     rogue()
@@ -353,7 +353,7 @@ def test_without_a_guard_edges_are_still_said_to_be_live_and_nobody_is_judged(
     assert "TF80" not in robot.text
 
 
-def test_looking_before_the_start_takes_nothing_from_the_time_that_was_asked_for(up: Callable[..., Up]) -> None:
+def test_observing_before_the_start_takes_nothing_from_the_time_that_was_requested(up: Callable[..., Up]) -> None:
     begun = time.monotonic()
     robot = up(ROVER, "--settle", "4", "--for", "9")
     late = {"TF804", "TF805"}  # a busy machine is, in truth

@@ -31,7 +31,7 @@ def earlier_build(folder: Path) -> dict[str, bytes | None]:
     return contents(folder)
 
 
-def test_the_files_are_written_and_nothing_else_is_left(tmp_path: Path) -> None:
+def test_the_files_are_emitted_and_nothing_else_is_left(tmp_path: Path) -> None:
     write_all(tmp_path / "x" / "out", FILES)
     assert contents(tmp_path / "x" / "out") == {
         "a.txt": b"new a\n",
@@ -66,18 +66,18 @@ def test_a_disk_that_is_full_leaves_the_earlier_build_or_no_folder(
     fails_at: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = earlier_build(tmp_path / "old")
-    written = []
+    saved = []
 
     def full(descriptor: int) -> None:
-        written.append(descriptor)
-        if len(written) % 3 == fails_at % 3:
+        saved.append(descriptor)
+        if len(saved) % 3 == fails_at % 3:
             raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match="No space"):
         write_all(tmp_path / "old", FILES)
     assert contents(tmp_path / "old") == before
-    written.clear()
+    saved.clear()
     with pytest.raises(OSError, match="No space"):
         write_all(tmp_path / "x" / "y", FILES)
     assert not (tmp_path / "x").exists()
@@ -141,7 +141,7 @@ def test_a_plan_that_names_files_elsewhere_has_nothing_removed_there(tmp_path: P
     assert victim.exists()
 
 
-def test_two_builds_at_once_leave_one_whole_build(tmp_path: Path) -> None:
+def test_two_builds_at_once_leave_one_complete_build(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "tfcompose", "build", str(ROBOTS / "autonomous_robot.yaml"), "-o", "out"]
     both = [processes.start(command, cwd=tmp_path, stdout=subprocess.DEVNULL) for _ in range(4)]
     assert [process.wait(60) for process in both] == [0] * 4

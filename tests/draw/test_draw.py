@@ -87,7 +87,7 @@ def read_dot(graph: Graph) -> Any:
 FAMILY = [(seed, frames, poses) for seed in range(12) for frames in (1, 2, 9, 100) for poses in (False, True)]
 
 
-def looks(drawing: Drawing, *prefixes: str) -> list[Box]:
+def boxes_of(drawing: Drawing, *prefixes: str) -> list[Box]:
     return [shape for shape in drawing.shapes if isinstance(shape, Box) and shape.style.startswith(prefixes)]
 
 
@@ -113,7 +113,7 @@ def around(shape: Box | Text) -> tuple[float, float, float, float]:
 def test_no_boxes_and_no_texts_overlap_and_all_is_on_the_paper(seed: int, frames: int, *, poses: bool) -> None:
     drawing = draw(tree(seed, frames, poses=poses))
     texts = [around(shape) for shape in drawing.shapes if isinstance(shape, Text)]
-    boxes = [around(box) for box in looks(drawing, "box", "root")]
+    boxes = [around(box) for box in boxes_of(drawing, "box", "root")]
     assert len(boxes) == frames
     for some in (texts, boxes):
         some.sort()
@@ -127,11 +127,13 @@ def test_no_boxes_and_no_texts_overlap_and_all_is_on_the_paper(seed: int, frames
 
 
 @for_each(FAMILY)
-def test_the_area_of_a_group_holds_its_frames_whole_and_cuts_no_box(seed: int, frames: int, *, poses: bool) -> None:
+def test_the_area_of_a_group_holds_its_frames_entirely_and_crosses_no_box(
+    seed: int, frames: int, *, poses: bool
+) -> None:
     graph = tree(seed, frames, poses=poses)
     drawing = draw(graph)
-    areas = [around(box) for box in looks(drawing, "group")]
-    boxes = {name: around(box) for name, box in zip(_names(drawing), looks(drawing, "box", "root"), strict=True)}
+    areas = [around(box) for box in boxes_of(drawing, "group")]
+    boxes = {name: around(box) for name, box in zip(_names(drawing), boxes_of(drawing, "box", "root"), strict=True)}
     for box in boxes.values():
         for area in areas:
             inside = area[0] <= box[0] and area[1] <= box[1] and area[2] >= box[2] and area[3] >= box[3]
@@ -231,13 +233,13 @@ def test_a_pdf_holds_every_name_as_text_and_fits_its_page() -> None:
     assert float(page.mediabox.height) == pytest.approx(drawing.height * 0.75, abs=0.01)
 
 
-def test_a_png_shows_boxes_and_letters_where_the_drawing_has_them() -> None:
+def test_a_png_shows_boxes_and_characters_where_the_drawing_has_them() -> None:
     drawing = draw(tree(2, 9))
     image = Image.open(io.BytesIO(png(drawing))).convert("RGB")
     image.load()
     assert image.size == pytest.approx((2 * drawing.width, 2 * drawing.height), abs=2)
     assert image.getpixel((4, 4)) == (255, 255, 255)
-    for badge in looks(drawing, "badge"):
+    for badge in boxes_of(drawing, "badge"):
         corner = image.getpixel((round(2 * (badge.x + 3)), round(2 * (badge.y + badge.height - 3))))
         assert corner == _rgb(STYLES[badge.style].fill[0])
     for text in (shape for shape in drawing.shapes if isinstance(shape, Text) and shape.style == "name"):
@@ -272,17 +274,17 @@ def test_the_same_graph_gives_the_same_bytes() -> None:
     assert pdf(first) == pdf(second)
 
 
-def test_letters_are_as_wide_as_pdfium_draws_helvetica() -> None:
-    letters = "".join(map(chr, range(33, 127)))
-    shape = Text(10.0, 50.0, letters, "name", width_of(letters, 12.0))
+def test_characters_are_as_wide_as_pdfium_draws_helvetica() -> None:
+    chars = "".join(map(chr, range(33, 127)))
+    shape = Text(10.0, 50.0, chars, "name", width_of(chars, 12.0))
     page = pypdfium2.PdfDocument(pdf(Drawing("", 1000.0, 100.0, (shape,))))[0].get_textpage()
     left = 10.0
     x, y = ctypes.c_double(), ctypes.c_double()
-    for index, letter in enumerate(letters):
-        assert page.get_text_range(index, 1) == letter
+    for index, char in enumerate(chars):
+        assert page.get_text_range(index, 1) == char
         assert pypdfium2.raw.FPDFText_GetCharOrigin(page, index, x, y)
-        assert x.value / 0.75 == pytest.approx(left, abs=0.02), letter
-        left += width_of(letter, 1000.0) * 0.012
+        assert x.value / 0.75 == pytest.approx(left, abs=0.02), char
+        left += width_of(char, 1000.0) * 0.012
 
 
 def _contrast(first: str, second: str) -> float:

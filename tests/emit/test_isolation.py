@@ -56,7 +56,7 @@ def test_frames_get_the_namespace_as_prefix_and_shared_ones_do_not() -> None:
     assert plan.process("ekf").owns == (("map", "robot1/odom"), ("robot1/odom", "robot1/base_link"))
 
 
-def test_a_prefix_is_written_in_front_as_it_is() -> None:
+def test_a_prefix_is_emitted_in_front_as_it_is() -> None:
     plan = read_plan(built('frame_prefix: "a_"')["plan.json"], "plan.json")
     assert plan.base == "a_base_link"
     assert plan.edges[0].parent == "a_map"
@@ -86,7 +86,7 @@ def test_processes_are_given_final_names() -> None:
     assert "--to=map" in read_plan(files["plan.json"], "p").process("ekf").argv
 
 
-def test_the_driver_is_told_the_prefix_and_only_where_there_is_one() -> None:
+def test_the_driver_gets_the_prefix_and_only_where_there_is_one() -> None:
     assert '"tf_prefix": "robot1/"' in built("isolate: frames")["params/camera.yaml"]
     assert "tf_prefix" not in built("isolate: topics")["params/camera.yaml"]
 

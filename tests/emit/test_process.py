@@ -115,7 +115,7 @@ def test_how_it_is_run_becomes_words_that_the_launcher_can_follow(keys: str) -> 
     assert process_of(keys).argv == COMMANDS[keys]
 
 
-def test_a_command_that_owns_an_edge_is_told_what_all_nodes_are_and_one_that_may_be_no_node_is_not() -> None:
+def test_a_command_that_owns_an_edge_gets_the_arguments_of_all_nodes_and_one_that_may_be_no_node_does_not() -> None:
     head = HEAD.replace("namespace: r1", "namespace: r1, isolate: topics, clock: sim")
     head = head.replace("{map: {}}", "{map: {}, odom: {parent: map, owner: drive}}")
     plan = read_plan(files_of("drive: {run: [drive]}\n  web: {run: [serve, --port, '80']}", head)["plan.json"], "p")
@@ -243,7 +243,7 @@ def test_a_file_is_named_from_the_plans_folder_and_found_from_wherever_the_plan_
 @pytest.mark.parametrize(
     ("cwd", "place"), [("maps", "robots/maps"), (".", "robots"), ('"${file(maps)}"', "robots/maps"), ("/", "/")]
 )
-def test_a_process_runs_in_the_folder_beside_the_file_that_names_it(tmp_path: Path, cwd: str, place: str) -> None:
+def test_a_process_runs_in_the_folder_of_the_file_that_names_it(tmp_path: Path, cwd: str, place: str) -> None:
     built = built_at(tmp_path, "build/r", f"{FILES}    cwd: {cwd}\n")
     assert isinstance(built, tuple)
     build_dir = tmp_path / "build/r"
@@ -265,7 +265,9 @@ def test_the_same_robot_in_another_place_is_built_to_the_same_bytes(tmp_path: Pa
         ('n: 1, path: "${file(maps)}/b.yaml", deep: {all: ["${file(maps/a.yaml)}", c], m: 2}', "", "TF816"),
     ],
 )
-def test_a_file_that_is_not_there_or_cannot_be_told_is_a_finding(tmp_path: Path, old: str, new: str, code: str) -> None:
+def test_a_file_that_is_missing_or_of_no_known_format_is_a_finding(
+    tmp_path: Path, old: str, new: str, code: str
+) -> None:
     text = FILES.replace("${build_dir}/x", "${params_file}")
     assert old in text
     found = built_at(tmp_path, "build/r", text.replace(old, new))

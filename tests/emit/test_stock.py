@@ -67,8 +67,8 @@ def test_the_stock_publisher_owns_what_is_ours_below_base_and_static_the_rest() 
     assert words[0] == "${executable:robot_state_publisher/robot_state_publisher}"
     assert joints["nodes"] == ["/rover/robot_state_publisher"]
     assert {edge["node"] for edge in plan["edges"] if edge["owner"] == "joints"} == {"/rover/robot_state_publisher"}
-    told = {words[at + 1] for at, word in enumerate(words) if word == "-r"}
-    assert {"robot_description:=~/robot_description", "/tf:=/rover/tf", "__ns:=/rover"} <= told
+    remaps = {words[at + 1] for at, word in enumerate(words) if word == "-r"}
+    assert {"robot_description:=~/robot_description", "/tf:=/rover/tf", "__ns:=/rover"} <= remaps
     assert not any("<robot" in word for word in words)
     assert joints["env"] == {"A": "b"}
     assert "static" in {process["name"] for process in plan["processes"]}
@@ -112,7 +112,7 @@ def test_static_sends_the_description_even_where_it_has_no_edge() -> None:
     ("more", "code"),
     [(", frame_prefix: r1/, shared_frames: [mast]", "TF316"), ("}\nbase: mast\nvars: {", "TF315")],
 )
-def test_what_a_stock_publisher_cannot_do_is_said(more: str, code: str) -> None:
+def test_what_a_stock_publisher_cannot_do_is_reported(more: str, code: str) -> None:
     assert [one.code for one in compiled(more).errors] == [code]
 
 

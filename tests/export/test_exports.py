@@ -120,8 +120,8 @@ def test_systemd_finds_nothing_wrong_with_the_units(
         (tmp_path / file.path).write_text(file.text, "utf-8")
     command = ["systemd-analyze", "verify", "--man=no", *(str(tmp_path / file.path) for file in files)]
     done = processes.run(command)
-    said = [line for line in done.stderr.splitlines() if str(tmp_path) in line or "rover" in line or "robot" in line]
-    assert (done.returncode, said) == (0, [])
+    output = [line for line in done.stderr.splitlines() if str(tmp_path) in line or "rover" in line or "robot" in line]
+    assert (done.returncode, output) == (0, [])
 
 
 def test_a_value_stays_what_it_is_whatever_systemd_makes_of_its_characters() -> None:
@@ -145,8 +145,8 @@ def test_ros_has_somewhere_to_log_to_in_a_service_without_a_home() -> None:
         ["tfcompose/rover"],
         ["ROS_LOG_DIR=%L/tfcompose/rover"],
     )
-    said = Machine("/opt/rover", "/usr/bin/python3", env={"ROS_LOG_DIR": "/data/log"})
-    assert "LogsDirectory" not in units(compiled_plan(DRIVEN), said)["rover-drive.service"]["Service"]
+    output = Machine("/opt/rover", "/usr/bin/python3", env={"ROS_LOG_DIR": "/data/log"})
+    assert "LogsDirectory" not in units(compiled_plan(DRIVEN), output)["rover-drive.service"]["Service"]
 
 
 @pytest.mark.parametrize(("text", "profiles"), [(DRIVEN, ()), (ROBOT, ()), (ROBOT, ("demo",))])
@@ -171,7 +171,7 @@ def test_a_strict_guard_is_started_before_what_it_passes_on() -> None:
 
 def test_each_process_is_a_service_on_the_hosts_network_that_waits_as_the_plan_says() -> None:
     plan = compiled_plan(DRIVEN)
-    (file,), said = compose(plan, Machine("..", image="robot:1"))
+    (file,), output = compose(plan, Machine("..", image="robot:1"))
     made = yaml.safe_load(file.text)
     assert set(made) == {"name", "services"}
     services = made["services"]
@@ -187,7 +187,7 @@ def test_each_process_is_a_service_on_the_hosts_network_that_waits_as_the_plan_s
     assert "healthcheck" in services["static"], "who waits for healthy waits for ever without it"
     assert (services["slam"]["restart"], services["drive"]["restart"]) == ("on-failure:3", "always")
     assert (services["drive"]["stop_signal"], services["drive"]["stop_grace_period"]) == ("SIGTERM", "2000ms")
-    assert any("other is expected" in line for line in said)
+    assert any("other is expected" in line for line in output)
 
 
 @pytest.mark.parametrize("profiles", [(), ("demo",)])
@@ -213,18 +213,18 @@ def test_a_health_check_has_ross_environment_also_where_only_the_entry_point_sou
     end = words.index("python3")
     words[end:] = ["sh", "-c", 'echo "$SOURCED $1"', "sh", "two words"]
     words = [word.replace("/opt/ros", str(tmp_path)) for word in words]
-    for distro, said in (("rolling", "yes two words"), ("jazzy", " two words")):
+    for distro, output in (("rolling", "yes two words"), ("jazzy", " two words")):
         env = {"PATH": os.environ["PATH"], "ROS_DISTRO": distro}
         done = processes.run(words, env=env)
-        assert (done.stdout.strip("\n"), done.stderr) == (said, "")
+        assert (done.stdout.strip("\n"), done.stderr) == (output, "")
 
 
-def test_a_folder_that_a_container_does_not_have_is_said() -> None:
+def test_a_folder_that_a_container_does_not_have_is_reported() -> None:
     plan = compiled_plan(DRIVEN)
     there = {"drive": "${build_dir}/x", "slam": "${build_dir}/../.."}
     processes = tuple(replace(one, cwd=there.get(one.name)) for one in plan.processes)
-    said = compose(replace(plan, processes=processes), Machine(".."))[1]
-    assert [line for line in said if "${build_dir}" in line] == [
+    output = compose(replace(plan, processes=processes), Machine(".."))[1]
+    assert [line for line in output if "${build_dir}" in line] == [
         "slam needs ${build_dir}/../.., which is outside of /robot: add a volume"
     ]
 
@@ -240,7 +240,7 @@ def load(text: str, file: Path, monkeypatch: pytest.MonkeyPatch) -> list[Recorde
     """Return the actions of a launch file, with stand-ins for what it imports of launch."""
 
     def kind(name: str) -> Any:
-        return lambda *words, **told: Recorded(kind=name, words=words, **told)
+        return lambda *words, **given: Recorded(kind=name, words=words, **given)
 
     for module in (
         "launch", "launch.actions", "launch.event_handlers", "launch.events", "launch_ros", "launch_ros.actions",
@@ -278,10 +278,10 @@ def sent(actions: list[Recorded]) -> dict[tuple[str, str], list[float] | None]:
                     ends = tuple(str(joint.find(end).get("link")) for end in ("parent", "child"))  # type: ignore[union-attr]
                     edges[ends] = None  # type: ignore[index]
         elif getattr(action, "executable", "") == "static_transform_publisher":
-            told = dict(zip(action.arguments[::2], action.arguments[1::2], strict=True))
-            ends = (told["--frame-id"], told["--child-frame-id"])
+            given = dict(zip(action.arguments[::2], action.arguments[1::2], strict=True))
+            ends = (given["--frame-id"], given["--child-frame-id"])
             assert ends not in edges
-            edges[ends] = [float(told[key]) for key in ("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw")]
+            edges[ends] = [float(given[key]) for key in ("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw")]
     return edges
 
 
@@ -320,15 +320,15 @@ def test_a_driver_is_a_node_with_its_name_parameters_and_remappings(
     assert variables == [("ROS_DOMAIN_ID", "7"), ("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")]
 
 
-def test_what_launch_does_otherwise_with_a_process_is_said() -> None:
+def test_what_launch_does_otherwise_with_a_process_is_reported() -> None:
     text = DRIVEN.replace("node: slam,", "node: slam, lifecycle: active,")
-    _, said = launch(compiled_plan(text), Machine(".."), built(text)["robot.urdf"])
-    assert [line for line in said if line.startswith(("drive", "/r1"))] == [
+    _, output = launch(compiled_plan(text), Machine(".."), built(text)["robot.urdf"])
+    assert [line for line in output if line.startswith(("drive", "/r1"))] == [
         "drive is started again without a limit",
         "drive is ended by SIGINT, and not by SIGTERM",
         "/r1/slam of slam is not brought into its lifecycle state",
     ]
-    assert "slam is started again whatever its exit code, and without a limit" in said
+    assert "slam is started again whatever its exit code, and without a limit" in output
 
 
 def test_where_a_urdf_is_not_all_that_we_send_our_own_publishers_are_started(

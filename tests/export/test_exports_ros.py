@@ -134,17 +134,17 @@ def units(folder: Path) -> dict[str, Service]:
     found = {}
     logs = folder / "log"
     for file in sorted(folder.glob("*.service")):
-        said: dict[str, list[str]] = {}
+        lines_of: dict[str, list[str]] = {}
         for line in file.read_text("utf-8").splitlines():
             key, _, value = line.partition("=")
-            said.setdefault(key, []).append(value.replace("%%", "%"))
-        env = dict(word.split("=", 1) for line in said["Environment"] for word in shlex.split(line))
-        (logs / said["LogsDirectory"][0]).mkdir(parents=True, exist_ok=True)
+            lines_of.setdefault(key, []).append(value.replace("%%", "%"))
+        env = dict(word.split("=", 1) for line in lines_of["Environment"] for word in shlex.split(line))
+        (logs / lines_of["LogsDirectory"][0]).mkdir(parents=True, exist_ok=True)
         env = {name: value.replace("%L", str(logs)) for name, value in env.items()}
-        argv = [word.replace("$$", "$") for word in shlex.split(said["ExecStart"][0])]
-        after = [Path(unit).stem for line in said.get("After", []) for unit in line.split()]
+        argv = [word.replace("$$", "$") for word in shlex.split(lines_of["ExecStart"][0])]
+        after = [Path(unit).stem for line in lines_of.get("After", []) for unit in line.split()]
         found[file.stem] = Service(
-            argv, env, Path(said["WorkingDirectory"][0]), after, notifies=said["Type"] == ["notify"]
+            argv, env, Path(lines_of["WorkingDirectory"][0]), after, notifies=lines_of["Type"] == ["notify"]
         )
     return found
 
@@ -202,8 +202,8 @@ def verified(folder: Path, wrong: str = "") -> str:
     """Compare the live tree with the plan, and return what is wrong, if a line of it fits; else nothing."""
     command = [sys.executable, "-m", "tfcompose", "verify", "build/plan.json", "--live", "--for", "3"]
     done = processes.run(command, cwd=folder)
-    said = done.stdout + done.stderr
-    return said if done.returncode and re.search(wrong, said, re.MULTILINE) else ""
+    lines_of = done.stdout + done.stderr
+    return lines_of if done.returncode and re.search(wrong, lines_of, re.MULTILINE) else ""
 
 
 @pytest.mark.parametrize(
@@ -252,13 +252,13 @@ from tfcompose.ros.node import open_node
 from tfcompose.ros.stop import Stop
 from tfcompose.ros.node import TFPublisher
 at = sys.argv.index("--ros-args")
-said, told = dict(zip(sys.argv[1:at:2], sys.argv[2:at:2])), sys.argv[at + 1 :]
-files = [told[n + 1] for n, word in enumerate(told) if word == "--params-file"]
-rules = [word for n, word in enumerate(told) if word == "-r" or told[n - 1] == "-r"]
+own, ros_args = dict(zip(sys.argv[1:at:2], sys.argv[2:at:2])), sys.argv[at + 1 :]
+files = [ros_args[n + 1] for n, word in enumerate(ros_args) if word == "--params-file"]
+rules = [word for n, word in enumerate(ros_args) if word == "-r" or ros_args[n - 1] == "-r"]
 edges = []
-if said:
-    numbers = [float(said[key]) for key in ("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw")]
-    edges.append(Transform(0, said["--frame-id"], said["--child-frame-id"], tuple(numbers[:3]), tuple(numbers[3:])))
+if own:
+    numbers = [float(own[key]) for key in ("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw")]
+    edges.append(Transform(0, own["--frame-id"], own["--child-frame-id"], tuple(numbers[:3]), tuple(numbers[3:])))
 for file in files:
     for node in yaml.safe_load(open(file)).values():
         urdf = node["ros__parameters"].get("robot_description")

@@ -93,80 +93,80 @@ def doctor() -> Iterator[Finding]:
 
 
 def _trees() -> Iterator[TreeState]:
-    yield sound_tree().fixed("base_lnk camera").seen()
-    yield sound_tree().fixed("robot1/base_link camera").seen()
-    yield sound_tree().fixed("world table").seen()
+    yield sound_tree().fixed("base_lnk camera").observed()
+    yield sound_tree().fixed("robot1/base_link camera").observed()
+    yield sound_tree().fixed("world table").observed()
     arm = MovingJoint("shoulder", "base_link", "arm")
-    yield sound_tree().fixed("arm hand").seen(moving_joints=(arm,))
-    yield TreeHistory().moving("a b").moving("b a").seen()
-    yield TreeHistory().moving("a b").moving("b a", b"x").fixed("world a").seen()
-    yield sound_tree().moving("map base_link", b"x").seen()
-    yield TreeHistory().moving("table cup", b"x", parents=lambda tick: ("table", "hand")[tick % 2]).seen()
+    yield sound_tree().fixed("arm hand").observed(moving_joints=(arm,))
+    yield TreeHistory().moving("a b").moving("b a").observed()
+    yield TreeHistory().moving("a b").moving("b a", b"x").fixed("world a").observed()
+    yield sound_tree().moving("map base_link", b"x").observed()
+    yield TreeHistory().moving("table cup", b"x", parents=lambda tick: ("table", "hand")[tick % 2]).observed()
     many = TreeHistory()
     for number in range(60):
         many.fixed(f"parent{number:02} cup")
-    yield many.seen()
-    yield sound_tree().moving("base_link base_link", b"x").seen()
-    yield sound_tree().moving("/odom /gps", b"x").seen()
+    yield many.observed()
+    yield sound_tree().moving("base_link base_link", b"x").observed()
+    yield sound_tree().moving("/odom /gps", b"x").observed()
     for quaternion_w, x in ((0.9, 0.0), (0.0, 0.0), (1.0, float("nan"))):
-        yield sound_tree().takes(row("base_link arm", END_NS, x, quaternion_w), b"x").seen()
-        yield sound_tree().takes(row("odom base_link", END_NS, x, quaternion_w)).seen()
-    yield sound_tree().moving("odom base_link", b"x").seen()
-    yield sound_tree().moving("odom base_link", b"e").seen()
-    yield sound_tree().fixed("odom base_link", b"x").seen()
-    yield TreeHistory().moving("odom base_link", until_s=2.0).seen()
-    yield sound_tree().knows(b"s").seen()
-    yield sound_tree().knows(b"d").seen()
-    yield TreeHistory().moving("odom base_link", hz=4).seen()
-    yield TreeHistory().moving("odom base_link", hz=15).seen()
+        yield sound_tree().takes(row("base_link arm", END_NS, x, quaternion_w), b"x").observed()
+        yield sound_tree().takes(row("odom base_link", END_NS, x, quaternion_w)).observed()
+    yield sound_tree().moving("odom base_link", b"x").observed()
+    yield sound_tree().moving("odom base_link", b"e").observed()
+    yield sound_tree().fixed("odom base_link", b"x").observed()
+    yield TreeHistory().moving("odom base_link", until_s=2.0).observed()
+    yield sound_tree().knows(b"s").observed()
+    yield sound_tree().knows(b"d").observed()
+    yield TreeHistory().moving("odom base_link", hz=4).observed()
+    yield TreeHistory().moving("odom base_link", hz=15).observed()
     paused = TreeHistory().moving("odom base_link", until_s=1.0)
     for tick in range(100):
         now = BEGUN_NS + 3 * SECOND_NS + tick * SECOND_NS // 50
         paused.takes(row("odom base_link", now), at_ns=now)
-    yield paused.seen()
+    yield paused.observed()
 
 
 def _stamps() -> Iterator[TreeState]:
-    yield TreeHistory().moving("odom base_link", stamp=late(0.7)).seen()
-    yield TreeHistory().moving("odom base_link", stamp=late(-0.3)).seen()
-    yield TreeHistory().moving("odom base_link", stamp=lambda _: BEGUN_NS).seen()
-    yield TreeHistory().moving("odom base_link", stamp=lambda now: now - now // 20_000_000 % 2 * SECOND_NS).seen()
-    yield TreeHistory().moving("odom base_link", stamp=lambda _: 0).seen()
-    yield TreeHistory().moving("odom base_link", stamp=since_start).seen()
-    yield TreeHistory().moving("odom base_link", stamp=late(3600)).seen()
-    yield sound_tree().moving("base_link arm", b"x", stamp=since_start).seen(clock_ns=5 * SECOND_NS)
+    yield TreeHistory().moving("odom base_link", stamp=late(0.7)).observed()
+    yield TreeHistory().moving("odom base_link", stamp=late(-0.3)).observed()
+    yield TreeHistory().moving("odom base_link", stamp=lambda _: BEGUN_NS).observed()
+    yield TreeHistory().moving("odom base_link", stamp=lambda now: now - now // 20_000_000 % 2 * SECOND_NS).observed()
+    yield TreeHistory().moving("odom base_link", stamp=lambda _: 0).observed()
+    yield TreeHistory().moving("odom base_link", stamp=since_start).observed()
+    yield TreeHistory().moving("odom base_link", stamp=late(3600)).observed()
+    yield sound_tree().moving("base_link arm", b"x", stamp=since_start).observed(clock_ns=5 * SECOND_NS)
     simulated = TreeHistory().moving("odom base_link")
     for edge in ("map odom", "base_link arm"):
         simulated.moving(edge, b"x", stamp=since_start)
-    yield simulated.seen(clock_ns=5 * SECOND_NS, clock_moves=True)
-    yield sound_tree().seen(skews_s={b"d": 3.2})
-    yield sound_tree().seen(skews_s={b"d": -0.4})
+    yield simulated.observed(clock_ns=5 * SECOND_NS, clock_moves=True)
+    yield sound_tree().observed(skews_s={b"d": 3.2})
+    yield sound_tree().observed(skews_s={b"d": -0.4})
     clock = Topic("/clock", CLOCK, ("/gazebo",), ("/nav",))
-    yield sound_tree().seen(graph=(clock,))
-    yield sound_tree().seen(graph=(clock,), clock_ns=5 * SECOND_NS)
-    yield sound_tree().seen(graph=(replace(clock, publishers=()),))
+    yield sound_tree().observed(graph=(clock,))
+    yield sound_tree().observed(graph=(clock,), clock_ns=5 * SECOND_NS)
+    yield sound_tree().observed(graph=(replace(clock, publishers=()),))
     plan = sound_plan(ros=RosSettings(clock="sim"))
-    yield sound_tree().seen(graph=(replace(clock, publishers=(), readers=()),), plan=plan)
-    yield sound_tree().seen(graph=(replace(clock, publishers=("/bag", "/gazebo")),), clock_ns=1, clock_moves=True)
+    yield sound_tree().observed(graph=(replace(clock, publishers=(), readers=()),), plan=plan)
+    yield sound_tree().observed(graph=(replace(clock, publishers=("/bag", "/gazebo")),), clock_ns=1, clock_moves=True)
 
 
 def _graphs() -> Iterator[TreeState]:
-    yield sound_tree().seen(publishers=(Publisher(b"s", "/static", static=True, latched=False),), plan=sound_plan())
-    yield sound_tree().seen(publishers=(Publisher(b"d", "/drive", static=False, reliable=False),))
-    yield sound_tree().seen(volatile_readers=("/rviz",))
-    yield sound_tree().seen(volatile_readers=("/rviz", "/viewer"))
-    yield sound_tree().seen(graph=(Topic("/tf", "std_msgs/msg/String", ("/old",)),))
-    yield sound_tree().seen(malformed={b"d": 3, None: 1})
+    yield sound_tree().observed(publishers=(Publisher(b"s", "/static", static=True, latched=False),), plan=sound_plan())
+    yield sound_tree().observed(publishers=(Publisher(b"d", "/drive", static=False, reliable=False),))
+    yield sound_tree().observed(volatile_readers=("/rviz",))
+    yield sound_tree().observed(volatile_readers=("/rviz", "/viewer"))
+    yield sound_tree().observed(graph=(Topic("/tf", "std_msgs/msg/String", ("/old",)),))
+    yield sound_tree().observed(malformed={b"d": 3, None: 1})
     both = (Topic("/robot1/tf", TF_MESSAGE, ("/robot1/drive",)), Topic("/tf", TF_MESSAGE, ("/robot1/ekf",)))
-    yield sound_tree().seen(graph=both)
-    yield sound_tree().seen(publishers=tuple(Publisher(bytes([n]), f"/n{n}", static=True) for n in range(101)))
+    yield sound_tree().observed(graph=both)
+    yield sound_tree().observed(publishers=tuple(Publisher(bytes([n]), f"/n{n}", static=True) for n in range(101)))
     joints = (MovingJoint("shoulder", "base_link", "arm"),)
     states = Topic("/joint_states", JOINT_STATE, ("/broadcaster",), ())
-    yield sound_tree().seen(graph=(states,))
-    yield sound_tree().seen(graph=(states,), moving_joints=joints)
-    yield sound_tree().seen(graph=(replace(states, publishers=(), readers=("/drive",)),), moving_joints=joints)
+    yield sound_tree().observed(graph=(states,))
+    yield sound_tree().observed(graph=(states,), moving_joints=joints)
+    yield sound_tree().observed(graph=(replace(states, publishers=(), readers=("/drive",)),), moving_joints=joints)
     heard = replace(states, readers=("/drive",))
-    yield sound_tree().seen(graph=(heard,), moving_joints=joints, joint_names=frozenset({"sholder"}))
+    yield sound_tree().observed(graph=(heard,), moving_joints=joints, joint_names=frozenset({"sholder"}))
 
 
 def _data() -> Iterator[TreeState]:
@@ -174,16 +174,16 @@ def _data() -> Iterator[TreeState]:
         return (StampedData("/scan", frame, ("/lidar",), (delay_s,) * 5, *stamps),)
 
     for frame in ("", "lasr", "elsewhere", "/laser"):
-        yield sound_tree().seen(stamped=data(frame))
+        yield sound_tree().observed(stamped=data(frame))
     prefixed = TreeHistory().moving("robot1/odom robot1/base_link").fixed("robot1/base_link robot1/laser")
-    yield prefixed.seen(stamped=data("laser"))
-    yield TreeHistory().moving("odom base_link", stamp=late(0.4)).seen(stamped=data("base_link"))
-    yield sound_tree().seen(stamped=data("laser", 12.0))
-    yield sound_tree().seen(stamped=data("laser", -1.0))
+    yield prefixed.observed(stamped=data("laser"))
+    yield TreeHistory().moving("odom base_link", stamp=late(0.4)).observed(stamped=data("base_link"))
+    yield sound_tree().observed(stamped=data("laser", 12.0))
+    yield sound_tree().observed(stamped=data("laser", -1.0))
     for stamp in (0, 1234 * SECOND_NS, END_NS + 7200 * SECOND_NS):
-        yield sound_tree().seen(stamped=data("laser", (END_NS - stamp) / 1e9, stamp, END_NS))
+        yield sound_tree().observed(stamped=data("laser", (END_NS - stamp) / 1e9, stamp, END_NS))
     simulated = TreeHistory().moving("odom base_link", stamp=since_start).fixed("base_link laser")
-    yield simulated.seen(stamped=data("laser", 0.0, END_NS, END_NS), clock_ns=5 * SECOND_NS, clock_moves=True)
+    yield simulated.observed(stamped=data("laser", 0.0, END_NS, END_NS), clock_ns=5 * SECOND_NS, clock_moves=True)
 
 
 def _setups() -> Iterator[TreeState]:
@@ -201,7 +201,7 @@ def _setups() -> Iterator[TreeState]:
         {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LAN"},
         {"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"},
     ):
-        yield sound_tree().seen(settings=settings)
+        yield sound_tree().observed(settings=settings)
 
 
 def with_a_plan() -> Iterator[Finding]:
@@ -227,8 +227,8 @@ def with_a_plan() -> Iterator[Finding]:
         (TreeHistory().moving("odom base_link").fixed("base_link laser", x=0.02), sound_plan()),
         (sound_tree().moving("odom base_link", b"e"), sound_plan()),
     ):
-        yield from diagnose(tree.seen(plan=plan))
-        yield from diagnose(replace(tree.seen(plan=plan), recorded=True))
+        yield from diagnose(tree.observed(plan=plan))
+        yield from diagnose(replace(tree.observed(plan=plan), recorded=True))
 
 
 # The guard.

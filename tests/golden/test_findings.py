@@ -224,12 +224,12 @@ def calibrations() -> Iterator[Case]:
         "  lens: {parent: base_link, calibration: FILE}\n"
         "  cam1: {parent: base_link}\n  cam0: {parent: cam1, calibration: {file: FILE, parent: cam1, child: cam0}}\n"
     )
-    whole = HEAD + "frames: {kit_link: {parent: base_link}, lens: {parent: base_link}}\ncalibrations: [FILE]\n"
+    full = HEAD + "frames: {kit_link: {parent: base_link}, lens: {parent: base_link}}\ncalibrations: [FILE]\n"
     for path in CALIBRATIONS:
         text = path.read_text("utf-8")
         for number in range(-1, 20):
             wrong = mutated(text, f"{path.name} {number}") if number >= 0 else text
-            for kind, use in (("of frames", robot), ("of all", whole)):
+            for kind, use in (("of frames", robot), ("of all", full)):
                 found = within(use.replace("FILE", path.name), "robot.yaml", {path.name: wrong})
                 yield f"{path.name} {number} {kind}", path.name, found
 

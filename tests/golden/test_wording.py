@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from tfcompose.findings import Finding
 
 GOLDEN = Path(__file__).parent / "wording"
-WRITTEN = ("robots", "specs", "bad_input", "values")
+IN_SOURCE = ("robots", "specs", "bad_input", "values")
 #: What marked specs leave out: parts, sweeps, claims of nodes.
 TEXTS = [GOLDEN / "texts" / f"{name}.yaml" for name in ("claims", "fleet", "parts", "same_names", "sweeps")]
 URDFS = sorted((ROOT / "tests/urdf/urdfs").glob("*.urdf"))
@@ -40,7 +40,7 @@ FAMILIES = ("TF0", "TF1", "TF2", "TF3", "TF4", "TF5", "TF6", "TF7", "TF8", "TF9"
 
 def findings() -> Iterator[Finding]:
     with in_the_repository():
-        for name in WRITTEN:
+        for name in IN_SOURCE:
             for _, _, found in CORPORA[name]():
                 yield from found
         for file in TEXTS:
@@ -56,9 +56,9 @@ def findings() -> Iterator[Finding]:
 @cache
 def texts() -> dict[str, str]:
     """Return what is said, each text once, by the first three letters of its code."""
-    said = {text_of(one) for one in findings()}
+    output = {text_of(one) for one in findings()}
     return {
-        family: "\n".join(sorted(text for text in said if f"[{family}" in text.partition(" ")[0]))
+        family: "\n".join(sorted(text for text in output if f"[{family}" in text.partition(" ")[0]))
         for family in FAMILIES
     }
 

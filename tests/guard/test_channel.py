@@ -12,20 +12,20 @@ if TYPE_CHECKING:
     from tfcompose.ipc import GuardEvent
 
 
-def test_each_edge_that_falls_silent_or_whose_publisher_is_gone_is_said_once_and_when_it_is_back() -> None:
+def test_each_edge_that_falls_silent_or_whose_publisher_is_gone_is_reported_once_and_when_it_is_back() -> None:
     edges = (edge("base lidar", "static", "static"), edge("base camera", "static", "static"))
     running = History(edges=(edge("odom base", "drive", rate=10), *edges)).clear()
-    said: list[GuardEvent] = []
-    look = SilentEdges([running.judge], said.append).report
+    events: list[GuardEvent] = []
+    report_silent = SilentEdges([running.judge], events.append).report
     static, drive = running.joins("/static", static=True), running.joins("/drive")
     running.send(static, FIXED).repeat(drive, "odom base", 20)
-    look()
-    assert said == []
+    report_silent()
+    assert events == []
     running.leaves(static)
     running.repeat(drive, "odom base", 50)
-    look()
-    assert said == [Silent(("camera", "lidar"), over=False)]
+    report_silent()
+    assert events == [Silent(("camera", "lidar"), over=False)]
     running.send(running.joins("/static", static=True), FIXED).wait(5)
-    look()
-    look()
-    assert said[1:] == [Silent(("base",), over=False), Silent(("camera", "lidar"), over=True)]
+    report_silent()
+    report_silent()
+    assert events[1:] == [Silent(("base",), over=False), Silent(("camera", "lidar"), over=True)]

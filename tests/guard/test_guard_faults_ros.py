@@ -17,7 +17,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from tests.support import processes
 from tests.support.guard_without_ids import guard_without_ids
-from tests.support.waiting import TIMEOUT_S, in_one_of_a_few, until, whole_lines
+from tests.support.waiting import TIMEOUT_S, complete_lines, in_one_of_a_few, until
 from tfcompose.guard.judge import FINDING_S
 from tfcompose.plan import SILENT_PERIODS
 
@@ -108,12 +108,12 @@ class Running:
     def says(self, *words: str, notes: tuple[str, ...] = ()) -> None:
         """Wait for a line with all the words, and for these notes in the lines behind it."""
 
-        def said() -> bool:
-            lines = whole_lines(self.output)
+        def reports() -> bool:
+            lines = complete_lines(self.output)
             found = ("\n".join(lines[at : at + 8]) for at, line in enumerate(lines) if all(w in line for w in words))
             return any(all(note in block for note in notes) for block in found)
 
-        assert until(said), f"{words} {notes} not in\n{self.output.read_text('utf-8')}"
+        assert until(reports), f"{words} {notes} not in\n{self.output.read_text('utf-8')}"
 
     def child(self, name: str) -> psutil.Process:
         """Return one of the robot's processes."""
@@ -121,7 +121,7 @@ class Running:
 
     def count(self, *words: str) -> int:
         """Return how many lines hold all the words."""
-        return sum(all(word in line for word in words) for line in whole_lines(self.output))
+        return sum(all(word in line for word in words) for line in complete_lines(self.output))
 
     def end(self) -> int:
         self.leaves()
@@ -176,7 +176,7 @@ def test_what_strangers_do_to_the_tree_is_named_as_what_it_is(up: Callable[[str]
 
 
 @pytest.mark.parametrize(
-    ("stamps", "code", "said"),
+    ("stamps", "code", "reports"),
     [
         ("since start", "error[TF825]", "simulated"),
         ("none", "error[TF825]", "without"),
@@ -185,11 +185,11 @@ def test_what_strangers_do_to_the_tree_is_named_as_what_it_is(up: Callable[[str]
     ],
 )
 def test_an_owner_whose_stamps_are_wrong_is_named(
-    up: Callable[[str], Running], stamps: str, code: str, said: str
+    up: Callable[[str], Running], stamps: str, code: str, reports: str
 ) -> None:
     robot = up(ROBOT)
     robot.joins("/drive", "odom base_link", stamps=stamps)
-    robot.says(code, "/drive", "odom → base_link", said)
+    robot.says(code, "/drive", "odom → base_link", reports)
     robot.says("complete")
 
 
@@ -228,8 +228,8 @@ def test_a_node_of_an_isolated_plan_that_writes_the_global_topic_is_named(up: Ca
     robot.joins("/other_robot/drive", "odom base_link")
     robot.joins("/rover/drive", "odom base_link")
     robot.says("error[TF827]", "/rover/drive", "/rover/tf")
-    said = robot.output.read_text(encoding="utf-8")
-    assert ("/other_robot" in said, said.count("TF827")) == (False, 1)
+    reports = robot.output.read_text(encoding="utf-8")
+    assert ("/other_robot" in reports, reports.count("TF827")) == (False, 1)
 
 
 def test_what_the_guard_knows_and_finds_is_on_the_diagnostics_page(up: Callable[[str], Running]) -> None:
@@ -243,7 +243,7 @@ def test_what_the_guard_knows_and_finds_is_on_the_diagnostics_page(up: Callable[
     def last() -> dict[str, Any]:
         return {line.name.removeprefix("tfcompose faulty: "): line for line in pages[-1].status} if pages else {}
 
-    def told() -> bool:
+    def reported() -> bool:
         """Return whether the page says what is; a process that was kept from running is slow for a while."""
         rclpy.spin_once(reader, timeout_sec=0.1)
         return bool(pages) and last()["slam"].level == DiagnosticStatus.OK
@@ -252,7 +252,7 @@ def test_what_the_guard_knows_and_finds_is_on_the_diagnostics_page(up: Callable[
     try:
         reader: Any = rclpy.create_node("reader")
         reader.create_subscription(DiagnosticArray, "/diagnostics", pages.append, 10)
-        assert until(told), pages
+        assert until(reported), pages
         reader.destroy_node()
     finally:
         rclpy.shutdown()
@@ -376,7 +376,7 @@ GUARDS = ["mode: watch", "mode: strict, fence: partition", "mode: strict, fence:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("guard", GUARDS)
-def test_a_rogue_at_1_khz_is_named_once_and_costs_the_guard_little_beside_a_plain_listener(
+def test_a_rogue_at_1_khz_is_named_once_and_costs_the_guard_little_more_than_a_plain_listener(
     up: Callable[[str], Running], guard: str
 ) -> None:
     robot = up(ROBOT.replace("guard: {", f"guard: {{{guard}, "))
@@ -406,7 +406,7 @@ def test_a_rogue_at_1_khz_is_named_once_and_costs_the_guard_little_beside_a_plai
 
 @pytest.mark.slow
 @pytest.mark.parametrize("guard", GUARDS)
-def test_of_more_static_publishers_than_a_listener_keeps_every_one_is_seen(
+def test_of_more_static_publishers_than_a_listener_keeps_every_one_is_received(
     up: Callable[[str], Running], guard: str
 ) -> None:
     foreign = processes.start([sys.executable, "-c", MANY], stdout=subprocess.PIPE)
@@ -416,10 +416,10 @@ def test_of_more_static_publishers_than_a_listener_keeps_every_one_is_seen(
         robot = up(ROBOT.replace("guard: {", f"guard: {{{guard}, "))
         robot.joins("/drive", "odom base_link")
         robot.says("complete")
-        told = re.compile(r"dock_\d+(?: and (\d+) more)?.* published by /foreign")
+        reported = re.compile(r"dock_\d+(?: and (\d+) more)?.* published by /foreign")
 
         def named() -> int:
-            return sum(1 + int(more or 0) for more in told.findall(robot.output.read_text("utf-8")))
+            return sum(1 + int(more or 0) for more in reported.findall(robot.output.read_text("utf-8")))
 
         assert until(lambda: named() == 120), named()
     finally:

@@ -15,7 +15,7 @@ import pytest
 
 from tests.support import processes
 from tests.support.domains import reserved_domain
-from tests.support.waiting import TIMEOUT_S, in_one_of_a_few, offences, until, whole_lines
+from tests.support.waiting import TIMEOUT_S, complete_lines, in_one_of_a_few, offences, until
 from tfcompose.ros.node import TFSubscription, open_node, wait
 from tfcompose.ros.stop import Stop
 from tfcompose.ros.tf_codec import decode
@@ -67,7 +67,7 @@ class Robot:
 
     def lines(self, *words: str) -> list[str]:
         """Return the lines that hold all the words."""
-        return [line for line in whole_lines(self.output) if all(word in line for word in words)]
+        return [line for line in complete_lines(self.output) if all(word in line for word in words)]
 
     def says(self, *words: str, times: int = 1) -> None:
         """Wait for such a line, or so many."""
@@ -176,7 +176,7 @@ def test_a_stranger_on_an_owned_edge_is_named_once(robot: Robot, stranger: Stran
     assert len(robot.lines(*named)) == 1
 
 
-def test_a_stranger_that_leaves_is_said_to_have(robot: Robot, stranger: Stranger) -> None:
+def test_a_stranger_that_leaves_is_reported_to_have(robot: Robot, stranger: Stranger) -> None:
     stranger("rogue_guest", "moving", "map odom")
     robot.says("TF801", "map → odom", "/strange/rogue_guest", "slam")
     stranger.leaves()

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.support.findings import expect, words_of
-from tests.support.guard_history import FIXED, LOOK_S, SETTLE_S, History, Publisher
+from tests.support.guard_history import FIXED, SETTLE_S, TICK_S, History, Publisher
 from tfcompose.ipc import Clear, Complete, Found, Live, OwnerReady, Recovered
 from tfcompose.plan import EdgePattern, GuardPolicy
 
@@ -24,32 +24,32 @@ def test_owners_are_live_and_nothing_is_found(running: History) -> None:
     assert running.all(Live) == [Live(owner, children) for owner, children in live]
     assert running.all(OwnerReady) == [OwnerReady(name) for name in ("static", "joints", "slam", "drive")]
     assert running.all(Complete) == [Complete(5)]
-    assert running.said() == []
+    assert running.reports() == []
 
 
 def test_all_is_clear_after_the_settling_time_when_nobody_sends(history: History) -> None:
     history.wait(SETTLE_S - 0.05)
     assert history.events == []
-    assert history.wait(LOOK_S).events == [Clear()]
+    assert history.wait(TICK_S).events == [Clear()]
 
 
 def test_an_external_owner_that_is_there_before_the_start_is_right(history: History) -> None:
     drive = history.joins("/drive")
     history.repeat(drive, "odom base", 30)
-    assert history.said() == []
+    assert history.reports() == []
     assert Live("drive", ("base",)) in history.events
 
 
 def test_a_restarted_owner_is_right_also_while_its_old_publisher_is_still_in_the_graph(running: History) -> None:
     for _ in range(4):
         running.repeat(running.joins("/slam"), "map odom", 10)
-    assert running.said() == []
+    assert running.reports() == []
 
 
 def test_an_owner_may_send_other_edges_that_are_allowed() -> None:
     running = History(GuardPolicy(unknown_edges="error", allow=(EdgePattern("map", "goal_*"),))).clear()
     running.repeat(running.joins("/slam"), "map odom, map goal_1", 5)
-    assert running.said() == []
+    assert running.reports() == []
 
 
 @settings(max_examples=60, deadline=None)
@@ -72,23 +72,25 @@ def test_rightful_messages_are_never_found_however_they_are_ordered_and_their_na
             named.append((running.now + delay, publishers[node], node))
         for at, publisher, name in named:
             publisher.node = name if running.now >= at else publisher.node
-        running.send(publishers[node], edges[node], ago=min(delay, running.now - 1000 - SETTLE_S - LOOK_S)).wait(pause)
+        running.send(publishers[node], edges[node], ago=min(delay, running.now - 1000 - SETTLE_S - TICK_S)).wait(pause)
     for _, publisher, name in named:
         publisher.node = name
     running.wait(2)
-    assert running.said() == []
+    assert running.reports() == []
     assert {e.owner for e in running.all(Live) if isinstance(e, Live)} == {name[1:] for name in publishers}
 
 
-def test_a_foreign_publisher_is_named_once_and_within_a_look(running: History) -> None:
+def test_a_foreign_publisher_is_named_once_and_at_the_next_check(running: History) -> None:
     rogue = running.joins("/rogue")
-    running.send(rogue, "map odom").wait(LOOK_S).repeat(rogue, "map odom", 100)
+    running.send(rogue, "map odom").wait(TICK_S).repeat(rogue, "map odom", 100)
     (found,) = running.found()
     expect(found, "TF801", "map → odom", "/rogue", "slam (/slam)", "rover.yaml:7")
     assert found.severity == "error"
 
 
-def test_a_foreign_publisher_that_ended_is_said_to_have_and_is_reported_when_it_comes_again(running: History) -> None:
+def test_a_foreign_publisher_that_ended_is_reported_to_have_and_is_reported_when_it_comes_again(
+    running: History,
+) -> None:
     rogue = running.joins("/rogue")
     running.repeat(rogue, "map odom", 5)
     running.leaves(rogue)
@@ -122,14 +124,14 @@ def test_a_latched_offence_lasts_while_its_publisher_does(running: History) -> N
 
 def test_many_edges_of_one_node_are_one_finding_also_when_each_comes_in_a_message_of_its_own(running: History) -> None:
     rogue = running.joins("/rogue", static=True)
-    running.send(rogue, "base lidar").send(rogue, "base camera").wait(LOOK_S)
+    running.send(rogue, "base lidar").send(rogue, "base camera").wait(TICK_S)
     (found,) = running.found()
     expect(found, "TF801", "base → lidar and 1 more", "/rogue", "static (/static)")
     assert [note.message for note in found.notes][:2] == ["base → lidar", "base → camera"]
 
 
 def test_edges_of_several_owners_are_one_finding_that_names_all_owners(running: History) -> None:
-    running.send(running.joins("/rogue"), "map odom, odom base, odom base").wait(LOOK_S)
+    running.send(running.joins("/rogue"), "map odom, odom base, odom base").wait(TICK_S)
     (found,) = running.found()
     expect(found, "TF801", "map → odom and 1 more", "/rogue", "slam (/slam), drive (/drive)")
 
@@ -141,12 +143,12 @@ def test_edges_that_an_offender_adds_later_are_reported_too_and_those_of_a_flood
     running.wait(1)
     assert 2 <= len(running.found()) <= 6
     assert len(running.found()[1].notes) <= 13
-    running.send(rogue, "map odom").wait(LOOK_S)
+    running.send(rogue, "map odom").wait(TICK_S)
     assert running.found()[-1].code == "TF801"
 
 
 def test_a_second_parent_is_reported_with_both_parents(running: History) -> None:
-    running.send(running.joins("/rogue"), "base_footprint base").wait(LOOK_S)
+    running.send(running.joins("/rogue"), "base_footprint base").wait(TICK_S)
     (found,) = running.found()
     expect(found, "TF802", "base", "base_footprint (from /rogue)", "odom", "drive (/drive)")
 
@@ -189,12 +191,14 @@ def test_a_volatile_writer_of_static_edges_is_reported_once_with_what_it_owns(ru
 
 
 @pytest.mark.parametrize("late", [0.0, 5.0])
-def test_an_owner_that_replaced_a_latched_edge_before_it_was_heard_is_told_once_with_what_is_lost(late: float) -> None:
+def test_an_owner_that_replaced_a_latched_edge_before_it_was_heard_is_reported_once_with_what_is_lost(
+    late: float,
+) -> None:
     running = History().clear().wait(late)
     static = running.joins("/static", static=True)
     static.sent = 1  # with base → lidar, before the guard had found it
     running.send(static, "base camera").wait(1)
-    assert running.said() == []
+    assert running.reports() == []
     running.wait(5)
     (found,) = running.found()
     expect(found, "TF850", "/static", "1 message", "/tf_static", "base → lidar")
@@ -211,21 +215,23 @@ def test_an_owner_whose_latched_messages_were_all_heard_or_hold_all_replaced_not
     static.sent = 0 if edges == "base camera" else 3
     running.send(static, edges).wait(5)
     running.send(static, FIXED).wait(5)
-    assert running.said() == []
+    assert running.reports() == []
 
 
-def test_of_who_has_new_frames_again_and_again_is_told_ever_more_rarely_and_of_all_of_them(running: History) -> None:
+def test_of_who_has_new_frames_again_and_again_is_reported_ever_more_rarely_and_of_all_of_them(
+    running: History,
+) -> None:
     """A tracker that names its frames after what it sees: tag_1, tag_2, …; for a minute, ten a second."""
     tracker = running.joins("/tracker")
     for number in range(600):
         running.send(tracker, f"base tag_{number}").wait(0.1)
-    assert 5 < len(running.said()) < 10
+    assert 5 < len(running.reports()) < 10
     running.wait(130)
-    for told in (running.said(), running.over()):
-        assert len(told) < 20
-        counted = [re.search(r"and (\d+) more", one) for one in told]
+    for texts in (running.reports(), running.over()):
+        assert len(texts) < 20
+        counted = [re.search(r"and (\d+) more", one) for one in texts]
         assert sum(1 + int(more[1]) if more else 1 for more in counted) == 600
     found = [event.found for event in running.events if isinstance(event, Found)]
     assert "child: 'tag_*'}" in (found[-1].help or "")
     running.send(tracker, "base tag_600").wait(0.5)
-    assert "base → tag_600" in running.said()[-1], "after some quiet it is told at once again"
+    assert "base → tag_600" in running.reports()[-1], "after some quiet it is told at once again"

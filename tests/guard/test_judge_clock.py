@@ -29,7 +29,7 @@ def test_an_owner_that_stamps_with_another_clock_is_reported_and_when_it_is_righ
 
 
 @pytest.mark.parametrize(
-    ("off", "said"),
+    ("off", "reports"),
     [
         (-60.0, "60 s behind"),
         (3600.0, "1 h ahead of"),
@@ -38,12 +38,12 @@ def test_an_owner_that_stamps_with_another_clock_is_reported_and_when_it_is_righ
         (None, "without"),
     ],
 )
-def test_a_clock_that_is_more_than_ten_seconds_off_is_wrong(running: History, off: float | None, said: str) -> None:
+def test_a_clock_that_is_more_than_ten_seconds_off_is_wrong(running: History, off: float | None, reports: str) -> None:
     slam = running.joins("/slam")
     for _ in range(10):
         running.send(slam, "map odom", stamp_s=0 if off is None else wall(running) + off).wait(0.1)
-    assert [found.code for found in running.found() if found.code != "TF823"] == (["TF825"] if said else [])
-    assert not said or said in running.said()[0]
+    assert [found.code for found in running.found() if found.code != "TF823"] == (["TF825"] if reports else [])
+    assert not reports or reports in running.reports()[0]
 
 
 def test_one_stray_stamp_is_no_wrong_clock(running: History) -> None:
@@ -54,7 +54,7 @@ def test_one_stray_stamp_is_no_wrong_clock(running: History) -> None:
 
 
 @pytest.mark.parametrize("off", [0.0, -60.0])
-def test_what_waited_while_the_guard_was_kept_from_looking_says_nothing_of_its_senders_clock(
+def test_what_waited_while_the_guard_was_kept_from_running_reports_nothing_of_its_senders_clock(
     running: History, off: float
 ) -> None:
     slam = running.joins("/slam")
@@ -63,7 +63,7 @@ def test_what_waited_while_the_guard_was_kept_from_looking_says_nothing_of_its_s
     running.now += 12.7  # the guard, or the machine, stood still, and looks again
     for n in range(30):
         running.send(slam, "map odom", stamp_s=waited + n / 50)
-    assert running.look().said() == []
+    assert running.check().reports() == []
     for _ in range(60):
         running.send(slam, "map odom", stamp_s=wall(running) + off).wait(0.1)
     assert [found.code for found in running.found() if found.code != "TF824"] == (["TF825"] if off else [])
@@ -75,7 +75,7 @@ def test_in_simulated_time_the_systems_time_is_the_wrong_one_and_clock_decides()
     for n in range(20):
         running.send(slam, "map odom", stamp_s=wall(running))
         running.send(drive, "odom base", stamp_s=100 + n / 10).wait(0.1)
-    assert running.said() == []  # nothing on /clock, so nothing is known
+    assert running.reports() == []  # nothing on /clock, so nothing is known
     for n in range(20):
         running.judge.clock(round((102 + n / 10) * 1e9), running.now)
         running.send(slam, "map odom", stamp_s=wall(running))
@@ -133,7 +133,7 @@ def test_simulated_time_that_begins_again_takes_the_stamps_with_it() -> None:
     for n in range(60):
         running.judge.clock(round((20 + n % 30 / 10) * 1e9), running.now)
         running.send(drive, "odom base", stamp_s=20 + n % 30 / 10).wait(0.1)
-    assert running.said() == []
+    assert running.reports() == []
 
 
 def test_the_same_stamp_again_and_again_is_a_warning_and_now_and_then_is_nothing(running: History) -> None:

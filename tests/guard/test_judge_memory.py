@@ -21,7 +21,7 @@ from tfcompose.plan import Claim, EdgePattern, GuardPolicy, PlanEdge, PlanProces
 @given(st.lists(st.tuples(st.sampled_from("sdrjx"), st.sampled_from((0.0, 0.05, 0.1, 0.7))), max_size=60))
 def test_remembered_verdicts_are_those_that_would_be_given_anew(sends: list[tuple[str, float]]) -> None:
     """The same history, judged with and without memory of what was judged before."""
-    said = []
+    reports = []
     for forgets in (False, True):
         running = History(GuardPolicy(allow=(EdgePattern("map", "person"),))).clear()
         senders = {
@@ -36,8 +36,8 @@ def test_remembered_verdicts_are_those_that_would_be_given_anew(sends: list[tupl
                 running.judge._verdicts._verdicts.clear()
             running.send(*senders[who]).wait(pause)
         running.wait(1)
-        said.append(running.events)
-    assert said[0] == said[1]
+        reports.append(running.events)
+    assert reports[0] == reports[1]
 
 
 def test_edges_that_waited_for_a_name_share_a_history_all_the_same(running: History) -> None:
@@ -54,7 +54,7 @@ def test_edges_that_waited_for_a_name_share_a_history_all_the_same(running: Hist
     assert [len(one.children) for one in running.all(Live) if isinstance(one, Live)] == [99]
 
 
-def test_each_edge_has_its_publisher_rate_age_and_delay_and_is_not_seen_before_it_came() -> None:
+def test_each_edge_has_its_publisher_rate_age_and_delay_and_none_before_it_came() -> None:
     rated = tuple(replace(one, rate=10.0) if one.owner == "slam" else one for one in EDGES)
     running = History(edges=rated).clear()
     slam, static = running.joins("/slam"), running.joins("/static", static=True)
@@ -109,7 +109,7 @@ def test_a_judge_that_follows_another_tells_nothing_twice_and_goes_on(running: H
     static, slam, rogue = running.joins("/static", static=True), running.joins("/slam"), running.joins("/rogue")
     volatile = running.joins("/volatile", static=True, volatile=True)
     running.send(static, FIXED).repeat(slam, "map odom", 5).repeat(rogue, "map odom, map cup", 5)
-    assert [line[:5] for line in running.said()] == ["TF806", "TF801", "TF803"]
+    assert [line[:5] for line in running.reports()] == ["TF806", "TF801", "TF803"]
     assert running.all(Live) != []
     running.dies()
     assert running.events == [Clear()]
@@ -138,21 +138,21 @@ def test_a_judge_that_follows_another_does_not_miss_whom_it_has_not_found_yet(ru
     assert running.events == [Clear()]
     running.leaves(static)
     running.repeat(rogue, "map odom", 20)
-    assert sorted(line[:10] for line in running.said()) == ["TF804 slam", "TF804 stat"]
+    assert sorted(line[:10] for line in running.reports()) == ["TF804 slam", "TF804 stat"]
 
 
-def test_an_owner_that_was_silent_is_not_said_to_be_again_and_is_back_when_it_is() -> None:
+def test_an_owner_that_was_silent_is_not_reported_to_be_again_and_is_back_when_it_is() -> None:
     running = History(edges=(edge("map odom", "slam", rate=10.0),)).clear()
     slam = running.joins("/slam")
     running.repeat(slam, "map odom", 30).wait(2)
-    assert [line[:5] for line in running.said()] == ["TF804"]
+    assert [line[:5] for line in running.reports()] == ["TF804"]
     running.dies().wait(8)
     assert running.events == [Clear()]
     running.repeat(slam, "map odom", 5)
     assert [event for event in running.events if not isinstance(event, Clear)] == running.all(Recovered) != []
 
 
-def test_a_namesake_is_still_told_from_the_owner_after_the_guard_died(running: History) -> None:
+def test_a_namesake_is_still_distinguished_from_the_owner_after_the_guard_died(running: History) -> None:
     slam, other = running.joins("/slam"), running.joins("/slam")
     running.repeat(slam, "map odom", 5).dies()
     running.send(other, "map odom").repeat(slam, "map odom", 5)
@@ -170,7 +170,7 @@ def test_a_message_may_pass_when_all_of_it_is_its_senders_and_only_once_that_has
         ("/slam", "odom map", set()),
     ):
         slam.node = name
-        running.look().send(slam, edges)
+        running.check().send(slam, edges)
         assert running.judge.admitted == admitted, edges
         running.send(slam, edges)
         assert running.judge.admitted == admitted, edges
@@ -188,7 +188,7 @@ def test_only_an_offender_that_is_surely_of_the_run_can_be_stopped_for_it() -> N
 
 
 @pytest.mark.parametrize(("ours", "process"), [(True, "slam"), (False, ""), (None, "slam")])
-def test_an_offender_whose_process_is_seen_is_of_the_run_or_is_not(*, ours: bool | None, process: str) -> None:
+def test_an_offender_whose_process_is_known_is_of_the_run_or_is_not(*, ours: bool | None, process: str) -> None:
     running = History(processes=(PlanProcess("slam", "run", nodes=("/slam",)),)).clear()
     slam = running.joins("/slam")
     running.send(slam, "odom base")
@@ -201,7 +201,7 @@ def test_an_offender_whose_process_is_seen_is_of_the_run_or_is_not(*, ours: bool
 @pytest.mark.parametrize(
     ("process", "edges", "ours"), [("slam", "map odom", True), ("slam", "odom base", False), ("", "map odom", False)]
 )
-def test_an_owner_whose_node_has_another_name_is_told_to_say_so_and_not_to_end_itself(
+def test_an_owner_whose_node_has_another_name_is_advised_to_declare_it_and_not_to_end_itself(
     process: str, edges: str, *, ours: bool
 ) -> None:
     processes = [PlanProcess(name, "run", nodes=(f"/{name}",)) for name in ("slam", "drive")]

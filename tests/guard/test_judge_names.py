@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from tests.support.findings import expect
-from tests.support.guard_history import EDGES, FIXED, LOOK_S, PROCESSES, SETTLE_S, History
+from tests.support.guard_history import EDGES, FIXED, PROCESSES, SETTLE_S, TICK_S, History
 from tfcompose.guard.judge import Judge
 from tfcompose.ipc import Live, Recovered, Taken
 from tfcompose.live.state import NAMELESS
@@ -15,9 +15,9 @@ from tfcompose.plan import Plan, RosSettings
 def test_a_publisher_whose_name_comes_later_is_judged_when_it_is_known(running: History) -> None:
     rogue = running.joins(None)
     running.send(rogue, "map odom").wait(0.4)
-    assert running.said() == []
+    assert running.reports() == []
     rogue.node = "/rogue"
-    expect(running.wait(LOOK_S).only(), "TF801", "/rogue;")
+    expect(running.wait(TICK_S).only(), "TF801", "/rogue;")
 
 
 def test_an_owner_whose_name_comes_after_seconds_is_not_blamed(running: History) -> None:
@@ -25,7 +25,7 @@ def test_an_owner_whose_name_comes_after_seconds_is_not_blamed(running: History)
     running.repeat(slam, "map odom", 40)
     slam.node = "/slam"
     running.repeat(slam, "map odom", 10)
-    assert running.said() == []
+    assert running.reports() == []
     assert Live("slam", ("odom",)) in running.events
 
 
@@ -36,7 +36,7 @@ def test_a_publisher_without_a_name_is_reported_within_a_second_where_the_owner_
     expect(running.only(), "TF801", "map → odom", NAMELESS, "slam (/slam)")
 
 
-def test_a_publisher_that_gets_its_name_after_it_was_reported_is_named_once_and_not_said_to_have_ended(
+def test_a_publisher_that_gets_its_name_after_it_was_reported_is_named_once_and_not_reported_to_have_ended(
     running: History,
 ) -> None:
     slam, stranger = running.joins("/slam"), running.joins(None)
@@ -56,11 +56,11 @@ def test_a_publisher_that_never_gets_a_name_is_reported_at_last(running: History
 
 def test_a_publisher_that_sends_once_and_leaves_is_named(running: History) -> None:
     rogue = running.joins("/rogue")
-    running.look().leaves(rogue)
-    assert "/rogue" in running.send(rogue, "map odom").wait(LOOK_S).said()[0]
+    running.check().leaves(rogue)
+    assert "/rogue" in running.send(rogue, "map odom").wait(TICK_S).reports()[0]
 
 
-def test_two_publishers_of_one_name_that_take_turns_are_reported_and_the_edge_is_not_silent() -> None:
+def test_two_publishers_of_one_name_that_alternate_are_reported_and_the_edge_is_not_silent() -> None:
     rated = tuple(replace(one, rate=10.0) if one.owner == "slam" else one for one in EDGES)
     running = History()
     running.judge = Judge(
@@ -86,7 +86,7 @@ def test_a_static_process_in_the_place_of_one_that_has_left_is_right(running: Hi
     first = running.joins("/static", static=True)
     running.send(first, FIXED).wait(1).leaves(first)
     running.send(running.joins("/static", static=True), FIXED).wait(1)
-    assert running.said() == []
+    assert running.reports() == []
 
 
 def test_a_static_owner_that_leaves_is_reported_once(running: History) -> None:
@@ -101,7 +101,7 @@ def test_without_ids_nobody_is_blamed_where_the_owner_may_have_sent_it() -> None
     slam, rogue = running.joins("/slam"), running.joins("/slam_helper")
     for _ in range(10):
         running.send(slam, "map odom").send(rogue, "map odom").wait(0.1)
-    assert running.said() == []
+    assert running.reports() == []
 
 
 def test_without_ids_one_of_those_that_may_have_sent_it_is_blamed_once_and_nobody_was_first() -> None:
@@ -117,7 +117,7 @@ def test_without_ids_one_of_those_that_may_have_sent_it_is_blamed_once_and_nobod
     assert running.all(Taken) == []
 
 
-def test_ids_that_do_not_say_whose_they_are_tell_two_that_take_turns_apart() -> None:
+def test_ids_that_do_not_say_whose_they_are_distinguish_two_that_alternate() -> None:
     running = History(says_who=False).clear()
     slam, rogue = running.joins("/slam"), running.joins("/rogue")
     running.repeat(slam, "map odom", 5)
@@ -135,8 +135,8 @@ def test_where_ids_do_not_say_whose_they_are_who_came_just_now_is_one_of_those_t
     slam, rogue = running.joins("/slam"), running.joins("/rogue", hidden=True)
     running.joins("/drive")
     running.repeat(slam, "map odom", 5)
-    for turn in range(20):
-        if turn == 5:
+    for step in range(20):
+        if step == 5:
             running.graph.append(rogue)
         running.send(slam, "map odom").send(rogue, "map odom").wait(0.1)
     expect(running.only(), "TF801", "map → odom", "one of /drive, /rogue, /slam;", "slam (/slam)")
@@ -153,7 +153,7 @@ def test_ids_that_do_not_say_whose_they_are_blame_no_owner_and_nobody_who_was_st
     again = running.joins("/slam")
     for _ in range(30):
         running.send(again, "map odom").send(drive, "odom base").wait(0.1)
-    assert running.said() == []
+    assert running.reports() == []
     assert {child for one in running.all(Live) if isinstance(one, Live) for child in one.children} >= {"odom", "base"}
 
 

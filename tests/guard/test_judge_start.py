@@ -69,7 +69,7 @@ def test_a_publisher_that_began_just_before_the_start_is_found_and_not_taken_for
     assert [type(event) for event in running.events if isinstance(event, (Found, Taken))] == [Found]
 
 
-def test_lost_messages_do_not_turn_a_newcomer_into_one_that_was_first(running: History) -> None:
+def test_lost_messages_do_not_make_a_newcomer_one_that_was_first(running: History) -> None:
     rogue = running.joins("/rogue")
     running.wait(0.3)
     rogue.sent = 10
@@ -88,7 +88,7 @@ def test_lost_messages_do_not_turn_a_newcomer_into_one_that_was_first(running: H
     st.floats(0, 0.8),
     st.floats(0, 0.2),
 )
-def test_jitter_and_a_hiccup_do_not_turn_a_newcomer_into_one_that_was_first(
+def test_jitter_and_a_hiccup_do_not_make_a_newcomer_one_that_was_first(
     hertz: int, jitter: list[float], at: int, hiccup: float, unheard_s: float
 ) -> None:
     running = History().clear()

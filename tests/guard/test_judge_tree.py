@@ -19,7 +19,7 @@ def test_the_owner_may_hang_a_switched_edge_on_each_of_its_parents_and_on_no_oth
     changer = history.joins("/changer")
     for parent in ("arm", "rack_1", "rack_2", "arm"):
         history.repeat(changer, f"{parent} tool", 5)
-    assert history.said() == []
+    assert history.reports() == []
     history.repeat(changer, "table tool", 10)
     expect(history.only(), "TF802", "changer (/changer)", "table → tool", "arm → tool")
 
@@ -52,30 +52,32 @@ def test_a_loop_through_several_strangers_is_found_when_the_last_edge_comes(runn
         running.send(one, "base cup").send(other, "cup map").wait(0.1)
     loop = next(found.message for found in running.found() if found.code == "TF820")
     assert loop.endswith("cup → map from /other")
-    assert "the frames map → odom → base → cup → map" in next(said for said in running.said() if "TF820" in said)
+    assert "the frames map → odom → base → cup → map" in next(
+        reports for reports in running.reports() if "TF820" in reports
+    )
 
 
 def test_a_loop_among_frames_of_others_is_not_the_robots_business_where_these_are_allowed() -> None:
     running = History(GuardPolicy(allow=(EdgePattern("cup", "saucer"), EdgePattern("saucer", "cup")))).clear()
     running.repeat(running.joins("/waiter"), "cup saucer, saucer cup", 10)
-    assert running.said() == []
+    assert running.reports() == []
 
 
 def test_an_edge_that_others_stopped_sending_closes_no_loop_any_more(running: History) -> None:
     one = running.joins("/one")
     running.repeat(one, "base cup", 3).leaves(one)
     running.wait(12).repeat(running.joins("/other"), "cup map", 3)
-    assert [said[:5] for said in running.said()] == ["TF803", "TF803"]
+    assert [reports[:5] for reports in running.reports()] == ["TF803", "TF803"]
 
 
 def test_a_stranger_that_sends_for_long_closes_a_loop_all_the_same(running: History) -> None:
     one = running.joins("/one")
     running.repeat(one, "base cup", 200)
     running.send(running.joins("/other"), "cup map").send(one, "base cup").wait(0.2)
-    assert "TF820" in [said[:5] for said in running.said()]
+    assert "TF820" in [reports[:5] for reports in running.reports()]
 
 
-def test_a_loop_is_said_to_be_over_and_to_have_been_there_before_the_start(running: History) -> None:
+def test_a_loop_is_reported_to_be_over_and_to_have_been_there_before_the_start(running: History) -> None:
     rogue = running.joins("/rogue")
     running.repeat(rogue, "base map", 5).leaves(rogue)
     (over,) = running.wait(4).over()
@@ -87,7 +89,7 @@ def test_a_loop_is_said_to_be_over_and_to_have_been_there_before_the_start(runni
     expect(early.only(), "TF807", "base → map", "/rogue", "map → odom → base → map")
 
 
-def test_a_frame_in_itself_is_said_to_be_dropped_and_is_no_second_parent(running: History) -> None:
+def test_a_frame_in_itself_is_reported_to_be_dropped_and_is_no_second_parent(running: History) -> None:
     running.repeat(running.joins("/slam"), "odom odom", 5)
     expect(running.only(), "TF821", "/slam", "odom → odom")
     assert running.only().severity == "warning"
@@ -109,7 +111,7 @@ def test_a_node_that_was_started_anew_is_no_second_writer() -> None:
     for _ in range(3):
         tracker = running.joins("/tracker")
         running.repeat(tracker, "map person_1", 5).leaves(tracker)
-    assert running.said() == []
+    assert running.reports() == []
 
 
 @pytest.mark.parametrize("static", [False, True])

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from tfcompose.findings import Finding
     from tfcompose.plan import EdgeKind
 
-LOOK_S = 0.1
+TICK_S = 0.1
 
 
 def edge(names: str, owner: str, rate: float | None = None, kind: EdgeKind = "dynamic") -> PlanEdge:
@@ -44,8 +44,8 @@ class History:
     def run(self, seconds: float, arrivals: Iterable[tuple[float, str]] = ()) -> History:
         """Let time pass with these arrivals, at seconds from now."""
         begun = self.now
-        looks = [(LOOK_S * n, "") for n in range(1, round(seconds / LOOK_S) + 1)]
-        for at, child in sorted([*arrivals, *looks]):
+        ticks = [(TICK_S * n, "") for n in range(1, round(seconds / TICK_S) + 1)]
+        for at, child in sorted([*arrivals, *ticks]):
             self.now = begun + at
             self.events += self.live.arrived((child,), self.now) if child else self.live.judge(self.now)
         self.now = begun + seconds
@@ -110,7 +110,7 @@ def test_edges_without_a_rate_and_static_ones_are_never_silent(watch: Callable[.
     assert history.steadily(0.1, 10, "left", "lidar").run(60).found() == []
 
 
-def test_a_slow_rate_may_be_quiet_for_four_periods(watch: Callable[..., History]) -> None:
+def test_a_slow_rate_may_be_silent_for_four_periods(watch: Callable[..., History]) -> None:
     history = watch(edge("map odom", "slam", 0.5)).steadily(20, 0.5, "odom").run(5)
     assert history.found() == []
     assert len(history.run(2).found()) == 1
@@ -152,7 +152,7 @@ def test_an_owner_that_is_nearly_as_fast_as_declared_or_faster_is_right(
     assert watch(edge("map odom", "slam", 10)).steadily(20, hertz, "odom").found() == []
 
 
-def test_an_owner_that_is_fast_enough_again_is_said_to_be(watch: Callable[..., History]) -> None:
+def test_an_owner_that_is_fast_enough_again_is_reported_to_be(watch: Callable[..., History]) -> None:
     history = watch(edge("map odom", "slam", 10)).steadily(6, 5, "odom").steadily(6, 10, "odom")
     assert len(history.found()) == 1
     (over,) = history.over()
@@ -164,7 +164,7 @@ def test_several_slow_edges_of_one_owner_are_one_finding(watch: Callable[..., Hi
     expect(history.only(), "TF805", "odom → a, odom → b", " 5 Hz", "drive (/drive)", " 10 Hz")
 
 
-def test_an_owner_that_sends_a_tenth_of_what_is_declared_is_silent_then_slow_and_no_more_is_said(
+def test_an_owner_that_sends_a_tenth_of_what_is_declared_is_silent_then_slow_and_nothing_else(
     watch: Callable[..., History],
 ) -> None:
     history = watch(edge("map odom", "slam", 10)).steadily(3, 10, "odom").steadily(60, 1, "odom")
@@ -179,7 +179,7 @@ def test_a_hiccup_of_half_a_second_is_neither_silence_nor_slowness(watch: Callab
 
 
 @pytest.mark.parametrize(("stall_s", "late_s"), [(0.5, 0.2), (2, 3), (30, 3)])
-def test_a_guard_that_was_kept_from_looking_does_not_cry_wolf(
+def test_a_guard_that_was_kept_from_running_reports_nothing_false(
     watch: Callable[..., History], stall_s: float, late_s: float
 ) -> None:
     history = watch(edge("map odom", "slam", 10), edge("odom base", "drive", 50))
@@ -200,15 +200,15 @@ def test_a_guard_that_was_kept_from_looking_does_not_cry_wolf(
     st.lists(st.floats(-0.45, 0.45), min_size=400, max_size=400),
     st.lists(st.sampled_from((0.05, 0.1, 0.2, 0.4, 1.5)), max_size=12),
 )
-def test_jitter_and_looks_at_uneven_times_find_nothing(hertz: float, jitter: list[float], looks: list[float]) -> None:
+def test_jitter_and_checks_at_uneven_times_find_nothing(hertz: float, jitter: list[float], ticks: list[float]) -> None:
     plan = Plan("rover", "0", None, RosSettings(), (edge("map odom", "slam", hertz),), ())
     live, at, now, sent = Liveness(plan), 500.0, 500.0, 0
     times = [500.0 + (n + part) / hertz for n, part in enumerate(jitter)]
-    for pause in [*looks, *[LOOK_S] * 20]:
+    for pause in [*ticks, *[TICK_S] * 20]:
         now += pause
         while sent < len(times) and times[sent] <= now:
             at = max(at, times[sent])
-            live.arrived(("odom",), now if pause > LOOK_S else at)
+            live.arrived(("odom",), now if pause > TICK_S else at)
             sent += 1
         if sent < len(times):
             assert [event for event in live.judge(now) if isinstance(event, Found)] == []

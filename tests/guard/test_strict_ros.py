@@ -15,7 +15,7 @@ import pytest
 
 from tests.support import processes
 from tests.support.guard_without_ids import guard_without_ids
-from tests.support.waiting import TIMEOUT_S, gone, until, whole_lines
+from tests.support.waiting import TIMEOUT_S, complete_lines, gone, until
 from tfcompose.ros.graph import writers
 from tfcompose.ros.node import TFPublisher, TFSubscription, open_node, wait
 from tfcompose.ros.stop import Stop
@@ -111,14 +111,14 @@ class Fenced:
             self.popen = processes.start(command, cwd=folder, stdout=out, stderr=out, env=os.environ | env)
 
     def lines(self, word: str) -> list[str]:
-        return [line for line in whole_lines(self.output) if word in line]
+        return [line for line in complete_lines(self.output) if word in line]
 
     @property
     def text(self) -> str:
         return self.output.read_text(encoding="utf-8")
 
     def says(self, *words: str) -> None:
-        there = until(lambda: any(all(word in line for word in words) for line in whole_lines(self.output)), 60)
+        there = until(lambda: any(all(word in line for word in words) for line in complete_lines(self.output)), 60)
         assert there, (words, self.text)
 
     def guard(self) -> psutil.Process:
@@ -144,7 +144,7 @@ def robot(request: pytest.FixtureRequest, domain: object, tmp_path: Path) -> Ite
         running.end()
 
 
-class Ear:
+class Listener:
     """A listener like anybody's."""
 
     def __init__(self, node: object) -> None:
@@ -169,7 +169,7 @@ def of_the_base(received: list[Received]) -> set[str]:
     return {one.data.hex() for one in received if children([one]) == {"base_link"}}
 
 
-def told(robot: Fenced) -> list[str]:
+def reported(robot: Fenced) -> list[str]:
     return [line for line in robot.lines(" published by /rogue") if "note" not in line]
 
 
@@ -177,9 +177,9 @@ def test_only_what_each_process_owns_gets_through_unchanged_and_what_is_held_bac
     robot.says("error[TF801]", "/rogue;")
     robot.says("warning[TF803]", "tool → cup", "/rogue")
     with open_node("late", "/test") as node:
-        ear = Ear(node)
-        received = ear.hears(TIMEOUT_S, lambda some: children(some) >= FRAMES and len(of_the_base(some)) > 10)
-        received += ear.hears(2)
+        listener = Listener(node)
+        received = listener.hears(TIMEOUT_S, lambda some: children(some) >= FRAMES and len(of_the_base(some)) > 10)
+        received += listener.hears(2)
         names: dict[bytes | None, str] = {}
 
         def named() -> bool:
@@ -211,11 +211,11 @@ def test_only_what_each_process_owns_gets_through_unchanged_and_what_is_held_bac
 
 def test_while_the_guard_is_dead_nothing_passes_and_the_next_one_passes_all_on_again(robot: Fenced) -> None:
     with open_node("early", "/test") as node, open_node("meanwhile", "/test") as other:
-        ear = Ear(node)
-        assert children(ear.hears(TIMEOUT_S, lambda some: children(some) >= FRAMES)) == FRAMES
+        listener = Listener(node)
+        assert children(listener.hears(TIMEOUT_S, lambda some: children(some) >= FRAMES)) == FRAMES
         more = re.compile(r"(?: and (\d+) more edge)? (?:is|are) published by /rogue")
-        assert until(lambda: sum(1 + int(more.findall(line)[0] or 0) for line in told(robot)) == 3), robot.text
-        before = told(robot)
+        assert until(lambda: sum(1 + int(more.findall(line)[0] or 0) for line in reported(robot)) == 3), robot.text
+        before = reported(robot)
         dead = robot.guard()
         dead.kill()
         assert until(lambda: gone(dead))
@@ -223,19 +223,19 @@ def test_while_the_guard_is_dead_nothing_passes_and_the_next_one_passes_all_on_a
         meanwhile: list[Received] = []
 
         def is_back() -> bool:
-            meanwhile.extend(ear.hears(0.05))
+            meanwhile.extend(listener.hears(0.05))
             return robot.text.count("started guard") == 2
 
         assert until(is_back), robot.text  # it waits a second, and then needs some time to listen
         began_ns = robot.guard().create_time() * 1e9
         assert [one for one in meanwhile if died_ns < one.source_ns < began_ns] == []
-        joined = Ear(other)
+        joined = Listener(other)
         robot.says("warning[TF808]", "guard", "SIGKILL", "/tf")
         robot.says("over", "guard")
-        assert children(ear.hears(TIMEOUT_S, lambda some: children(some) >= FRAMES - FIXED)) >= FRAMES - FIXED
+        assert children(listener.hears(TIMEOUT_S, lambda some: children(some) >= FRAMES - FIXED)) >= FRAMES - FIXED
         assert children(joined.hears(TIMEOUT_S, lambda some: children(some) >= FRAMES)) == FRAMES
     assert robot.text.count("tree complete") == 1
-    assert told(robot) == before
+    assert reported(robot) == before
 
 
 #: A node that latches an edge, and counts what it hears: a line of JSON, by frame, whenever it has changed.
@@ -285,7 +285,7 @@ def one(parent: str, child: str) -> bytes:
     return encode([Transform(time.time_ns(), parent, child, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
 
 
-def test_a_remapped_listener_hears_the_whole_tree_once_also_when_it_starts_late(
+def test_a_remapped_listener_hears_the_complete_tree_once_also_when_it_starts_late(
     start: Callable[..., Started], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -307,12 +307,12 @@ def test_a_remapped_listener_hears_the_whole_tree_once_also_when_it_starts_late(
             return until(lambda: "dock_2" in heard_by(up), 0.05)
 
         assert until(send), up.output
-        whole = {"base_link", "laser", "ear", "dock"}
-        assert until(lambda: heard_by(up).keys() >= whole), up.output
+        full = {"base_link", "laser", "ear", "dock"}
+        assert until(lambda: heard_by(up).keys() >= full), up.output
         assert heard_by(up)["dock_2"] <= sent
         assert heard_by(up)["ear"] == 1, "its own came back to it"
         start("tfcompose", "restart", "ear__").process.wait(60)
-        assert until(lambda: heard_by(up).keys() >= whole), up.output
+        assert until(lambda: heard_by(up).keys() >= full), up.output
         assert heard_by(up)["ear"] == 1
         known = {"/tfcompose_guard", "/test/outside"}
         assert until(lambda: {one.node for one in writers(node, "/tf_static")} == known)

@@ -27,7 +27,7 @@ DRIVEN = (Driven("front", "realsense/d455", publishes=False, switch={"publish_tf
 
 
 @pytest.mark.parametrize(
-    ("wanted", "found", "told"),
+    ("wanted", "found", "reported"),
     [
         (False, False, False),
         (False, True, True),
@@ -42,11 +42,11 @@ DRIVEN = (Driven("front", "realsense/d455", publishes=False, switch={"publish_tf
         (False, None, True),
     ],
 )
-def test_a_parameter_is_told_exactly_where_it_is_another_value(
-    wanted: Value, found: Value | None, *, told: bool
+def test_a_parameter_is_reported_exactly_where_it_is_another_value(
+    wanted: Value, found: Value | None, *, reported: bool
 ) -> None:
     wrong = not_taken("/front/front", {"switch": wanted}, {"switch": found}, DRIVEN)
-    assert [one.code for one in wrong] == ["TF829"] * told
+    assert [one.code for one in wrong] == ["TF829"] * reported
 
 
 def test_the_finding_names_the_node_the_parameter_and_both_values() -> None:
@@ -64,13 +64,13 @@ class Reader:
     """Stands in for a node's parameters."""
 
     is_there: bool = True
-    asked: int = 0
+    requested: int = 0
 
     def ask(self, _: float) -> None:
-        self.asked += 1
+        self.requested += 1
 
     def take(self) -> dict[str, Any] | None:
-        return {"publish_tf": True} if self.asked else None
+        return {"publish_tf": True} if self.requested else None
 
 
 @dataclass
@@ -81,14 +81,14 @@ class Watch:
     now: float = 0.0
 
     def __post_init__(self) -> None:
-        self.told: list[GuardEvent] = []
+        self.reported: list[GuardEvent] = []
 
     def follow(self, left: dict[str, Any]) -> None:
         """Let a guard run that knows what is ``left`` of the one before."""
         drive = PlanProcess("front", "external", switches={"/front": {"publish_tf": False}})
         plan = Plan("rover", "", None, RosSettings(), (), (drive,))
-        self.switches = Switches(None, plan, self.told.append)  # type: ignore[arg-type]
-        self.memory = SwitchMemory(self.switches, self.told.append, left)
+        self.switches = Switches(None, plan, self.reported.append)  # type: ignore[arg-type]
+        self.memory = SwitchMemory(self.switches, self.reported.append, left)
 
     def run_for(self, seconds: float) -> None:
         end = self.now + seconds
@@ -98,7 +98,7 @@ class Watch:
             self.memory.hand_on()
 
     def all(self, kind: type[Any]) -> list[Any]:
-        return [one for one in self.told if isinstance(one, kind)]
+        return [one for one in self.reported if isinstance(one, kind)]
 
 
 @pytest.fixture
@@ -134,10 +134,10 @@ def test_a_guard_that_follows_one_that_died_tells_no_switch_twice(
     watch.run_for(2)
     watch.reader.is_there = True
     watch.run_for(10)
-    assert (len(watch.all(Found)), watch.reader.asked) == (1, 1)
+    assert (len(watch.all(Found)), watch.reader.requested) == (1, 1)
 
 
-def test_a_node_that_comes_back_after_the_guard_has_is_asked_anew(
+def test_a_node_that_comes_back_after_the_guard_has_is_queried_anew(
     watch: Watch, left: Callable[[], dict[str, Any]]
 ) -> None:
     watch.run_for(10)

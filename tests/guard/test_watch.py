@@ -27,8 +27,8 @@ def plan(*edges: PlanEdge) -> Plan:
 
 def test_each_judge_gets_the_edges_of_the_owners_on_its_topics(edge: Callable[..., PlanEdge]) -> None:
     mine, theirs = edge("map dock"), edge("map one/base", "one/static")
-    whole = plan(mine, theirs)
-    plans = plans_by_topics(whole, whole.process("guard"))
+    full = plan(mine, theirs)
+    plans = plans_by_topics(full, full.process("guard"))
     assert {topics: some.edges for topics, some in plans.items()} == {
         ("/tf", "/tf_static"): (mine,),
         ("/one/tf", "/one/tf_static"): (theirs,),
@@ -36,17 +36,17 @@ def test_each_judge_gets_the_edges_of_the_owners_on_its_topics(edge: Callable[..
 
 
 def test_the_guards_own_topics_are_watched_where_nothing_is_planned_on_them(edge: Callable[..., PlanEdge]) -> None:
-    whole = plan(edge("map one/base", "one/static"))
-    assert plans_by_topics(whole, whole.process("guard"))["/tf", "/tf_static"].edges == ()
+    full = plan(edge("map one/base", "one/static"))
+    assert plans_by_topics(full, full.process("guard"))["/tf", "/tf_static"].edges == ()
 
 
 def test_all_is_clear_and_complete_once_the_last_judge_says_so(edge: Callable[..., PlanEdge]) -> None:
-    said: list[GuardEvent] = []
+    reports: list[GuardEvent] = []
     one, two, none = plan(edge("a b")), plan(edge("c d"), edge("c e")), plan()
-    tell = together(said.append, [one, two, none])
+    tell = together(reports.append, [one, two, none])
     for event in (Clear(), Clear(), OwnerReady("static"), Complete(0), Complete(1)):
         tell(event)
-    assert said == [OwnerReady("static")]
+    assert reports == [OwnerReady("static")]
     tell(Clear())
     tell(Complete(2))
-    assert said == [OwnerReady("static"), Clear(), Complete(3)]
+    assert reports == [OwnerReady("static"), Clear(), Complete(3)]

@@ -36,21 +36,21 @@ def moving(more: str, kind: str = "revolute") -> str:
     return f'{HEAD}<link name="arm"/><joint name="shoulder" type="{kind}">{ends}{more}</joint></robot>'
 
 
-def test_angles_are_written_in_degrees_where_that_is_exact(tmp_path: Path) -> None:
-    said = 'rpy="1.5707963267948966 0 -0.7853981633974483"'
+def test_angles_are_emitted_in_degrees_where_that_is_exact(tmp_path: Path) -> None:
+    output = 'rpy="1.5707963267948966 0 -0.7853981633974483"'
     limit = '<limit lower="-3.14159265359" upper="1.5708" effort="1" velocity="2"/>'
-    joint = data(imported(moving(f"<origin {said}/>{limit}"), tmp_path))["joints"]["shoulder"]
+    joint = data(imported(moving(f"<origin {output}/>{limit}"), tmp_path))["joints"]["shoulder"]
     assert joint["rpy"] == ["90 deg", 0, "-45 deg"]
     assert joint["limit"] == {"lower": "-180 deg", "upper": 1.5708, "effort": 1, "velocity": 2}
 
 
-def test_a_rotation_is_written_with_the_angles_of_the_source(tmp_path: Path) -> None:
+def test_a_rotation_is_emitted_with_the_angles_of_the_source(tmp_path: Path) -> None:
     tool = fixed("tool", origin='rpy="-1.5708 1.5708 0.1"')
     text = imported(f"{HEAD}{tool}</robot>", tmp_path)
     assert data(text)["frames"]["tool"] == {"parent": "base_link", "rpy": [-1.5708, 1.5708, 0.1]}
 
 
-def test_what_cannot_be_taken_is_said_at_its_place(tmp_path: Path) -> None:
+def test_what_cannot_be_taken_is_reported_at_its_place(tmp_path: Path) -> None:
     limit = '<limit lower="-1" upper="1" effort="1" velocity="2" jerk="5"/>'
     text = imported(
         moving(limit).replace("</robot>", '<material name="grey"><color rgba="1 1 1 1"/></material></robot>'), tmp_path
@@ -64,7 +64,7 @@ def test_a_frame_keeps_the_name_of_its_joint_in_a_comment(tmp_path: Path) -> Non
     assert "  # joint mast_fix\n  mast: " in imported(f"{HEAD}{fixed('mast', name='mast_fix')}</robot>", tmp_path)
 
 
-def test_names_beyond_letters_are_taken_and_lint_no_longer_refuses_them(tmp_path: Path) -> None:
+def test_names_with_other_characters_are_taken_and_lint_no_longer_refuses_them(tmp_path: Path) -> None:
     text = imported(f"{HEAD}{fixed('the tool', name='a-b.c')}</robot>", tmp_path)
     assert data(text)["rules"] == {"TF501": "warning"}
     assert '<link name="the tool"/>' in built(tmp_path / "robot.yaml")
@@ -101,9 +101,9 @@ def test_a_link_with_a_name_longer_than_a_line_is_a_link(tmp_path: Path) -> None
 
 def test_a_joint_that_a_block_names_stays_a_joint(tmp_path: Path) -> None:
     block = '<gazebo reference="mast_fix"><preserveFixedJoint>true</preserveFixedJoint></gazebo>'
-    said = data(imported(f"{HEAD}{fixed('mast', name='mast_fix')}{block}</robot>", tmp_path))
-    assert said["joints"]["mast_fix"]["type"] == "fixed"
-    assert "frames" not in said
+    output = data(imported(f"{HEAD}{fixed('mast', name='mast_fix')}{block}</robot>", tmp_path))
+    assert output["joints"]["mast_fix"]["type"] == "fixed"
+    assert "frames" not in output
 
 
 def test_a_free_joint_gets_an_owner_to_be_named(tmp_path: Path) -> None:
@@ -137,13 +137,13 @@ def test_ros2_control_becomes_the_section_and_texts_stay_what_they_are(tmp_path:
     assert '<param name="port">0.10</param>' in built(tmp_path / "robot.yaml")
 
 
-def test_ros2_control_with_more_in_it_stays_as_it_is_written(tmp_path: Path) -> None:
+def test_ros2_control_with_more_in_it_stays_as_it_is(tmp_path: Path) -> None:
     text = imported(moving(LIMIT).replace("</robot>", CONTROL.format(more="<other/>") + "</robot>"), tmp_path)
     assert "ros2_control" not in data(text)
     assert "<other/>" in data(text)["xml"]["ros2_control_1"]
 
 
-def test_a_text_that_looks_like_an_expression_is_none(tmp_path: Path) -> None:
+def test_a_text_that_resembles_an_expression_is_none(tmp_path: Path) -> None:
     block = "<gazebo><plugin>${robot_namespace}</plugin></gazebo>"
     imported(f"{HEAD}{block}</robot>", tmp_path)
     assert "<plugin>${robot_namespace}</plugin>" in built(tmp_path / "robot.yaml")
@@ -163,9 +163,9 @@ def test_a_block_ends_where_it_ends(block: str, tmp_path: Path) -> None:
 
 
 def test_colours_get_names_that_the_language_has(tmp_path: Path) -> None:
-    said = '<material name="{}"><color rgba="{} 0 0 1"/></material>'
+    output = '<material name="{}"><color rgba="{} 0 0 1"/></material>'
     visual = "<visual><geometry><sphere radius='1'/></geometry>{}</visual>"
-    visuals = "".join(visual.format(said.format(*one)) for one in (("light blue", 1), ("light-blue", 0.5)))
+    visuals = "".join(visual.format(output.format(*one)) for one in (("light blue", 1), ("light-blue", 0.5)))
     text = imported(f'<robot name="r"><link name="base_link">{visuals}</link></robot>', tmp_path)
     names = [one["material"]["name"] for one in data(text)["links"]["base_link"]["visual"]]
     assert names == ["light_blue", "light_blue_"]
@@ -179,15 +179,15 @@ def test_a_relative_mesh_is_addressed_from_where_the_robot_file_is(tmp_path: Pat
     (tmp_path / "r.urdf").write_text(f'<robot name="r"><link name="base_link">{visual}</link></robot>')
     (tmp_path / "sub").mkdir()
     assert main(["import", str(tmp_path / "r.urdf"), "-o", str(tmp_path / "sub/robot.yaml")]) == 0
-    said = data((tmp_path / "sub/robot.yaml").read_text("utf-8"))
-    assert said["links"]["base_link"]["visual"]["mesh"] == "../meshes/a.stl"
+    output = data((tmp_path / "sub/robot.yaml").read_text("utf-8"))
+    assert output["links"]["base_link"]["visual"]["mesh"] == "../meshes/a.stl"
 
 
 #: Sensors that nothing else has the frames of.
-TOLD_APART = ("realsense/d455", "realsense/d405", "oak/oak-d-sr", "realsense/l515", "sick/nanoscan3")
+DISTINGUISHED = ("realsense/d455", "realsense/d405", "oak/oak-d-sr", "realsense/l515", "sick/nanoscan3")
 
 
-@pytest.mark.parametrize("name", TOLD_APART)
+@pytest.mark.parametrize("name", DISTINGUISHED)
 def test_a_sensor_that_is_like_no_other_is_recognised(name: str, tmp_path: Path) -> None:
     sensor = {"preset": name, "parent": "base_link", "xyz": [0.1, 0, 0.2], "driver": "none"}
     spec = {"tfcompose": 1, "robot": "r", "links": {"base_link": {}}, "sensors": {"eye": sensor}}
@@ -255,7 +255,7 @@ def test_a_xacro_file_is_expanded_with_arguments(tmp_path: Path) -> None:
     assert main(["import", str(tmp_path / "plain.urdf"), "high:=0.5"]) == 1
 
 
-def test_a_source_with_errors_is_refused_whole_unless_that_is_wanted(
+def test_a_source_with_errors_is_refused_entirely_unless_that_is_wanted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file, out = tmp_path / "r.urdf", tmp_path / "robot.yaml"
@@ -264,14 +264,14 @@ def test_a_source_with_errors_is_refused_whole_unless_that_is_wanted(
     )
     assert main(["import", str(file), "-o", str(out)]) == 1
     assert not out.exists()
-    said = capsys.readouterr().err
-    assert said.count("error[TF721]") == 2
-    assert "--keep-going" in said
+    output = capsys.readouterr().err
+    assert output.count("error[TF721]") == 2
+    assert "--keep-going" in output
     assert main(["import", str(file), "-o", str(out), "--keep-going"]) == 1
     assert "# TF721 in the source: the axis of shoulder has no direction" in out.read_text("utf-8")
 
 
-def test_a_file_that_is_there_is_not_written_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_that_is_there_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file, out = tmp_path / "r.urdf", tmp_path / "robot.yaml"
     file.write_text(f"{HEAD}</robot>")
     out.write_text("mine")
@@ -287,7 +287,7 @@ def test_a_file_that_is_there_is_not_written_over(tmp_path: Path, capsys: pytest
 )
 def test_wrong_use_is_one_sentence(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["import", *words]) == 2
-    said = capsys.readouterr()
-    assert said.err
-    assert not said.out
-    assert "Traceback" not in said.err
+    output = capsys.readouterr()
+    assert output.err
+    assert not output.out
+    assert "Traceback" not in output.err

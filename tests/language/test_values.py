@@ -23,9 +23,9 @@ def validated(text: str) -> Validated:
     return validate(composed(load(HEAD + text, "r.yaml"), []))
 
 
-def value_of(written: str, variables: str = "{}") -> Any:
+def value_of(source_text: str, variables: str = "{}") -> Any:
     """Return what ``xyz: [written, 0, 0]`` is read as."""
-    done = validated(f"vars: {variables}\nframes: {{a: {{xyz: [{written}, 0, 0]}}}}\n")
+    done = validated(f"vars: {variables}\nframes: {{a: {{xyz: [{source_text}, 0, 0]}}}}\n")
     assert not done.found, done.found
     return done.spec.frames["a"].xyz[0]
 
@@ -161,7 +161,7 @@ def test_dimensions_are_carried_along() -> None:
 
 
 @pytest.mark.parametrize(
-    ("written", "variables", "expected"),
+    ("source_text", "variables", "expected"),
     [
         ('"${mast}"', "{mast: 30 cm}", 0.3),
         ('"${mast + 2 cm}"', "{mast: 30 cm}", 0.32),
@@ -171,8 +171,8 @@ def test_dimensions_are_carried_along() -> None:
         ('"${3 m}"', '{m: "${n}", n: "${3 m}"}', 3.0),
     ],
 )
-def test_variables_are_computed_in_whatever_order_they_stand(written: str, variables: str, expected: float) -> None:
-    assert value_of(written, variables) == pytest.approx(expected, abs=1e-15)
+def test_variables_are_computed_in_whatever_order_they_stand(source_text: str, variables: str, expected: float) -> None:
+    assert value_of(source_text, variables) == pytest.approx(expected, abs=1e-15)
 
 
 def test_a_chain_of_a_thousand_variables_is_computed() -> None:
@@ -192,7 +192,7 @@ def test_a_text_does_not_grow_without_bound() -> None:
     assert set(codes_of(f"vars: {{v0: xxxxxxxxxx, {bomb}}}\n")) == {"TF105"}
 
 
-def test_what_was_refused_in_an_expression_is_said_once() -> None:
+def test_what_was_refused_in_an_expression_is_reported_once() -> None:
     text = "links: {a: {visual: {box: ['${nope}', 1, 1]}}}\nframes: {b: {parent: '${nope}', look: '${nope}'}}\n"
     assert codes_of(text) == ["TF105"] * 3
 
@@ -207,9 +207,9 @@ def test_parameters_are_passed_on_as_they_are() -> None:
     assert [type(params[key]) for key in ("i", "f", "b")] == [int, float, bool]
 
 
-@pytest.mark.parametrize("written", ["${3}", "${1 + 2}", "${6 / 2}"])
-def test_a_whole_number_can_be_computed(written: str) -> None:
-    assert validated(f"ros: {{domain_id: '{written}'}}\n").spec.ros.domain_id == 3
+@pytest.mark.parametrize("source_text", ["${3}", "${1 + 2}", "${6 / 2}"])
+def test_a_complete_number_can_be_computed(source_text: str) -> None:
+    assert validated(f"ros: {{domain_id: '{source_text}'}}\n").spec.ros.domain_id == 3
 
 
 ROTATIONS = {
@@ -229,13 +229,13 @@ ROTATIONS = {
 }
 
 
-@pytest.mark.parametrize("written", ROTATIONS)
-def test_each_way_to_write_a_rotation_agrees_with_scipy(written: str) -> None:
-    done = validated(f"frames: {{a: {{{written}}}}}\n")
+@pytest.mark.parametrize("source_text", ROTATIONS)
+def test_each_way_to_write_a_rotation_agrees_with_scipy(source_text: str) -> None:
+    done = validated(f"frames: {{a: {{{source_text}}}}}\n")
     assert not done.found
     found = done.spec.frames["a"].rotation
     assert found
-    x, y, z, w = ROTATIONS[written].as_quat()
+    x, y, z, w = ROTATIONS[source_text].as_quat()
     assert angle_between(found, (x, y, z, w)) < 1e-9
 
 
@@ -250,7 +250,7 @@ def test_each_way_to_write_a_rotation_agrees_with_scipy(written: str) -> None:
         ("down", (0, 0, -1)),
     ],
 )
-def test_to_look_somewhere_points_the_x_axis_there(direction: str, axis: tuple[int, int, int]) -> None:
+def test_a_direction_points_the_x_axis_there(direction: str, axis: tuple[int, int, int]) -> None:
     quat = validated(f"frames: {{a: {{look: {direction}}}}}\n").spec.frames["a"].rotation
     assert quat
     assert Rotation.from_quat(quat).apply([1, 0, 0]) == pytest.approx(axis, abs=1e-12)
@@ -289,10 +289,10 @@ def test_what_would_be_computed_wrongly_or_ignored_is_refused(text: str, codes: 
 def test_a_joint_limit_takes_the_units_of_its_motion(kind: str, limit: str, velocity: float, effort: float) -> None:
     text = f"tfcompose: 1\nrobot: r\njoints: {{j: {{type: {kind}, parent: a, child: b, limit: {limit}}}}}\n"
     validated = validate(composed(load(text, "f")))
-    said = validated.spec.joints["j"].limit
-    assert said
+    output = validated.spec.joints["j"].limit
+    assert output
     assert not validated.found
-    assert (said.velocity, said.effort) == pytest.approx((velocity, effort))
+    assert (output.velocity, output.effort) == pytest.approx((velocity, effort))
 
 
 @pytest.mark.parametrize("name", ["pi", "a b", "ü", "1a", "build_dir", "params_file", ""])
@@ -304,7 +304,7 @@ def test_a_variable_that_no_expression_can_mean_is_refused_where_it_stands(name:
 
 @pytest.mark.parametrize("what", ["frame(f)", "file(maps/a.yaml)", "frame(f) + 1"])
 @pytest.mark.parametrize("where", ["vars: {a: %s}", "frames: {f: {parent: %s}}", "base: %s", "calibrations: [%s]"])
-def test_what_only_processes_are_told_is_named_elsewhere(what: str, where: str) -> None:
+def test_what_only_processes_can_use_is_refused_elsewhere(what: str, where: str) -> None:
     (one,) = validated(where % f"'${{{what}}}'" + "\n").found
     assert one.code == "TF105"
     assert one.message.endswith("is for processes only")

@@ -24,53 +24,53 @@ if TYPE_CHECKING:
 @given(st.text(alphabet="ab\né", max_size=60), st.integers(1, 7))
 def test_lines_are_the_same_however_the_bytes_arrive(text: str, size: int) -> None:
     data, lines = text.encode(), Lines()
-    said = [line for start in range(0, len(data), size) for line in lines.feed(data[start : start + size])]
+    lines_read = [line for start in range(0, len(data), size) for line in lines.feed(data[start : start + size])]
     expected = text.split("\n")
-    assert [*said, *lines.end()] == (expected if expected[-1] else expected[:-1])
+    assert [*lines_read, *lines.end()] == (expected if expected[-1] else expected[:-1])
 
 
 @given(st.lists(st.binary(max_size=40), max_size=20))
 def test_no_line_is_longer_than_the_limit_nothing_is_lost_and_little_is_kept(chunks: list[bytes]) -> None:
     lines = Lines(8)
-    said: list[str] = []
+    lines_read: list[str] = []
     for chunk in (chunk.replace(b"\r", b"").replace(b"\n", b"x") for chunk in chunks):
-        said.extend(lines.feed(chunk))
+        lines_read.extend(lines.feed(chunk))
         assert len(lines._rest) <= 8
-    said.extend(lines.end())
-    assert all(len(line) <= 8 for line in said)
+    lines_read.extend(lines.end())
+    assert all(len(line) <= 8 for line in lines_read)
     if all(max(chunk, default=0) < 128 for chunk in chunks):
-        assert len("".join(said)) == sum(len(chunk) - chunk.count(b"\r") for chunk in chunks)
+        assert len("".join(lines_read)) == sum(len(chunk) - chunk.count(b"\r") for chunk in chunks)
 
 
-def read_flood(written: bytes, ending: bytes) -> list[str]:
+def read_flood(source_text: bytes, ending: bytes) -> list[str]:
     """Return the lines that are kept of a process that writes all at once, and then its end, and ends."""
-    said: list[str] = []
+    lines_read: list[str] = []
     read_end, write_end = os.pipe()
     with os.fdopen(write_end, "wb", buffering=0) as writer:
-        pipe = Pipe(os.fdopen(read_end, "rb", buffering=0), said.append, bucket=Bucket(lambda: 0.0))
-        for start in range(0, len(written), 4096):
-            writer.write(written[start : start + 4096])
+        pipe = Pipe(os.fdopen(read_end, "rb", buffering=0), lines_read.append, bucket=Bucket(lambda: 0.0))
+        for start in range(0, len(source_text), 4096):
+            writer.write(source_text[start : start + 4096])
             pipe.read()
         writer.write(ending)
     pipe.drain()
-    return said
+    return lines_read
 
 
 def test_the_last_words_of_a_process_that_flooded_are_kept() -> None:
-    written = b"flood, flood\n" * (BURST // 13 + 100_000)
-    *flood, note, last = read_flood(written, b"\nValueError: the reason\n")[-330:]
+    source_text = b"flood, flood\n" * (BURST // 13 + 100_000)
+    *flood, note, last = read_flood(source_text, b"\nValueError: the reason\n")[-330:]
     assert last == "ValueError: the reason"
     assert (note, set(flood[-5:])) == ("", {"flood, flood"})
-    (told,) = [line for line in flood if line.startswith("…")]
-    kept = len(flood) - flood.index(told) - 1
-    thrown = int(told.split()[1].replace(",", ""))
-    assert thrown + kept * 13 == pytest.approx(len(written) - BURST, abs=4096 + 13)
+    (marker,) = [line for line in flood if line.startswith("…")]
+    kept = len(flood) - flood.index(marker) - 1
+    thrown = int(marker.split()[1].replace(",", ""))
+    assert thrown + kept * 13 == pytest.approx(len(source_text) - BURST, abs=4096 + 13)
 
 
 def test_the_last_words_after_an_endless_line_are_kept() -> None:
-    said = read_flood(b"a" * (BURST + 1_000_000), b"\nlast\n")
-    assert said[-1] == "last"
-    assert max(map(len, said)) <= LINE_LIMIT
+    lines_read = read_flood(b"a" * (BURST + 1_000_000), b"\nlast\n")
+    assert lines_read[-1] == "last"
+    assert max(map(len, lines_read)) <= LINE_LIMIT
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_a_sighup_that_is_ignored_as_below_nohup_stays_ignored() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize("seconds", [0.0, 0.03, 0.06, 0.1])
-def test_an_own_process_that_is_told_to_end_while_it_starts_ends_by_its_own_rules(
+def test_an_own_process_that_is_ordered_to_end_while_it_starts_ends_by_its_own_rules(
     number: int, seconds: float, tmp_path: Path
 ) -> None:
     argv = (sys.executable, "-m", "tfcompose.publishers.static", str(tmp_path / "plan.json"), "static")
@@ -114,12 +114,12 @@ def test_an_own_process_that_is_told_to_end_while_it_starts_ends_by_its_own_rule
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_keeper_stays_that_is_told_to_end_in_its_first_moment(number: int) -> None:
+def test_a_child_holder_stays_that_is_ordered_to_end_in_its_first_moment(number: int) -> None:
     """As systemd tells all of a unit's processes, also one that it has just started."""
-    keeper = Reaper()
-    os.kill(keeper.pid, number)
-    keeper.close()
-    assert keeper.returncode == 0
+    holder = Reaper()
+    os.kill(holder.pid, number)
+    holder.close()
+    assert holder.returncode == 0
 
 
 def test_a_process_that_is_not_our_own_is_started_with_no_signal_blocked(tmp_path: Path) -> None:

@@ -54,15 +54,15 @@ def test_a_foreign_process_is_its_own_supervised_process_with_the_plans_environm
 
 
 @pytest.mark.parametrize(
-    ("name", "said", "code"), [("nobody", "has no process nobody", 2), ("missing", "no-such-program of missing", 1)]
+    ("name", "shown", "code"), [("nobody", "has no process nobody", 2), ("missing", "no-such-program of missing", 1)]
 )
-def test_what_cannot_be_started_is_said(
-    name: str, said: str, code: int, units: Path, start: Callable[..., Started]
+def test_what_cannot_be_started_is_reported(
+    name: str, shown: str, code: int, units: Path, start: Callable[..., Started]
 ) -> None:
     plan = units.parent / "plan.json"
     text = plan.read_text("utf-8").replace('"hello"', '"missing"').replace('["sh", ', '["no-such-program", ')
     plan.write_text(text, "utf-8")
     one = start("tfcompose.launcher.exec", plan, name)
     assert one.process.wait(60) == code
-    assert until(lambda: said in "".join(one.errors)), one.errors
+    assert until(lambda: shown in "".join(one.errors)), one.errors
     assert "Traceback" not in "".join(one.errors)

@@ -121,7 +121,7 @@ class Run:
         except OSError:
             return False
 
-    def look_around(self) -> None:
+    def search(self) -> None:
         """Wait until the launcher has looked what descends from it now."""
         time.sleep(LONGEST_SLEEP_S)  # then it is due, and follows what comes next
         self.ps()
@@ -247,25 +247,25 @@ def test_what_left_its_group_and_its_environment_ends_with_the_run(
     assert until(lambda: run.ps()["bare"].state == ("RUNNING" if parent == "stays" else "EXITED"))
     assert pid not in {one.pid for one in leftovers(f"{NAME}:")}
     if how == "is killed":
-        run.look_around()
+        run.search()
         run.popen.kill()
     else:
         assert run.down() == 0
     assert until(lambda: gone(pid))
 
 
-def test_a_keeper_that_is_killed_is_replaced(launch: Callable[..., Run], tmp_path: Path) -> None:
+def test_a_child_holder_that_is_killed_is_replaced(launch: Callable[..., Run], tmp_path: Path) -> None:
     run = launch(program("daemon", DAEMON), program("calm", SLEEPER))
     assert until(lambda: (tmp_path / "daemon").exists() and (tmp_path / "daemon").read_text())
-    first = keeper_of(run)
+    first = holder_of(run)
     assert first
     first.kill()
-    assert until(lambda: keeper_of(run) not in {None, first})
+    assert until(lambda: holder_of(run) not in {None, first})
     run.popen.kill()
     assert until(lambda: gone(int((tmp_path / "daemon").read_text())))
 
 
-def keeper_of(run: Run) -> psutil.Process | None:
+def holder_of(run: Run) -> psutil.Process | None:
     for one in psutil.Process(run.popen.pid).children():
         with contextlib.suppress(psutil.NoSuchProcess):  # another one may just end
             if one.name() == "sh":
@@ -281,9 +281,9 @@ def test_leftovers_are_recognised_by_the_runs_id_and_ended_on_request_only(
     pid = int((tmp_path / "daemon").read_text())
     assert {one.launcher for one in leftovers(f"{NAME}:")} == {run.popen.pid}
     run.popen.send_signal(signal.SIGSTOP)  # it shall not get another keeper
-    keeper = keeper_of(run)
-    assert keeper
-    keeper.kill()
+    child_holder = holder_of(run)
+    assert child_holder
+    child_holder.kill()
     run.popen.kill()
     run.popen.wait()
     assert until(lambda: [one.pid for one in leftovers(f"{NAME}:")] == [pid])
@@ -340,8 +340,8 @@ def test_a_clock_that_goes_back_an_hour_stops_nothing_and_delays_nothing(
     assert ask(run.place, ProcessRequest("restart", "a"), Done).ok
     assert until(lambda: run.ps()["a"].restarts == 1)
     assert run.down() == 0
-    said = [line.split()[0] for line in (tmp_path / "log" / "tfcompose.log").read_text().splitlines()]
-    assert said != sorted(said), "the clock did go back"
+    stamps = [line.split()[0] for line in (tmp_path / "log" / "tfcompose.log").read_text().splitlines()]
+    assert stamps != sorted(stamps), "the clock did go back"
 
 
 def test_a_socket_that_was_left_there_by_a_killed_launcher_is_not_in_the_way(launch: Callable[..., Run]) -> None:

@@ -41,7 +41,7 @@ def plan_of(*processes: PlanProcess, fence: FenceWay = "auto") -> Plan:
     return Plan("rover", "", None, RosSettings(), edges, processes, GuardPolicy("strict", fence=fence))
 
 
-def look(
+def inspect(
     tmp_path: Path, *processes: PlanProcess, fence: FenceWay = "auto", **env: str
 ) -> tuple[dict[str, Command], list[Finding]]:
     base = {"PATH": os.environ["PATH"]} | env
@@ -72,7 +72,7 @@ def moved(command: Command) -> dict[str, str]:
 
 def test_a_strict_plan_fences_off_what_children_send_and_lets_the_guard_read_both(tmp_path: Path) -> None:
     slam = PlanProcess("slam", "run", argv=("true",), remap={"/tf": "/r/tf"}, owns=(("map", "odom"),))
-    commands, found = look(tmp_path, slam, GUARD)
+    commands, found = inspect(tmp_path, slam, GUARD)
     assert found == []
     assert partitions(commands["slam"]) == {
         ("data_writer", "/r/tf"): "tfc_rover",
@@ -92,7 +92,7 @@ def test_a_strict_plan_fences_off_what_children_send_and_lets_the_guard_read_bot
 def test_a_users_own_profiles_stay_behind_the_fence(tmp_path: Path) -> None:
     own = tmp_path / "own.xml"
     own.write_text("<profiles><data_writer profile_name='/scan'/></profiles>")
-    commands, found = look(tmp_path, SLAM, GUARD, FASTRTPS_DEFAULT_PROFILES_FILE=str(own))
+    commands, found = inspect(tmp_path, SLAM, GUARD, FASTRTPS_DEFAULT_PROFILES_FILE=str(own))
     assert found == []
     assert "profile_name='/scan'" in (commands["slam"].fence or ("", ""))[1]
 
@@ -102,7 +102,7 @@ def test_a_process_that_sends_on_topics_that_nobody_judges_is_left_alone(tmp_pat
         "debug", "run", argv=("true",), nodes=("/debug",), owns=(), remap={"/tf": "/x/tf", "/tf_static": "/x/s"}
     )
     for fence in ("partition", "remap"):
-        commands, found = look(tmp_path, SLAM, debug, GUARD, fence=fence)
+        commands, found = inspect(tmp_path, SLAM, debug, GUARD, fence=fence)
         assert found == []
         assert commands["debug"].fence is None
         assert commands["debug"].argv[1:] == ()
@@ -124,7 +124,7 @@ def test_what_a_partition_cannot_fence_off_is_one_finding_that_names_all(
     own.write_text('<profiles><data_writer profile_name="/tf"></data_writer></profiles>')
     env = {name: value.replace("OWN", str(own)) for name, value in env.items()}
     both = [PlanProcess(name, "run", argv=("true",), remap=remap, owns=(("map", name),)) for name in ("slam", "drive")]
-    _, (found,) = look(tmp_path, *both, fence="partition", **env)
+    _, (found,) = inspect(tmp_path, *both, fence="partition", **env)
     expect(found, "TF902", *names)
     assert found.message.endswith(": slam, drive")
 
@@ -134,7 +134,7 @@ def test_what_a_partition_cannot_fence_off_is_one_finding_that_names_all(
 
 def test_another_rmw_is_fenced_off_by_remapping(tmp_path: Path) -> None:
     static = PlanProcess("static", "static", argv=("${python}", "-m", "x", "${plan}", "static"))
-    commands, found = look(tmp_path, SLAM, static, GUARD, RMW_IMPLEMENTATION="rmw_cyclonedds_cpp")
+    commands, found = inspect(tmp_path, SLAM, static, GUARD, RMW_IMPLEMENTATION="rmw_cyclonedds_cpp")
     assert found == []
     for name in ("slam", "static"):
         assert moved(commands[name]) == {
@@ -147,17 +147,17 @@ def test_another_rmw_is_fenced_off_by_remapping(tmp_path: Path) -> None:
 
 
 def test_the_way_can_be_chosen(tmp_path: Path) -> None:
-    commands, _ = look(tmp_path, SLAM, GUARD, fence="remap")
+    commands, _ = inspect(tmp_path, SLAM, GUARD, fence="remap")
     assert moved(commands["slam"])
     assert commands["slam"].fence is None
-    assert look(tmp_path, SLAM, GUARD)[0]["slam"].fence
+    assert inspect(tmp_path, SLAM, GUARD)[0]["slam"].fence
 
 
 def test_remappings_come_before_those_of_the_plan_and_catch_what_is_sent_on_its_topics(tmp_path: Path) -> None:
     argv = ("true", "--speed", "3", "--ros-args", "-r", "__node:=slam", "-r", "/tf:=/r/tf", "-p", "a:=1")
     remap = {"/tf": "/r/tf", "/tf_static": "/r/tf_static"}
     slam = PlanProcess("slam", "run", argv=argv, nodes=("/r/slam",), remap=remap, owns=(("map", "odom"),))
-    commands, _ = look(tmp_path, slam, GUARD, fence="remap")
+    commands, _ = inspect(tmp_path, slam, GUARD, fence="remap")
     words = commands["slam"].argv[1:]
     assert words[:3] == ("--speed", "3", "--ros-args")
     assert words[-6:] == ("-r", "__node:=slam", "-r", "/tf:=/r/tf", "-p", "a:=1")
@@ -170,7 +170,7 @@ def test_remappings_come_before_those_of_the_plan_and_catch_what_is_sent_on_its_
     }
 
 
-def test_a_launch_file_is_remapped_as_a_whole(tmp_path: Path) -> None:
+def test_a_launch_file_is_remapped_in_full(tmp_path: Path) -> None:
     share = tmp_path / "share" / "nav"
     share.mkdir(parents=True)
     (share / "nav.launch.py").write_text("")
@@ -180,7 +180,7 @@ def test_a_launch_file_is_remapped_as_a_whole(tmp_path: Path) -> None:
     argv = ("${launch:nav/nav.launch.py}", "a:=1")
     nav = PlanProcess("nav", "run", argv=argv, remap={"/scan": "/front/scan"}, owns=(("a", "b"),))
     env = {"PATH": str(tmp_path), "AMENT_PREFIX_PATH": str(tmp_path)}
-    commands, found = look(tmp_path, nav, fence="remap", **env)
+    commands, found = inspect(tmp_path, nav, fence="remap", **env)
     assert found == []
     given = json.loads(commands["nav"].env[LAUNCH])
     topics = {"/tf": "/_tfcompose/rover/nav/tf", "/tf_static": "/_tfcompose/rover/nav/tf_static"}
@@ -191,14 +191,14 @@ def test_a_launch_file_is_remapped_as_a_whole(tmp_path: Path) -> None:
 def test_owners_that_no_remapping_reaches_are_one_finding(tmp_path: Path) -> None:
     shell = PlanProcess("shell", "run", argv=("/bin/sh", "-c", "drive | tee log"), nodes=("/a",), owns=(("a", "b"),))
     more = replace(shell, name="more", nodes=("/b",), owns=(("b", "c"),))
-    _, (found,) = look(tmp_path, shell, more, SLAM, GUARD, fence="remap")
+    _, (found,) = inspect(tmp_path, shell, more, SLAM, GUARD, fence="remap")
     expect(found, "TF902", "shell, more")
 
 
 def test_a_command_that_may_be_no_node_gets_no_ros_arguments(tmp_path: Path) -> None:
     web = PlanProcess("web", "run", argv=("true", "--port", "80"), nodes=("/web",))
     play = PlanProcess("play", "run", argv=("true", "--ros-args", "-p", "a:=1"), nodes=("/play",))
-    commands, found = look(tmp_path, web, play, SLAM, GUARD, fence="remap")
+    commands, found = inspect(tmp_path, web, play, SLAM, GUARD, fence="remap")
     assert found == []
     assert commands["web"].argv[1:] == ("--port", "80")
     assert moved(commands["play"])

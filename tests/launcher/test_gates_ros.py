@@ -83,41 +83,41 @@ def run(tmp_path: Path, *processes: PlanProcess, late: int = 0) -> list[Notice]:
     plan = Plan("rover", "", None, RosSettings(), edges, (*processes, GUARD))
     file = tmp_path / "plan.json"
     file.write_text(write_plan(plan))
-    told: list[Notice] = []
+    notices: list[Notice] = []
 
     def report(notice: Notice) -> None:
-        told.append(notice)
-        shut = [one for one in told if isinstance(one, FindingShown) and one.found.code == "TF817"]
+        notices.append(notice)
+        shut = [one for one in notices if isinstance(one, FindingShown) and one.found.code == "TF817"]
         if isinstance(notice, AllReady) or (late and len(shut) == late):
             raise BrokenPipeError  # enough was seen
 
     supervise(plan, file, report=report, duration_s=120)
-    return told
+    return notices
 
 
-def late_of(told: list[Notice]) -> dict[str, Finding]:
+def late_of(notices: list[Notice]) -> dict[str, Finding]:
     """Return what was shown, by the process that is not ready."""
-    found = [notice.found for notice in told if isinstance(notice, FindingShown)]
+    found = [notice.found for notice in notices if isinstance(notice, FindingShown)]
     return {one.message.split()[0]: one for one in found}
 
 
 @pytest.mark.usefixtures("domain")
 def test_a_topic_and_a_service_open_gates_and_say_what_they_are(tmp_path: Path) -> None:
     lidar, reset = Ready("topic", "/robot/scan"), Ready("service", "/robot/reset")
-    told = run(tmp_path, node("lidar", ready=lidar), node("reset", ready=reset))
-    seen = {notice.process: notice.seen for notice in told if isinstance(notice, ProcessReady)}
-    assert words_of(seen["lidar"]) >= {"/robot/scan", "/robot/lidar"}
-    assert "/robot/reset" in words_of(seen["reset"])
-    assert isinstance(told[-1], AllReady)
+    notices = run(tmp_path, node("lidar", ready=lidar), node("reset", ready=reset))
+    observed = {notice.process: notice.seen for notice in notices if isinstance(notice, ProcessReady)}
+    assert words_of(observed["lidar"]) >= {"/robot/scan", "/robot/lidar"}
+    assert "/robot/reset" in words_of(observed["reset"])
+    assert isinstance(notices[-1], AllReady)
 
 
 @pytest.mark.usefixtures("domain")
 def test_a_lifecycle_node_is_configured_and_activated_and_then_ready(tmp_path: Path) -> None:
-    told = run(tmp_path, node("slam", "lifecycle", lifecycle={"/robot/slam": "active"}))
-    (ready,) = [notice for notice in told if isinstance(notice, ProcessReady)]
+    notices = run(tmp_path, node("slam", "lifecycle", lifecycle={"/robot/slam": "active"}))
+    (ready,) = [notice for notice in notices if isinstance(notice, ProcessReady)]
     assert ready.seen == "/robot/slam is active"
-    said = [getattr(notice, "text", "") for notice in told if getattr(notice, "process", "") == "slam"]
-    assert [text for text in said if text] == ["configured", "activated"]
+    output = [getattr(notice, "text", "") for notice in notices if getattr(notice, "process", "") == "slam"]
+    assert [text for text in output if text] == ["configured", "activated"]
 
 
 @pytest.mark.usefixtures("domain")
@@ -127,38 +127,40 @@ def test_edges_a_line_an_exit_code_and_a_time_open_gates_and_what_waits_follows(
     code = script("code", "exit 4", Ready("exit", number=4.0))
     later = script("later", "sleep 180", Ready("time", number=0.4))
     last = script("last", "sleep 180", None, after=dict.fromkeys(("drive", "line", "code", "later"), "ready"))
-    told = run(tmp_path, drive, line, code, later, last)
-    seen = {notice.process: notice.seen for notice in told if isinstance(notice, ProcessReady)}
-    assert seen == {"drive": "its edges are live", "line": "ready 17", "later": "0.4 s have passed"}
-    assert isinstance(told[-1], AllReady)
-    assert {row.process for row in told[-1].rows} >= {"drive", "line", "code", "later", "last"}
+    notices = run(tmp_path, drive, line, code, later, last)
+    observed = {notice.process: notice.seen for notice in notices if isinstance(notice, ProcessReady)}
+    assert observed == {"drive": "its edges are live", "line": "ready 17", "later": "0.4 s have passed"}
+    assert isinstance(notices[-1], AllReady)
+    assert {row.process for row in notices[-1].rows} >= {"drive", "line", "code", "later", "last"}
 
 
 @pytest.mark.usefixtures("domain")
-def test_edges_a_line_and_an_exit_code_that_do_not_come_are_told_with_what_was_seen_instead(tmp_path: Path) -> None:
+def test_edges_a_line_and_an_exit_code_that_do_not_come_are_reported_with_what_was_there_instead(
+    tmp_path: Path,
+) -> None:
     idle = replace(simulated(Ready("edges", timeout_s=6.0)), kind="run", argv=("sleep", "180"), simulate=None)
     line = script("line", "echo booting; sleep 180", Ready("log", "ready [0-9]+", timeout_s=5.0))
     code = script("code", "sleep 180", Ready("exit", timeout_s=5.0))
-    told = run(tmp_path, idle, line, code, late=3)
-    found = late_of(told)
+    notices = run(tmp_path, idle, line, code, late=3)
+    found = late_of(notices)
     expect(found["line"], "TF817", " 5 s", "ready [0-9]+", "line: booting")
     expect(found["code"], "TF817", " 5 s")
     expect(found["drive"], "TF817", " 6 s", "odom → base_link", "/tf ", "/tf_static", "nobody")
 
 
 @pytest.mark.usefixtures("domain")
-def test_gates_that_stay_shut_say_what_was_seen_instead(tmp_path: Path) -> None:
+def test_gates_that_stay_shut_report_what_was_there_instead(tmp_path: Path) -> None:
     scan = Ready("topic", "/robot/scam", timeout_s=9.0)
     other = Ready("topic", "/front/scan", timeout_s=9.0)
     active = Ready("lifecycle", "active", timeout_s=10.0)
     slam = node("slam", "lifecycle", "fail", lifecycle={"/robot/slam": "active"}, ready=active)
-    asked = Ready("service", "/robot/asked_for", timeout_s=9.0)
-    told = run(
+    requested = Ready("service", "/robot/asked_for", timeout_s=9.0)
+    notices = run(
         tmp_path,
-        *(node("lidar", ready=scan), slam, script("calm", "sleep 180", asked), script("c", "sleep 180", other)),
+        *(node("lidar", ready=scan), slam, script("calm", "sleep 180", requested), script("c", "sleep 180", other)),
         late=4,
     )
-    found = late_of(told)
+    found = late_of(notices)
     expect(found["lidar"], "TF817", " 9 s", "/robot/scam", "/robot/scan")
     expect(found["c"], "TF817", "/front/scan", "topics /robot/scan, ")  # the same name elsewhere comes first
     expect(found["calm"], "TF817", "/robot/asked_for", "services /robot/reset, /robot/slam/change_state, ")

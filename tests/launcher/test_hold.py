@@ -30,21 +30,21 @@ HELD = f"""
 import os, time
 print("pids", os.getpid(), "loaded", flush=True)
 open("loaded", "w").close()
-said = os.read(int(os.environ["{HOLD_FD}"]), 9)
-print("went on" if said == {GO!r} else "was not let go", flush=True)
+order = os.read(int(os.environ["{HOLD_FD}"]), 9)
+print("went on" if order == {GO!r} else "was not let go", flush=True)
 time.sleep(180)
 """
 
 
-def looking_until(file: str) -> PlanProcess:
+def observing_until(file: str) -> PlanProcess:
     """Return a guard whose look before the start ends when there is such a file."""
-    look = f"import os, time\nwhile not os.path.exists({file!r}): time.sleep(0.01)\n"
+    observation = f"import os, time\nwhile not os.path.exists({file!r}): time.sleep(0.01)\n"
     say = f"os.write(int(os.environ['TFCOMPOSE_EVENTS_FD']), {GUARD_EVENTS.line(Clear()).encode()!r}); {SLEEPER}"
-    return program("guard", f"{LISTEN}; {look}{say}", kind="guard", cwd=".")
+    return program("guard", f"{LISTEN}; {observation}{say}", kind="guard", cwd=".")
 
 
 @pytest.mark.parametrize(("sent", "ends"), [(GO, False), (b"", True), (b"no", True)])
-def test_a_held_process_goes_on_when_it_is_told_and_ends_when_nobody_is_left_to_tell_it(
+def test_a_held_process_goes_on_at_the_order_and_ends_when_nobody_is_left_to_give_it(
     monkeypatch: pytest.MonkeyPatch,
     sent: bytes,
     ends: bool,  # noqa: FBT001 (a parameter of the test)
@@ -60,23 +60,25 @@ def test_a_held_process_goes_on_when_it_is_told_and_ends_when_nobody_is_left_to_
     wait_for_go(stop)  # nobody holds it any more
 
 
-def test_own_publishers_load_while_the_guard_looks_and_go_on_when_they_are_started(tmp_path: Path) -> None:
-    told: list[tuple[float, Notice]] = []
+def test_own_publishers_load_while_the_guard_observes_and_go_on_when_they_are_started(tmp_path: Path) -> None:
+    notices: list[tuple[float, Notice]] = []
 
     def report(notice: Notice) -> None:
-        told.append((time.monotonic(), notice))
+        notices.append((time.monotonic(), notice))
         if isinstance(notice, LogLine) and notice.text == "went on":
             os.kill(os.getpid(), signal.SIGINT)
 
-    plan = plan_of(looking_until("loaded"), program("static", HELD, kind="static", cwd="."), program("other", SLEEPER))
+    plan = plan_of(
+        observing_until("loaded"), program("static", HELD, kind="static", cwd="."), program("other", SLEEPER)
+    )
     assert supervise(plan, tmp_path / "plan.json", report=report) == 0
-    kinds = [notice for _, notice in told]
+    kinds = [notice for _, notice in notices]
     started = next(i for i, one in enumerate(kinds) if isinstance(one, ProcessState) and one.process == "static")
-    said = [one.text if isinstance(one, LogLine) else "" for one in kinds]
-    loaded = next(i for i, text in enumerate(said) if text.endswith("loaded"))
-    assert loaded < started < said.index("went on")
+    output = [one.text if isinstance(one, LogLine) else "" for one in kinds]
+    loaded = next(i for i, text in enumerate(output) if text.endswith("loaded"))
+    assert loaded < started < output.index("went on")
     pids = {one.pid for one in kinds if isinstance(one, ProcessState) and one.process == "static" and one.pid}
-    assert pids == {int(said[loaded].split()[1])}
+    assert pids == {int(output[loaded].split()[1])}
     others = [i for i, one in enumerate(kinds) if isinstance(one, ProcessState) and one.process == "other"]
     assert others[0] > loaded
 
@@ -85,7 +87,7 @@ def test_own_publishers_load_while_the_guard_looks_and_go_on_when_they_are_start
 def test_one_that_is_held_when_the_launcher_ends_ends_with_it(
     launch: Callable[..., Launcher], tmp_path: Path, number: int
 ) -> None:
-    launcher = launch(looking_until("never"), program("static", HELD, kind="static", cwd="."))
+    launcher = launch(observing_until("never"), program("static", HELD, kind="static", cwd="."))
     assert until((tmp_path / "loaded").exists)
     below = launcher.below()
     os.kill(launcher.popen.pid, number)
@@ -94,20 +96,20 @@ def test_one_that_is_held_when_the_launcher_ends_ends_with_it(
 
 
 def test_one_that_dies_while_it_is_held_has_failed_when_it_is_started(tmp_path: Path) -> None:
-    told: list[Notice] = []
+    notices: list[Notice] = []
     dies = program("static", "open('dies', 'w').close(); raise SystemExit(3)", kind="static", cwd=".")
-    plan = plan_of(looking_until("dies"), dies)
-    assert supervise(plan, tmp_path / "plan.json", report=told.append) == 1
-    states = [one.state for one in told if isinstance(one, ProcessState) and one.process == "static"]
+    plan = plan_of(observing_until("dies"), dies)
+    assert supervise(plan, tmp_path / "plan.json", report=notices.append) == 1
+    states = [one.state for one in notices if isinstance(one, ProcessState) and one.process == "static"]
     assert states == ["STARTING", "RUNNING", "EXITED"]
     assert not psutil.Process().children(recursive=True)
 
 
 def test_one_that_died_while_it_was_held_ends_nothing_when_the_guard_dies_too(tmp_path: Path) -> None:
-    told: list[Notice] = []
-    look = "import os, time\nwhile not os.path.exists('dies'): time.sleep(0.01)\n"
+    notices: list[Notice] = []
+    observation = "import os, time\nwhile not os.path.exists('dies'): time.sleep(0.01)\n"
     dies = program("static", "open('dies', 'w').close(); raise SystemExit(3)", kind="static", cwd=".")
-    plan = plan_of(program("guard", f"{look}raise SystemExit(4)", kind="guard", cwd="."), dies)
-    assert supervise(plan, tmp_path / "plan.json", report=told.append) == 1
-    assert {one.process for one in told if isinstance(one, ProcessState) and one.state == "EXITED"} == {"guard"}
+    plan = plan_of(program("guard", f"{observation}raise SystemExit(4)", kind="guard", cwd="."), dies)
+    assert supervise(plan, tmp_path / "plan.json", report=notices.append) == 1
+    assert {one.process for one in notices if isinstance(one, ProcessState) and one.state == "EXITED"} == {"guard"}
     assert not psutil.Process().children(recursive=True)

@@ -58,7 +58,9 @@ def env(tmp_path: Path) -> dict[str, str]:
     return dict(os.environ) | {"PATH": path, "AMENT_PREFIX_PATH": str(tmp_path / "ros")}
 
 
-def look(tmp_path: Path, env: dict[str, str], process: PlanProcess = NAV2) -> tuple[dict[str, Command], Finding | None]:
+def inspect(
+    tmp_path: Path, env: dict[str, str], process: PlanProcess = NAV2
+) -> tuple[dict[str, Command], Finding | None]:
     plan = Plan("rover", "", None, RosSettings(), (), (process,))
     commands, found = commands_of(plan, [process], tmp_path / "plan.json", env, child_environment)
     return commands, found[0] if found else None
@@ -69,9 +71,9 @@ def test_the_file_is_included_with_namespace_remappings_sim_time_and_arguments(
     tmp_path: Path, env: dict[str, str], own: str | None, namespace: str
 ) -> None:
     plan = Plan("rover", "", None, RosSettings("r", clock="sim"), (), (replace(NAV2, namespace=own),))
-    told: list[Notice] = []
-    assert supervise(plan, tmp_path / "plan.json", report=told.append, base_env=env) == 0
-    (line,) = [notice.text for notice in told if isinstance(notice, LogLine)]
+    notices: list[Notice] = []
+    assert supervise(plan, tmp_path / "plan.json", report=notices.append, base_env=env) == 0
+    (line,) = [notice.text for notice in notices if isinstance(notice, LogLine)]
     words, description = json.loads(line)
     file = f"{tmp_path}/ros/share/nav2_bringup/launch/navigation_launch.py"
     assert words == ["launch", "--noninteractive"]
@@ -96,16 +98,16 @@ def test_the_file_is_included_with_namespace_remappings_sim_time_and_arguments(
 
 
 @pytest.mark.parametrize(("theirs", "output"), [({}, "both"), ({"OVERRIDE_LAUNCH_PROCESS_OUTPUT": "log"}, "log")])
-def test_what_the_nodes_say_comes_to_the_log_unless_the_user_said_where_it_goes(
+def test_output_of_nodes_comes_to_the_log_unless_the_user_sends_it_elsewhere(
     tmp_path: Path, env: dict[str, str], theirs: dict[str, str], output: str
 ) -> None:
     env.pop("OVERRIDE_LAUNCH_PROCESS_OUTPUT", None)
-    commands, _ = look(tmp_path, env | theirs)
+    commands, _ = inspect(tmp_path, env | theirs)
     assert commands["nav2"].env["OVERRIDE_LAUNCH_PROCESS_OUTPUT"] == output
 
 
 def test_without_ros2_it_says_what_brings_it(tmp_path: Path, env: dict[str, str]) -> None:
-    _, found = look(tmp_path, env | {"PATH": "/nowhere"})
+    _, found = inspect(tmp_path, env | {"PATH": "/nowhere"})
     assert found
     expect(found, "TF810", "ros2 (for launch nav2_bringup/navigation_launch.py) of nav2", "ros2launch")
 
@@ -117,12 +119,12 @@ def test_without_ros2_it_says_what_brings_it(tmp_path: Path, env: dict[str, str]
 def test_a_launch_file_that_is_not_there_is_named_with_what_is(
     tmp_path: Path, env: dict[str, str], word: str, advice: str
 ) -> None:
-    _, found = look(tmp_path, env, PlanProcess("nav2", "run", (f"${{launch:{word}}}",)))
+    _, found = inspect(tmp_path, env, PlanProcess("nav2", "run", (f"${{launch:{word}}}",)))
     assert found
     expect(found, "TF810", f"{word} of nav2", advice)
 
 
 def test_a_word_that_is_no_argument_is_refused(tmp_path: Path, env: dict[str, str]) -> None:
-    _, found = look(tmp_path, env, PlanProcess("nav2", "run", (*NAV2.argv, "--debug")))
+    _, found = inspect(tmp_path, env, PlanProcess("nav2", "run", (*NAV2.argv, "--debug")))
     assert found
     expect(found, "TF902", "nav2", "--debug")

@@ -87,8 +87,8 @@ def test_its_nodes_have_the_plans_namespace_remappings_clock_and_arguments_and_e
     paths = os.pathsep.join(filter(None, (str(package / "ws"), os.environ.get("AMENT_PREFIX_PATH"))))
     words = ("up", package / "robot.yaml", "-o", package / "build")
     up = start("tfcompose", *words, AMENT_PREFIX_PATH=paths)
-    for said in ("I am /rover/a /rover/loud True 2.5", "I am /rover/b /rover/loud True 0.0", "ready demo"):
-        up.until_says(said)
+    for output in ("I am /rover/a /rover/loud True 2.5", "I am /rover/b /rover/loud True 0.0", "ready demo"):
+        up.until_says(output)
     below = psutil.Process(up.process.pid).children(recursive=True)
     nodes = [process for process in below if str(package / "ws/lib/demo/talker") in process.cmdline()]
     assert len(nodes) == 2

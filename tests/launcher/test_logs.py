@@ -19,7 +19,7 @@ def texts(folder: Path, *names: str) -> list[str]:
     return [text for _, _, text in read_logs(folder, list(names))]
 
 
-def test_lines_of_several_processes_come_in_the_order_in_which_they_were_written(tmp_path: Path) -> None:
+def test_lines_of_several_processes_come_in_the_order_of_their_output(tmp_path: Path) -> None:
     logs = Logs(tmp_path)
     for name, text in (("a", "one"), ("b", "two "), ("a", ""), ("b", "four")):
         assert logs.write(name, text) is None
@@ -72,17 +72,19 @@ def test_a_follower_sees_each_line_once_also_when_the_file_is_turned_over(tmp_pa
     logs = Logs(tmp_path, file_bytes=1000)
     logs.write("a", "before")
     follower = Follower(tmp_path, ["a"])
-    seen = []
+    observed = []
     for number in range(200):
         logs.write("a", f"line {number}")
         if number % 7 == 0:
-            seen += [text for _, _, text in follower.more()]
-    seen += [text for _, _, text in follower.more()]
+            observed += [text for _, _, text in follower.more()]
+    observed += [text for _, _, text in follower.more()]
     logs.close()
-    assert seen == [f"line {number}" for number in range(200)]
+    assert observed == [f"line {number}" for number in range(200)]
 
 
-def test_a_full_disk_is_said_once_costs_lines_and_stops_nobody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_is_reported_once_costs_lines_and_stops_nobody(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     logs = Logs(tmp_path)
     logs.write("a", "before")
     write = os.write
@@ -91,9 +93,9 @@ def test_a_full_disk_is_said_once_costs_lines_and_stops_nobody(tmp_path: Path, m
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "write", full)
-    said = [logs.write("a", "lost") for _ in range(100)]
-    assert str(tmp_path) in (said[0] or "")
-    assert said[1:] == [None] * 99
+    output = [logs.write("a", "lost") for _ in range(100)]
+    assert str(tmp_path) in (output[0] or "")
+    assert output[1:] == [None] * 99
     monkeypatch.setattr(os, "write", write)
     monkeypatch.setattr("tfcompose.launcher.logs.LEFT_ALONE_S", 0.0)
     logs.write("a", "after")

@@ -90,7 +90,7 @@ def test_a_guard_that_does_not_say_clear_within_20_s_is_a_failure_that_says_so()
     assert history.started == ["guard"]
 
 
-def test_the_time_that_the_guard_was_told_to_look_is_waited_besides() -> None:
+def test_the_time_of_the_guards_observation_is_waited_besides() -> None:
     history = begin(replace(GUARD, env={SETTLE: "30"}), SLAM)
     assert history.sleep_until_due() == pytest.approx(50)
     expect(history.only(), "TF808", "guard", " 50 s ")
@@ -128,7 +128,7 @@ def test_after_started_waits_until_the_process_runs() -> None:
     assert history.started == ["a", "b"]
 
 
-def test_a_process_is_started_when_the_operating_system_has_said_so() -> None:
+def test_a_process_is_started_when_the_operating_system_has_confirmed_it() -> None:
     state, actions = step(initial(plan_of(run_process("a"), run_process("b", after={"a": "started"}))), Begin(), 0.0)
     assert [action for action in actions if isinstance(action, Start)] == [Start("a")]
     assert Start("b") in step(state, Started("a", 7), 0.1)[1]
@@ -151,7 +151,7 @@ def test_a_process_that_owns_no_edge_is_ready_when_it_has_started() -> None:
     ]
 
 
-def test_after_ready_means_started_where_no_guard_looks() -> None:
+def test_after_ready_means_started_where_no_guard_runs() -> None:
     assert begin(run_process("b", after={"slam": "ready"}), SLAM).started == ["slam", "b"]
 
 
@@ -239,7 +239,7 @@ def test_a_process_that_waits_for_its_restart_is_not_started_once_everything_sto
 # What the guard sees.
 
 
-def test_what_the_guard_sees_is_told_with_the_seconds_since_the_start() -> None:
+def test_what_the_guard_finds_is_reported_with_the_seconds_since_the_start() -> None:
     history = begin(GUARD, STATIC).wait(1.5).feed(Clear()).wait(0.5)
     live = Live("static", ("laser",))
     history.feed(live, OwnerReady("static"), Complete(1), Recovered("it is back"))
@@ -322,7 +322,7 @@ def test_a_signal_stops_everything_in_reverse_order_the_guard_last_and_the_exit_
     assert history.killed == [("slam", SIGINT), ("static", SIGINT), ("guard", SIGINT)]
     assert history.exit_code is None
     assert history.feed(Exited("guard", 0)).exit_code == 0
-    assert history.told[-1] == Ended(0)
+    assert history.notices[-1] == Ended(0)
 
 
 def test_a_process_is_stopped_only_when_those_that_wait_for_it_are_gone() -> None:
@@ -331,7 +331,7 @@ def test_a_process_is_stopped_only_when_those_that_wait_for_it_are_gone() -> Non
     assert history.feed(Exited("b", 0)).killed == [("b", SIGINT), ("a", SIGINT)]
 
 
-def test_a_process_that_does_not_stop_is_told_more_firmly_every_5_s() -> None:
+def test_a_process_that_does_not_stop_gets_a_firmer_signal_every_5_s() -> None:
     history = begin(STATIC).feed(Signalled(SIGINT))
     assert [history.sleep_until_due(), history.sleep_until_due()] == pytest.approx([5, 5])
     assert history.killed == [("static", SIGINT), ("static", SIGTERM), ("static", SIGKILL)]
@@ -360,9 +360,9 @@ def test_the_first_ctrl_c_while_a_failure_ends_everything_changes_nothing() -> N
 
 def test_what_the_guard_says_while_everything_stops_is_not_shown() -> None:
     history = begin(GUARD, STATIC).feed(Clear(), Signalled(SIGINT))
-    told = len(history.told)
+    notices = len(history.notices)
     history.feed(Found(ERROR), Taken(ERROR), Complete(1), Live("static", ("laser",)))
-    assert history.told[told:] == []
+    assert history.notices[notices:] == []
     assert history.feed(Exited("static", 1), Exited("guard", 1)).exit_code == 0
     assert history.found() == []
 
@@ -378,9 +378,9 @@ def test_a_process_that_was_being_started_when_the_stop_came_is_stopped_too() ->
 
 def test_nothing_happens_after_the_end() -> None:
     history = begin(STATIC).feed(Signalled(SIGINT), Exited("static", 0))
-    told = len(history.told)
+    notices = len(history.notices)
     history.feed(Signalled(SIGINT), Exited("static", 1), TimeUp(), Clear()).wait(100)
-    assert (len(history.told), history.exit_code) == (told, 0)
+    assert (len(history.notices), history.exit_code) == (notices, 0)
 
 
 def test_output_that_nobody_reads_any_more_ends_everything_with_exit_141() -> None:
@@ -402,14 +402,14 @@ def test_time_is_up_ends_with_1_when_an_error_was_shown() -> None:
     assert history.feed(Exited("static", 0), Exited("guard", 0)).exit_code == 1
 
 
-def test_time_is_up_ends_with_1_and_names_the_edges_that_were_never_seen() -> None:
+def test_time_is_up_ends_with_1_and_names_the_edges_that_were_never_observed() -> None:
     history = begin(GUARD, STATIC, SLAM).feed(Clear(), Live("static", ("laser",)), TimeUp())
     expect(history.only(), "TF811", "slam", "map → odom")
     history.feed(Exited("slam", 0), Exited("static", 0), Exited("guard", 0))
     assert history.exit_code == 1
 
 
-def test_a_process_that_was_stopped_is_not_said_to_have_never_published() -> None:
+def test_a_process_that_was_stopped_is_not_reported_to_have_never_published() -> None:
     slam = replace(SLAM, argv=("slam",))
     history = begin(GUARD, STATIC, slam).feed(Clear(), Live("static", ("laser",)), Live("slam", ("odom",)), Complete(2))
     history.feed(ProcessRequest("stop", "slam"), Exited("slam", -SIGINT), TimeUp())
@@ -425,7 +425,7 @@ def test_a_process_that_was_never_started_is_not_blamed_for_its_edges() -> None:
     expect(drive, "TF811", "drive", "odom → base_link")
 
 
-def test_time_is_up_ends_with_0_where_no_guard_looks() -> None:
+def test_time_is_up_ends_with_0_where_no_guard_runs() -> None:
     assert begin(STATIC).feed(TimeUp(), Exited("static", 0)).exit_code == 0
 
 

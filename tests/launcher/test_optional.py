@@ -133,10 +133,10 @@ def test_an_optional_process_does_not_hold_back_that_all_is_started() -> None:
 
 def test_ps_says_what_is_optional_why_it_ended_and_that_it_has_failed() -> None:
     history = failed(SLAM)
-    said = {one.name: one for one in status(history.state, history.now).processes}
-    camera = said["camera"]
+    output = {one.name: one for one in status(history.state, history.now).processes}
+    camera = output["camera"]
     assert (camera.state, camera.detail, camera.failed) == ("EXITED", "exit code 3", True)
-    assert (camera.required, said["slam"].required) == (False, None)
+    assert (camera.required, output["slam"].required) == (False, None)
 
 
 def test_what_waited_in_vain_is_not_named_as_the_first_that_failed() -> None:

@@ -13,19 +13,19 @@ from tfcompose.launcher.output import KEPT, NonBlockingOutput
 
 def test_a_reader_that_does_not_read_is_not_waited_for_costs_bounded_memory_and_learns_how_much_is_left_out() -> None:
     reader, writer = os.pipe()
-    outlet = NonBlockingOutput(writer)
+    stream = NonBlockingOutput(writer)
     for number in range(20_000):
-        outlet.write(f"line {number:06d} of a process that floods a pager\n", log=True)
-    outlet.write("said by the launcher\n")
-    assert len(outlet._owed) <= KEPT + 1000
+        stream.write(f"line {number:06d} of a process that floods a pager\n", log=True)
+    stream.write("said by the launcher\n")
+    assert len(stream._owed) <= KEPT + 1000
     os.set_blocking(reader, False)
     text = b""
-    while outlet.owes:
+    while stream.owes:
         text += os.read(reader, 1 << 16)
-        outlet.push()
-    outlet.write("and on\n")
+        stream.push()
+    stream.write("and on\n")
     text += os.read(reader, 1 << 16)
-    outlet.close()
+    stream.close()
     os.close(writer)
     os.close(reader)
     lines = text.decode().splitlines()
@@ -38,29 +38,29 @@ def test_a_reader_that_does_not_read_is_not_waited_for_costs_bounded_memory_and_
 
 def test_a_terminal_that_is_stopped_is_not_waited_for_and_the_shell_keeps_its_blocking_one() -> None:
     master, slave = pty.openpty()
-    outlet = NonBlockingOutput(slave)
+    stream = NonBlockingOutput(slave)
     for _ in range(5000):  # a write that waits, waits for ever
-        outlet.write("x" * 100 + "\n", log=True)
+        stream.write("x" * 100 + "\n", log=True)
     assert os.get_blocking(slave)
-    outlet.close(0.01)
+    stream.close(0.01)
     os.close(slave)
     os.close(master)
 
 
 def test_a_reader_that_is_gone_is_an_error() -> None:
     reader, writer = os.pipe()
-    outlet = NonBlockingOutput(writer)
+    stream = NonBlockingOutput(writer)
     os.close(reader)
     with pytest.raises(BrokenPipeError):
-        outlet.write("text\n")
-    outlet.close()
+        stream.write("text\n")
+    stream.close()
     os.close(writer)
 
 
 def test_a_full_disk_behind_the_output_is_no_error() -> None:
     with Path("/dev/full").open("wb", buffering=0) as full:
-        outlet = NonBlockingOutput(full.fileno())
+        stream = NonBlockingOutput(full.fileno())
         for _ in range(10):
-            outlet.write("text\n")
-        assert outlet.left_out == 10
-        outlet.close()
+            stream.write("text\n")
+        assert stream.left_out == 10
+        stream.close()

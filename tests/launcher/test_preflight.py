@@ -33,7 +33,7 @@ def prefix(tmp_path: Path) -> Path:
     return tmp_path / "ros"
 
 
-def look(
+def inspect(
     tmp_path: Path, *processes: PlanProcess, env: Mapping[str, str] | None = None, ros: RosSettings | None = None
 ) -> tuple[dict[str, Command], list[Finding]]:
     plan = Plan("rover", "", None, ros or RosSettings(), (), processes)
@@ -47,20 +47,22 @@ def lidar(word: str) -> PlanProcess:
 
 def test_a_ros_executable_is_found_below_the_prefixes_in_their_order(tmp_path: Path, prefix: Path) -> None:
     path = f"{tmp_path}/other:{prefix}"
-    commands, found = look(tmp_path, lidar("${executable:sllidar_ros2/sllidar_node}"), env={"AMENT_PREFIX_PATH": path})
+    commands, found = inspect(
+        tmp_path, lidar("${executable:sllidar_ros2/sllidar_node}"), env={"AMENT_PREFIX_PATH": path}
+    )
     assert commands["lidar"].argv == (f"{prefix}/lib/sllidar_ros2/sllidar_node", "-x")
     assert found == []
 
 
 def test_a_ros_executable_that_no_prefix_has_is_taken_from_the_path(tmp_path: Path) -> None:
-    commands, _ = look(tmp_path, lidar("${executable:coreutils/true}"))
+    commands, _ = inspect(tmp_path, lidar("${executable:coreutils/true}"))
     assert os.path.basename(commands["lidar"].argv[0]) == "true"  # noqa: PTH119 (a text, not a place)
 
 
-def test_a_misspelt_ros_executable_is_reported_with_where_it_was_looked_for_and_the_nearest_name(
+def test_a_misspelt_ros_executable_is_reported_with_the_folders_searched_and_the_nearest_name(
     tmp_path: Path, prefix: Path
 ) -> None:
-    _, (found,) = look(
+    _, (found,) = inspect(
         tmp_path, lidar("${executable:sllidar_ros2/slidar_node}"), env={"AMENT_PREFIX_PATH": str(prefix)}
     )
     expect(found, "TF810", "sllidar_ros2/slidar_node of lidar", "sllidar_node?")
@@ -68,59 +70,59 @@ def test_a_misspelt_ros_executable_is_reported_with_where_it_was_looked_for_and_
 
 
 def test_a_package_that_is_not_installed_is_to_be_installed(tmp_path: Path, prefix: Path) -> None:
-    _, (found,) = look(tmp_path, lidar("${executable:nope/no_such_node}"), env={"AMENT_PREFIX_PATH": str(prefix)})
+    _, (found,) = inspect(tmp_path, lidar("${executable:nope/no_such_node}"), env={"AMENT_PREFIX_PATH": str(prefix)})
     expect(found, "TF810", "package nope")
 
 
-def test_all_that_is_missing_is_one_finding_that_says_once_where_it_was_looked_for(tmp_path: Path) -> None:
+def test_all_that_is_missing_is_one_finding_that_names_the_folders_searched_once(tmp_path: Path) -> None:
     words = {"laser": "${executable:sllidar_ros2/sllidar_node}", "slam": "${executable:slam_toolbox/slam}", "a": "no_a"}
-    _, (found,) = look(tmp_path, *(PlanProcess(name, "run", argv=(word,)) for name, word in words.items()))
+    _, (found,) = inspect(tmp_path, *(PlanProcess(name, "run", argv=(word,)) for name, word in words.items()))
     missing = "sllidar_ros2/sllidar_node of laser, slam_toolbox/slam of slam, no_a of a"
     expect(found, "TF810", "3 executables", missing, "AMENT_PREFIX_PATH", f": {os.environ['PATH']}", "setup file")
     assert len(found.notes) == 2
 
 
 def test_without_any_prefix_the_setup_file_is_to_be_sourced(tmp_path: Path) -> None:
-    _, (found,) = look(tmp_path, lidar("${executable:nope/no_such_node}"))
+    _, (found,) = inspect(tmp_path, lidar("${executable:nope/no_such_node}"))
     expect(found, "TF810", "setup file", "AMENT_PREFIX_PATH")
 
 
-def test_a_file_that_may_not_be_executed_is_said_to_be_there(tmp_path: Path, prefix: Path) -> None:
+def test_a_file_that_may_not_be_executed_is_reported_to_be_there(tmp_path: Path, prefix: Path) -> None:
     notes = f"{prefix}/lib/sllidar_ros2/notes.txt"
-    _, (found,) = look(tmp_path, lidar(notes))
+    _, (found,) = inspect(tmp_path, lidar(notes))
     (note,) = found.notes
     assert note.message.startswith(f"{notes} may not")
 
 
-def test_a_relative_program_is_looked_up_in_the_processs_folder(tmp_path: Path, prefix: Path) -> None:
+def test_a_relative_program_is_found_in_the_processs_folder(tmp_path: Path, prefix: Path) -> None:
     process = PlanProcess("lidar", "run", argv=("./sllidar_node",), cwd="ros/lib/sllidar_ros2")
-    commands, _ = look(tmp_path, process)
+    commands, _ = inspect(tmp_path, process)
     assert commands["lidar"].argv == (f"{prefix}/lib/sllidar_ros2/sllidar_node",)
 
 
 @pytest.mark.parametrize("cwd", ["maps", "${build_dir}/../maps"])
 def test_a_folder_that_is_not_there_is_found_before_anything_is_started(tmp_path: Path, cwd: str) -> None:
     process = PlanProcess("lidar", "run", argv=("true",), cwd=cwd)
-    _, (found,) = look(tmp_path, process)
+    _, (found,) = inspect(tmp_path, process)
     folder = os.path.normpath(tmp_path / cwd.replace("${build_dir}/", ""))
     expect(found, "TF810", folder, "lidar")
-    commands, found_of_optional = look(tmp_path, replace(process, required=False))
+    commands, found_of_optional = inspect(tmp_path, replace(process, required=False))
     assert (commands["lidar"].missing, found_of_optional) == (found.message, [])
 
 
-def test_a_relative_program_that_is_not_there_can_be_named_beside_the_robot_file(tmp_path: Path) -> None:
-    _, (found,) = look(tmp_path, lidar("bin/lidar"))
+def test_a_relative_program_that_is_not_there_can_be_named_from_the_robot_file(tmp_path: Path) -> None:
+    _, (found,) = inspect(tmp_path, lidar("bin/lidar"))
     expect(found, "TF810", "${file(bin/lidar)}")
 
 
 def test_a_placeholder_in_a_value_is_not_replaced_again(tmp_path: Path) -> None:
     process = PlanProcess("lidar", "run", argv=("true", "${params_file}"), params_file="${plan}.yaml")
-    commands, _ = look(tmp_path, process)
+    commands, _ = inspect(tmp_path, process)
     assert commands["lidar"].argv[1] == f"{tmp_path}/${{plan}}.yaml"
 
 
 def test_a_process_that_the_plan_does_not_say_how_to_start_is_a_finding(tmp_path: Path) -> None:
-    _, (found,) = look(tmp_path, PlanProcess("lidar", "run"))
+    _, (found,) = inspect(tmp_path, PlanProcess("lidar", "run"))
     expect(found, "TF902", "lidar")
 
 
@@ -131,18 +133,18 @@ def test_a_process_that_waits_for_what_cannot_come_is_a_finding(
     tmp_path: Path, after: dict[str, StartCondition], code: str
 ) -> None:
     waiting = PlanProcess("lidar", "run", argv=("true",), after=after)
-    _, (found,) = look(tmp_path, waiting, PlanProcess("static", "static", argv=("true",)))
+    _, (found,) = inspect(tmp_path, waiting, PlanProcess("static", "static", argv=("true",)))
     expect(found, code, "lidar", *after)
 
 
 def test_processes_that_wait_for_each_other_are_a_finding(tmp_path: Path) -> None:
     a = PlanProcess("a", "run", argv=("true",), after={"b": "started"})
     b = PlanProcess("b", "run", argv=("true",), after={"a": "started"})
-    _, (found,) = look(tmp_path, a, b, lidar("true"))
+    _, (found,) = inspect(tmp_path, a, b, lidar("true"))
     expect(found, "TF812", "a, b ")
 
 
-def test_a_guard_is_started_first_whatever_it_is_said_to_wait_for(tmp_path: Path) -> None:
+def test_a_guard_is_started_first_whatever_it_is_declared_to_wait_for(tmp_path: Path) -> None:
     guard = PlanProcess("guard", "guard", argv=("true",), after={"lidar": "started"})
     waiting = PlanProcess("lidar", "run", argv=("true",), after={"guard": "ready"})
-    assert look(tmp_path, guard, waiting)[1] == []
+    assert inspect(tmp_path, guard, waiting)[1] == []

@@ -57,7 +57,7 @@ AFTER = run_process("b", after={"lidar": "ready"})
         ("lifecycle", Gate("lidar", nodes={"/lidar": "active"})),
     ],
 )
-def test_the_guard_looks_at_a_gate_and_what_waits_is_started_when_it_opens(kind: str, gate: Gate) -> None:
+def test_the_guard_checks_a_gate_and_what_waits_is_started_when_it_opens(kind: str, gate: Gate) -> None:
     text = "active" if kind == "lifecycle" else "/scan"
     history = begin(GUARD, gated(kind=kind, text=text), AFTER).feed(Clear())
     assert history.orders == [gate]
@@ -67,7 +67,7 @@ def test_the_guard_looks_at_a_gate_and_what_waits_is_started_when_it_opens(kind:
     assert history.all(ProcessReady) == [ProcessReady("lidar", "/scan", 2.0)]
 
 
-def test_a_gate_that_stays_shut_is_told_once_with_what_was_seen_instead_and_may_still_open() -> None:
+def test_a_gate_that_stays_shut_is_reported_once_with_what_was_there_instead_and_may_still_open() -> None:
     history = begin(GUARD, gated(timeout_s=3.0), AFTER).feed(Clear(), GateShut("lidar", "topics /tf, /scan_raw"))
     assert history.sleep_until_due() == pytest.approx(3)
     (found,) = history.late
@@ -103,7 +103,7 @@ def test_an_exit_code_that_is_not_the_one_is_a_failure() -> None:
     expect(history.only(), "TF808", "code", "exit code 0")
 
 
-def test_who_sends_on_tf_is_looked_at_while_an_edges_gate_is_shut_and_no_longer() -> None:
+def test_who_sends_on_tf_is_observed_while_an_edges_gate_is_shut_and_no_longer() -> None:
     slam = replace(SLAM, ready=Ready("edges", timeout_s=3.0))
     history = begin(GUARD, STATIC, slam).feed(Clear(), GateShut("slam", "/tf: nobody"))
     assert history.orders == [Gate("slam", writers=("/tf", "/tf_static"))]
@@ -138,19 +138,19 @@ def test_lifecycle_nodes_are_driven_and_ready_means_that_they_are_there() -> Non
     assert history.feed(GateOpen("lidar", "/slam is active")).started[-1] == "b"
 
 
-def test_all_ready_is_told_once_with_when_each_was_started_and_ready() -> None:
+def test_all_ready_is_reported_once_with_when_each_was_started_and_ready() -> None:
     history = begin(GUARD, STATIC, gated()).wait(1).feed(Clear()).wait(1)
     assert [notice.waiting for notice in history.all(AllStarted)] == [()]
     history.feed(Live("static", ("laser",)), OwnerReady("static"), Complete(1)).wait(1)
     assert history.all(AllReady) == []
     history.feed(GateOpen("lidar", "x"))
-    (told,) = history.all(AllReady)
-    assert {row.process: (row.started, row.ready) for row in told.rows} == {
+    (notices,) = history.all(AllReady)
+    assert {row.process: (row.started, row.ready) for row in notices.rows} == {
         "guard": (0.0, 0.0),
         "static": (1.0, 2.0),
         "lidar": (1.0, 3.0),
     }
-    assert told.seconds == pytest.approx(3)
+    assert notices.seconds == pytest.approx(3)
 
 
 # Ends.
@@ -194,7 +194,7 @@ def test_everything_is_stopped_on_request_with_exit_code_0() -> None:
 # Requests.
 
 
-def test_a_process_is_restarted_and_the_guard_is_told_before_and_after() -> None:
+def test_a_process_is_restarted_and_the_guard_is_informed_before_and_after() -> None:
     history = begin(GUARD, STATIC, SLAM).feed(Clear(), Live("slam", ("odom",)), OwnerReady("slam"))
     history.feed(ProcessRequest("restart", "slam"))
     assert history.killed == [("slam", SIGINT)]
@@ -216,7 +216,7 @@ def test_a_process_that_was_stopped_stays_so_until_it_is_started() -> None:
     assert history.found() == []
 
 
-def test_a_process_that_ignores_a_request_to_stop_is_told_more_firmly() -> None:
+def test_a_process_that_ignores_a_request_to_stop_gets_a_firmer_signal() -> None:
     history = begin(STATIC, run_process("a")).feed(ProcessRequest("stop", "a"))
     assert [history.sleep_until_due(), history.sleep_until_due()] == pytest.approx([5, 5])
     assert history.killed == [("a", SIGINT), ("a", SIGTERM), ("a", SIGKILL)]
@@ -244,7 +244,7 @@ def test_what_cannot_be_done_is_refused_with_the_reason(name: str, verb: Verb, w
     assert refusal(history.state, "guard", "restart") is None
 
 
-def test_a_guard_that_is_restarted_is_told_who_is_absent_and_which_gates_are_shut() -> None:
+def test_a_guard_that_is_restarted_learns_who_is_absent_and_which_gates_are_shut() -> None:
     history = begin(GUARD, STATIC, SLAM, gated()).feed(Clear(), ProcessRequest("stop", "slam"), Exited("slam", 0))
     history.orders.clear()
     history.feed(ProcessRequest("restart", "guard"), Exited("guard", 0))
@@ -253,10 +253,10 @@ def test_a_guard_that_is_restarted_is_told_who_is_absent_and_which_gates_are_shu
     assert history.found() == []
 
 
-def test_a_guard_that_dies_is_told_and_started_again_with_what_it_said_and_what_is_live_stays_so() -> None:
+def test_a_guard_that_dies_is_reported_and_restarted_with_its_reports_and_live_edges_stay_live() -> None:
     history = begin(GUARD, STATIC, SLAM).feed(Clear(), Live("slam", ("odom",)), OwnerReady("slam"))
     history.feed(Remember({"a": 1, "b": 1}), Remember({"b": 2}))
-    history.told.clear()
+    history.notices.clear()
     history.feed(Exited("guard", -SIGKILL, ("last words",)))
     expect(history.only(), "TF808", "guard", "SIGKILL", "guard: last words")
     assert history.only().severity == "warning"
@@ -273,7 +273,7 @@ def test_a_guard_that_dies_is_told_and_started_again_with_what_it_said_and_what_
 
 
 @pytest.mark.parametrize(("mode", "did"), [("watch", "watched nothing"), ("strict", "passed nothing on")])
-def test_a_guard_that_hangs_is_told_and_ended_and_its_end_is_that_of_one_that_dies(mode: str, did: str) -> None:
+def test_a_guard_that_hangs_is_reported_and_ended_and_its_end_is_that_of_one_that_dies(mode: str, did: str) -> None:
     history = begin(GUARD, STATIC, guard=GuardPolicy(mode)).feed(Clear(), Alive())  # type: ignore[arg-type]
     history.wait(9).feed(Alive())
     assert (history.sleep_until_due(), history.killed) == (10.0, []), "the launcher may have been kept from running"
@@ -296,8 +296,8 @@ def test_a_guard_that_is_heard_again_before_it_is_believed_to_hang_goes_on() -> 
 
 def test_edges_that_are_silent_are_not_counted_as_live_until_they_are_heard_again() -> None:
     def counted() -> tuple[bool, tuple[str, ...], int]:
-        said = status(history.state, history.now)
-        return said.complete, said.silent, said.processes[1].live
+        answer = status(history.state, history.now)
+        return answer.complete, answer.silent, answer.processes[1].live
 
     history = begin(GUARD, STATIC).feed(Clear(), Live("static", ("laser",)), OwnerReady("static"), Complete(1))
     assert counted() == (True, (), 1)
@@ -315,7 +315,7 @@ def test_a_strict_guard_that_dies_lets_nothing_pass_and_says_so() -> None:
     expect(history.feed(Clear(), Exited("guard", 1)).only(), "TF808", "guard", "exit code 1", "/tf")
 
 
-def test_an_owner_that_ended_while_nobody_watched_is_to_be_seen_anew() -> None:
+def test_an_owner_that_ended_while_nobody_watched_must_be_observed_anew() -> None:
     slam = replace(SLAM, restart="always")
     history = begin(GUARD, slam).feed(Clear(), Live("slam", ("odom",)), Remember({"a": 1}))
     history.feed(Exited("guard", 1), Exited("slam", 1))
@@ -336,7 +336,7 @@ def test_a_guard_that_dies_again_and_again_ends_everything_with_1() -> None:
     assert history.feed(Exited("static", 0)).exit_code == 1
 
 
-def test_a_guard_that_is_asked_for_anew_or_follows_another_plan_begins_without_memory() -> None:
+def test_a_guard_that_is_requested_anew_or_follows_another_plan_begins_without_memory() -> None:
     history = begin(GUARD, STATIC).feed(Clear(), Remember({"a": 1}), Live("static", ("laser",)))
     history.feed(ProcessRequest("restart", "guard"), Exited("guard", 0))
     assert (history.state.memory, history.state.live, history.found()) == ({}, frozenset(), [])

@@ -63,15 +63,15 @@ def test_without_a_safe_runtime_folder_one_of_the_users_own_is_made(
     assert place.folder.parent.stat().st_mode & 0o777 == 0o700
 
 
-def test_who_is_not_told_of_the_users_folder_uses_it_too(
+def test_who_does_not_name_the_users_folder_uses_it_too(
     env: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As a service does, or cron: so that ``ps`` in a terminal sees what was started there."""
     monkeypatch.setattr(runtime_dir, "USERS", tmp_path)
     (tmp_path / str(os.getuid())).mkdir(mode=0o700)
-    told = runtime_dir_of(ROVER, env | {"XDG_RUNTIME_DIR": str(tmp_path / str(os.getuid()))})
+    given = runtime_dir_of(ROVER, env | {"XDG_RUNTIME_DIR": str(tmp_path / str(os.getuid()))})
     del env["XDG_RUNTIME_DIR"]
-    assert runtime_dir_of(ROVER, env) == told
+    assert runtime_dir_of(ROVER, env) == given
 
 
 @pytest.mark.parametrize("how", ["open to all", "a link"])
@@ -112,7 +112,7 @@ def test_of_two_only_one_gets_the_lock_the_other_learns_who_has_it_and_a_killed_
     lock.close()
 
 
-def test_who_only_looks_is_in_nobodys_way_and_is_taken_for_nobodys_run(env: dict[str, str]) -> None:
+def test_who_only_observes_is_in_nobodys_way_and_is_taken_for_nobodys_run(env: dict[str, str]) -> None:
     place = runtime_dir_of(ROVER, env)
     Lock(place).close()
     with (place.folder / "lock").open() as looker:

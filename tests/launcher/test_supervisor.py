@@ -58,13 +58,13 @@ time.sleep(180)
 
 def run(tmp_path: Path, *processes: PlanProcess, **more: Any) -> tuple[int, list[Notice]]:
     """Run the plan in this process and return its exit code and what was told."""
-    told: list[Notice] = []
-    code = supervise(plan_of(*processes), tmp_path / "plan.json", report=told.append, **more)
-    return code, told
+    notices: list[Notice] = []
+    code = supervise(plan_of(*processes), tmp_path / "plan.json", report=notices.append, **more)
+    return code, notices
 
 
-def logged(told: list[Notice], process: str) -> list[str]:
-    return [notice.text for notice in told if isinstance(notice, LogLine) and notice.process == process]
+def logged(notices: list[Notice], process: str) -> list[str]:
+    return [notice.text for notice in notices if isinstance(notice, LogLine) and notice.process == process]
 
 
 @pytest.mark.parametrize("number", [SIGINT, SIGTERM, SIGHUP])
@@ -80,15 +80,15 @@ def test_a_signal_ends_everything_with_0_and_no_process_is_left(launch: Callable
     )
 
 
-@pytest.mark.parametrize("keeper", ["runs", "told", "dead"])
-def test_sigkill_of_the_launcher_takes_its_children_along(launch: Callable[..., Launcher], keeper: str) -> None:
+@pytest.mark.parametrize("holder", ["runs", "told", "dead"])
+def test_sigkill_of_the_launcher_takes_its_children_along(launch: Callable[..., Launcher], holder: str) -> None:
     launcher = launch(program("a", PARENT), program("b", DEAF))
     assert until(lambda: len(launcher.pids()) == 3)
     below, children = launcher.below(), launcher.below()
     (shell,) = [pid for pid in launcher.below(recursive=False) if psutil.Process(pid).name() == "sh"]
-    if "told" in keeper:
+    if "told" in holder:
         os.kill(shell, SIGTERM)
-    if "dead" in keeper:
+    if "dead" in holder:
         children = launcher.below(recursive=False)
         os.kill(shell, SIGKILL)
         assert until(lambda: gone(shell))
@@ -96,52 +96,52 @@ def test_sigkill_of_the_launcher_takes_its_children_along(launch: Callable[..., 
     launcher.popen.wait()
     try:
         assert until(lambda: all(gone(pid) for pid in children))
-        assert len(children) == (3 if "dead" in keeper else 4)
+        assert len(children) == (3 if "dead" in holder else 4)
     finally:
         for pid in below:
             if not gone(pid):
                 os.kill(pid, SIGKILL)
 
 
-def test_a_child_that_heeds_neither_sigint_nor_sigterm_is_killed(tmp_path: Path) -> None:
+def test_a_child_that_ignores_sigint_and_sigterm_is_killed(tmp_path: Path) -> None:
     times = Times(interrupt_s=0.2, terminate_s=0.2)
-    told: list[Notice] = []
+    notices: list[Notice] = []
 
     def report(notice: Notice) -> None:
-        told.append(notice)
+        notices.append(notice)
         if isinstance(notice, LogLine):
             os.kill(os.getpid(), SIGINT)
 
     assert supervise(plan_of(program("a", DEAF)), tmp_path / "plan.json", report=report, times=times) == 0
-    details = [notice.detail for notice in told if isinstance(notice, ProcessState) and notice.state == "STOPPING"]
+    details = [notice.detail for notice in notices if isinstance(notice, ProcessState) and notice.state == "STOPPING"]
     assert [detail.split()[-1] for detail in details] == ["SIGINT", "SIGTERM", "SIGKILL"]
-    assert gone(int(logged(told, "a")[0].split()[1]))
+    assert gone(int(logged(notices, "a")[0].split()[1]))
 
 
 def test_what_a_process_leaves_in_its_group_ends_with_it(tmp_path: Path) -> None:
-    code, told = run(tmp_path, program("a", PARENT.replace("time.sleep(180)\n", "")))
+    code, notices = run(tmp_path, program("a", PARENT.replace("time.sleep(180)\n", "")))
     assert code == 0
-    assert until(lambda: gone(int(logged(told, "a")[0].split()[2])))  # init may still have to bury it
+    assert until(lambda: gone(int(logged(notices, "a")[0].split()[2])))  # init may still have to bury it
 
 
 def test_a_process_that_left_its_group_is_not_waited_for(tmp_path: Path) -> None:
     code = PARENT.replace("stdout=subprocess.PIPE)", "start_new_session=True)")
     code = code.replace("child.stdout.readline()\n", "").replace("time.sleep(180)\n", "")
     code = code.replace("print('deaf', flush=True); ", "")  # nobody may read it any more, and that would end it
-    _, told = run(tmp_path, program("a", code))
-    (said,) = [line for line in logged(told, "a") if line.startswith("pids")]
-    assert not gone(int(said.split()[2]))
-    os.kill(int(said.split()[2]), SIGKILL)
+    _, notices = run(tmp_path, program("a", code))
+    (output,) = [line for line in logged(notices, "a") if line.startswith("pids")]
+    assert not gone(int(output.split()[2]))
+    os.kill(int(output.split()[2]), SIGKILL)
 
 
 def test_a_failed_process_is_named_with_its_last_lines_and_the_exit_code_is_1(tmp_path: Path) -> None:
     failing = "import sys; [print(i) for i in range(20)]; sys.exit('no lidar at /dev/ttyUSB0')"
-    code, told = run(tmp_path, program("lidar", failing), program("b", SLEEPER))
-    (found,) = [notice.found for notice in told if isinstance(notice, FindingShown)]
+    code, notices = run(tmp_path, program("lidar", failing), program("b", SLEEPER))
+    (found,) = [notice.found for notice in notices if isinstance(notice, FindingShown)]
     assert code == 1
     expect(found, "TF808", "lidar", "exit code 1", "lidar: no lidar at /dev/ttyUSB0")
     assert len(found.notes) == 8
-    assert told[-1] == Ended(1, (found.message, *(note.message for note in found.notes)))
+    assert notices[-1] == Ended(1, (found.message, *(note.message for note in found.notes)))
 
 
 def test_a_process_that_fails_is_started_again(tmp_path: Path) -> None:
@@ -154,19 +154,19 @@ def test_a_process_that_fails_is_started_again(tmp_path: Path) -> None:
 def test_a_process_that_floods_neither_fills_the_memory_nor_keeps_the_others_from_being_heard(tmp_path: Path) -> None:
     flood = "import os\nwhile True: os.write(1, b'flood\\n' * 1000)"
     endless = "import os\nwhile True: os.write(2, b'x' * 6000)"
-    seen = {"a": 0, "b": 0, "c": 0}
-    longest = asked = heeded = 0
+    observed = {"a": 0, "b": 0, "c": 0}
+    longest = requested = handled = 0
 
     def report(notice: Notice) -> None:
-        nonlocal longest, asked, heeded
+        nonlocal longest, requested, handled
         if isinstance(notice, LogLine):
-            seen[notice.process] += 1
+            observed[notice.process] += 1
             longest = max(longest, len(notice.text))
-            if seen["a"] > 10_000 and seen["b"] > 10 and seen["c"] and not asked:
-                asked = seen["a"]
+            if observed["a"] > 10_000 and observed["b"] > 10 and observed["c"] and not requested:
+                requested = observed["a"]
                 os.kill(os.getpid(), SIGTERM)
         elif isinstance(notice, Stopping):
-            heeded = seen["a"]
+            handled = observed["a"]
 
     tracemalloc.start()
     plan = plan_of(program("a", flood), program("b", endless), program("c", "print('heard', flush=True); " + SLEEPER))
@@ -174,8 +174,8 @@ def test_a_process_that_floods_neither_fills_the_memory_nor_keeps_the_others_fro
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 100 * READ_SIZE
-    assert (asked > 10_000, seen["b"] > 10, seen["c"]) == (True, True, 1)
-    assert heeded - asked < 3 * READ_SIZE / len("flood\n"), "the flood was read on before a signal was heeded"
+    assert (requested > 10_000, observed["b"] > 10, observed["c"]) == (True, True, 1)
+    assert handled - requested < 3 * READ_SIZE / len("flood\n"), "the flood was read on before a signal was heeded"
     assert longest == 64 * 1024
 
 
@@ -183,11 +183,11 @@ def test_what_cannot_be_executed_is_named_and_everything_ends_with_1(tmp_path: P
     broken = tmp_path / "broken"
     broken.write_bytes(b"\x7fnothing")
     broken.chmod(0o755)
-    code, told = run(tmp_path, program("b", SLEEPER), PlanProcess("a", "run", argv=(str(broken),)))
-    (found,) = [notice.found for notice in told if isinstance(notice, FindingShown)]
+    code, notices = run(tmp_path, program("b", SLEEPER), PlanProcess("a", "run", argv=(str(broken),)))
+    (found,) = [notice.found for notice in notices if isinstance(notice, FindingShown)]
     assert code == 1
     expect(found, "TF808", "a ", "Exec format error", str(broken))
-    assert [notice.state for notice in told if isinstance(notice, ProcessState) and notice.process == "b"][
+    assert [notice.state for notice in notices if isinstance(notice, ProcessState) and notice.process == "b"][
         -1
     ] == "STOPPED"
 
@@ -196,27 +196,27 @@ def test_the_rest_goes_on_without_optional_processes_that_are_not_there_or_fail(
     absent = PlanProcess("absent", "run", argv=("${executable:no_package/no_program}",), required=False)
     failing = program("failing", "raise SystemExit(3)", required=False)
     lasting = program("lasting", "import time; time.sleep(0.3); print('to the end')")
-    code, told = run(tmp_path, absent, failing, lasting)
-    assert (code, logged(told, "lasting")) == (1, ["to the end"])
-    found = [notice.found for notice in told if isinstance(notice, FindingShown)]
+    code, notices = run(tmp_path, absent, failing, lasting)
+    assert (code, logged(notices, "lasting")) == (1, ["to the end"])
+    found = [notice.found for notice in notices if isinstance(notice, FindingShown)]
     assert [one.severity for one in found] == ["warning", "warning"]
     expect(found[0], found[0].code, "no_package/no_program", "absent")
     expect(found[1], "TF808", "failing", "exit code 3")
 
 
 def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
-    code, told = run(tmp_path, program("a", SLEEPER, cwd="maps"))
-    (found,) = [notice.found for notice in told if isinstance(notice, FindingShown)]
+    code, notices = run(tmp_path, program("a", SLEEPER, cwd="maps"))
+    (found,) = [notice.found for notice in notices if isinstance(notice, FindingShown)]
     assert code == 1
     expect(found, "TF810", f"{tmp_path}/maps", "a ")
 
 
 def test_missing_executables_are_all_reported_before_anything_is_started(tmp_path: Path) -> None:
     missing = [PlanProcess(name, "run", argv=(f"no_such_{name}",)) for name in "ab"]
-    code, told = run(tmp_path, program("c", SLEEPER), *missing)
+    code, notices = run(tmp_path, program("c", SLEEPER), *missing)
     assert code == 1
-    assert [notice.found.code for notice in told[:-1] if isinstance(notice, FindingShown)] == ["TF810"]
-    assert told[1:] == [Ended(1)]
+    assert [notice.found.code for notice in notices[:-1] if isinstance(notice, FindingShown)] == ["TF810"]
+    assert notices[1:] == [Ended(1)]
 
 
 def test_placeholders_environment_and_folder_are_those_of_the_plan(tmp_path: Path) -> None:
@@ -225,41 +225,41 @@ def test_placeholders_environment_and_folder_are_those_of_the_plan(tmp_path: Pat
     words = ("${plan}", "${build_dir}/x", "${params_file}", "${other}")
     process = program("a", code, *words, cwd="maps", params_file="params/a.yaml", env={"MINE": "1"})
     plan = Plan("rover", "", None, RosSettings(domain_id=7), (), (process,))
-    told: list[Notice] = []
-    supervise(plan, tmp_path / "plan.json", report=told.append)
+    notices: list[Notice] = []
+    supervise(plan, tmp_path / "plan.json", report=notices.append)
     expected = [tmp_path / "plan.json", tmp_path / "x", tmp_path / "params/a.yaml", "${other}", tmp_path / "maps", 7, 1]
-    assert logged(told, "a") == [" ".join(map(str, expected))]
+    assert logged(notices, "a") == [" ".join(map(str, expected))]
 
 
 def test_the_guards_events_steer_the_start_and_a_line_that_is_none_is_shown(tmp_path: Path) -> None:
-    seen = Live("a", ("laser",))
-    events = guard(Clear(), "rubbish\n", seen, OwnerReady("a"), Complete(1))
+    observed = Live("a", ("laser",))
+    events = guard(Clear(), "rubbish\n", observed, OwnerReady("a"), Complete(1))
     a, b = program("a", SLEEPER, owns=(("base_link", "laser"),)), program("b", SLEEPER, after={"a": "ready"})
-    told: list[Notice] = []
+    notices: list[Notice] = []
 
     def report(notice: Notice) -> None:
-        told.append(notice)
+        notices.append(notice)
         if notice == running_b():
             os.kill(os.getpid(), SIGTERM)
 
     def running_b() -> Notice | None:
         return next(
-            (one for one in told if isinstance(one, ProcessState) and (one.process, one.state) == ("b", "RUNNING")),
+            (one for one in notices if isinstance(one, ProcessState) and (one.process, one.state) == ("b", "RUNNING")),
             None,
         )
 
     assert supervise(plan_of(events, b, a), tmp_path / "plan.json", report=report) == 0
-    started = [notice.process for notice in told if isinstance(notice, ProcessState) and notice.state == "STARTING"]
+    started = [notice.process for notice in notices if isinstance(notice, ProcessState) and notice.state == "STARTING"]
     assert started == ["guard", "a", "b"]
-    assert logged(told, "guard")[:1] == ["not an event: rubbish"]
+    assert logged(notices, "guard")[:1] == ["not an event: rubbish"]
 
 
 def test_a_guard_that_dies_before_it_is_clear_ends_everything_with_1(tmp_path: Path) -> None:
-    code, told = run(tmp_path, guard(end="raise SystemExit('no rclpy')"), program("a", SLEEPER))
+    code, notices = run(tmp_path, guard(end="raise SystemExit('no rclpy')"), program("a", SLEEPER))
     assert code == 1
-    assert [notice.process for notice in told if isinstance(notice, ProcessState) and notice.state == "STARTING"] == [
-        "guard"
-    ]
+    assert [
+        notice.process for notice in notices if isinstance(notice, ProcessState) and notice.state == "STARTING"
+    ] == ["guard"]
 
 
 def test_a_guard_that_dies_is_followed_by_one_that_is_given_its_memory_and_leaves_no_descriptor(tmp_path: Path) -> None:
@@ -272,8 +272,8 @@ if "TFCOMPOSE_MEMORY_FD" in os.environ:
         time.sleep(0.01)
 os.write(int(os.environ["TFCOMPOSE_EVENTS_FD"]), SAID)
 """
-    said = GUARD_EVENTS.line(Clear()) + GUARD_EVENTS.line(Remember({"é": [1, None]}))
-    dies = program("guard", code.replace("SAID", repr(said.encode())), kind="guard", cwd=".")
+    output = GUARD_EVENTS.line(Clear()) + GUARD_EVENTS.line(Remember({"é": [1, None]}))
+    dies = program("guard", code.replace("SAID", repr(output.encode())), kind="guard", cwd=".")
     remembered: list[str] = []
     counted: list[int] = []
 
@@ -290,17 +290,19 @@ os.write(int(os.environ["TFCOMPOSE_EVENTS_FD"]), SAID)
     assert len(set(counted)) == 1, counted
 
 
-def test_output_that_nobody_reads_any_more_ends_everything_with_141_and_nothing_more_is_told(tmp_path: Path) -> None:
-    told: list[Notice] = []
+def test_output_that_nobody_reads_any_more_ends_everything_with_141_and_nothing_more_is_reported(
+    tmp_path: Path,
+) -> None:
+    notices: list[Notice] = []
 
     def report(notice: Notice) -> None:
-        told.append(notice)
+        notices.append(notice)
         if isinstance(notice, LogLine):
             raise BrokenPipeError
 
     assert supervise(plan_of(program("a", PARENT)), tmp_path / "plan.json", report=report) == 141
-    assert isinstance(told[-1], LogLine)
-    assert len([notice for notice in told if isinstance(notice, LogLine)]) == 1
+    assert isinstance(notices[-1], LogLine)
+    assert len([notice for notice in notices if isinstance(notice, LogLine)]) == 1
 
 
 def test_an_error_in_the_launcher_itself_leaves_no_process(tmp_path: Path) -> None:

@@ -30,8 +30,8 @@ def edges(done: subprocess.CompletedProcess[str]) -> dict[str, Any]:
 @pytest.mark.parametrize("mcap", [True, False], ids=["mcap", "sqlite"])
 def test_monitor_tells_rates_and_delays_of_a_bag(tmp_path: Path, *, mcap: bool) -> None:
     bag = write_bag(tmp_path / "bag", [*FIXED, *drive()], mcap=mcap)
-    seen = edges(tfcompose_without_ros("monitor", "--bag", str(bag), "--format", "json"))
-    base, laser = seen["base_link"], seen["laser_link"]
+    observed = edges(tfcompose_without_ros("monitor", "--bag", str(bag), "--format", "json"))
+    base, laser = observed["base_link"], observed["laser_link"]
     assert (base["kind"], base["count"], base["publisher"]) == ("dynamic", 200, None)
     assert base["rate"] == pytest.approx(50, rel=1e-3)
     assert base["jitter_s"] == pytest.approx(0, abs=1e-5)
@@ -73,7 +73,7 @@ def test_the_table_says_how_many_were_refused(tmp_path: Path) -> None:
     )
 
 
-def test_a_namespace_is_looked_at_alone_and_where_tf_is_instead_is_said(tmp_path: Path) -> None:
+def test_a_namespace_is_observed_alone_and_where_tf_is_instead_is_reported(tmp_path: Path) -> None:
     bag = write_bag(tmp_path / "bag", drive(topic="/robot1/tf"))
     assert edges(tfcompose_without_ros("monitor", "--bag", str(bag), "--namespace", "robot1", "--format", "json"))
     errors = tfcompose_without_ros("monitor", "--bag", str(bag), code=2).stderr
@@ -81,13 +81,13 @@ def test_a_namespace_is_looked_at_alone_and_where_tf_is_instead_is_said(tmp_path
     assert "TF is on /robot1/tf: --namespace /robot1" in errors
 
 
-def test_what_is_no_bag_is_said_in_one_sentence(tmp_path: Path) -> None:
+def test_what_is_no_bag_is_reported_in_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     (tmp_path / "text.mcap").write_text("this is no recording, however long it is\n" * 10)
     (tmp_path / "text.db3").write_text("nor is this")
     (tmp_path / "old.bag").write_text("#ROSBAG V2.0\n")
-    whole = write_bag(tmp_path / "whole", drive())
-    [file] = whole.glob("*.mcap")
+    full = write_bag(tmp_path / "whole", drive())
+    [file] = full.glob("*.mcap")
     (tmp_path / "whole.zstd").write_bytes(b"")
     (tmp_path / "cut.mcap").write_bytes(file.read_bytes()[:2000])
     (tmp_path / "noise.mcap").write_bytes(file.read_bytes().replace(b"/tf", b"\xff\xfe\xfd"))
@@ -126,7 +126,7 @@ def poses(*words: str) -> list[Any]:
 
 
 @pytest.mark.parametrize("mcap", [True, False], ids=["mcap", "sqlite"])
-def test_echo_follows_a_recording_at_the_rate_that_is_asked_for(tmp_path: Path, *, mcap: bool) -> None:
+def test_echo_follows_a_recording_at_the_rate_that_is_requested(tmp_path: Path, *, mcap: bool) -> None:
     bag = str(write_bag(tmp_path / "bag", [*FIXED, *drive()], mcap=mcap))
     found = poses("odom", "laser_link", "--bag", bag, "--rate", "2")
     assert found == [(pytest.approx(at), pytest.approx(at, abs=1e-6)) for at in (0, 0.5, 1, 1.5, 2, 2.5, 3, 3.5)]
@@ -168,8 +168,8 @@ def test_where_echo_finds_no_pose_in_a_bag_it_says_why(tmp_path: Path) -> None:
 )
 def test_compressed_bags_are_read(tmp_path: Path, compressed: CompressionMode, *, mcap: bool) -> None:
     bag = write_bag(tmp_path / "bag", [*FIXED, *drive()], mcap=mcap, compressed=compressed)
-    seen = edges(tfcompose_without_ros("monitor", "--bag", str(bag), "--format", "json"))
-    assert (seen["base_link"]["count"], seen["laser_link"]["count"]) == (200, 1)
+    observed = edges(tfcompose_without_ros("monitor", "--bag", str(bag), "--format", "json"))
+    assert (observed["base_link"]["count"], observed["laser_link"]["count"]) == (200, 1)
 
 
 @pytest.mark.parametrize("mcap", [True, False], ids=["mcap", "sqlite"])
@@ -188,7 +188,7 @@ def test_a_bag_that_was_split_is_read_in_order_without_its_metadata_too(tmp_path
     assert stamps == pytest.approx(list(range(11)), abs=0.03)
 
 
-def test_a_bag_without_messages_and_one_of_another_type_are_told_apart(tmp_path: Path) -> None:
+def test_a_bag_without_messages_differs_from_one_of_another_type(tmp_path: Path) -> None:
     text = ("/tf", 0.0, "std_msgs/msg/String", STORE.types["std_msgs/msg/String"]("a"))
     strange = write_bag(tmp_path / "strange", [], others=[text])
     errors = tfcompose_without_ros("monitor", "--bag", str(strange), code=2).stderr

@@ -22,7 +22,7 @@ from sensor_msgs.msg import JointState, LaserScan
 from std_msgs.msg import String
 
 from tests.support import processes
-from tests.support.doctor import at_last, doctor, doctor_finds, finds_nothing, said
+from tests.support.doctor import at_last, doctor, doctor_finds, finds_nothing, messages_of
 from tests.support.fake_nodes import message
 from tests.support.waiting import until
 from tfcompose.ros.node import LATCHED, TFPublisher, open_node, qos
@@ -87,10 +87,10 @@ def wrong_trees(nodes: FakeNodes) -> None:
 
 def wrong_times(nodes: FakeNodes) -> None:
     """Each edge is stamped wrong in a way of its own, or comes too rarely."""
-    began, turns, ticks = time.time_ns(), iter(range(1_000_000)), iter(range(1_000_000))
+    began, rotations, ticks = time.time_ns(), iter(range(1_000_000)), iter(range(1_000_000))
     nodes.moving(nodes.node("drive"), "odom base_link", hz=4)
     nodes.moving(nodes.node("frozen"), "base_link frozen", stamp=lambda _: began)
-    nodes.moving(nodes.node("back"), "base_link back", stamp=lambda now: now - next(turns) % 2 * SECOND_NS // 4)
+    nodes.moving(nodes.node("back"), "base_link back", stamp=lambda now: now - next(rotations) % 2 * SECOND_NS // 4)
     nodes.moving(nodes.node("zero"), "base_link zero", stamp=lambda _: 0)
     nodes.moving(nodes.node("gazebo"), "base_link wheel", stamp=lambda now: now - began)
     nodes.moving(nodes.node("late"), "base_link late", stamp=lambda now: now - 2 * SECOND_NS)
@@ -212,7 +212,7 @@ def test_what_is_wrong_is_found_with_the_nodes_and_the_numbers(
     scene(nodes)
     found = doctor_finds(SCENES[scene], LATE)
     for code, names in SCENES[scene].items():
-        text = said(found, code)
+        text = messages_of(found, code)
         assert [name for name in names if name not in text] == [], text
     assert {one["code"] for one in found} <= {*SCENES[scene], *LATE}, found
 
@@ -244,7 +244,7 @@ def missed(name: str, *, static: bool, seconds: float) -> str:
                 time.sleep(1.0 / len(data))
             leave.close()
             output, _ = process.communicate(timeout=90)
-    return said(json.loads(output), "TF804")
+    return messages_of(json.loads(output), "TF804")
 
 
 def test_one_that_leaves_is_missed(nodes: FakeNodes) -> None:
@@ -270,21 +270,21 @@ def test_fixed_frames_whose_publisher_leaves_are_missed(nodes: FakeNodes) -> Non
 
 
 @pytest.mark.usefixtures("nodes")
-def test_where_nothing_runs_it_says_with_which_settings_it_looked(domain: Any) -> None:
+def test_where_nothing_runs_it_reports_with_which_settings_it_observed(domain: Any) -> None:
     code, found = doctor(seconds=1.0)
-    text = said(found, "TF845")
+    text = messages_of(found, "TF845")
     assert code == 1
     assert f"ROS_DOMAIN_ID={domain.id}, ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST" in text
 
 
-def test_a_robot_below_a_namespace_is_pointed_at_and_then_looked_at(nodes: FakeNodes) -> None:
+def test_a_robot_below_a_namespace_is_pointed_at_and_then_observed(nodes: FakeNodes) -> None:
     node = nodes.node("drive", "robot1")
     nodes.moving(node, "odom base_link", topic="/robot1/tf")
     nodes.fixed(node, "base_link laser", topic="/robot1/tf_static")
     words = "tfcompose doctor --namespace /robot1"
 
     def is_pointed_at(seconds: float) -> None:
-        assert words in said(doctor(seconds=seconds)[1], "TF845")
+        assert words in messages_of(doctor(seconds=seconds)[1], "TF845")
 
     at_last(is_pointed_at)
     assert finds_nothing("--namespace", "robot1")
@@ -300,7 +300,7 @@ with open_node("far", ""):
 
 
 @pytest.mark.slow
-def test_a_robot_in_another_domain_is_seen_by_its_process(domain: Any) -> None:
+def test_a_robot_in_another_domain_is_observed_by_its_process(domain: Any) -> None:
     """It runs on this machine, and it cannot be heard: the process says in which domain it was started.
 
     It is slow so that it runs alone: of many such processes on a machine doctor names the first few.
@@ -308,25 +308,25 @@ def test_a_robot_in_another_domain_is_seen_by_its_process(domain: Any) -> None:
     environment = {**domain.environment, "ROS_DOMAIN_ID": "101"}
     command = [sys.executable, "-c", FAR]
 
-    def is_seen(seconds: float) -> None:
+    def is_observed(seconds: float) -> None:
         with processes.start(command, stdout=subprocess.PIPE, env=environment) as process:
             try:
                 assert process.stdout
                 assert process.stdout.readline() == "up\n"
-                text = said(doctor(seconds=seconds / 3)[1], "TF908")
+                text = messages_of(doctor(seconds=seconds / 3)[1], "TF908")
             finally:
                 process.kill()
         assert "ROS_DOMAIN_ID=101 tfcompose doctor" in text
         assert f"pid {process.pid}: " in text
 
-    at_last(is_seen)  # what others run here at the same time may have been started later, and is named first
+    at_last(is_observed)  # what others run here at the same time may have been started later, and is named first
 
 
 def test_discovery_that_is_switched_off_is_named(nodes: FakeNodes, monkeypatch: pytest.MonkeyPatch) -> None:
     sound(nodes)
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
     _, found = doctor(seconds=1.0)
-    assert "ROS_AUTOMATIC_DISCOVERY_RANGE=OFF" in said(found, "TF909")
+    assert "ROS_AUTOMATIC_DISCOVERY_RANGE=OFF" in messages_of(found, "TF909")
     assert "TF845" in {one["code"] for one in found}
 
 
@@ -370,12 +370,12 @@ def test_the_clock_of_another_machine_is_named_with_how_far_it_is_off(tmp_path: 
             found = doctor_finds({"TF834": ["/far"]}, set())
         finally:
             talker.kill()
-    text = said(found, "TF834")
+    text = messages_of(found, "TF834")
     assert re.search(r" (3|2\.9\d) s ahead ", text), text
     assert {one["code"] for one in found} == {"TF834"}
 
 
-def test_a_robot_that_runs_as_planned_gives_no_finding_and_one_beside_its_plan_is_told_what_differs(
+def test_a_robot_that_runs_as_planned_gives_no_finding_and_one_that_differs_from_its_plan_gives_each_difference(
     start: Callable[..., Started], nodes: FakeNodes
 ) -> None:
     """The example's stand-ins; without the profile the plan expects a camera's driver."""
@@ -385,19 +385,19 @@ def test_a_robot_that_runs_as_planned_gives_no_finding_and_one_beside_its_plan_i
     assert finds_nothing()
     nodes.fixed(nodes.node("rogue"), "base_link laser_link", x=0.1)
 
-    def is_told(seconds: float) -> None:
-        text = said(doctor(ROBOT, seconds=seconds)[1], "TF801")
+    def is_reported(seconds: float) -> None:
+        text = messages_of(doctor(ROBOT, seconds=seconds)[1], "TF801")
         for name in ("base_link → laser_link", "/rogue", "static (/tfcompose_static)", "camera (/camera/camera)"):
             assert name in text
 
-    at_last(is_told)
+    at_last(is_reported)
     up.end()
 
 
-def test_ctrl_c_ends_the_look_and_says_what_was_found(nodes: FakeNodes, start: Callable[..., Started]) -> None:
+def test_ctrl_c_ends_the_observation_and_prints_what_was_found(nodes: FakeNodes, start: Callable[..., Started]) -> None:
     nodes.moving(node := nodes.node("drive"), "odom base_link", stamp=lambda _: 0)
 
-    def is_said(seconds: float) -> None:
+    def is_named(seconds: float) -> None:
         process = start("tfcompose", "doctor", "--for", "600")
         assert until(lambda: node.count_subscribers("/tf"))
         time.sleep(seconds)  # it is to have looked for so long
@@ -406,7 +406,7 @@ def test_ctrl_c_ends_the_look_and_says_what_was_found(nodes: FakeNodes, start: C
         assert (code, process.errors) == (1, [])
         assert "TF825" in process.output
 
-    at_last(is_said)
+    at_last(is_named)
 
 
 @pytest.mark.parametrize(
@@ -444,20 +444,20 @@ def test_a_node_that_asks_a_discovery_server_is_named(domain: Any) -> None:
         finally:
             process.kill()
     assert "TF845" in {one["code"] for one in found}
-    assert "ROS_DISCOVERY_SERVER=127.0.0.1:11811" in said(found, "TF908")
+    assert "ROS_DISCOVERY_SERVER=127.0.0.1:11811" in messages_of(found, "TF908")
 
 
-def test_where_other_robots_are_beside_is_said(nodes: FakeNodes) -> None:
+def test_other_robots_in_the_same_domain_are_reported(nodes: FakeNodes) -> None:
     sound(nodes)
     nodes.moving(nodes.node("drive", "robot2"), "odom base_link", topic="/robot2/tf")
     command = [sys.executable, "-m", "tfcompose", "doctor", "--for"]
 
-    def is_said(seconds: float) -> None:
+    def is_named(seconds: float) -> None:
         done = processes.run([*command, str(seconds)])
         assert "/robot2/tf" in done.stdout.splitlines()[-1]
         assert done.stdout.endswith("--namespace /robot2\n")
 
-    at_last(is_said)
+    at_last(is_named)
 
 
 OTHER_RMW = """
@@ -483,7 +483,7 @@ def test_a_process_with_another_middleware_is_named(domain: Any) -> None:
             _, found = doctor(seconds=1.0)
         finally:
             process.kill()
-    text = said(found, "TF908")
+    text = messages_of(found, "TF908")
     assert "RMW_IMPLEMENTATION=rmw_cyclonedds_cpp" in text
     assert "rmw_fastrtps_cpp" in text
     assert f"pid {process.pid}: " in text
@@ -493,7 +493,7 @@ def test_a_process_with_another_middleware_is_named(domain: Any) -> None:
     ("name", "value"), [("RMW_IMPLEMENTATION", "rmw_none_cpp"), ("ROS_DOMAIN_ID", "300"), ("ROS_DOMAIN_ID", "lab")]
 )
 @pytest.mark.usefixtures("domain")
-def test_settings_with_which_ros_does_not_start_are_said_by_every_command_that_looks(
+def test_settings_with_which_ros_does_not_start_are_reported_by_every_live_command(
     monkeypatch: pytest.MonkeyPatch, name: str, value: str
 ) -> None:
     """ROS itself ends the process, with exit code 102, or with Fast DDS's own words."""

@@ -69,7 +69,7 @@ def misses(*arguments: str, why: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.usefixtures("rover")
-def test_a_time_before_it_listened_is_looked_for_in_recordings() -> None:
+def test_a_time_before_it_listened_is_searched_in_recordings() -> None:
     done = misses("odom", "camera", "--at", "1000000000.5", why="would be extrapolation into the past")
     assert "--bag" in done.stderr
 
@@ -194,7 +194,7 @@ def running(domain: Any) -> Iterator[Callable[..., subprocess.Popen[str]]]:
     ("at", "x", "when"),
     [("101.25", "1.25", "at 101.250000000"), ("-0.5", "2.50", "at 102.500000000"), ("103", "3.00", "at 103.000000000")],
 )
-def test_at_a_time_the_pose_is_interpolated_and_printed_with_as_many_decimals_as_asked(
+def test_at_a_time_the_pose_is_interpolated_and_printed_with_as_many_decimals_as_requested(
     running: Callable[..., subprocess.Popen[str]], at: str, x: str, when: str
 ) -> None:
     words = ["--at", at, "--precision", "2", "--timeout", "60"]
@@ -214,7 +214,7 @@ def test_at_a_time_the_pose_is_interpolated_and_printed_with_as_many_decimals_as
 
 
 @pytest.fixture
-def said(running: Callable[..., subprocess.Popen[str]]) -> Callable[..., str]:
+def messages_of(running: Callable[..., subprocess.Popen[str]]) -> Callable[..., str]:
     """Let echo hear (x, stamp in seconds, w of the quaternion) of base_link in odom; return why it ends."""
 
     def run(samples: Sequence[tuple[float, int, float]], why: str, *arguments: str) -> str:
@@ -235,10 +235,10 @@ def said(running: Callable[..., subprocess.Popen[str]]) -> Callable[..., str]:
     return run
 
 
-def test_a_time_that_is_over_is_a_miss_with_the_milliseconds(said: Callable[..., str]) -> None:
+def test_a_time_that_is_over_is_a_miss_with_the_milliseconds(messages_of: Callable[..., str]) -> None:
     why = "odom → base_link at 99.900000000 s would be extrapolation into the past: its oldest sample is 100 ms"
     samples = [(float(second), 100 + second, 1.0) for second in range(4)]
-    assert why in said(samples, why, "--at", "99.9")
+    assert why in messages_of(samples, why, "--at", "99.9")
 
 
 def test_under_a_namespace_only_its_topics_are_heard(running: Callable[..., subprocess.Popen[str]]) -> None:
@@ -254,9 +254,9 @@ def test_under_a_namespace_only_its_topics_are_heard(running: Callable[..., subp
     assert (row["xyz"], row["stamp_ns"]) == ([1.0, 0.0, 0.0], None)
 
 
-def test_when_the_time_starts_again_it_says_so(said: Callable[..., str]) -> None:
+def test_when_the_time_starts_again_it_says_so(messages_of: Callable[..., str]) -> None:
     why = "what came for base_link was too old to be taken: did a bag or a simulation start again?"
-    assert why in said([(1.0, 100, 1.0), (1.0, 1, 1.0)], why, "--rate", "100")
+    assert why in messages_of([(1.0, 100, 1.0), (1.0, 1, 1.0)], why, "--rate", "100")
 
 
 def test_when_simulated_time_starts_again_it_goes_on(running: Callable[..., subprocess.Popen[str]]) -> None:
@@ -317,9 +317,9 @@ def test_what_was_sent_before_simulated_time_starts_again_does_not_outlive_it(mo
     assert 101.0 not in poses
 
 
-def test_what_tf2_refuses_is_said_where_the_frame_is_missing(said: Callable[..., str]) -> None:
+def test_what_tf2_refuses_is_reported_where_the_frame_is_missing(messages_of: Callable[..., str]) -> None:
     why = "what came for base_link was rejected: its quaternion is not of length 1"
-    assert why in said([(0.0, 1, 1.1)], why)
+    assert why in messages_of([(0.0, 1, 1.1)], why)
 
 
 @pytest.mark.parametrize(

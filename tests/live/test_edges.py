@@ -30,8 +30,8 @@ def take(observer: TreeObserver, edge: str, at_ns: int, stamp_ns: int | None = N
 
 
 def only(observer: TreeObserver, now_ns: int) -> EdgeState:
-    [seen] = observer.edges(now_ns)
-    return seen
+    [observed] = observer.edges(now_ns)
+    return observed
 
 
 def test_rate_jitter_gaps_and_delays_are_those_of_the_standard_library() -> None:
@@ -42,16 +42,16 @@ def test_rate_jitter_gaps_and_delays_are_those_of_the_standard_library() -> None
     for gap, delay in zip([0, *gaps], delays, strict=True):
         at += gap
         take(observer, "odom base_link", at, at - delay)
-    seen = only(observer, at)
-    timing = seen.timing
+    observed = only(observer, at)
+    timing = observed.timing
     assert timing.rate == pytest.approx(500 / (sum(gaps) / S))
     assert timing.jitter_s == pytest.approx(statistics.pstdev(gaps) / S, rel=1e-6)
     assert timing.longest_gap_s == pytest.approx(max(gaps) / S)
     assert timing.delay_s == pytest.approx(statistics.mean(delays) / S)
     assert timing.least_delay_s == pytest.approx(min(delays) / S)
     assert timing.most_delay_s == pytest.approx(max(delays) / S)
-    assert seen.stream.arrivals.count == 501
-    assert seen.data_age_s == pytest.approx(delays[-1] / S)
+    assert observed.stream.arrivals.count == 501
+    assert observed.data_age_s == pytest.approx(delays[-1] / S)
 
 
 def test_a_window_forgets_what_was_before_it_and_a_rate_falls_while_nothing_comes() -> None:
@@ -70,7 +70,7 @@ def test_a_window_forgets_what_was_before_it_and_a_rate_falls_while_nothing_come
     assert later.timing.rate < 25
 
 
-def test_an_edge_from_two_publishers_is_told_twice_each_with_its_node() -> None:
+def test_an_edge_from_two_publishers_is_reported_twice_each_with_its_node() -> None:
     observer = TreeObserver()
     take(observer, "odom base_link", S)
     take(observer, "odom base_link", S, gid=B)
@@ -123,9 +123,9 @@ def test_what_tf2_refuses_is_counted_with_the_reason(bad: tuple[object, ...], wh
 def test_a_sound_transform_is_not_refused_and_its_pose_is_kept() -> None:
     observer = TreeObserver()
     observer.take([row("a b", x=2.5)], static=True, gid=A, received_ns=S)  # type: ignore[list-item]
-    seen = only(observer, 3 * S)
-    assert (seen.stream.rejected, seen.stream.pose.xyz) == (None, (2.5, 0.0, 0.0))
-    assert (seen.age_s, seen.data_age_s, seen.timing.delay_s) == (2, None, None)
+    observed = only(observer, 3 * S)
+    assert (observed.stream.rejected, observed.stream.pose.xyz) == (None, (2.5, 0.0, 0.0))
+    assert (observed.age_s, observed.data_age_s, observed.timing.delay_s) == (2, None, None)
 
 
 def test_a_flood_of_names_is_counted_and_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -145,5 +145,5 @@ def test_stamps_are_compared_with_the_clock_that_is_given() -> None:
     observer = TreeObserver()
     rows = [row("a b", 9 * S)]
     observer.take(rows, static=False, gid=A, received_ns=1000 * S, clock_ns=10 * S)  # type: ignore[arg-type]
-    seen = only(observer, 1001 * S)
-    assert (seen.timing.delay_s, seen.data_age_s) == (1, 2)
+    observed = only(observer, 1001 * S)
+    assert (observed.timing.delay_s, observed.data_age_s) == (1, 2)

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from tests.support import processes
-from tests.support.doctor import LOOKS_S, at_last
+from tests.support.doctor import OBSERVE_S, at_last
 from tests.support.fake_nodes import sending
 
 pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
@@ -46,17 +46,17 @@ def test_each_publisher_of_an_edge_is_named_with_its_rate_and_delay() -> None:
 
 
 def test_the_table_says_that_a_publisher_is_not_the_only_one() -> None:
-    def is_said(seconds: float) -> None:
+    def is_named(seconds: float) -> None:
         lines = monitor("--for", str(seconds)).stdout.splitlines()
         assert lines[0].startswith("2 edges, 2 publishers, ")
         assert [line.split()[3] for line in lines[2:]] == ["/ekf", "/drive"]
         assert all(line.endswith("not the only one") for line in lines[2:])
 
     with sending("drive", "odom", "base_link", rate=50), sending("ekf", "map", "base_link", rate=50):
-        at_last(is_said)
+        at_last(is_named)
 
 
-def test_bytes_that_are_no_tf_are_counted_and_the_rest_is_still_told() -> None:
+def test_bytes_that_are_no_tf_are_counted_and_the_rest_is_still_reported() -> None:
     def are_counted(seconds: float) -> None:
         done = monitor("--for", str(seconds), "--format", "json")
         assert json.loads(done.stdout)["malformed"] > 10
@@ -91,7 +91,7 @@ sys.exit(main(sys.argv[1:]))
 
 
 @pytest.mark.parametrize("command", ["monitor", "doctor"])
-def test_what_a_slow_start_takes_is_not_taken_from_the_time_to_look(command: str) -> None:
+def test_what_a_slow_start_takes_is_not_taken_from_the_time_of_observation(command: str) -> None:
     words = [sys.executable, "-c", SLOW, command, "--for", "3"]
 
     def is_heard() -> bool:
@@ -99,7 +99,7 @@ def test_what_a_slow_start_takes_is_not_taken_from_the_time_to_look(command: str
         return "/drive" in done.stdout or " 1 edge " in done.stdout
 
     with sending("drive", "odom", "base_link", rate=50):
-        assert any(is_heard() for _ in LOOKS_S)
+        assert any(is_heard() for _ in OBSERVE_S)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.support import processes
-from tests.support.doctor import LOOKS_S, doctor, finds, finds_nothing, said
+from tests.support.doctor import OBSERVE_S, doctor, finds, finds_nothing, messages_of
 from tests.support.fake_nodes import message
 from tfcompose.geometry import OPTICAL_XYZW
 from tfcompose.ros.node import TFPublisher
@@ -169,13 +169,13 @@ def test_what_differs_from_the_plan_is_found_by_the_doctor_and_by_verify(
 ) -> None:
     scene(Rover(nodes))
     expected, follows = SCENES[scene]
-    for seconds in LOOKS_S:
+    for seconds in OBSERVE_S:
         found = doctor(robot, seconds=seconds)[1], verify(robot, seconds)
         if all(finds(some, expected, {*LATE, *follows}) for some in found):
             break
     for some in found:
         for code, names in expected.items():
-            text = said(some, code)
+            text = messages_of(some, code)
             assert [name for name in names if name not in text] == [], text
         assert {one["code"] for one in some} <= {*expected, *LATE, *follows}, some
     at = {one["code"] for one in found[1] if one["line"]}
@@ -185,4 +185,4 @@ def test_what_differs_from_the_plan_is_found_by_the_doctor_and_by_verify(
 def test_a_robot_as_planned_has_no_findings(nodes: FakeNodes, robot: str) -> None:
     Rover(nodes).all_but()
     assert finds_nothing(robot)
-    assert any(verify(robot, seconds) == [] for seconds in LOOKS_S)
+    assert any(verify(robot, seconds) == [] for seconds in OBSERVE_S)

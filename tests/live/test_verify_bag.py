@@ -61,7 +61,7 @@ def test_a_built_plan_or_its_folder_does_as_well(tmp_path: Path, robot: str) -> 
         assert "note: base_link → laser_link is declared in rover.yaml:6" in output
 
 
-def test_what_is_wrong_is_told_with_the_place_in_the_file(tmp_path: Path, robot: str) -> None:
+def test_what_is_wrong_is_reported_with_the_place_in_the_file(tmp_path: Path, robot: str) -> None:
     bag = write_bag(tmp_path / "bag", [fixed("laser_link", 0.3, math.radians(2)), fixed("mast", 0.5), *drive(rate=20)])
     output = tfcompose_without_ros("verify", robot, "--bag", str(bag), code=1).stdout
     assert f"{robot}:6:" in output
@@ -73,7 +73,7 @@ def test_what_is_wrong_is_told_with_the_place_in_the_file(tmp_path: Path, robot:
     assert output.endswith(f"rover: 0 of 3 edges as expected, 1 that nobody declared, in {bag}\n")
 
 
-def test_the_tolerance_is_what_is_asked_for(tmp_path: Path, robot: str) -> None:
+def test_the_tolerance_is_the_given_one(tmp_path: Path, robot: str) -> None:
     bag = write_bag(tmp_path / "bag", [fixed("laser_link", 0.304, math.radians(2)), fixed("mast_link"), *drive()])
     for words, code in (("5mm,3deg", 0), ("5 mm", 1), ("3deg", 1), ("0.5cm,0.1rad", 0)):
         tfcompose_without_ros("verify", robot, "--bag", str(bag), "--tolerance", words, code=code)
@@ -140,7 +140,7 @@ def test_junit_has_a_case_for_each_edge(tmp_path: Path, robot: str) -> None:
     ],
     ids=["parent", "topic", "silent", "gap"],
 )
-def test_each_difference_is_told_of_a_bag_without_a_publisher(
+def test_each_difference_is_reported_of_a_bag_without_a_publisher(
     tmp_path: Path, robot: str, sent: list[Sent], code: str, message: str
 ) -> None:
     bag = write_bag(tmp_path / "bag", sent)
@@ -159,7 +159,7 @@ def test_wrong_use_and_what_cannot_be_read_is_exit_code_2(tmp_path: Path, robot:
 
 
 def test_without_ros_the_running_tree_is_no_traceback(robot: str) -> None:
-    looking = (
+    observing = (
         ("monitor",),
         ("tree", "--live"),
         ("graph", "--live"),
@@ -167,7 +167,7 @@ def test_without_ros_the_running_tree_is_no_traceback(robot: str) -> None:
         ("doctor",),
         ("doctor", robot),
     )
-    for words in (("verify", robot), *looking):
+    for words in (("verify", robot), *observing):
         done = tfcompose_without_ros(*words, code=1)
         first, advice = (done.stdout + done.stderr).splitlines()
         assert first == "error[TF901] rclpy cannot be imported"

@@ -52,8 +52,8 @@ def test_a_robot_as_planned_is_as_expected(running: Path) -> None:
     at_last(is_as_expected)
 
 
-def test_a_second_publisher_and_a_strange_frame_are_told(running: Path) -> None:
-    def are_told(seconds: float) -> None:
+def test_a_second_publisher_and_a_strange_frame_are_reported(running: Path) -> None:
+    def are_reported(seconds: float) -> None:
         output = tfcompose("verify", str(running), "--for", str(seconds), "--format", "json", code=1)
         found = {one["code"]: one["message"] for one in json.loads(output)}
         assert set(found) == {"TF801", "TF803"}
@@ -61,20 +61,20 @@ def test_a_second_publisher_and_a_strange_frame_are_told(running: Path) -> None:
         assert all(name in found["TF803"] for name in ("laser → tag_1", "/tags"))
 
     with sending("rogue", "odom", "base_link", rate=20), sending("tags", "laser", "tag_1", rate=20):
-        at_last(are_told)
+        at_last(are_reported)
 
 
-def test_a_plan_that_changed_after_the_start_is_told(running: Path) -> None:
+def test_a_plan_that_changed_after_the_start_is_reported(running: Path) -> None:
     plan = read_plan(running.read_text(), str(running))
     moved = replace(plan.edges[1], pose=Pose((0.0, 0.012, 0.3)))
     running.write_text(write_plan(replace(plan, edges=(plan.edges[0], moved))))
 
-    def is_told(seconds: float) -> None:
+    def is_reported(seconds: float) -> None:
         output = tfcompose("verify", str(running), "--for", str(seconds), code=1)
         (line,) = [line for line in output.splitlines() if "error[TF846]" in line]
         assert all(name in line for name in ("laser", "base_link", "/rover/static", "12 mm"))
 
-    at_last(is_told)
+    at_last(is_reported)
 
 
 def test_the_live_tree_names_nodes_and_what_is_unexpected(running: Path) -> None:

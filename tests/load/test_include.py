@@ -75,15 +75,17 @@ def test_files_that_include_each_other_are_refused_with_the_circle() -> None:
     assert "robot.yaml → a.yaml → robot.yaml" in found.message
 
 
-def test_a_file_that_is_not_there_is_said_with_the_place_that_includes_it() -> None:
+def test_a_file_that_is_not_there_is_reported_with_the_place_that_includes_it() -> None:
     (found,) = refused({"robot.yaml": "robot: r\ninclude:\n  - nope.yaml\n"})
     assert found.code == "TF001"
     assert [(note.message, str(note.span)) for note in found.notes] == [("included here", "robot.yaml:3:5")]
 
 
-@pytest.mark.parametrize("written", ["3", "[a.yaml, 3]", "{a: b}", "['']"])
-def test_include_takes_names_of_files(written: str) -> None:
-    assert [found.code for found in refused({"robot.yaml": f"include: {written}\n", "a.yaml": "robot: r"})] == ["TF103"]
+@pytest.mark.parametrize("source_text", ["3", "[a.yaml, 3]", "{a: b}", "['']"])
+def test_include_takes_names_of_files(source_text: str) -> None:
+    assert [found.code for found in refused({"robot.yaml": f"include: {source_text}\n", "a.yaml": "robot: r"})] == [
+        "TF103"
+    ]
 
 
 def test_many_files_are_bounded() -> None:

@@ -57,10 +57,10 @@ SCALARS: dict[str, Any] = {
 
 
 @for_each(SCALARS)
-def test_a_scalar_is_read_as_yaml_1_2_reads_it(written: str) -> None:
-    value = load(f"a: {written}\n", "f").data["a"]
-    assert value == SCALARS[written]
-    assert type(value) is type(SCALARS[written])
+def test_a_scalar_is_read_as_yaml_1_2_reads_it(source_text: str) -> None:
+    value = load(f"a: {source_text}\n", "f").data["a"]
+    assert value == SCALARS[source_text]
+    assert type(value) is type(SCALARS[source_text])
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
@@ -71,14 +71,14 @@ def test_every_float_reads_back_as_itself(value: float) -> None:
 
 
 @given(st.integers(-(10**200), 10**200))
-def test_every_whole_number_reads_back_as_itself(value: int) -> None:
+def test_every_complete_number_reads_back_as_itself(value: int) -> None:
     assert load(f"a: {value}\n", "f").data["a"] == value
 
 
-@pytest.mark.parametrize("written", [".nan", ".inf", "-.INF", "1e999", "9" * 400])
-def test_what_is_not_finite_is_a_finding_at_its_place(written: str) -> None:
-    found = load(f"a: {written}\n", "f").found
-    assert [(one.code, one.span) for one in found] == [("TF007", Span("f", 1, 4, 1, 4 + len(written)))]
+@pytest.mark.parametrize("source_text", [".nan", ".inf", "-.INF", "1e999", "9" * 400])
+def test_what_is_not_finite_is_a_finding_at_its_place(source_text: str) -> None:
+    found = load(f"a: {source_text}\n", "f").found
+    assert [(one.code, one.span) for one in found] == [("TF007", Span("f", 1, 4, 1, 4 + len(source_text)))]
 
 
 TEXT = """\
@@ -350,7 +350,7 @@ two: {<<: *used, 3: {a: !mine b}}
 """
 
 
-def test_what_is_wrong_below_an_anchor_at_the_top_is_said_once_and_only_if_something_uses_it() -> None:
+def test_what_is_wrong_below_an_anchor_at_the_top_is_reported_once_and_only_if_something_uses_it() -> None:
     found = load(ASIDE, "f").found
     places = sorted((one.code, one.span.line, one.span.column) for one in found if one.span)
     assert places == [("TF004", 2, 28), ("TF004", 4, 18), ("TF005", 2, 19), ("TF007", 2, 38)]

@@ -86,15 +86,15 @@ DATA = {
 
 
 @given(MACHINES)
-def test_what_is_written_is_read(machine: Machine) -> None:
+def test_what_is_encoded_is_decoded(machine: Machine) -> None:
     assert decode(Machine, json.loads(json.dumps(encode(machine)))) == machine
 
 
-def test_fields_stand_in_their_order_flat_ones_beside_the_others_and_omitted_ones_not_at_their_default() -> None:
+def test_fields_stand_in_their_order_flat_ones_among_the_others_and_omitted_ones_not_at_their_default() -> None:
     assert json.dumps(encode(ONE)) == json.dumps(DATA)
 
 
-def test_a_whole_number_stands_for_a_float_and_other_keys_are_ignored() -> None:
+def test_a_complete_number_stands_for_a_float_and_other_keys_are_ignored() -> None:
     found = decode(Machine, DATA | {"ratio": 2, "colour": "blue"})
     assert (found.ratio, type(found.ratio)) == (2.0, float)
 
@@ -158,7 +158,7 @@ EVENTS = TaggedUnion[Went | Stayed]("event", (Went, Stayed))
 REQUESTS = TaggedUnion[Switch]("do", (Switch,))
 
 
-def test_a_message_is_told_by_its_tag() -> None:
+def test_a_message_is_recognised_by_its_tag() -> None:
     assert EVENTS.line(Went("home")) == '{"event": "Went", "where": "home"}\n'
     assert REQUESTS.line(Switch("off")) == '{"do": "off"}\n'
     for message in (Went("home"), Stayed()):

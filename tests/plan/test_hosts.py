@@ -41,7 +41,7 @@ def test_every_process_is_started_by_exactly_one_machine_and_the_guard_by_each(
     text: str, machines: list[tuple[str | None, str]]
 ) -> None:
     plan = compiled_plan(text)
-    shares = [started(share_of(plan, asked, machine)) for asked, machine in machines]
+    shares = [started(share_of(plan, requested, machine)) for requested, machine in machines]
     assert all("guard" in share for share in shares)
     assert all((a & b) == {"guard"} for a, b in pairwise(shares))
     assert set().union(*shares) == {process.name for process in plan.processes}
@@ -57,21 +57,21 @@ def test_what_names_no_host_runs_where_static_does() -> None:
 
 def test_each_machine_sees_all_edges_with_their_owners() -> None:
     plan = compiled_plan(ON_TWO_HOSTS)
-    for asked in ("jetson", None):
-        share = share_of(plan, asked, "elsewhere")
+    for requested in ("jetson", None):
+        share = share_of(plan, requested, "elsewhere")
         assert isinstance(share, Plan)
         assert share.edges == plan.edges
         assert [process.owns for process in share.processes] == [process.owns for process in plan.processes]
 
 
-def test_a_plan_without_hosts_is_whole_on_every_machine() -> None:
+def test_a_plan_without_hosts_is_complete_on_every_machine() -> None:
     plan = compiled_plan(ON_TWO_HOSTS.replace(", host: jetson", ""))
     assert share_of(plan, None, "jetson") is plan
     assert describe_share(plan) == ()
 
 
 @pytest.mark.parametrize(
-    ("text", "asked", "message", "advice"),
+    ("text", "requested", "message", "advice"),
     [
         (ON_TWO_HOSTS, "jetsn", "no process of rover runs on a host jetsn", "did you mean jetson?"),
         (NAMED, "zzz", "no process of rover runs on a host zzz", "the plan names main, jetson"),
@@ -85,9 +85,9 @@ def test_a_plan_without_hosts_is_whole_on_every_machine() -> None:
     ],
 )  # fmt: skip
 def test_a_host_that_the_plan_does_not_know_is_a_finding(
-    text: str, asked: str | None, message: str, advice: str
+    text: str, requested: str | None, message: str, advice: str
 ) -> None:
-    found = share_of(compiled_plan(text), asked, "desk")
+    found = share_of(compiled_plan(text), requested, "desk")
     assert isinstance(found, Finding)
     assert (found.code, found.message) == ("TF819", message)
     assert advice in found.help
@@ -98,7 +98,7 @@ STRICT = "guard: {mode: strict}\n"
 
 def test_behind_a_strict_guard_each_machine_hears_the_others_guard_and_has_a_fence_of_its_own() -> None:
     plan = compiled_plan(ON_TWO_HOSTS + STRICT)
-    shares = [share for asked in ("jetson", None) if isinstance(share := share_of(plan, asked, "x"), Plan)]
+    shares = [share for requested in ("jetson", None) if isinstance(share := share_of(plan, requested, "x"), Plan)]
     assert [{edge.child: edge.node for edge in share.edges} for share in shares] == [
         {"base_link": "/tfcompose_guard", "lidar": "/tfcompose_guard", "arm": "/arm_drive"},
         {"base_link": "/drive", "lidar": "/tfcompose_static", "arm": "/tfcompose_guard_jetson"},
@@ -114,7 +114,7 @@ def test_a_strict_guard_on_one_of_several_machines_passes_nothing_on_of_the_othe
     assert (found.code, found.help) == ("TF819", "remove the guard's host, or watch: guard: {mode: watch}")
 
 
-def test_a_share_is_written_and_read_and_has_a_place_of_its_own(tmp_path: Path) -> None:
+def test_a_share_is_saved_and_read_and_has_a_folder_of_its_own(tmp_path: Path) -> None:
     tmp_path.chmod(0o700)
     env = {"XDG_RUNTIME_DIR": str(tmp_path), "ROS_DOMAIN_ID": "7"}
     plan = compiled_plan(ON_TWO_HOSTS)
@@ -130,15 +130,17 @@ def test_two_guards_have_two_names() -> None:
     plan = compiled_plan(ON_TWO_HOSTS)
     nodes = [
         share.process("guard").nodes
-        for asked in ("jetson", None)
-        if isinstance(share := share_of(plan, asked, "x"), Plan)
+        for requested in ("jetson", None)
+        if isinstance(share := share_of(plan, requested, "x"), Plan)
     ]
     assert nodes == [("/tfcompose_guard_jetson",), ("/tfcompose_guard",)]
 
 
 def test_a_guard_with_a_host_judges_there_only() -> None:
     plan = compiled_plan(ON_TWO_HOSTS + "  guard: {host: jetson}\n")
-    modes = [share.guard.mode for asked in ("jetson", None) if isinstance(share := share_of(plan, asked, "x"), Plan)]
+    modes = [
+        share.guard.mode for requested in ("jetson", None) if isinstance(share := share_of(plan, requested, "x"), Plan)
+    ]
     assert modes == ["watch", "off"]
 
 

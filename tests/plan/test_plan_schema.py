@@ -47,9 +47,9 @@ def test_what_build_writes_is_valid(file: Path) -> None:
 
 @pytest.mark.parametrize("file", PLANS, ids=lambda file: file.parent.name)
 def test_without_one_key_both_refuse_or_both_take_it(file: Path) -> None:
-    whole = json.loads(file.read_text("utf-8"))
-    for path in places(whole):
-        plan = copy.deepcopy(whole)
+    full = json.loads(file.read_text("utf-8"))
+    for path in places(full):
+        plan = copy.deepcopy(full)
         holder = plan
         for key in path[:-1]:
             holder = holder[key]
@@ -59,17 +59,17 @@ def test_without_one_key_both_refuse_or_both_take_it(file: Path) -> None:
 
 def test_what_the_reader_refuses_for_its_kind_the_schema_refuses_too() -> None:
     """The reader is stricter about values, such as the length of a quaternion; it is laxer about none."""
-    whole = json.loads((GOLDEN / "two_rovers" / "plan.json").read_text("utf-8"))
-    seen, mistaken = 0, []
-    for path in places(whole):
+    full = json.loads((GOLDEN / "two_rovers" / "plan.json").read_text("utf-8"))
+    observed, mistaken = 0, []
+    for path in places(full):
         for wrong in WRONG:
-            plan = copy.deepcopy(whole)
+            plan = copy.deepcopy(full)
             holder = plan
             for key in path[:-1]:
                 holder = holder[key]
             holder[path[-1]] = wrong
             if not SCHEMA.is_valid(plan) and is_read(plan):
                 mistaken.append((path, wrong))
-            seen += not SCHEMA.is_valid(plan)
-    assert seen > 300
+            observed += not SCHEMA.is_valid(plan)
+    assert observed > 300
     assert not mistaken

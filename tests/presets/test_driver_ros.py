@@ -33,12 +33,12 @@ from tfcompose.ros.tf_codec import Transform, encode
 from tfcompose.ros.node import TFPublisher
 rclpy.init(args=sys.argv)
 node = Node("camera", automatically_declare_parameters_from_overrides=True)
-told = {name: node.get_parameter(name).value for name in node._parameters}
+parameters = {name: node.get_parameter(name).value for name in node._parameters}
 streams = {"depth": True, "color": True, "infra1": False, "infra2": False, "gyro": False, "accel": False}
-streams = {name: told.get("enable_" + name, default) for name, default in streams.items()}
+streams = {name: parameters.get("enable_" + name, default) for name, default in streams.items()}
 streams |= {name: True for name in os.environ.get("STAND_IN_ALSO", "").split()}
-prefix = told.get("tf_prefix", "") + told.get("camera_name", "camera") + "_"
-base = prefix + told.get("base_frame_id", "link")
+prefix = parameters.get("tf_prefix", "") + parameters.get("camera_name", "camera") + "_"
+base = prefix + parameters.get("base_frame_id", "link")
 kept = {}
 off = dict(word.split(":") for word in os.environ.get("STAND_IN_OFF", "").split())
 places = {"color": (0.0, 0.015, 0.0), "infra2": (0.0, -0.05, 0.0)}
@@ -57,17 +57,17 @@ for name in (stream for stream, enabled in streams.items() if enabled):
         aligned = f"{prefix}aligned_depth_to_{name}_frame"
         send(base, aligned, own)
         send(aligned, optical, optical=True)
-if streams["gyro"] and told.get("unite_imu_method", 0) > 0:
+if streams["gyro"] and parameters.get("unite_imu_method", 0) > 0:
     send(f"{prefix}gyro_frame", f"{prefix}imu_frame")
     send(f"{prefix}imu_frame", f"{prefix}imu_optical_frame", optical=True)
-if told.get("publish_tf", True) or os.environ.get("STAND_IN_IGNORES"):
+if parameters.get("publish_tf", True) or os.environ.get("STAND_IN_IGNORES"):
     publisher = TFPublisher(node, static=True)
     publisher.publish(encode(list(kept.values())))
 if "STAND_IN_FORCES" in os.environ:
     node.set_parameters([rclpy.Parameter("publish_tf", value=os.environ["STAND_IN_FORCES"] == "true")])
 if "STAND_IN_LACKS" in os.environ:
     node.undeclare_parameter(os.environ["STAND_IN_LACKS"])
-print("stand-in:", node.get_fully_qualified_name(), told.get("serial_no"), len(kept), flush=True)
+print("stand-in:", node.get_fully_qualified_name(), parameters.get("serial_no"), len(kept), flush=True)
 def spin():
     try:
         rclpy.spin(node)
@@ -189,7 +189,7 @@ def test_a_driver_with_another_stream_than_its_preset_has_is_named_with_what_was
     robot.says("TF803", "realsense/d435i", "front_infra1_frame", "/front/front", "sensors.front")
 
 
-def test_a_driver_whose_frame_is_far_from_nominal_is_told_with_both_poses(up: Callable[..., Up]) -> None:
+def test_a_driver_whose_frame_is_far_from_nominal_is_reported_with_both_poses(up: Callable[..., Up]) -> None:
     """An infra2 that is 4.5 cm further to the right is that of a D455."""
     robot = up(ROVER % (EVERYTHING, "tf: driver"), STAND_IN_OFF="infra2_frame:-0.045")
     robot.says("warning[TF828]", "front_infra2_frame", "front_link", "/front/front", " 46.", "realsense/d435i")
@@ -211,7 +211,7 @@ def test_a_switch_that_the_driver_has_otherwise_is_read_back_and_named(up: Calla
     assert len([line for line in codes(robot.text) if "TF829" in line]) == 1
 
 
-def test_a_switch_that_the_driver_does_not_know_is_asked_for_a_while_and_named(up: Callable[..., Up]) -> None:
+def test_a_switch_that_the_driver_does_not_know_is_requested_a_while_and_named(up: Callable[..., Up]) -> None:
     robot = up(ROVER % (EVERYTHING, "tf: driver"), STAND_IN_LACKS="publish_tf")
     robot.says("TF829", "/front/front", "publish_tf")
 

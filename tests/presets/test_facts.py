@@ -51,10 +51,10 @@ def is_there(frame: PresetFrame, fact: dict[str, Any], name: str, *, optical: bo
         return frame.xyz is None
     if frame.xyz is None or max(abs(a - b) for a, b in zip(frame.xyz, fact["xyz"], strict=True)) > 1e-9:
         return False
-    turn = rotation_of(frame, name) or IDENTITY_XYZW
+    rotation = rotation_of(frame, name) or IDENTITY_XYZW
     if fact["rpy"] is None:
         return True
-    return angle_between(turn, OPTICAL_XYZW if optical else quat_from_rpy(*fact["rpy"])) < 1e-9
+    return angle_between(rotation, OPTICAL_XYZW if optical else quat_from_rpy(*fact["rpy"])) < 1e-9
 
 
 @for_each([(preset, name) for preset, frames in FACTS.items() for name in frames])

@@ -98,8 +98,8 @@ TABLE: list[tuple[str, dict[str, Any], str, Vector, Axes]] = [
 
 
 def robot_of(preset: str, options: dict[str, Any], **keys: Any) -> Robot:
-    said = {"preset": preset, "parent": "base_link", "options": options} | keys
-    done = compile_robot(HEAD + "sensors: " + json.dumps({"s": said}) + "\n", "r.yaml", KNOWN)
+    output = {"preset": preset, "parent": "base_link", "options": options} | keys
+    done = compile_robot(HEAD + "sensors: " + json.dumps({"s": output}) + "\n", "r.yaml", KNOWN)
     assert done.robot
     assert not done.errors, done.errors
     return done.robot

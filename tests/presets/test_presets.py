@@ -23,7 +23,7 @@ KNOWN = library()
 NAMES = KNOWN.names
 HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
 #: A frame in what is to be written for values that nobody knows.
-ASKED = re.compile(r"(\w+): \{(?:xyz|rpy)")
+REQUESTED = re.compile(r"(\w+): \{(?:xyz|rpy)")
 OPTICAL_XYZW = (-0.5, 0.5, -0.5, 0.5)
 
 
@@ -33,7 +33,7 @@ def variants(name: str) -> list[dict[str, str]]:
     return [dict(zip(choices, values, strict=True)) for values in product(*choices.values())]
 
 
-def whole(name: str) -> dict[str, Any]:
+def full(name: str) -> dict[str, Any]:
     """Return options that give the sensor all the frames it can have."""
     options = KNOWN.get(name).options
     sets = {key: list(option.values) for key, option in options.items() if option.type == "set"}
@@ -41,8 +41,8 @@ def whole(name: str) -> dict[str, Any]:
 
 
 def spec(name: str, options: dict[str, Any], tf: str, frames: dict[str, Any]) -> str:
-    said = {"preset": name, "parent": "base_link", "options": options, "frames": frames} | ({"tf": tf} if tf else {})
-    return HEAD + "sensors: " + json.dumps({"s": said}) + "\n"
+    output = {"preset": name, "parent": "base_link", "options": options, "frames": frames} | ({"tf": tf} if tf else {})
+    return HEAD + "sensors: " + json.dumps({"s": output}) + "\n"
 
 
 @cache
@@ -51,11 +51,11 @@ def robots(name: str) -> list[tuple[str, dict[str, Any], Robot]]:
     made = []
     driver = KNOWN.get(name).driver
     for variant in variants(name):
-        options = whole(name) | variant
+        options = full(name) | variant
         for tf in ("", "driver", "tfcompose"):
             plain = compile_robot(spec(name, options, tf, {}), "r.yaml", KNOWN)
-            asked = [frame for one in plain.found if one.code == "TF605" for frame in ASKED.findall(one.help)]
-            frames = {frame: {"xyz": [0.1, 0.2, 0.3], "rpy": [0, 0, 0]} for frame in asked}
+            requested = [frame for one in plain.found if one.code == "TF605" for frame in REQUESTED.findall(one.help)]
+            frames = {frame: {"xyz": [0.1, 0.2, 0.3], "rpy": [0, 0, 0]} for frame in requested}
             done = compile_robot(spec(name, options, tf, frames), "r.yaml", KNOWN)
             assert done.robot
             can_all = driver is not None and (driver.off is not None or tf != "tfcompose")
@@ -104,9 +104,9 @@ def test_the_optical_frames_of_a_t265_have_x_right_y_up_and_z_backward() -> None
 def test_what_stamps_its_messages_is_a_frame_of_the_robot(name: str) -> None:
     for tf, options, robot in robots(name):
         preset = KNOWN.get(name, {key: options[key] for key in (variants(name) or [{}])[0]})
-        for topic, said in preset.topics.items():
-            stamped = filled(said.frame, "s", preset.words)
-            assert said.hard_coded is (stamped not in robot.frames), (tf, topic, stamped)
+        for topic, output in preset.topics.items():
+            stamped = filled(output.frame, "s", preset.words)
+            assert output.hard_coded is (stamped not in robot.frames), (tf, topic, stamped)
 
 
 @for_each(NAMES)

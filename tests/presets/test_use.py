@@ -31,8 +31,8 @@ HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
 
 
 def compiled(preset: str, top: str = "", file: str = "r.yaml", **keys: Any) -> Compiled:
-    said = {"s": {"preset": preset, "parent": "base_link"} | keys}
-    return compile_robot(f"{HEAD}{top}sensors: {json.dumps(said)}\n", file, library())
+    declared = {"s": {"preset": preset, "parent": "base_link"} | keys}
+    return compile_robot(f"{HEAD}{top}sensors: {json.dumps(declared)}\n", file, library())
 
 
 def robot_of(preset: str, top: str = "", **keys: Any) -> Robot:
@@ -52,7 +52,7 @@ def driver_of(robot: Robot) -> Process:
     return next(process for process in robot.processes if process.name == "s")
 
 
-def told(robot: Robot) -> dict[str, Any]:
+def driver_parameters(robot: Robot) -> dict[str, Any]:
     """Return what the driver is told, as its parameter file or its command line has it after a build."""
     files = {file.path: file.text for file in emit(robot)}
     plan = json.loads(files["plan.json"])
@@ -67,12 +67,12 @@ def told(robot: Robot) -> dict[str, Any]:
 
 def unknown(preset: str, **keys: Any) -> dict[str, Any]:
     found = compiled(preset, **keys).found
-    asked: dict[str, Any] = {}
+    requested: dict[str, Any] = {}
     for one in found:
         if one.code == "TF605":
-            asked |= yaml.safe_load(one.help.partition(" write: ")[2])["sensors"]["s"]["frames"]
+            requested |= yaml.safe_load(one.help.partition(" write: ")[2])["sensors"]["s"]["frames"]
     values = {"xyz": [1, 2, 3], "rpy": [0, 0, 0]}
-    return {frame: {key: values[key] for key in keys} for frame, keys in asked.items()}
+    return {frame: {key: values[key] for key in keys} for frame, keys in requested.items()}
 
 
 DRIVEN = [name for name in NAMES if any(frame.driver for frame in KNOWN.get(name).frames.values())]
@@ -81,7 +81,7 @@ WITH_CLAIMS = [name for name in NAMES if (driver := KNOWN.get(name).driver) and 
 
 
 @for_each(WITH_SWITCH)
-def test_the_switch_is_among_what_the_driver_is_told(name: str) -> None:
+def test_the_switch_is_among_the_parameters_of_the_driver(name: str) -> None:
     preset = KNOWN.get(name)
     assert preset.driver
     options = {key: True for key, option in preset.options.items() if option.type == "bool"}
@@ -89,12 +89,12 @@ def test_the_switch_is_among_what_the_driver_is_told(name: str) -> None:
     keys["frames"] = unknown(name, **keys)
     robot = robot_of(name, **keys)
     assert preset.driver.off
-    assert preset.driver.off.items() <= told(robot).items()
+    assert preset.driver.off.items() <= driver_parameters(robot).items()
     assert {edge.owner for edge in robot.edges} == {"static"}
     keys["tf"] = "driver"
     robot = robot_of(name, **keys)
     assert preset.driver.on
-    assert preset.driver.on.items() <= told(robot).items()
+    assert preset.driver.on.items() <= driver_parameters(robot).items()
     assert {edge.owner for edge in robot.edges} == {"static", "s"}
 
 
@@ -114,12 +114,12 @@ def test_what_a_driver_claims_outside_its_sensor_is_switched_off_unless_it_owns_
     frames = unknown(name)
     off = {key: value for claim in driver.claims for key, value in claim.off.items()}
     assert off
-    assert off.items() <= told(robot_of(name, frames=frames)).items()
-    assert not off.keys() & told(robot_of(name, frames=frames, owner="s")).keys()
+    assert off.items() <= driver_parameters(robot_of(name, frames=frames)).items()
+    assert not off.keys() & driver_parameters(robot_of(name, frames=frames, owner="s")).keys()
 
 
 @for_each([name for name in NAMES if (driver := KNOWN.get(name).driver) and driver.naming])
-def test_a_driver_is_told_the_final_names_of_its_frames(name: str) -> None:
+def test_a_driver_gets_the_final_names_of_its_frames(name: str) -> None:
     preset = KNOWN.get(name)
     assert preset.driver
     frames = unknown(name)
@@ -131,10 +131,10 @@ def test_a_driver_is_told_the_final_names_of_its_frames(name: str) -> None:
             continue  # other frames of it have no parameter
         assert done.robot
         assert not done.errors
-        said = told(done.robot)
+        declared = driver_parameters(done.robot)
         for key, frame in preset.driver.naming.items():
             plain = filled(frame, "s", preset.words)
-            assert said[key] == prefix + renamed.get(plain, plain)
+            assert declared[key] == prefix + renamed.get(plain, plain)
 
 
 def test_every_parameter_that_depends_on_an_option_changes_with_it() -> None:
@@ -224,7 +224,7 @@ def test_a_unit_whose_cameras_hang_otherwise_says_on_what() -> None:
     assert [(one.code, one.help) for one in found] == [("TF203", "did you mean s_right_camera_frame?")]
 
 
-def test_what_nobody_knows_is_asked_for_with_the_yaml_to_write_and_is_never_a_zero() -> None:
+def test_what_nobody_knows_is_requested_with_the_yaml_to_write_and_is_never_a_zero() -> None:
     found = compiled("realsense/d457").found
     assert [one.code for one in found] == ["TF605"]
     assert found[0].message == "realsense/d457 does not know where s_color_frame is in s_link"
@@ -244,7 +244,10 @@ def test_a_name_that_the_driver_makes_itself_cannot_be_changed() -> None:
     assert [one.code for one in done.errors] == ["TF604"]
     assert "makes the name s_color_optical_frame itself, and cannot call it eye_optical_frame" in done.errors[0].message
     assert not compiled("ouster/os1", frames={"s_lidar": {"name": "roof_lidar"}}).errors
-    assert told(robot_of("ouster/os1", frames={"s_lidar": {"name": "roof_lidar"}}))["lidar_frame"] == "roof_lidar"
+    assert (
+        driver_parameters(robot_of("ouster/os1", frames={"s_lidar": {"name": "roof_lidar"}}))["lidar_frame"]
+        == "roof_lidar"
+    )
     prefixed = compiled("orbbec/gemini-335", 'ros: {frame_prefix: "robot1/"}\n')
     assert "cannot write robot1/ in front of its frames" in prefixed.errors[0].message
 
@@ -270,7 +273,7 @@ def write(folder: Path, name: str, text: str) -> None:
     file.write_text(text, encoding="utf-8")
 
 
-def test_a_folder_beside_the_robot_adds_presets(tmp_path: Path) -> None:
+def test_a_folder_next_to_the_robot_adds_presets(tmp_path: Path) -> None:
     write(tmp_path / "presets", "me/mast", MAST)
     write(
         tmp_path / "presets",
@@ -286,7 +289,7 @@ def test_a_folder_beside_the_robot_adds_presets(tmp_path: Path) -> None:
     assert compiled("me/mist", top, file).found[0].help == "did you mean me/mast?"
 
 
-def test_a_preset_that_stands_before_a_built_in_one_is_said_and_may_change_it(tmp_path: Path) -> None:
+def test_a_preset_that_stands_before_a_built_in_one_is_reported_and_may_change_it(tmp_path: Path) -> None:
     text = 'preset: 1\nextends: realsense/d435i\nframes:\n  "{name}_color_frame": {xyz: [0, 0.0149, 0]}\n'
     write(tmp_path / "mine", "realsense/d435i", text)
     done = compiled("realsense/d435i", "preset_path: mine/\n", str(tmp_path / "r.yaml"))
@@ -297,7 +300,7 @@ def test_a_preset_that_stands_before_a_built_in_one_is_said_and_may_change_it(tm
     assert compiled("realsense/d435", "preset_path: mine\n", str(tmp_path / "r.yaml")).found == ()
 
 
-def test_a_folder_that_is_not_there_is_said(tmp_path: Path) -> None:
+def test_a_folder_that_is_not_there_is_reported(tmp_path: Path) -> None:
     found = compiled("generic/imu", "preset_path: [mine, .]\n", str(tmp_path / "r.yaml")).found
     assert [(one.code, one.message) for one in found] == [("TF001", f"preset_path: no folder {tmp_path}/mine")]
 
@@ -344,10 +347,10 @@ def test_only_the_presets_that_a_robot_uses_are_read(monkeypatch: pytest.MonkeyP
 
 def test_the_command_lists_all_presets_and_shows_each(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["presets"]) == 0
-    said = capsys.readouterr().out
-    assert all(f"  {name} " in said for name in NAMES)
-    assert "(= orbbec/gemini-335)" in said
-    assert "(from realsense/d455)" in said, "a D456 has no screw that is known"
+    declared = capsys.readouterr().out
+    assert all(f"  {name} " in declared for name in NAMES)
+    assert "(= orbbec/gemini-335)" in declared
+    assert "(from realsense/d455)" in declared, "a D456 has no screw that is known"
     assert main(["presets", "--format", "json"]) == 0
     rows = json.loads(capsys.readouterr().out)
     assert [row["name"] for row in rows if row["kind"] != "node"] == NAMES

@@ -29,8 +29,8 @@ def test_a_relative_path_becomes_the_file_that_it_means() -> None:
 
 
 def test_other_addresses_stay_as_they_are() -> None:
-    for whole in ("package://a/b.stl", "file:///a/b.stl", "/a/b.stl", "http://a/b.stl", "model://a"):
-        assert address(whole) == whole
+    for full in ("package://a/b.stl", "file:///a/b.stl", "/a/b.stl", "http://a/b.stl", "model://a"):
+        assert address(full) == full
 
 
 def test_a_texture_is_addressed_too_and_nothing_else_changes() -> None:

@@ -33,9 +33,9 @@ quaternions = st.tuples(numbers, numbers, numbers, numbers).filter(lambda q: mat
 class Robot:
     """A mover, what it said, and messages for it."""
 
-    def __init__(self, edges: list[PlanEdge], told: PublishOptions | None = None, now_ns: int | None = 5) -> None:
-        self.said: list[str] = []
-        self.mover = JointMover(edges, self.said.append, lambda arrival: now_ns and arrival + now_ns, told)
+    def __init__(self, edges: list[PlanEdge], options: PublishOptions | None = None, now_ns: int | None = 5) -> None:
+        self.reports: list[str] = []
+        self.mover = JointMover(edges, self.reports.append, lambda arrival: now_ns and arrival + now_ns, options)
 
     def hear(self, positions: Mapping[str, float], stamp_ns: int = SECOND_NS) -> dict[str, Transform]:
         data = encode_names(list(positions))
@@ -63,7 +63,7 @@ def heights(found: dict[str, Transform]) -> dict[str, float]:
 @given(
     quaternions, quaternions, st.tuples(numbers, numbers, numbers), numbers, st.sampled_from(["revolute", "prismatic"])
 )
-def test_a_joint_turns_about_its_axis_or_slides_along_it_after_its_edges_pose(
+def test_a_joint_rotates_about_its_axis_or_slides_along_it_after_its_edges_pose(
     at: tuple[float, float, float, float],
     towards: tuple[float, float, float, float],
     xyz: tuple[float, float, float],
@@ -131,11 +131,11 @@ def test_of_a_name_that_comes_twice_the_first_counts() -> None:
 
 
 @pytest.mark.parametrize("kind", ["floating", "planar"])
-def test_a_joint_without_a_single_position_is_never_published_and_said_once(kind: JointType) -> None:
+def test_a_joint_without_a_single_position_is_never_published_and_reported_once(kind: JointType) -> None:
     robot = Robot([joint_edge(Joint("float", kind)), slide("left"), joint_edge(Joint("f", "revolute", Z, "float"))])
     for stamp in (1, 2):
         assert heights(robot.hear({"float": 1.0, "left": 2.0}, stamp)).keys() == {"left", "f"}
-    assert robot.said == [f"base → float is not published: a {kind} joint has no single position in joint states"]
+    assert robot.reports == [f"base → float is not published: a {kind} joint has no single position in joint states"]
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
@@ -143,7 +143,7 @@ def test_a_position_that_is_not_finite_drops_the_message_with_one_line_that_name
     robot = Robot([slide("left"), slide("right")])
     for stamp in range(1, 4):
         assert robot.hear({"left": 1.0, "right": bad}, stamp) == {}
-    assert robot.said == ["dropped a joint state: the position of right is not finite (said once)"]
+    assert robot.reports == ["dropped a joint state: the position of right is not finite (said once)"]
     assert heights(robot.hear({"left": 1.0, "right": 2.0}, 9)) == {"left": 1.0, "right": 2.0}
 
 
@@ -154,7 +154,7 @@ def test_messages_that_are_none_are_dropped_with_one_line_for_each_fault() -> No
     for _ in range(3):
         for length in (0, 3, 20, len(data) - 12):
             assert robot.answer(bytes(data[:length])) == {}
-    assert robot.said == [
+    assert robot.reports == [
         "dropped a joint state: its bytes are not one (said once)",
         "dropped a joint state: it ends inside its positions (said once)",
     ]
@@ -168,7 +168,7 @@ def test_a_source_that_never_repeats_its_names_fills_neither_the_memory_nor_the_
             {"left": 1.0},
         )
     assert len(robot.mover._sources) <= 64
-    assert len(robot.said) == 1
+    assert len(robot.reports) == 1
 
 
 def test_all_transforms_have_the_messages_time_and_one_without_gets_that_of_its_arrival() -> None:
@@ -188,7 +188,7 @@ def test_a_time_that_comes_twice_is_left_out_as_tf2_would_with_one_line() -> Non
     assert robot.hear({"left": 1.0}, 10) == {}
     assert robot.hear({"right": 1.0}, 10), "another driver's joints"
     assert robot.hear({"left": 1.0}, 11)
-    assert robot.said == ["left out a joint state with the same time as the one before (said once)"]
+    assert robot.reports == ["left out a joint state with the same time as the one before (said once)"]
 
 
 def test_a_recording_that_starts_anew_is_published() -> None:
@@ -200,7 +200,7 @@ def test_a_recording_that_starts_anew_is_published() -> None:
 def test_a_time_that_no_transform_can_hold_is_dropped() -> None:
     robot = Robot([slide("left")], now_ns=2**31 * SECOND_NS)
     assert robot.hear({"left": 1.0}, 0) == {}
-    assert "does not fit" in robot.said[0]
+    assert "does not fit" in robot.reports[0]
 
 
 @pytest.mark.parametrize(("source", "most"), [(100, 30), (100, 100), (100, 50), (500, 20), (50, 100)])
@@ -214,7 +214,7 @@ def test_publish_frequency_gives_that_frequency_and_says_when_it_leaves_somethin
     published = sum(bool(robot.hear({"left": 1.0}, stamp)) for stamp in stamps)
     assert published == pytest.approx(500 * min(1, most / source), rel=0.02, abs=2)
     left_out = f"joint states come with more than {most} Hz: some are left out, as publish_frequency says"
-    assert robot.said == ([left_out] if most < source else [])
+    assert robot.reports == ([left_out] if most < source else [])
 
 
 def test_without_publish_frequency_everything_is_published() -> None:
@@ -225,7 +225,7 @@ def test_without_publish_frequency_everything_is_published() -> None:
 def test_ignore_timestamp_publishes_whatever_the_time_is() -> None:
     robot = Robot([slide("left")], PublishOptions(publish_frequency=1, ignore_timestamp=True))
     assert all(robot.hear({"left": 1.0}, stamp) for stamp in (10, 10, 9, 11))
-    assert robot.said == []
+    assert robot.reports == []
 
 
 def test_joints_that_nobody_spoke_of_are_missing_and_not_those_that_follow_them() -> None:

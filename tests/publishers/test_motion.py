@@ -13,7 +13,7 @@ from tfcompose.publishers.simulate import JointSource, circle, swept
 
 
 @given(st.floats(0.1, 5), st.floats(-3, 3).filter(lambda speed: abs(speed) > 0.01), st.floats(0, 100))
-def test_on_the_circle_a_body_looks_where_it_goes(radius: float, speed: float, time_s: float) -> None:
+def test_on_the_circle_a_body_faces_where_it_goes(radius: float, speed: float, time_s: float) -> None:
     pose = circle(radius, speed, time_s)
     assert math.hypot(*pose.xyz) == pytest.approx(radius)
     heading = Rotation.from_quat(pose.quat_xyzw).apply([1, 0, 0])
@@ -44,7 +44,7 @@ def test_a_sweep_reaches_both_ends_and_no_further_from_where_it_begins(
     assert max(steps) <= math.pi * (upper - lower) / period_s + 1e-9
 
 
-def test_a_joint_without_ends_turns_round_and_round() -> None:
+def test_a_joint_without_ends_rotates_round_and_round() -> None:
     places = [swept(Sweep(4.0), 1.0, seconds) for seconds in (0.0, 1.0, 2.0, 3.0, 4.0)]
     assert places == pytest.approx([1.0, 1.0 + math.pi / 2, 1.0 - math.pi, 1.0 - math.pi / 2, 1.0])
 

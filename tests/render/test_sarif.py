@@ -33,7 +33,7 @@ PAGES = {code: page(code) for code in CATALOGUE}
 VALIDATOR = Draft4Validator(SCHEMA)
 
 
-def written(found: list[Finding]) -> Any:
+def source_text(found: list[Finding]) -> Any:
     """Return the one run that is written of the findings; what the schema refuses is an error."""
     log = json.loads(render_sarif(found, __version__, PAGES))
     VALIDATOR.validate(log)
@@ -56,7 +56,7 @@ def test_the_schema_is_the_official_one_of_2_1_0() -> None:
 @for_each(SPECS)
 def test_it_is_valid_and_says_what_was_found(spec: Path) -> None:
     found = findings(spec)
-    run = written(found)
+    run = source_text(found)
     driver = run["tool"]["driver"]
     assert driver["name"] == "tfcompose"
     assert len(run["results"]) == len(found)
@@ -75,7 +75,7 @@ def test_it_is_valid_and_says_what_was_found(spec: Path) -> None:
 
 def test_each_rule_stands_once_with_its_page_and_in_one_line_what_it_says() -> None:
     found = [one for spec in SPECS for one in findings(spec)]
-    rules = written(found)["tool"]["driver"]["rules"]
+    rules = source_text(found)["tool"]["driver"]["rules"]
     assert [rule["id"] for rule in rules] == sorted({one.code for one in found})
     for rule in rules:
         assert rule["name"] == CATALOGUE[rule["id"]].name
@@ -91,7 +91,7 @@ def test_a_file_with_any_name_is_a_uri_that_leads_back_to_it(file: str) -> None:
     one = Finding(
         "TF101", "unknown_key", "error", "m", Span(file, 2, 3, 2, 4), (Note("n", Span(file)), Note("no place"))
     )
-    (result,) = written([one])["results"]
+    (result,) = source_text([one])["results"]
     uri = result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
     parsed = urlparse(uri)
     assert not set(uri) & set(' "<>\\^`{|}')
@@ -101,8 +101,8 @@ def test_a_file_with_any_name_is_a_uri_that_leads_back_to_it(file: str) -> None:
     assert len(result["relatedLocations"]) == 1
 
 
-def test_a_finding_without_a_place_and_no_findings_are_said_too() -> None:
-    (result,) = written([Finding("TF801", "foreign_publisher", "warning", "m")])["results"]
+def test_a_finding_without_a_place_and_no_findings_are_reported_too() -> None:
+    (result,) = source_text([Finding("TF801", "foreign_publisher", "warning", "m")])["results"]
     assert "locations" not in result
-    run = written([])
+    run = source_text([])
     assert (run["results"], run["tool"]["driver"]["rules"]) == ([], [])

@@ -96,17 +96,17 @@ def test_several_turned_boxes_have_the_inertia_of_their_triangles(given: list[An
     meshes, shapes = [], []
     for size, xyz, rpy in given:
         mesh = trimesh.creation.box(size)
-        turn = Rotation.from_euler("xyz", rpy).as_matrix()
-        mesh.vertices = mesh.vertices @ turn.T + xyz  # apply_transform does nothing below 1e-8
+        rotation = Rotation.from_euler("xyz", rpy).as_matrix()
+        mesh.vertices = mesh.vertices @ rotation.T + xyz  # apply_transform does nothing below 1e-8
         meshes.append(mesh)
         shapes.append({"box": list(size), "xyz": list(xyz), "rpy": list(rpy)})
-    whole: Any = trimesh.util.concatenate(meshes)
-    whole.density = 7.0
+    full: Any = trimesh.util.concatenate(meshes)
+    full.density = 7.0
     found = inertial_of({"collision": shapes, "inertial": {"density": 7}})
-    assert found.mass == pytest.approx(7 * whole.volume, rel=1e-9)
-    assert found.pose.xyz == pytest.approx(tuple(whole.center_mass), abs=1e-9)
+    assert found.mass == pytest.approx(7 * full.volume, rel=1e-9)
+    assert found.pose.xyz == pytest.approx(tuple(full.center_mass), abs=1e-9)
     lost = 1e-13 * found.mass * 100  # trimesh integrates about the origin, up to 10 m away
-    assert matrix(found) == pytest.approx(whole.moment_inertia, rel=1e-8, abs=lost)
+    assert matrix(found) == pytest.approx(full.moment_inertia, rel=1e-8, abs=lost)
 
 
 @pytest.mark.parametrize("ending", ["stl", "obj", "ply"])
@@ -190,7 +190,7 @@ def test_computing_leaves_no_noise_in_products_that_are_nothing() -> None:
     assert inertial_of({"visual": turned, "inertial": {"mass": 7}}).tensor[2] == 0
 
 
-def test_a_moment_that_is_small_beside_the_others_is_none_the_less_there() -> None:
+def test_a_moment_that_is_small_next_to_the_others_is_none_the_less_there() -> None:
     assert inertial_of({"visual": {"box": [1e-6, 1e6, 0.1]}, "inertial": {"mass": 12}}).tensor[3] == pytest.approx(0.01)
 
 

@@ -23,11 +23,11 @@ HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {visual: {box: [2, 2, 2]}}}\n
 CAMERA = "sensors: {camera: {preset: realsense/d435i, parent: base_link, tf: tfcompose, driver: none, %s}}\n"
 OPTICAL = "camera_color_optical_frame"
 
-TURN = Rotation.from_euler("xyz", [0.3, -0.5, 1.1])
-QUAT = [float(part) for part in TURN.as_quat()]
+ROTATION = Rotation.from_euler("xyz", [0.3, -0.5, 1.1])
+QUAT = [float(part) for part in ROTATION.as_quat()]
 XYZ = [0.12, -0.34, 0.56]
 MEASURED = Pose((0.12, -0.34, 0.56), (QUAT[0], QUAT[1], QUAT[2], QUAT[3]))
-ROWS = [[*map(float, row), at] for row, at in zip(TURN.as_matrix(), XYZ, strict=True)] + [[0.0, 0.0, 0.0, 1.0]]
+ROWS = [[*map(float, row), at] for row, at in zip(ROTATION.as_matrix(), XYZ, strict=True)] + [[0.0, 0.0, 0.0, 1.0]]
 
 
 def compiled(robot: str, **files: str) -> Compiled:
@@ -55,7 +55,7 @@ def assert_same(a: Pose, b: Pose) -> None:
 
 
 def autoware(parent: str = "base_link", child: str = "lens") -> str:
-    roll, pitch, yaw = TURN.as_euler("xyz")
+    roll, pitch, yaw = ROTATION.as_euler("xyz")
     return (
         f"{parent}:\n  {child}:\n    x: 0.12\n    y: -0.34\n    z: 0.56\n"
         f"    roll: {roll}\n    pitch: !radians {pitch}\n    yaw: !degrees {math.degrees(yaw)}\n"
@@ -87,9 +87,9 @@ def handeye(*, flat: bool) -> str:
     x, y, z, w = QUAT
     indent = "" if flat else "  "
     names = {"eye_on_hand": "false", "robot_base_frame": "base_link", "tracking_base_frame": "lens"}
-    said = "".join(f"{indent}{key}: {value}\n" for key, value in names.items())
+    output = "".join(f"{indent}{key}: {value}\n" for key, value in names.items())
     values = f"transformation: {{qw: {w!r}, qx: {x!r}, qy: {y!r}, qz: {z!r}, x: 0.12, y: -0.34, z: 0.56}}\n"
-    return ("" if flat else "parameters:\n") + said + values
+    return ("" if flat else "parameters:\n") + output + values
 
 
 def moveit_launch() -> str:
@@ -104,7 +104,7 @@ def moveit_launch() -> str:
 def moveit_python(*, euler: bool = False) -> str:
     turned = dict(zip(("qx", "qy", "qz", "qw"), QUAT, strict=True))
     if euler:
-        turned = dict(zip(("roll", "pitch", "yaw"), map(float, TURN.as_euler("xyz")), strict=True))
+        turned = dict(zip(("roll", "pitch", "yaw"), map(float, ROTATION.as_euler("xyz")), strict=True))
     values = {"frame-id": "base_link", "child-frame-id": "lens", **dict(zip("xyz", XYZ, strict=True)), **turned}
     words = "".join(f'                "--{key}",\n                "{value}",\n' for key, value in values.items())
     return (
@@ -148,9 +148,9 @@ STRAIGHT = {
 @pytest.mark.parametrize("explicit", [False, True])
 def test_each_format_gives_the_measured_pose(case: str, *, explicit: bool) -> None:
     form = case.split(maxsplit=1)[0]
-    said = f"{{file: c.txt, format: {form}}}" if explicit else "c.txt"
+    output = f"{{file: c.txt, format: {form}}}" if explicit else "c.txt"
     edge = edge_of(
-        compiled(f"frames: {{lens: {{parent: base_link, calibration: {said}}}}}\n", c_txt=STRAIGHT[case]), "lens"
+        compiled(f"frames: {{lens: {{parent: base_link, calibration: {output}}}}}\n", c_txt=STRAIGHT[case]), "lens"
     )
     assert_same(edge.pose, MEASURED)
     made = edge.calibration
@@ -187,7 +187,7 @@ def test_kalibr_takes_points_from_the_imu_to_the_camera_and_so_gives_the_imu_in_
     assert mount.calibration.name.endswith("c.yaml:1 (kalibr T_cam_imu, inverted)")
     assert_same(mount.calibration.pose, MEASURED.inverse())
     point_in_imu = [0.3, 0.2, 0.9]
-    in_camera = TURN.apply(point_in_imu) + XYZ
+    in_camera = ROTATION.apply(point_in_imu) + XYZ
     back = mount.calibration.pose
     again = Rotation.from_quat(back.quat_xyzw).apply(in_camera) + back.xyz
     assert again == pytest.approx(point_in_imu)
@@ -246,7 +246,7 @@ def test_an_entry_the_other_way_round_is_taken_inverted() -> None:
     assert edge.calibration.inverted
 
 
-def test_a_whole_file_is_applied_and_its_chain_too() -> None:
+def test_a_complete_file_is_applied_and_its_chain_too() -> None:
     text = autoware("base_link", "kit") + autoware("kit", "camera_link").replace("0.12", "0.1")
     robot = "calibrations: c.yaml\nframes: {kit: {parent: base_link}}\n" + (CAMERA % "").replace("base_link", "kit")
     result = compiled(robot.replace(", }", "}"), c_yaml=text)
@@ -277,7 +277,7 @@ PROBLEMS = {
 
 
 @pytest.mark.parametrize(("code", "text"), [(code, text) for code, texts in PROBLEMS.items() for text in texts])
-def test_what_cannot_be_used_is_said_where_the_file_is_named_with_a_note_into_it(code: str, text: str) -> None:
+def test_what_cannot_be_used_is_reported_where_the_file_is_named_with_a_note_into_it(code: str, text: str) -> None:
     found = compiled("frames: {lens: {parent: base_link, calibration: c.yaml}}\n", c_yaml=text).found
     assert {one.code for one in found} == {code}
     assert {one.span.file for one in found if one.span} == {"r.yaml"}
@@ -291,16 +291,16 @@ def test_a_missing_file_and_a_missing_reader_are_findings() -> None:
 
 
 def test_paths_are_relative_to_the_file_that_writes_them() -> None:
-    asked: list[str] = []
+    requested: list[str] = []
     base = "frames: {lens: {parent: base_link, calibration: cal/c.yaml}}\n"
 
     def read(name: str) -> str:
-        asked.append(name)
+        requested.append(name)
         return {"robots/common/base.yaml": base, "robots/common/cal/c.yaml": autoware()}[name]
 
     text = HEAD + "include: common/base.yaml\n"
     assert not compile_robot(text, "robots/r.yaml", library(), read=read).found
-    assert asked == ["robots/common/base.yaml", "robots/common/cal/c.yaml"]
+    assert requested == ["robots/common/base.yaml", "robots/common/cal/c.yaml"]
 
 
 NOMINAL = "frames: {lens: {parent: base_link, xyz: [0.12, -0.34, 0.5], quat_xyzw: %s, calibration: {file: c.yaml%s}}}\n"
@@ -381,8 +381,8 @@ ROBOT = "calibrations: c.yaml\nframes: {lens: {parent: base_link, xyz: [1, 0, 0]
 
 
 def settle(text: str, form: str) -> None:
-    for said in ("", f", format: {form}", ", parent: cam0, child: imu"):
-        result = compiled(ROBOT % said, c_yaml=text)
+    for output in ("", f", format: {form}", ", parent: cam0, child: imu"):
+        result = compiled(ROBOT % output, c_yaml=text)
         assert result.robot
         assert "TF903" not in {one.code for one in result.found}
         assert all("\n" not in one.message and len(one.message) < 2000 for one in result.found)

@@ -46,7 +46,7 @@ def params_of(done: Compiled, process: str) -> dict[str, dict[str, Any]]:
     return {node: params["ros__parameters"] for node, params in read.items()}
 
 
-def said(done: Compiled) -> list[str]:
+def output(done: Compiled) -> list[str]:
     return [f"{one.code} {one.message}" for one in done.found]
 
 
@@ -61,21 +61,21 @@ def test_the_parameters_that_hold_frames_names_agree_with_the_tree(ros: str, pre
     assert params_of(compiled(ros=ros), "ekf") == {"/r1/ekf": ekf | {"world_frame": f"{prefix}odom"}}
 
 
-def test_a_filter_that_owns_the_upper_edge_is_told_to() -> None:
+def test_a_filter_that_owns_the_upper_edge_is_configured_to() -> None:
     more = "  drive: {external: true}\n"
     done = compiled(more, **{"owner: ekf": "owner: drive", "owner: slam": "owner: ekf"})
     assert params_of(done, "ekf")["/r1/ekf"]["world_frame"] == "map"
     assert params_of(done, "slam")["/r1/slam"]["transform_publish_period"] == 0.0
 
 
-def test_unusual_names_are_told_too() -> None:
+def test_unusual_names_are_set_too() -> None:
     names = {"map: ": "world: ", "parent: map": "parent: world", "odom: {": "local: {", "parent: odom": "parent: local"}
     done = compiled(**names)
     assert params_of(done, "slam")["/r1/slam"] == {
         "map_frame": "world", "odom_frame": "local", "base_frame": "base_link",
     }  # fmt: skip
-    told = params_of(done, "ekf")["/r1/ekf"]
-    assert (told["odom_frame"], told["world_frame"]) == ("local", "local")
+    parameters = params_of(done, "ekf")["/r1/ekf"]
+    assert (parameters["odom_frame"], parameters["world_frame"]) == ("local", "local")
 
 
 CONTROL = """  control:
@@ -100,9 +100,9 @@ CLAIMS: dict[str, tuple[str, str, dict[str, Any]]] = {
 def test_what_a_node_publishes_and_another_owns_is_switched_off_in_that_nodes_parameters(more: str) -> None:
     process, node, switch = CLAIMS[more]
     foot = {"  base_link:": "  base_footprint: {parent: odom, owner: foot}\n  base_link:"}
-    told = params_of(compiled(f"{more}  foot: {{external: true}}\n", **foot), process)
-    assert {key: told[node].get(key) for key in switch} == switch
-    assert set(told) == {node}
+    parameters = params_of(compiled(f"{more}  foot: {{external: true}}\n", **foot), process)
+    assert {key: parameters[node].get(key) for key in switch} == switch
+    assert set(parameters) == {node}
 
 
 def test_the_node_of_several_that_publishes_an_edge_is_its_publisher() -> None:
@@ -113,7 +113,7 @@ def test_the_node_of_several_that_publishes_an_edge_is_its_publisher() -> None:
     assert params_of(done, "ekf")["/r1/ekf"]["publish_tf"] is False
 
 
-def test_a_node_that_publishes_only_when_told_is_told_by_its_owner_alone() -> None:
+def test_a_node_that_publishes_only_when_configured_is_configured_by_its_owner_alone() -> None:
     more = CONTROL.replace("diff_drive", "tricycle")
     assert params_of(compiled(more, **{"owner: ekf": "owner: control"}), "control")["/r1/diff"]["enable_odom_tf"]
     assert "enable_odom_tf" not in params_of(compiled(more), "control")["/r1/diff"]
@@ -176,10 +176,10 @@ def test_a_claim_that_cannot_be_settled_is_one_finding_with_the_exact_switch(mor
 )
 def test_what_is_switched_off_or_allowed_is_no_finding(more: str) -> None:
     done = compiled(more)
-    assert [one for one in said(done) if not one.startswith("TF815")] == []
+    assert [one for one in output(done) if not one.startswith("TF815")] == []
 
 
-def test_an_owner_that_is_told_not_to_publish_is_a_finding_at_the_parameter() -> None:
+def test_an_owner_that_is_configured_not_to_publish_is_a_finding_at_the_parameter() -> None:
     done = compiled(**{"node: {preset: ekf}": "node: {preset: ekf}, params: {publish_tf: false}"})
     (found,) = done.found
     assert found.code == "TF333"
@@ -233,7 +233,7 @@ def test_the_frames_parameters_and_their_defaults_are_the_vendors(name: str) -> 
     assert {role.parameter: role.default for role in roles if role.parameter} == FACTS[name]
 
 
-def test_a_switch_that_the_user_sets_otherwise_is_not_written_over_in_silence() -> None:
+def test_a_switch_that_the_user_sets_otherwise_is_not_overwritten_in_silence() -> None:
     text = (
         "tfcompose: 1\nrobot: r\nframes: {odom: {}, base_link: {parent: odom, owner: ekf}}\nprocesses:\n"
         "  ekf: {external: true}\n  drive:\n    run: RUN\n    params: {tf: true}\n"

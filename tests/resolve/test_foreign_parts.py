@@ -141,8 +141,8 @@ def test_a_joint_that_is_there_already_is_refused_as_a_frame_is(cell: Any, tmp_p
     """Of two joints with one name, joint states move both, and readers of the URDF refuse it."""
     text = '<robot name="r"><link name="{0}_a"/><link name="{0}_b"/><joint name="j" type="{1}"><parent link="{0}_a"/>'
     for name, kind in (("one", "fixed"), ("two", "continuous")):
-        whole = text.format(name, kind) + f'<child link="{name}_b"/></joint></robot>'
-        (tmp_path / f"{name}.urdf").write_text(whole, encoding="utf-8")
+        full = text.format(name, kind) + f'<child link="{name}_b"/></joint></robot>'
+        (tmp_path / f"{name}.urdf").write_text(full, encoding="utf-8")
     one, two = "one: {urdf: one.urdf, parent: table}", "two: {urdf: two.urdf, parent: table}"
     (found,) = cell(one, two).found
     assert found.code == "TF505"
@@ -152,7 +152,7 @@ def test_a_joint_that_is_there_already_is_refused_as_a_frame_is(cell: Any, tmp_p
     assert sound(cell(one, two.replace("parent", "prefix: t_, parent")))
 
 
-def test_what_is_about_links_and_joints_that_are_cut_off_is_cut_off_too(cell: Any, tmp_path: Path) -> None:
+def test_what_is_about_links_and_joints_that_are_removed_is_removed_too(cell: Any, tmp_path: Path) -> None:
     control = """<ros2_control name="{}" type="system"><hardware><plugin>a/B</plugin></hardware>{}</ros2_control>"""
     joint = '<joint name="{}"><command_interface name="position"/></joint>'
     both = control.format("both", joint.format("shoulder") + joint.format("roll"))
@@ -168,7 +168,7 @@ def test_what_is_about_links_and_joints_that_are_cut_off_is_cut_off_too(cell: An
     assert [one.get("name") for one in root.findall("ros2_control/joint")] == ["left_shoulder"]
 
 
-def test_names_that_are_beyond_letters_are_taken_from_others_and_renamed_everywhere(cell: Any, tmp_path: Path) -> None:
+def test_names_with_other_characters_are_taken_from_others_and_renamed_everywhere(cell: Any, tmp_path: Path) -> None:
     text = ARM.replace('"upper"', '"upper &amp; &lt;arm&gt;"').replace('"shoulder"', '"shoulder-joint 1.0"')
     (tmp_path / "third/arm/arm.urdf").write_text(text, encoding="utf-8")
     root = ET.fromstring(files(cell(LEFT))["robot.full.urdf"])  # noqa: S314 (our own text)
@@ -207,7 +207,7 @@ def test_a_package_of_the_robot_is_found_in_xacro_where_everything_is_relative(
         ("$(find arm)/base.stl", "TF018", "base.stl"),
     ],
 )
-def test_what_xacro_cannot_find_is_said_once(cell: Any, tmp_path: Path, find: str, code: str, message: str) -> None:
+def test_what_xacro_cannot_find_is_reported_once(cell: Any, tmp_path: Path, find: str, code: str, message: str) -> None:
     slide = tmp_path / "third/arm/slide.xacro"
     slide.write_text(XACRO.replace("$(find arm)/sizes.xacro", find), "utf-8")
     (found,) = cell("slide: {xacro: third/arm/slide.xacro, parent: table}").errors
@@ -237,7 +237,7 @@ def test_an_error_of_xacro_in_a_macro_of_another_file_is_found_there(cell: Any, 
     assert line[found.notes[0].span.column - 1 :].startswith("${height}")
 
 
-def test_a_floating_joint_of_somebody_elses_file_is_told_where_it_can_have_an_owner(cell: Any, tmp_path: Path) -> None:
+def test_a_floating_joint_of_a_foreign_file_is_reported_where_it_can_have_an_owner(cell: Any, tmp_path: Path) -> None:
     (tmp_path / "third/arm/arm.urdf").write_text(ARM.replace('name="end" type="fixed"', 'name="end" type="floating"'))
     (found,) = cell(LEFT).found
     assert (found.code, "tfcompose import" in found.help) == ("TF715", True)
@@ -246,11 +246,11 @@ def test_a_floating_joint_of_somebody_elses_file_is_told_where_it_can_have_an_ow
 def test_each_number_of_the_urdf_is_still_there(cell: Any) -> None:
     root = ET.fromstring(files(cell(LEFT))["robot.full.urdf"])  # noqa: S314 (our own text)
     joint = next(one for one in root.findall("joint") if one.get("name") == "left_shoulder")
-    said = {child.tag: child.attrib for child in joint}
-    assert said["limit"] == {"lower": "-3", "upper": "3", "effort": "10", "velocity": "1"}
-    assert said["dynamics"] == {"damping": "0.5", "friction": "0.25"}
-    assert said["axis"] == {"xyz": "0 0 1"}
-    assert [float(value) for value in said["safety_controller"].values()] == [-2, 2, 4, 8]
+    output = {child.tag: child.attrib for child in joint}
+    assert output["limit"] == {"lower": "-3", "upper": "3", "effort": "10", "velocity": "1"}
+    assert output["dynamics"] == {"damping": "0.5", "friction": "0.25"}
+    assert output["axis"] == {"xyz": "0 0 1"}
+    assert [float(value) for value in output["safety_controller"].values()] == [-2, 2, 4, 8]
     base = next(one for one in root.findall("link") if one.get("name") == "left_base")
     mesh, colour = next(base.iter("mesh")), next(base.iter("color"))
     assert (mesh.get("filename"), mesh.get("scale")) == ("package://arm/base.stl", "2 2 2")
@@ -261,11 +261,11 @@ def test_each_number_of_the_urdf_is_still_there(cell: Any) -> None:
 
 
 def test_every_frame_is_where_an_independent_reader_of_the_urdf_has_it(cell: Any, tmp_path: Path) -> None:
-    whole = tmp_path / "whole.urdf"
-    whole.write_text(files(cell(LEFT))["robot.full.urdf"], encoding="utf-8")
+    full = tmp_path / "whole.urdf"
+    full.write_text(files(cell(LEFT))["robot.full.urdf"], encoding="utf-8")
     load = {"load_meshes": False, "build_scene_graph": True}
     mine, theirs = (
-        yourdfpy.URDF.load(str(whole), **load),
+        yourdfpy.URDF.load(str(full), **load),
         yourdfpy.URDF.load(str(tmp_path / "third/arm/arm.urdf"), **load),
     )
     for q in (0.0, 0.7):
@@ -290,8 +290,8 @@ def test_a_frame_of_the_urdf_is_placed(cell: Any) -> None:
     edge = sound(cell(LEFT.replace("root: base", "place: left_base").replace("left_,", "left_,"))).parent_edge(
         "left_world"
     )
-    turn = Rotation.from_euler("xyz", [0, 0, 1])
-    assert edge.pose.xyz == pytest.approx(turn.apply([0, 0, -1]) + np.array([0, 0.5, 0]), abs=1e-12)
+    rotation = Rotation.from_euler("xyz", [0, 0, 1])
+    assert edge.pose.xyz == pytest.approx(rotation.apply([0, 0, -1]) + np.array([0, 0.5, 0]), abs=1e-12)
 
 
 def test_an_urdf_can_be_a_robot_of_its_own(cell: Any) -> None:
@@ -343,7 +343,9 @@ def test_what_hangs_on_a_part_that_was_refused_says_nothing_of_its_own(cell: Any
     assert result.found[1].message.split()[-1] == "tabel"
 
 
-def test_what_is_wrong_with_hardware_of_a_part_is_said_at_its_line_with_every_use(cell: Any, tmp_path: Path) -> None:
+def test_what_is_wrong_with_hardware_of_a_part_is_reported_at_its_line_with_every_use(
+    cell: Any, tmp_path: Path
+) -> None:
     joint = '\n    <joint name="shoulder"><command_interface name="position"/></joint>'
     control = f'<ros2_control name="hw" type="system"><hardware><plugin>a/B</plugin></hardware>{joint}</ros2_control>'
     file = tmp_path / "third/arm/arm.urdf"
@@ -358,10 +360,8 @@ def test_what_is_wrong_with_hardware_of_a_part_is_said_at_its_line_with_every_us
         .startswith('<joint name="shoulder"')
     )
     assert [note.message for note in found.notes][1:] == ["as the part left", "as the part right"]
-    (whole,) = cell(
-        f"{LEFT.replace('root: base, ', '')}\nros2_control: {{mine: {{plugin: a/B, joints: {mine}}}}}"
-    ).found
-    assert (whole.code, whole.span) == ("TF717", found.span)
+    (full,) = cell(f"{LEFT.replace('root: base, ', '')}\nros2_control: {{mine: {{plugin: a/B, joints: {mine}}}}}").found
+    assert (full.code, full.span) == ("TF717", found.span)
 
 
 def test_a_block_that_names_nothing_of_its_part_stands_once(cell: Any) -> None:
@@ -453,7 +453,7 @@ def test_warnings_about_somebody_elses_file_are_left_to_its_own_lint(cell: Any, 
         ("a: {parent: table}", "TF102", "", "spec", "cell.yaml"),
     ],
 )
-def test_what_cannot_be_a_part_is_said_with_its_place(  # noqa: PLR0913, PLR0917 (what is said, in its parts)
+def test_what_cannot_be_a_part_is_reported_with_its_place(  # noqa: PLR0913, PLR0917 (what is said, in its parts)
     cell: Any, part: str, code: str, message: str, advice: str, place: str
 ) -> None:
     errors = cell(part).errors

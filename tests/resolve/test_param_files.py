@@ -43,7 +43,7 @@ def compiled(params: str, **files: str) -> Compiled:
     return compile_robot(HEAD + PLANNER.replace("PARAMS", params), "r.yaml", library(), read=read)
 
 
-def written(params: str, **files: str) -> str:
+def source_text(params: str, **files: str) -> str:
     result = compiled(params, **files)
     assert not result.errors, [one.message for one in result.errors]
     assert result.robot
@@ -51,24 +51,24 @@ def written(params: str, **files: str) -> str:
 
 
 def test_what_the_file_says_to_the_node_is_taken_in_its_order_and_inline_parameters_are_laid_over_it() -> None:
-    params = yaml.safe_load(written("{file: p.yaml, deep: {a: 9}, own: x}"))
+    params = yaml.safe_load(source_text("{file: p.yaml, deep: {a: 9}, own: x}"))
     assert list(params) == ["/robot1/planner"]
-    said = params["/robot1/planner"]["ros__parameters"]
-    assert said["deep"] == {"a": 9, "b": 3}
-    assert said["common"] == said["one_part"] == 1
-    assert said["own"] == "x"
-    assert "not_mine" not in said
-    assert "nested" not in said  # robot1/planner below robot1 is /robot1/robot1/planner
+    output = params["/robot1/planner"]["ros__parameters"]
+    assert output["deep"] == {"a": 9, "b": 3}
+    assert output["common"] == output["one_part"] == 1
+    assert output["own"] == "x"
+    assert "not_mine" not in output
+    assert "nested" not in output  # robot1/planner below robot1 is /robot1/robot1/planner
 
 
 def test_a_name_in_the_file_is_below_the_namespace_of_the_process() -> None:
     file = "planner: {ros__parameters: {near: 1}}\n/robot1/planner: {ros__parameters: {far: 1}}\n"
-    params = yaml.safe_load(written("{file: front.yaml}, namespace: front", front=file))
+    params = yaml.safe_load(source_text("{file: front.yaml}, namespace: front", front=file))
     assert params == {"/robot1/front/planner": {"ros__parameters": {"near": 1}}}
 
 
-def test_words_stay_as_they_were_written() -> None:
-    text = written("{file: p.yaml}")
+def test_words_stay_as_in_the_source() -> None:
+    text = source_text("{file: p.yaml}")
     assert '"flag": on\n' in text
     assert '"octal": 012\n' in text
     assert '"text": "on"\n' in text
@@ -77,7 +77,7 @@ def test_words_stay_as_they_were_written() -> None:
 
 
 def test_later_files_are_laid_over_earlier_ones() -> None:
-    text = written("{file: [p.yaml, q.yaml]}", q="planner: {ros__parameters: {common: 2}}")
+    text = source_text("{file: [p.yaml, q.yaml]}", q="planner: {ros__parameters: {common: 2}}")
     assert yaml.safe_load(text)["/robot1/planner"]["ros__parameters"]["common"] == 2
 
 

@@ -135,13 +135,13 @@ def test_a_robot_of_its_own_has_its_own_publishers_description_and_joint_names()
     simulate = plan.process("two/wheels").simulate
     assert simulate
     assert simulate.joints == {"wheel_joint": 1.0}
-    two, whole = (ET.fromstring(files[f"{part}robot.full.urdf"]) for part in ("two/", ""))  # noqa: S314 (our own text)
+    two, full = (ET.fromstring(files[f"{part}robot.full.urdf"]) for part in ("two/", ""))  # noqa: S314 (our own text)
     links = {link.get("name") for link in two.iter("link")}
     assert {"base_link", "wheel_link"} <= links
     assert not any(name and name.startswith("r2/") for name in links)
-    joints = [joint.get("name") for joint in whole.findall("joint")]
+    joints = [joint.get("name") for joint in full.findall("joint")]
     assert len(joints) == len(set(joints))
-    mimics = {mimic.get("joint") for mimic in whole.iter("mimic")}
+    mimics = {mimic.get("joint") for mimic in full.iter("mimic")}
     assert mimics == {"r1/wheel_joint", "r2/wheel_joint"}
 
 
@@ -161,7 +161,7 @@ def test_isolated_frames_have_the_namespace_as_prefix() -> None:
     assert '"odom": "first/odom"' in built(text)["params/one/slam.yaml"]
 
 
-def test_a_prefix_of_the_whole_stands_before_the_parts() -> None:
+def test_a_prefix_of_the_robot_stands_before_the_parts() -> None:
     files = built(FLEET.replace("[map]}", "[map], frame_prefix: site_, namespace: site}"))
     plan = read_plan(files["plan.json"], "plan.json")
     assert {"map", "site_dock", "site_r1/odom"} <= {f for edge in plan.edges for f in (edge.parent, edge.child)}
@@ -169,7 +169,7 @@ def test_a_prefix_of_the_whole_stands_before_the_parts() -> None:
     assert plan.process("one/slam").nodes == ("/site/first/slam",)
 
 
-def test_a_part_without_a_namespace_is_a_piece_of_the_whole() -> None:
+def test_a_part_without_a_namespace_is_a_piece_of_the_robot() -> None:
     files = built(CELL.replace("EXTRA", "xyz: [0, 0.3, 0]"))
     plan = read_plan(files["plan.json"], "plan.json")
     owners = {(edge.parent, edge.child): edge.owner for edge in plan.edges}
@@ -187,10 +187,10 @@ def test_a_part_without_a_namespace_is_a_piece_of_the_whole() -> None:
 def test_a_frame_of_the_part_is_placed_and_the_mount_edge_solved() -> None:
     pose = "place: left_camera_frame, xyz: [1, 2, 3], rpy: [0.1, 0.2, 0.3]"
     edge = sound(CELL.replace("EXTRA", pose)).parent_edge("left_foot")
-    turn = Rotation.from_euler("xyz", [0.1, 0.2, 0.3]) * Rotation.from_euler("xyz", [0, 0.2, 0]).inv()
-    assert edge.pose.xyz == pytest.approx([1, 2, 3] - turn.apply([0.1, 0, 0.3]), abs=1e-12)
+    rotation = Rotation.from_euler("xyz", [0.1, 0.2, 0.3]) * Rotation.from_euler("xyz", [0, 0.2, 0]).inv()
+    assert edge.pose.xyz == pytest.approx([1, 2, 3] - rotation.apply([0.1, 0, 0.3]), abs=1e-12)
     measured = Rotation.from_quat(edge.pose.quat_xyzw)
-    assert (measured.inv() * turn).magnitude() < 1e-12
+    assert (measured.inv() * rotation).magnitude() < 1e-12
 
 
 def test_a_part_is_placed_by_a_calibration_of_a_frame_in_it() -> None:
@@ -221,18 +221,18 @@ def test_only_what_is_below_the_root_is_taken() -> None:
     assert "r1/odom" not in robot.frames
 
 
-def test_drivers_of_sensors_that_are_cut_off_are_cut_off_and_others_stay() -> None:
+def test_drivers_of_sensors_that_are_removed_are_removed_and_others_stay() -> None:
     cameras = """sensors:
   low: {preset: realsense/d435i, parent: foot, options: {serial: "1"}}
   high: {preset: realsense/d435i, parent: upper, options: {serial: "2"}}
 """
     hardware = "ros2_control: {h: {plugin: a/B, joints: {shoulder: {command: [position]}}}}\n"
     arm = ARM.replace("processes:", f"{cameras}{hardware}processes:")
-    whole, cut = (sound(CELL.replace("EXTRA", extra), arm_yaml=arm) for extra in ("", "root: upper"))
-    drivers = [{process.name for process in robot.processes if process.kind == "run"} for robot in (whole, cut)]
+    full, trimmed = (sound(CELL.replace("EXTRA", extra), arm_yaml=arm) for extra in ("", "root: upper"))
+    drivers = [{process.name for process in robot.processes if process.kind == "run"} for robot in (full, trimmed)]
     assert drivers == [{"left/low", "left/high"}, {"left/high"}]
-    assert [[one.name for one in robot.hardware] for robot in (whole, cut)] == [["left_h"], []]
-    assert "left_low_link" not in cut.frames
+    assert [[one.name for one in robot.hardware] for robot in (full, trimmed)] == [["left_h"], []]
+    assert "left_low_link" not in trimmed.frames
 
 
 def test_a_parameter_that_names_a_frame_or_joint_goes_with_it_and_no_other_does() -> None:
@@ -301,7 +301,9 @@ def test_a_frame_that_is_not_shared_gets_the_prefix() -> None:
         ("prefix: r1/", "prefix: r1/, parent: dock", "TF313", "one", "fleet.yaml"),
     ],
 )
-def test_what_does_not_fit_is_said_once_with_its_place(old: str, new: str, code: str, message: str, place: str) -> None:
+def test_what_does_not_fit_is_reported_once_with_its_place(
+    old: str, new: str, code: str, message: str, place: str
+) -> None:
     result = compiled(FLEET.replace(old, new))
     found = only(result, code)
     assert message in found.message
@@ -324,7 +326,7 @@ def test_a_clock_of_the_parts_own_is_refused() -> None:
     assert found.notes[0].span.file == "robots/rover.yaml"
 
 
-def test_a_fault_in_the_parts_file_is_said_there_and_names_the_part() -> None:
+def test_a_fault_in_the_parts_file_is_reported_there_and_names_the_part() -> None:
     rover = ROVER.replace("xyz: [0, 0.2, 0]", "xyz: [0, 0.2]")
     found, *others = (one for one in compiled(FLEET, **{"robots/rover_yaml": rover}).found if one.code == "TF103")
     assert found.span

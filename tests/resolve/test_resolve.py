@@ -43,12 +43,12 @@ def edge_of(robot: Robot, child: str) -> Edge:
 
 def pose_in_root(robot: Robot, frame: str) -> tuple[Rotation, Any]:
     """Return rotation and position of the frame in its root, computed by scipy."""
-    turn, at = Rotation.identity(), [0.0, 0.0, 0.0]
+    rotation, at = Rotation.identity(), [0.0, 0.0, 0.0]
     while edge := robot.parent_edge(frame):
         own = Rotation.from_quat(edge.pose.quat_xyzw)
-        turn, at = own * turn, own.apply(at) + edge.pose.xyz
+        rotation, at = own * rotation, own.apply(at) + edge.pose.xyz
         frame = edge.parent
-    return turn, at
+    return rotation, at
 
 
 def assert_rotation(found: Rotation, expected: Rotation) -> None:
@@ -63,9 +63,9 @@ def test_a_pose_relative_to_another_frame_is_there_while_the_parent_stays_the_pa
         "  sign: {parent: plate, relative_to: mast, xyz: [1, 0, 0], rpy: [5 deg, 0, 0]}\n"
     )
     assert edge_of(robot, "sign").parent == "plate"
-    turn, at = pose_in_root(robot, "sign")
+    rotation, at = pose_in_root(robot, "sign")
     assert at == pytest.approx([1, 3, 3], abs=1e-12)
-    assert_rotation(turn, Rotation.from_euler("z", 90, degrees=True) * Rotation.from_euler("x", 5, degrees=True))
+    assert_rotation(rotation, Rotation.from_euler("z", 90, degrees=True) * Rotation.from_euler("x", 5, degrees=True))
 
 
 def test_a_chain_of_five_hundred_relative_poses_is_solved_whatever_the_order() -> None:
@@ -84,40 +84,40 @@ def test_poses_relative_to_each_other_are_one_finding(count: int) -> None:
 @pytest.mark.parametrize("frame", ["c_link", "c_color_optical_frame", "c_bottom_screw_frame"])
 def test_the_placed_frame_is_where_the_pose_says_and_the_edge_is_the_mounts(frame: str) -> None:
     robot = robot_of(CAMERA % f"place: {frame}, xyz: [1, 2, 3], rpy: [10 deg, 20 deg, 30 deg]")
-    turn, at = pose_in_root(robot, frame)
+    rotation, at = pose_in_root(robot, frame)
     assert at == pytest.approx([1, 2, 3], abs=1e-12)
-    assert_rotation(turn, Rotation.from_euler("xyz", [10, 20, 30], degrees=True))
+    assert_rotation(rotation, Rotation.from_euler("xyz", [10, 20, 30], degrees=True))
     assert edge_of(robot, "c_bottom_screw_frame").parent == "base_link"
 
 
 @pytest.mark.parametrize(
-    ("look", "direction"),
+    ("inspect", "direction"),
     [("forward", (1, 0, 0)), ("left", (0, 1, 0)), ("down", (0, 0, -1)), ("{down: 15 deg}", None)],
 )
-def test_to_look_is_the_z_axis_of_a_placed_optical_frame_and_the_x_axis_of_others(
-    look: str, direction: tuple[int, ...] | None
+def test_the_view_is_the_z_axis_of_a_placed_optical_frame_and_the_x_axis_of_others(
+    inspect: str, direction: tuple[int, ...] | None
 ) -> None:
     expected = direction or tuple(Rotation.from_euler("y", 15, degrees=True).apply([1, 0, 0]))
-    text = CAMERA % f"place: c_color_optical_frame, look: {look}"
+    text = CAMERA % f"place: c_color_optical_frame, look: {inspect}"
     assert pose_in_root(robot_of(text), "c_color_optical_frame")[0].apply([0, 0, 1]) == pytest.approx(
         expected, abs=1e-9
     )
-    text = CAMERA % f"place: c_link, look: {look}"
+    text = CAMERA % f"place: c_link, look: {inspect}"
     assert pose_in_root(robot_of(text), "c_link")[0].apply([1, 0, 0]) == pytest.approx(expected, abs=1e-9)
     assert pose_in_root(robot_of(text), "c_color_optical_frame")[0].apply([0, 0, 1]) == pytest.approx(
         expected, abs=1e-9
     )
-    text = f"frames: {{a_optical_frame: {{parent: base_link, look: {look}}}}}\n"
+    text = f"frames: {{a_optical_frame: {{parent: base_link, look: {inspect}}}}}\n"
     if direction:
         assert pose_in_root(robot_of(text), "a_optical_frame")[0].apply([0, 0, 1]) == pytest.approx(expected, abs=1e-9)
 
 
-def test_an_image_looked_at_by_direction_is_upright() -> None:
-    turn, _ = pose_in_root(
+def test_an_image_of_a_camera_with_a_direction_is_upright() -> None:
+    rotation, _ = pose_in_root(
         robot_of("frames: {a_optical_frame: {parent: base_link, look: forward}}\n"), "a_optical_frame"
     )
-    assert turn.apply([1, 0, 0]) == pytest.approx([0, -1, 0], abs=1e-12)
-    assert turn.apply([0, 1, 0]) == pytest.approx([0, 0, -1], abs=1e-12)
+    assert rotation.apply([1, 0, 0]) == pytest.approx([0, -1, 0], abs=1e-12)
+    assert rotation.apply([0, 1, 0]) == pytest.approx([0, 0, -1], abs=1e-12)
 
 
 STREAMS = {
@@ -245,7 +245,7 @@ def test_rates_come_from_the_edge_or_from_the_process_behind_it() -> None:
     assert [edge_of(robot, child).rate for child in ("odom", "base_link", "w")] == [5, 20, 30]
 
 
-def test_joints_is_told_its_parameters_on_its_command_line() -> None:
+def test_joints_gets_its_parameters_on_its_command_line() -> None:
     joint = "joints: {j: {type: continuous, parent: base_link, child: w}}\nframes: {w: {}}\n"
     robot = robot_of(joint + "processes: {joints: {params: {publish_frequency: 30, ignore_timestamp: true}}}\n")
     plan = next(file.text for file in emit(robot) if file.path == "plan.json")

@@ -24,7 +24,7 @@ joints:
   follow: {type: revolute, parent: c, child: d, limit: {lower: -1, upper: 1, velocity: 2, effort: 1}, %s}
 processes: {states: {simulate: {joints: %s}}}
 """
-TURN = Sweep(6.0)
+ROTATION = Sweep(6.0)
 LIFT = Sweep(math.pi * 0.4 / 0.05, 0.1, 0.5)
 BEND = Sweep(6.0, -math.pi / 2, math.pi / 6)
 
@@ -50,19 +50,19 @@ def tuples(sweeps: dict[str, Sweep]) -> object:
 
 
 @pytest.mark.parametrize(
-    ("written", "joints", "sweeps"),
+    ("source_text", "joints", "sweeps"),
     [
         ("zero", {"turn": 0.0, "lift": 0.3, "bend": 0.0}, {}),
         ("{lift: 20 cm}", {"turn": 0.0, "lift": 0.2, "bend": 0.0}, {}),
-        ("sweep", {"turn": 0.0, "lift": 0.3, "bend": 0.0}, {"turn": TURN, "lift": LIFT, "bend": BEND}),
+        ("sweep", {"turn": 0.0, "lift": 0.3, "bend": 0.0}, {"turn": ROTATION, "lift": LIFT, "bend": BEND}),
         ("{turn: 90 deg, bend: sweep}", {"turn": math.pi / 2, "lift": 0.3, "bend": 0.0}, {"bend": BEND}),
     ],
 )
 def test_every_joint_with_a_position_of_its_own_is_simulated_within_its_limits_and_its_speed(
-    written: str, joints: dict[str, float], sweeps: dict[str, Sweep]
+    source_text: str, joints: dict[str, float], sweeps: dict[str, Sweep]
 ) -> None:
     """A joint that mimics one is left out; where 0 is beyond the limits the middle counts, as elsewhere in ROS."""
-    found = simulation(written)
+    found = simulation(source_text)
     assert found
     assert found.joints == pytest.approx(joints)
     assert tuples(found.sweep) == approx(sweeps)
@@ -81,7 +81,7 @@ processes: {states: {simulate: {joints: %s}}}
 """
 
 
-def test_without_limits_a_turn_sweeps_all_round_and_a_slide_stays() -> None:
+def test_without_limits_a_rotation_sweeps_all_round_and_a_slide_stays() -> None:
     done = compile_robot(UNLIMITED % "sweep", "arm.yaml", library())
     assert not done.errors
     assert done.robot
@@ -100,7 +100,7 @@ def test_a_slide_without_limits_cannot_sweep() -> None:
 
 
 @pytest.mark.parametrize(
-    ("written", "code", "words"),
+    ("source_text", "code", "words"),
     [
         ("swep", "TF106", "sweep"),
         ("{bend: swep}", "TF106", "sweep"),
@@ -110,7 +110,7 @@ def test_a_slide_without_limits_cannot_sweep() -> None:
         ("[1, 2]", "TF103", ""),
     ],
 )
-def test_what_is_not_understood_is_refused_once(written: str, code: str, words: str) -> None:
-    (found,) = compiled(written).errors
+def test_what_is_not_understood_is_refused_once(source_text: str, code: str, words: str) -> None:
+    (found,) = compiled(source_text).errors
     assert found.code == code
     assert words in (found.help or "")

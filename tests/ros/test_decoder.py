@@ -40,7 +40,7 @@ def test_a_second_message_of_the_same_layout_gives_its_own_numbers(
 
 
 @given(transforms, transforms)
-def test_messages_of_one_length_and_different_names_are_told_apart(a: Transform, b: Transform) -> None:
+def test_messages_of_one_length_and_different_names_are_distinguished(a: Transform, b: Transform) -> None:
     decoder = Decoder()
     swapped = [[a, b], [b, a], [a, a], [b, b], [a, b]]
     for sent in swapped:
@@ -82,7 +82,7 @@ def test_random_bytes_are_refused_or_read_as_by_decode(noise: bytes) -> None:
             assert repr(list(decoder.rows(data))) == expected
 
 
-def test_every_cut_and_every_huge_count_is_refused_after_the_whole_was_seen() -> None:
+def test_every_truncation_and_every_huge_count_is_refused_after_the_full_message_was_accepted() -> None:
     decoder = Decoder()
     data = encode([Transform(S, "odom", f"f{index}", (1, 2, 3), (0, 0, 0, 1)) for index in range(4)])
     decoder.rows(data)

@@ -46,7 +46,7 @@ def test_a_message_of_the_other_byte_order_does_not_fit() -> None:
 
 
 @given(names)
-def test_what_is_written_is_what_cdr_says(joints: list[str]) -> None:
+def test_what_is_encoded_is_cdr(joints: list[str]) -> None:
     positions = [-0.25 * n for n in range(len(joints))]
     data = encode_names(joints)
     fill(data, 3_000_000_007, positions)
@@ -65,13 +65,13 @@ def test_another_number_of_positions_is_refused_with_a_sentence(positions: list[
 def test_a_message_that_ends_early_is_refused_wherever_it_ends() -> None:
     data = message(["left", "right"], [1.0, 2.0])[:-8]
     assert list(read_names(data).positions(data)) == [1.0, 2.0]
-    whole = read_names(data)
+    full = read_names(data)
     for length in range(len(data)):
         with pytest.raises(ValueError, match=r"^it |^its "):
             _read(data[:length])
-        if whole.fit(data[:length]):
+        if full.fit(data[:length]):
             with pytest.raises(ValueError, match=r"^it "):
-                whole.positions(data[:length])
+                full.positions(data[:length])
 
 
 @given(st.binary(max_size=200))

@@ -26,7 +26,7 @@ def test_what_ros_writes_is_read(names: list[str], frame: str) -> None:
 
 
 @pytest.mark.parametrize("names", NAMES, ids=len)
-def test_what_is_written_ros_reads(names: list[str]) -> None:
+def test_what_is_encoded_ros_reads(names: list[str]) -> None:
     positions = [0.5 * n for n in range(len(names))]
     data = encode_names(names)
     fill(data, 7_000_000_009, positions)

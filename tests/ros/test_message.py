@@ -68,9 +68,9 @@ def test_a_damaged_message_gives_transforms_or_a_value_error(sent: list[Transfor
 
 @given(st.lists(transforms, min_size=1, max_size=3), st.data())
 def test_a_truncated_message_is_refused(sent: list[Transform], data: st.DataObject) -> None:
-    whole = encode(sent)
+    full = encode(sent)
     with pytest.raises(ValueError, match="message"):
-        decode(whole[: data.draw(st.integers(0, len(whole) - 1))])
+        decode(full[: data.draw(st.integers(0, len(full) - 1))])
 
 
 def test_a_huge_count_costs_no_memory() -> None:

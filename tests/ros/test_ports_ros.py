@@ -31,5 +31,5 @@ def test_tfcomposes_own_processes_read_no_shared_memory_and_others_do(
 ) -> None:
     assert domain
     env = child_environment(os.environ, RosSettings(discovery=discovery), own=own)
-    said = processes.run([sys.executable, "-c", NODE], env=env, check=True)
-    assert (said.stdout == "\n") == own, said.stdout
+    output = processes.run([sys.executable, "-c", NODE], env=env, check=True)
+    assert (output.stdout == "\n") == own, output.stdout

@@ -121,7 +121,7 @@ def test_a_node_leaves_no_thread_and_offers_nothing_that_it_does_not_answer(doma
     ("name", "args", "variables"),
     [("not a name", [], {}), ("fine", ["-r", "no rule"], {}), ("fine", [], {"ROS_DOMAIN_ID": "many"})],
 )
-def test_what_ros_refuses_is_said_in_one_sentence(
+def test_what_ros_refuses_is_reported_in_one_sentence(
     monkeypatch: pytest.MonkeyPatch, name: str, args: list[str], variables: dict[str, str]
 ) -> None:
     for variable, value in variables.items():

@@ -83,6 +83,6 @@ def test_another_process_sees_the_type_and_its_hash(python: Callable[[str], str]
     with open_node("talks", "/rover") as node:
         publisher = TFPublisher(node, static=False)
         publisher.publish(encode([Transform(0, "a", "b", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))]))
-        seen = python(SEES)
-    assert "['tf2_msgs/msg/TFMessage'] tf2_msgs/msg/TFMessage" in seen
-    assert TF_MESSAGE_HASH in seen
+        observed = python(SEES)
+    assert "['tf2_msgs/msg/TFMessage'] tf2_msgs/msg/TFMessage" in observed
+    assert TF_MESSAGE_HASH in observed

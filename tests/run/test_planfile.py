@@ -49,7 +49,7 @@ def refused(text: str) -> str:
     return found.message.removeprefix("not a valid plan: ")
 
 
-def test_what_is_written_is_read() -> None:
+def test_what_is_encoded_is_decoded() -> None:
     assert read_plan(write_plan(PLAN), "plan.json") == PLAN
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
 #: So long it is looked, again and again: where much else runs, publishers are found late, and late in truth.
-LOOKS_S = (3.0, 3.0, 3.0, 6.0, 12.0)
+OBSERVE_S = (3.0, 3.0, 3.0, 6.0, 12.0)
 
 
 def doctor(*words: str, seconds: float = 3.0) -> tuple[int, list[dict[str, Any]]]:
@@ -26,7 +26,7 @@ def doctor(*words: str, seconds: float = 3.0) -> tuple[int, list[dict[str, Any]]
 
 def doctor_finds(expected: Mapping[str, Sequence[str]], others: set[str]) -> list[dict[str, Any]]:
     """Run it until it finds these codes with these names, and no others but ``others``; a few times."""
-    for seconds in LOOKS_S:  # names may come late
+    for seconds in OBSERVE_S:  # names may come late
         exit_code, found = doctor(seconds=seconds)
         if finds(found, expected, others):
             break
@@ -36,25 +36,25 @@ def doctor_finds(expected: Mapping[str, Sequence[str]], others: set[str]) -> lis
 
 def finds_nothing(*words: str) -> bool:
     """Look until nothing is found, a few times."""
-    return any(doctor(*words, seconds=seconds) == (0, []) for seconds in LOOKS_S)
+    return any(doctor(*words, seconds=seconds) == (0, []) for seconds in OBSERVE_S)
 
 
 def at_last(claim: Callable[[float], None]) -> None:
     """Let the claim about what is seen in so many seconds hold once, of a few times that are longer and longer."""
-    for seconds in LOOKS_S[:-1]:
+    for seconds in OBSERVE_S[:-1]:
         with contextlib.suppress(AssertionError):
             return claim(seconds)
-    return claim(LOOKS_S[-1])
+    return claim(OBSERVE_S[-1])
 
 
 def finds(found: list[dict[str, Any]], expected: Mapping[str, Sequence[str]], others: set[str]) -> bool:
     """Return whether these codes were found, each with all its names, and no others but ``others``."""
     codes = {one["code"] for one in found}
-    named = (name in said(found, code) for code, names in expected.items() for name in names)
+    named = (name in messages_of(found, code) for code, names in expected.items() for name in names)
     return codes >= expected.keys() and codes <= {*expected, *others} and all(named)
 
 
-def said(found: list[dict[str, Any]], code: str) -> str:
+def messages_of(found: list[dict[str, Any]], code: str) -> str:
     """Return all that was said of that code."""
     assert code in {one["code"] for one in found}, found
     parts = [one for one in found if one["code"] == code]

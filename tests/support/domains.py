@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 #: The domains that tests may have; CI's own run of a robot has 101.
 DOMAINS = range(1, 101)
-_TURN = count(os.getpid())
+_WINDOW = count(os.getpid())
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def reserved_domain() -> Iterator[int]:
     """
     domains = own_domains()
     for _ in domains:
-        number = domains[next(_TURN) % len(domains)]
+        number = domains[next(_WINDOW) % len(domains)]
         try:
             descriptor = _opened(Path(tempfile.gettempdir()) / f"tfcompose-test-domain-{number}.lock")
         except PermissionError:  # of a user who lets nobody read it

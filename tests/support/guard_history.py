@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tfcompose.plan import Clock, EdgeKind
 
 
-LOOK_S = 0.1
+TICK_S = 0.1
 
 
 SETTLE_S = 1.0
@@ -81,13 +81,13 @@ class History:
     graph: list[Publisher] = field(default_factory=list)
     made: int = 0
     judge: Judge = field(init=False)
-    looked: float = field(init=False)
+    ticked: float = field(init=False)
 
     def __post_init__(self) -> None:
         settings = RosSettings(clock=self.clock)
         plan = Plan("rover", "0", "base", settings, self.edges, self.processes, self.guard, claims=self.claims)
         self.judge = Judge(plan, self.settle_s, self.now, self.wall_ns(), says_who=self.says_who)
-        self.looked = self.now
+        self.ticked = self.now
 
     def wall_ns(self) -> int:
         return 1_700_000_000_000_000_000 + round(self.now * 1e9)
@@ -125,7 +125,7 @@ class History:
         self.events += self.judge.message(message, self.now)
         return self
 
-    def look(self) -> History:
+    def check(self) -> History:
         writers = [TFPublisher(p.gid, p.node, p.static, latched=not p.volatile) for p in self.graph]
         self.events += self.judge.graph(writers, self.now)
         self.events += self.judge.tick(self.now)
@@ -135,8 +135,8 @@ class History:
         """Let time pass, in looks."""
         end = self.now + seconds
         while self.now < end - 1e-9:
-            self.now = min(end, self.now + LOOK_S)
-            self.look()
+            self.now = min(end, self.now + TICK_S)
+            self.check()
         return self
 
     def repeat(self, publisher: Publisher, edges: str, times: int, every: float = 0.1) -> History:
@@ -147,7 +147,7 @@ class History:
 
     def clear(self) -> History:
         """Look until all is clear."""
-        self.wait(self.settle_s + LOOK_S)
+        self.wait(self.settle_s + TICK_S)
         assert Clear() in self.events
         return self
 
@@ -162,7 +162,7 @@ class History:
     def found(self) -> list[Finding]:
         return [event.found for event in self.events if isinstance(event, (Found, Taken))]
 
-    def said(self) -> list[str]:
+    def reports(self) -> list[str]:
         return [
             f"{event.found.code} {event.found.message}" for event in self.events if isinstance(event, (Found, Taken))
         ]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import psutil
 
 from tests.support import processes
-from tests.support.waiting import TIMEOUT_S, whole_lines
+from tests.support.waiting import TIMEOUT_S, complete_lines
 from tfcompose.ipc import GUARD_EVENTS
 from tfcompose.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.plan.file import write_plan
@@ -61,8 +61,8 @@ class Launcher:
 
     def pids(self) -> list[int]:
         """Return the process numbers that the children have said so far."""
-        said = [line.split("pids ")[1] for line in whole_lines(self.output) if "pids " in line]
-        return [int(word) for words in said for word in words.rstrip("')").split()]
+        lines = [line.split("pids ")[1] for line in complete_lines(self.output) if "pids " in line]
+        return [int(word) for words in lines for word in words.rstrip("')").split()]
 
     def below(self, *, recursive: bool = True) -> list[int]:
         return [child.pid for child in psutil.Process(self.popen.pid).children(recursive=recursive)]

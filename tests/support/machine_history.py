@@ -61,7 +61,7 @@ class History:
     now: float = 100.0
     started: list[str] = field(default_factory=list)
     killed: list[tuple[str, int]] = field(default_factory=list)
-    told: list[Any] = field(default_factory=list)
+    notices: list[Any] = field(default_factory=list)
     orders: list[GuardOrder] = field(default_factory=list)
     late: list[Finding] = field(default_factory=list)
     exit_code: int | None = None
@@ -87,7 +87,7 @@ class History:
             case Kill(name, number):
                 self.killed.append((name, number))
             case Notify(notice):
-                self.told.append(notice)
+                self.notices.append(notice)
             case Order(order):
                 self.orders.append(order)
             case NotifyLate(_, found):
@@ -108,7 +108,7 @@ class History:
         return slept
 
     def all(self, kind: type[N]) -> list[N]:
-        return [notice for notice in self.told if isinstance(notice, kind)]
+        return [notice for notice in self.notices if isinstance(notice, kind)]
 
     def found(self) -> list[Finding]:
         return [notice.found for notice in self.all(FindingShown)]

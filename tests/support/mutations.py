@@ -98,13 +98,13 @@ def _spots(text: str) -> tuple[Spot, ...]:
 
 
 def _below(root: Any, text: str) -> Iterator[Spot]:
-    seen: set[int] = set()
+    observed: set[int] = set()
     stack: list[Any] = [root]
     while stack:
         node = stack.pop()
-        if node is None or id(node) in seen:
+        if node is None or id(node) in observed:
             continue
-        seen.add(id(node))
+        observed.add(id(node))
         if isinstance(node, yaml.MappingNode):
             pairs = [(key, value) for key, value in node.value if key.start_mark.index <= value.start_mark.index]
             for key, value in pairs:

@@ -100,9 +100,9 @@ def _inertial(link: Any) -> Any:
 
 def _colours(root: Any) -> dict[str, Any]:
     found: dict[str, Any] = {}
-    for said in [*root.findall("material"), *root.findall("link/visual/material")]:
-        if len(said):
-            found.setdefault(said.get("name", ""), said)
+    for output in [*root.findall("material"), *root.findall("link/visual/material")]:
+        if len(output):
+            found.setdefault(output.get("name", ""), output)
     return found
 
 
@@ -112,12 +112,12 @@ def _shapes(link: Any, tag: str, colours: dict[str, Any]) -> list[Any]:
         for form in one.find("geometry"):
             if form.tag not in FORMS or 0 in _sizes(form):
                 continue
-            said = {
+            output = {
                 key: value if key == "filename" else [float(word) for word in value.split()]
                 for key, value in form.attrib.items()
             }
-            said["scale"] = said.get("scale", [1.0, 1.0, 1.0])
-            shapes.append({"form": form.tag, "pose": _pose(one), "colour": _colour(one, tag, colours), **said})
+            output["scale"] = output.get("scale", [1.0, 1.0, 1.0])
+            shapes.append({"form": form.tag, "pose": _pose(one), "colour": _colour(one, tag, colours), **output})
     return shapes
 
 
@@ -127,36 +127,36 @@ def _sizes(form: Any) -> list[float]:
 
 
 def _colour(shape: Any, tag: str, colours: dict[str, Any]) -> Any:
-    said = shape.find("material") if tag == "visual" else None
-    if said is None:
+    output = shape.find("material") if tag == "visual" else None
+    if output is None:
         return None
-    said = said if len(said) else colours.get(said.get("name", ""))
-    if said is None:
+    output = output if len(output) else colours.get(output.get("name", ""))
+    if output is None:
         return None
-    colour, texture = said.find("color"), said.find("texture")
+    colour, texture = output.find("color"), output.find("texture")
     rgba = None if colour is None else [min(max(part, 0), 1) for part in _numbers(colour, "rgba", "0.5 0.5 0.5 1")]
     return [rgba, None if texture is None else texture.get("filename") or None]
 
 
 def _joint(joint: Any) -> dict[str, Any]:
     kind = joint.get("type")
-    said = {"parent": joint.find("parent").get("link"), "type": kind, "pose": _pose(joint)}
+    output = {"parent": joint.find("parent").get("link"), "type": kind, "pose": _pose(joint)}
     if kind == "fixed":
-        return said
-    said["name"] = joint.get("name")
+        return output
+    output["name"] = joint.get("name")
     if kind == "floating":
-        return said
+        return output
     axis = np.array(_numbers(joint.find("axis"), "xyz", "1 0 0"))
-    said["axis"] = axis / np.linalg.norm(axis)
+    output["axis"] = axis / np.linalg.norm(axis)
     for tag, values in _motion(kind, joint.find("limit") is not None).items():
         element = joint.find(tag)
         if element is not None or tag == "limit":
             given = {} if element is None else element.attrib
-            said[tag] = {key: float(given[key]) if key in given else usual for key, usual in values.items()}
+            output[tag] = {key: float(given[key]) if key in given else usual for key, usual in values.items()}
     mimic = joint.find("mimic")
     if mimic is not None:
-        said["mimic"] = [mimic.get("joint"), float(mimic.get("multiplier", "1")), float(mimic.get("offset", "0"))]
-    return said
+        output["mimic"] = [mimic.get("joint"), float(mimic.get("multiplier", "1")), float(mimic.get("offset", "0"))]
+    return output
 
 
 def _motion(kind: str, limited: bool) -> dict[str, dict[str, float | None]]:  # noqa: FBT001 (here only)

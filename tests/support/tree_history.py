@@ -57,7 +57,7 @@ class TreeHistory:
         self.observer.take([transform], static=static, gid=gid, received_ns=at_ns)
         return self
 
-    def seen(self, **more: Any) -> TreeState:
+    def observed(self, **more: Any) -> TreeState:
         publishers = more.pop("publishers", tuple(self.observer.publishers.known.values()))
         return TreeState(SECONDS, edges=tuple(self.observer.edges(END_NS)), publishers=publishers, **more)
 

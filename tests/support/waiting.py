@@ -35,14 +35,14 @@ def in_one_of_a_few(attempt: Callable[[int], bool], tries: int = 4) -> bool:
     return any(attempt(number) for number in range(tries))
 
 
-def whole_lines(file: Path) -> list[str]:
+def complete_lines(file: Path) -> list[str]:
     """Return the lines of a file that somebody still writes: what stands behind the last line's end is not one yet."""
     return file.read_bytes().rpartition(b"\n")[0].decode().splitlines()
 
 
-def offences(said: str) -> list[str]:
+def offences(output: str) -> list[str]:
     """Return the codes of what was found live, but of silence and slowness: a process may be kept from running."""
-    return re.findall(r"TF8(?!0[45])\d\d", said)
+    return re.findall(r"TF8(?!0[45])\d\d", output)
 
 
 def gone(process: int | psutil.Process) -> bool:

@@ -73,8 +73,8 @@ def test_random_trees_agree_with_scipy() -> None:
             xyz = (rng.uniform(-3, 3), rng.uniform(-3, 3), rng.uniform(-3, 3))
             quat: Quaternion = quat_from_rpy(rng.uniform(-3, 3), rng.uniform(-1.5, 1.5), rng.uniform(-3, 3))
             buffer.set(parent, f"f{index}", Pose(xyz, quat), 0, static=True)
-            origin, turn = in_world[parent]
-            in_world[f"f{index}"] = (origin + turn.apply(xyz), turn * Rotation.from_quat(quat))
+            origin, rotation = in_world[parent]
+            in_world[f"f{index}"] = (origin + rotation.apply(xyz), rotation * Rotation.from_quat(quat))
         a, b = rng.sample(sorted(in_world), 2)
         pose, _ = buffer.latest(a, b)
         (pa, ra), (pb, rb) = in_world[a], in_world[b]
@@ -112,7 +112,7 @@ def test_an_unknown_frame_is_named_with_the_nearest_known() -> None:
         rover().latest("odom", "lasr")
 
 
-def test_two_trees_are_said_with_their_roots() -> None:
+def test_two_trees_are_reported_with_their_roots() -> None:
     buffer = rover()
     buffer.set("world", "table", at(1), 0, static=True)
     with pytest.raises(

@@ -75,9 +75,9 @@ def test_between_two_samples_the_pose_is_between_them_and_near_a_sample_it_is_ne
     for p, q, x in zip(first.xyz, last.xyz, found.xyz, strict=True):
         assert min(p, q) - 1e-9 <= x <= max(p, q) + 1e-9
         assert x == pytest.approx(p + (q - p) * part, abs=1e-9)
-    whole = angle_between(first.quat_xyzw, last.quat_xyzw)
-    assert angle_between(first.quat_xyzw, found.quat_xyzw) == pytest.approx(whole * part, abs=1e-7)
-    assert angle_between(found.quat_xyzw, last.quat_xyzw) == pytest.approx(whole * (1 - part), abs=1e-7)
+    full = angle_between(first.quat_xyzw, last.quat_xyzw)
+    assert angle_between(first.quat_xyzw, found.quat_xyzw) == pytest.approx(full * part, abs=1e-7)
+    assert angle_between(found.quat_xyzw, last.quat_xyzw) == pytest.approx(full * (1 - part), abs=1e-7)
 
 
 @given(quaternions, quaternions, st.floats(0, 1))
@@ -152,15 +152,15 @@ def test_what_is_remembered_of_chains_changes_no_answer(
     operations: list[tuple[int, int, bool, int, Pose]], data: st.DataObject
 ) -> None:
     """Loops, new parents and kinds, all at once: a buffer that was asked in between answers as one that was not."""
-    asked, fresh = Buffer(), Buffer()
+    requested, fresh = Buffer(), Buffer()
     questions = st.tuples(st.integers(0, 4), st.integers(0, 4), st.integers(0, 30 * S))
     for parent, child, static, stamp, pose in operations:
-        for buffer in (asked, fresh):
+        for buffer in (requested, fresh):
             buffer.set(f"f{parent}", f"f{child}", pose, stamp, static=static)
         for a in range(5):
-            asked.can_transform(f"f{a}", f"f{(a + 2) % 5}", 0)
+            requested.can_transform(f"f{a}", f"f{(a + 2) % 5}", 0)
     for a, b, stamp in data.draw(st.lists(questions, max_size=6)):
-        assert _answer(asked, f"f{a}", f"f{b}", stamp) == _answer(fresh, f"f{a}", f"f{b}", stamp)
+        assert _answer(requested, f"f{a}", f"f{b}", stamp) == _answer(fresh, f"f{a}", f"f{b}", stamp)
 
 
 def _answer(buffer: Buffer, a: str, b: str, stamp: int) -> object:

@@ -81,11 +81,11 @@ def test_a_callback_that_awaits_lets_the_executor_hear_what_it_waits_for(node: A
     publisher = TFPublisher(other, static=False)
     assert until(lambda: publisher.publisher.get_subscription_count() == 1)
 
-    def asked() -> bool:
+    def requested() -> bool:
         executor.spin_once(timeout_sec=0.05)
         return bool(buffer.on_insert)
 
-    assert until(asked)
+    assert until(requested)
     publisher.publish(one(1.0, 4 * S))
     publisher.publish(one(2.0, 6 * S))
 
@@ -193,17 +193,17 @@ def test_a_listener_to_fixed_edges_alone_has_one_subscription(node: Any, other: 
 
 
 @pytest.mark.parametrize("handed_over", [True, False])
-def test_profiles_and_depths_are_those_that_were_asked_for(node: Any, *, handed_over: bool) -> None:
+def test_profiles_and_depths_are_those_that_were_requested(node: Any, *, handed_over: bool) -> None:
     profile: Any = QoSProfile
-    asked = profile(depth=7, reliability=2)  # best effort
-    with TransformListener(Buffer(), node if handed_over else None, qos=asked, static_qos=5) as listener:
+    requested = profile(depth=7, reliability=2)  # best effort
+    with TransformListener(Buffer(), node if handed_over else None, qos=requested, static_qos=5) as listener:
         own = listener._ros.node
         moving, fixed = (own.get_subscriptions_info_by_topic(name)[0].qos_profile for name in ("/tf", "/tf_static"))
     assert moving.reliability.name == "BEST_EFFORT"
     assert (fixed.reliability.name, fixed.durability.name) == ("RELIABLE", "TRANSIENT_LOCAL"), "still latched"
 
 
-def test_a_thread_of_the_listeners_spins_the_whole_node_and_ends_with_it(node: Any, other: Any) -> None:
+def test_a_thread_of_the_listeners_spins_the_entire_node_and_ends_with_it(node: Any, other: Any) -> None:
     before, ticks = threading.enumerate(), []
     node.create_timer(0.01, lambda: ticks.append(1))
     buffer = Buffer()

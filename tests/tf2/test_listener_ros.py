@@ -76,26 +76,26 @@ def program(tmp_path: Path) -> Callable[..., str]:
 @pytest.mark.usefixtures("rover")
 def test_a_listener_program_runs_after_changing_its_imports(program: Callable[..., str]) -> None:
     """Its wait for the next sample is in a timer's callback, which keeps the executor from hearing it."""
-    said = [line for line in program("listener").splitlines() if not line.startswith("not yet: no frame")]
-    assert said[0] == "laser_link in base_link: (0.000, 0.000, 0.300) base_link laser_link"
-    assert said[-3:] == ["point in odom: (4.000, 0.000, 0.300)", "point in base_link: (2.000, 0.000, 0.300)", "end"]
+    output = [line for line in program("listener").splitlines() if not line.startswith("not yet: no frame")]
+    assert output[0] == "laser_link in base_link: (0.000, 0.000, 0.300) base_link laser_link"
+    assert output[-3:] == ["point in odom: (4.000, 0.000, 0.300)", "point in base_link: (2.000, 0.000, 0.300)", "end"]
 
 
 @pytest.mark.usefixtures("rover")
 def test_a_program_awaits_transforms_in_its_callbacks(program: Callable[..., str]) -> None:
     """One of its waits is for a time that has not come yet; the module keeps the name that the program gives it."""
-    said = program("awaiting").splitlines()
-    assert sorted(said[:-1]) == [
+    output = program("awaiting").splitlines()
+    assert sorted(output[:-1]) == [
         "LookupException", "now laser_link is at 2.000", "then laser_link is at 2.000 in odom"
     ]  # fmt: skip
-    assert said[-1] == "end"
+    assert output[-1] == "end"
 
 
 @pytest.mark.usefixtures("rover")
 @pytest.mark.parametrize("arguments", [(), ("--thread",)])
 def test_a_program_moves_clouds_at_their_own_time(program: Callable[..., str], arguments: tuple[str, ...]) -> None:
-    said = [line for line in program("cloud", *arguments).splitlines() if not line.startswith("not yet: ")]
-    assert said == ["cloud in odom: 2.000 keep", "same time: True", "end"]
+    output = [line for line in program("cloud", *arguments).splitlines() if not line.startswith("not yet: ")]
+    assert output == ["cloud in odom: 2.000 keep", "same time: True", "end"]
 
 
 @pytest.fixture
@@ -173,7 +173,7 @@ def test_a_wait_ends_when_the_transform_comes_or_when_the_time_is_over_and_not_m
     timer.join()
 
 
-def test_bytes_that_are_no_message_and_transforms_that_tf2_refuses_are_said_once_and_the_listener_lives_on(
+def test_malformed_messages_and_transforms_that_tf2_refuses_are_reported_once_and_the_listener_goes_on(
     node: Any, capfd: pytest.CaptureFixture[str]
 ) -> None:
     buffer = Buffer()
@@ -186,10 +186,10 @@ def test_bytes_that_are_no_message_and_transforms_that_tf2_refuses_are_said_once
             publisher.publish(data)
         assert buffer.lookup_transform("odom", "base_link", 0, timeout=60 * S).transform.translation.x == 1.0
     listener.close()
-    said = capfd.readouterr().err
-    assert said.count("no TFMessage") == 1
-    assert said.count("TF_SELF_TRANSFORM: a transform of base_link was dropped: it is its own parent") == 1
-    assert said.count("TF_NAN_INPUT") == 1
+    output = capfd.readouterr().err
+    assert output.count("no TFMessage") == 1
+    assert output.count("TF_SELF_TRANSFORM: a transform of base_link was dropped: it is its own parent") == 1
+    assert output.count("TF_NAN_INPUT") == 1
 
 
 def test_when_the_clock_goes_back_moving_edges_are_forgotten(node: Any) -> None:

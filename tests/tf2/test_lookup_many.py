@@ -14,20 +14,20 @@ from tfcompose.tf2 import Buffer, ConnectivityException, ExtrapolationException,
 S = 1_000_000_000
 
 
-def drive(turn: float = 0.1) -> Buffer:
-    """A base that drives 1 m and turns ``turn`` radians a second for 9 s, with a laser on it."""
+def drive(rotation: float = 0.1) -> Buffer:
+    """A base that drives 1 m and turns ``rotation`` radians a second for 9 s, with a laser on it."""
     buffer = Buffer()
     for step in range(91):
-        pose = Pose((step / 10, 0, 0), quat_from_rpy(0, 0, turn * step / 10))
+        pose = Pose((step / 10, 0, 0), quat_from_rpy(0, 0, rotation * step / 10))
         buffer.set("odom", "base", pose, 100 * S + step * S // 10, static=False)
     buffer.set("base", "laser", Pose((0, 0, 0.3)), 0, static=True)
     return buffer
 
 
-@pytest.mark.parametrize("turn", [0.1, 25.0], ids=["small angles between samples", "large ones"])
+@pytest.mark.parametrize("rotation", [0.1, 25.0], ids=["small angles between samples", "large ones"])
 @pytest.mark.parametrize("order", ["ascending", "shuffled"])
-def test_the_rows_are_the_lookups_in_the_order_of_the_times(turn: float, order: str) -> None:
-    buffer = drive(turn)
+def test_the_rows_are_the_lookups_in_the_order_of_the_times(rotation: float, order: str) -> None:
+    buffer = drive(rotation)
     stamps = np.linspace(100 * S, 109 * S, 40_001).astype(np.int64)  # more than one block
     if order == "shuffled":
         np.random.default_rng(1).shuffle(stamps)

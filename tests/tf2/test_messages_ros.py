@@ -31,7 +31,7 @@ pytestmark = pytest.mark.ros
 S = 1_000_000_000
 QUAT = normalised((0.4, -0.1, 0.5, -0.7))
 XYZ = (-2.0, 0.25, 11.0)
-TURN = Rotation.from_quat(QUAT)
+ROTATION = Rotation.from_quat(QUAT)
 GIVEN = (0.5, -1.25, 2.0)
 
 
@@ -74,28 +74,28 @@ def test_points_vectors_and_corners(buffer: Buffer) -> None:
     put(point.point, GIVEN)
     put(vector.vector, GIVEN)
     polygon.polygon.points = [Point32(x=0.5, y=-1.25, z=2.0), Point32()]
-    assert of(moved(buffer, point).point) == pytest.approx(TURN.apply(GIVEN) + XYZ)
-    assert of(moved(buffer, vector).vector) == pytest.approx(TURN.apply(GIVEN))
+    assert of(moved(buffer, point).point) == pytest.approx(ROTATION.apply(GIVEN) + XYZ)
+    assert of(moved(buffer, vector).vector) == pytest.approx(ROTATION.apply(GIVEN))
     first, second = moved(buffer, polygon).polygon.points
-    assert of(first) == pytest.approx(TURN.apply(GIVEN) + XYZ, abs=1e-5)
+    assert of(first) == pytest.approx(ROTATION.apply(GIVEN) + XYZ, abs=1e-5)
     assert of(second) == pytest.approx(XYZ)
 
 
 def test_poses_and_their_covariances(buffer: Buffer) -> None:
-    turn = Rotation.from_euler("xyz", (0.3, -0.2, 2.0))
+    rotation = Rotation.from_euler("xyz", (0.3, -0.2, 2.0))
     spread = np.random.default_rng(4).normal(size=(6, 6))
     covariance = spread @ spread.T
     pose, known = headed(PoseStamped), headed(PoseWithCovarianceStamped)
     known.pose.covariance = covariance.reshape(-1)
     for place in (pose.pose, known.pose.pose):
         put(place.position, GIVEN)
-        put(place.orientation, turn.as_quat())
-    both = np.kron(np.eye(2), TURN.as_matrix())
+        put(place.orientation, rotation.as_quat())
+    both = np.kron(np.eye(2), ROTATION.as_matrix())
     found = moved(buffer, known).pose
     assert np.array(found.covariance).reshape(6, 6) == pytest.approx(both @ covariance @ both.T)
     for each in (moved(buffer, pose).pose, found.pose):
-        assert of(each.position) == pytest.approx(TURN.apply(GIVEN) + XYZ)
-        assert (Rotation.from_quat(of(each.orientation, "xyzw")).inv() * TURN * turn).magnitude() < 1e-12
+        assert of(each.position) == pytest.approx(ROTATION.apply(GIVEN) + XYZ)
+        assert (Rotation.from_quat(of(each.orientation, "xyzw")).inv() * ROTATION * rotation).magnitude() < 1e-12
 
 
 def test_an_organised_cloud_with_holes_and_colours(buffer: Buffer) -> None:
@@ -120,7 +120,7 @@ def test_an_organised_cloud_with_holes_and_colours(buffer: Buffer) -> None:
     found = moved(buffer, cloud)
     rows = bytes(found.data)
     read = np.array([np.frombuffer(rows, kind, 5, row * cloud.row_step) for row in range(3)])
-    expected = TURN.apply(np.stack([points[n] for n in "xyz"], axis=-1).reshape(-1, 3).astype(float)) + XYZ
+    expected = ROTATION.apply(np.stack([points[n] for n in "xyz"], axis=-1).reshape(-1, 3).astype(float)) + XYZ
     assert np.stack([read[n] for n in "xyz"], axis=-1).reshape(-1, 3) == pytest.approx(expected, abs=1e-5, nan_ok=True)
     assert np.isnan(read["x"]).sum() == 1
     assert (read["rgb"] == points["rgb"]).all()

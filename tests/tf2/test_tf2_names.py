@@ -165,7 +165,7 @@ def test_a_coroutine_waits_and_the_loop_goes_on_meanwhile() -> None:
 
 def test_many_futures_are_done_by_many_threads_each_once() -> None:
     buffer = rover()
-    asked = [buffer.wait_for_transform_async("odom", "laser", 3 * S + index) for index in range(1, 201)]
+    requested = [buffer.wait_for_transform_async("odom", "laser", 3 * S + index) for index in range(1, 201)]
     threads = [
         threading.Thread(
             target=lambda start: [
@@ -179,7 +179,7 @@ def test_many_futures_are_done_by_many_threads_each_once() -> None:
         thread.start()
     for thread in threads:
         thread.join()
-    assert all(future.done() and future.exception() is None for future in asked)
+    assert all(future.done() and future.exception() is None for future in requested)
     assert not buffer.on_insert
 
 
@@ -295,7 +295,7 @@ def test_a_velocity_is_a_mean_around_the_time_and_at_the_newest_one_up_to_it() -
     assert buffer.lookup_velocity("laser", "base", 0, S) == ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
-def test_half_a_turn_within_the_interval_goes_the_short_way() -> None:
+def test_half_a_rotation_within_the_interval_goes_the_short_way() -> None:
     buffer = Buffer()
     for second, yaw in ((1, 3.0), (2, -3.0)):
         buffer.set("odom", "base", Pose((0, 0, 0), quat_from_rpy(0, 0, yaw)), second * S, static=False)

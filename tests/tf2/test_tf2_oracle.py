@@ -31,8 +31,8 @@ class Pair:
         message = messages.TransformStamped()
         message.header.frame_id, message.child_frame_id = parent, child
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, S)
-        to, turn = message.transform.translation, message.transform.rotation
-        (to.x, to.y, to.z), (turn.x, turn.y, turn.z, turn.w) = pose.xyz, pose.quat_xyzw
+        to, rotated = message.transform.translation, message.transform.rotation
+        (to.x, to.y, to.z), (rotated.x, rotated.y, rotated.z, rotated.w) = pose.xyz, pose.quat_xyzw
         if static:
             self.ours.set_transform_static(message, "a")
             self.theirs.set_transform_static(message, "a")
@@ -41,15 +41,17 @@ class Pair:
             self.theirs.set_transform(message, "a")
 
     def compare(self, target: str, source: str, stamp_ns: int) -> None:
-        asked = target, source, time.Time(nanoseconds=stamp_ns)
-        self._both("lookup_transform_core", asked)
-        assert self.ours.can_transform_core(*asked)[0] == bool(self.theirs.can_transform_core(*asked)[0])
+        requested = target, source, time.Time(nanoseconds=stamp_ns)
+        self._both("lookup_transform_core", requested)
+        assert self.ours.can_transform_core(*requested)[0] == bool(self.theirs.can_transform_core(*requested)[0])
 
     def compare_full(self, target: str, target_ns: int, source: str, source_ns: int, fixed: str) -> None:
         times = time.Time(nanoseconds=target_ns), time.Time(nanoseconds=source_ns)
-        asked = target, times[0], source, times[1], fixed
-        self._both("lookup_transform_full_core", asked)
-        assert self.ours.can_transform_full_core(*asked)[0] == bool(self.theirs.can_transform_full_core(*asked)[0])
+        requested = target, times[0], source, times[1], fixed
+        self._both("lookup_transform_full_core", requested)
+        assert self.ours.can_transform_full_core(*requested)[0] == bool(
+            self.theirs.can_transform_full_core(*requested)[0]
+        )
 
     def clear(self) -> None:
         self.ours.clear()
@@ -59,25 +61,25 @@ class Pair:
         lines = [line for line in self.theirs.all_frames_as_string().splitlines() if "NO_PARENT" not in line]
         assert sorted(self.ours.all_frames_as_string().splitlines()) == sorted(lines)
 
-    def _both(self, name: str, asked: tuple[Any, ...]) -> None:
+    def _both(self, name: str, requested: tuple[Any, ...]) -> None:
         try:
-            found = getattr(self.ours, name)(*asked)
+            found = getattr(self.ours, name)(*requested)
         except TransformException as error:
             with pytest.raises(getattr(tf2, type(error).__name__)):
-                getattr(self.theirs, name)(*asked)
+                getattr(self.theirs, name)(*requested)
             return
-        same(found, getattr(self.theirs, name)(*asked))
+        same(found, getattr(self.theirs, name)(*requested))
 
 
 def same(ours: Any, theirs: Any) -> None:
     assert ours.header.stamp == theirs.header.stamp
     xyz = [(m.transform.translation.x, m.transform.translation.y, m.transform.translation.z) for m in (ours, theirs)]
     assert xyz[0] == pytest.approx(xyz[1], abs=1e-9)
-    turns: list[Quaternion] = [
+    rotations: list[Quaternion] = [
         (m.transform.rotation.x, m.transform.rotation.y, m.transform.rotation.z, m.transform.rotation.w)
         for m in (ours, theirs)
     ]
-    assert angle_between(turns[0], normalised(turns[1])) < 1e-6
+    assert angle_between(rotations[0], normalised(rotations[1])) < 1e-6
 
 
 @pytest.mark.parametrize("seed", range(100))

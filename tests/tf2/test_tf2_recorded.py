@@ -53,8 +53,8 @@ def ask(buffer: Buffer, what: str, given: list[Any]) -> Any:
 
 
 def packed(found: Any) -> list[float]:
-    to, turn, stamp = found.transform.translation, found.transform.rotation, found.header.stamp
-    return [stamp.sec * S + stamp.nanosec, to.x, to.y, to.z, turn.x, turn.y, turn.z, turn.w]
+    to, rotated, stamp = found.transform.translation, found.transform.rotation, found.header.stamp
+    return [stamp.sec * S + stamp.nanosec, to.x, to.y, to.z, rotated.x, rotated.y, rotated.z, rotated.w]
 
 
 def assert_same(ours: Any, theirs: Any) -> None:
@@ -105,8 +105,8 @@ def record() -> None:
             message = TransformStamped()
             message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, S)
             message.header.frame_id, message.child_frame_id = row[:2]
-            to, turn = message.transform.translation, message.transform.rotation
-            to.x, to.y, to.z, turn.x, turn.y, turn.z, turn.w = row[2:]
+            to, rotated = message.transform.translation, message.transform.rotation
+            to.x, to.y, to.z, rotated.x, rotated.y, rotated.z, rotated.w = row[2:]
             return (buffer.set_transform_static if static else buffer.set_transform)(message, "recorded")
         times = [Time(nanoseconds=each) if isinstance(each, int) else each for each in given]
         try:

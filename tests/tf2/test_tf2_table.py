@@ -194,7 +194,7 @@ def test_a_name_that_tf2_takes_in_no_question_is_an_invalid_argument(name: str) 
     assert not buffer.can_transform(name, "odom", 0)
 
 
-def test_a_frame_in_itself_is_asked_without_knowing_it() -> None:
+def test_a_frame_in_itself_needs_no_data() -> None:
     assert Buffer().lookup("x", "x", 7) == (Pose(), 7)
     assert Buffer().lookup("", "") == (Pose(), 0)
     assert moving(("a", "b", 1.0, 5.0)).lookup("b", "b") == (Pose(), 5 * S)
@@ -225,10 +225,10 @@ def test_between_two_times_rotations_count_in_the_order_of_the_frames() -> None:
     expected = buffer.lookup("laser", "odom", 2 * S)[0] @ buffer.lookup("odom", "base", S)[0]
     xyz = found.translation.x, found.translation.y, found.translation.z
     assert xyz == pytest.approx(expected.xyz, abs=1e-12)
-    turn = found.rotation.x, found.rotation.y, found.rotation.z, found.rotation.w
-    assert angle_between(turn, expected.quat_xyzw) < 1e-12
+    rotated = found.rotation.x, found.rotation.y, found.rotation.z, found.rotation.w
+    assert angle_between(rotated, expected.quat_xyzw) < 1e-12
     other = buffer.lookup("odom", "base", S)[0] @ buffer.lookup("laser", "odom", 2 * S)[0]
-    assert angle_between(turn, other.quat_xyzw) > 0.5, "in the other order it would be another rotation"
+    assert angle_between(rotated, other.quat_xyzw) > 0.5, "in the other order it would be another rotation"
 
 
 def test_clear_forgets_what_moves_and_keeps_what_is_fixed_and_the_names() -> None:

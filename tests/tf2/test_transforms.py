@@ -21,7 +21,7 @@ from tfcompose.tf2.messages import Header, Quaternion, Time, Vector3, do_transfo
 S = 1_000_000_000
 QUAT = normalised((0.1, -0.7, 0.3, 0.6))
 XYZ = (1.0, 2.0, -3.0)
-TURN = Rotation.from_quat(QUAT)
+ROTATION = Rotation.from_quat(QUAT)
 
 
 def laser() -> Buffer:
@@ -108,7 +108,7 @@ def header(frame: str = "laser", sec: int = 5) -> Header:
 def test_a_point_is_turned_and_moved_and_gets_the_frame_and_the_time() -> None:
     given = PointStamped(header(), Vector3(0.5, -1.0, 2.0))
     moved = laser().transform(given, "base")
-    assert (moved.point.x, moved.point.y, moved.point.z) == pytest.approx(tuple(TURN.apply([0.5, -1, 2]) + XYZ))
+    assert (moved.point.x, moved.point.y, moved.point.z) == pytest.approx(tuple(ROTATION.apply([0.5, -1, 2]) + XYZ))
     assert moved.header == Header(Time(5, 7), "base")
     assert given == PointStamped(header(), Vector3(0.5, -1.0, 2.0)), "what was given is left alone"
     newest = laser().transform(PointStamped(Header(Time(), "laser"), Vector3()), "base")
@@ -117,7 +117,7 @@ def test_a_point_is_turned_and_moved_and_gets_the_frame_and_the_time() -> None:
 
 def test_a_vector_is_turned_and_not_moved() -> None:
     moved = laser().transform(Vector3Stamped(header(), Vector3(0.5, -1.0, 2.0)), "base")
-    assert (moved.vector.x, moved.vector.y, moved.vector.z) == pytest.approx(tuple(TURN.apply([0.5, -1, 2])))
+    assert (moved.vector.x, moved.vector.y, moved.vector.z) == pytest.approx(tuple(ROTATION.apply([0.5, -1, 2])))
 
 
 def test_every_corner_of_a_polygon_is_moved() -> None:
@@ -125,17 +125,17 @@ def test_every_corner_of_a_polygon_is_moved() -> None:
     given = PolygonStamped(header(), Polygon([Vector3(*corner) for corner in corners]))
     moved = laser().transform(given, "base")
     found = [(corner.x, corner.y, corner.z) for corner in moved.polygon.points]
-    assert found == pytest.approx(TURN.apply(corners) + XYZ)
+    assert found == pytest.approx(ROTATION.apply(corners) + XYZ)
     assert (given.polygon.points[0].x, moved.header.frame_id) == (0.5, "base")
 
 
 @pytest.mark.parametrize("quat", [(0.5, 0.5, 0.5, 0.5), (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 2.0)])
 def test_a_pose_is_the_product_of_poses(quat: tuple[float, float, float, float]) -> None:
     moved = laser().transform(PoseStamped(header(), Placed(Vector3(1, 2, 3), Quaternion(*quat))), "base").pose
-    at, turn = moved.position, moved.orientation
-    assert (at.x, at.y, at.z) == pytest.approx(tuple(TURN.apply([1, 2, 3]) + XYZ))
-    expected = TURN * (Rotation.from_quat(quat) if any(quat) else Rotation.identity())
-    assert (Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).inv() * expected).magnitude() < 1e-12
+    at, rotation = moved.position, moved.orientation
+    assert (at.x, at.y, at.z) == pytest.approx(tuple(ROTATION.apply([1, 2, 3]) + XYZ))
+    expected = ROTATION * (Rotation.from_quat(quat) if any(quat) else Rotation.identity())
+    assert (Rotation.from_quat([rotation.x, rotation.y, rotation.z, rotation.w]).inv() * expected).magnitude() < 1e-12
 
 
 def test_covariances_are_turned_with_both_sides() -> None:
@@ -144,7 +144,7 @@ def test_covariances_are_turned_with_both_sides() -> None:
     covariance = spread @ spread.T
     given = PoseWithCovarianceStamped(header(), Known(Placed(Vector3(), Quaternion()), covariance.reshape(-1).tolist()))
     moved = laser().transform(given, "base")
-    both = np.kron(np.eye(2), TURN.as_matrix())
+    both = np.kron(np.eye(2), ROTATION.as_matrix())
     assert np.array(moved.pose.covariance).reshape(6, 6) == pytest.approx(both @ covariance @ both.T)
     transform = laser().lookup_transform("base", "laser", 0)
     assert transform_covariance([0.0] * 36, transform) == [0.0] * 36
@@ -170,13 +170,15 @@ def test_points_are_moved_in_any_shape_and_keep_their_type(kind: Any, shape: tup
     points = np.random.default_rng(1).normal(size=shape).astype(kind)
     moved = laser().transform_points(points, "base", "laser", 5 * S)
     assert (moved.shape, moved.dtype) == (shape, kind)
-    assert moved.reshape(-1, 3) == pytest.approx(TURN.apply(points.reshape(-1, 3)) + XYZ, abs=1e-5)
+    assert moved.reshape(-1, 3) == pytest.approx(ROTATION.apply(points.reshape(-1, 3)) + XYZ, abs=1e-5)
 
 
-def test_points_that_are_strided_whole_numbers_or_nan_are_taken() -> None:
+def test_points_that_are_strided_complete_numbers_or_nan_are_taken() -> None:
     buffer = laser()
     grid = np.arange(60).reshape(10, 6)
-    assert buffer.transform_points(grid[::2, ::2], "base", "laser") == pytest.approx(TURN.apply(grid[::2, ::2]) + XYZ)
+    assert buffer.transform_points(grid[::2, ::2], "base", "laser") == pytest.approx(
+        ROTATION.apply(grid[::2, ::2]) + XYZ
+    )
     holes = buffer.transform_points(np.array([[np.nan, 0, 0], [1, 2, 3]]), "base", "laser")
     assert np.isnan(holes[:, 0]).tolist() == [True, False]
     wrongs: tuple[Any, ...] = ([1.0, 2.0], np.zeros((3, 4)), 1.0)
@@ -255,7 +257,7 @@ def test_a_cloud_of_any_layout_is_moved_and_every_other_byte_stays(seed: int) ->
     for x, y, z in zip(places[::3], places[1::3], places[2::3], strict=True):
         point = [struct.unpack_from(code, before, at)[0] for _, at, code in (x, y, z)]
         found = [struct.unpack_from(code, after, at)[0] for _, at, code in (x, y, z)]
-        assert found == pytest.approx((TURN.apply([point]) + XYZ)[0], abs=1e-5, nan_ok=True)
+        assert found == pytest.approx((ROTATION.apply([point]) + XYZ)[0], abs=1e-5, nan_ok=True)
         coordinates |= {at + i for _, at, code in (x, y, z) for i in range(struct.calcsize(code))}
     assert all(a == b for i, (a, b) in enumerate(zip(before, after, strict=True)) if i not in coordinates)
     assert moved.header == Header(Time(5, 7), "base")
@@ -294,7 +296,7 @@ def test_a_flat_cloud_may_leave_its_row_step_out_and_its_data_may_be_a_list() ->
     transform = laser().lookup_transform("base", "laser", 0)
     moved = do_transform_cloud(xyz_cloud(row_step=0, data=data), transform)
     assert np.frombuffer(moved.data, "<f4").reshape(2, 3) == pytest.approx(
-        TURN.apply([[1, 2, 3], [4, 5, 6]]) + XYZ, abs=1e-5
+        ROTATION.apply([[1, 2, 3], [4, 5, 6]]) + XYZ, abs=1e-5
     )
 
 

@@ -61,7 +61,7 @@ def same(one: ET.Element, other: ET.Element) -> bool:
     )  # fmt: skip
 
 
-def test_hardware_is_written_as_ros2_control_reads_it() -> None:
+def test_hardware_is_emitted_as_ros2_control_reads_it() -> None:
     for urdf in urdfs(HARDWARE):
         (found,) = urdf.findall("ros2_control")
         assert same(found, ET.fromstring(EXPECTED)), ET.tostring(found)  # noqa: S314 (as above)
@@ -77,7 +77,7 @@ def test_the_joints_that_there_are_are_named_in_the_files_order_and_not_all_of_a
     assert found.help.endswith(" j0, j1, j2, j3, j4, j5, j6, j7 and 92 more")
 
 
-def test_a_raw_block_is_written_as_it_stands_in_both_files() -> None:
+def test_a_raw_block_is_emitted_as_it_stands_in_both_files() -> None:
     block = '<gazebo reference="wheel">\n  <mu1>1.2</mu1> <!-- worn: 0.9 -->\n</gazebo>\n<gazebo/>'
     text = "vars: {mu: 1.2}\nxml:\n  wheels: |\n" + "\n".join(
         f"      {line}" for line in block.replace("1.2", "${mu}").splitlines()
@@ -87,8 +87,8 @@ def test_a_raw_block_is_written_as_it_stands_in_both_files() -> None:
         assert urdf.findtext("gazebo/mu1") == "1.2"
     compiled = compile_robot(HEAD + text, "r.yaml", library())
     assert compiled.robot
-    whole = next(file.text for file in emit(compiled.robot) if file.path == "robot.full.urdf")
-    assert "<!-- worn: 0.9 -->" in whole
+    full = next(file.text for file in emit(compiled.robot) if file.path == "robot.full.urdf")
+    assert "<!-- worn: 0.9 -->" in full
 
 
 def test_one_block_needs_no_name_and_keeps_its_lines() -> None:
@@ -109,7 +109,7 @@ def test_an_overlay_takes_hardware_and_blocks_away() -> None:
 
 
 @pytest.mark.parametrize(
-    ("written", "place"),
+    ("source_text", "place"),
     [
         ("|\n    <gazebo reference='x'/>\n", (7, 24)),
         ("|\n\n    <gazebo\n     reference='x'/>\n", (9, 17)),
@@ -118,8 +118,8 @@ def test_an_overlay_takes_hardware_and_blocks_away() -> None:
         ("\"<gazebo reference='x'/>\\n<gazebo/>\"\n", (6, 11)),
     ],
 )
-def test_a_finding_in_a_block_has_the_line_of_the_robot_file(written: str, place: tuple[int, int]) -> None:
-    compiled = compile_robot(HEAD + f"xml:\n  wheels: {written}", "r.yaml", library())
+def test_a_finding_in_a_block_has_the_line_of_the_robot_file(source_text: str, place: tuple[int, int]) -> None:
+    compiled = compile_robot(HEAD + f"xml:\n  wheels: {source_text}", "r.yaml", library())
     (found,) = compiled.errors
     assert found.span
     assert (found.code, found.span.line, found.span.column) == ("TF203", *place)

@@ -70,11 +70,11 @@ def test_each_finding_points_at_the_word_that_is_wrong(file: Path) -> None:
     lines = file.read_text("utf-8").splitlines()
     for one in lint_urdf(str(file)):
         assert one.span
-        written = lines[one.span.line - 1][one.span.column - 1 : one.span.end_column - 1]
-        if written.startswith("<!--"):  # a comment may have several lines
+        source_text = lines[one.span.line - 1][one.span.column - 1 : one.span.end_column - 1]
+        if source_text.startswith("<!--"):  # a comment may have several lines
             continue
         assert one.span.line == one.span.end_line
-        assert written.startswith("<") or written in re.findall(r"\"([^\"]+)\"", lines[one.span.line - 1])
+        assert source_text.startswith("<") or source_text in re.findall(r"\"([^\"]+)\"", lines[one.span.line - 1])
 
 
 def test_the_nearest_name_is_the_advice() -> None:
@@ -126,24 +126,24 @@ REFUSED = {
 
 @pytest.mark.parametrize("what", REFUSED)
 def test_what_is_no_urdf_or_could_do_harm_is_one_finding(what: str) -> None:
-    text, said = REFUSED[what]
+    text, output = REFUSED[what]
     (found,) = lint_text(text)
-    assert said in found.message
+    assert output in found.message
 
 
 @pytest.mark.parametrize("encoding", ["ISO-8859-1", "windows-1252", "GB2312"])
 def test_a_file_is_read_in_the_encoding_that_it_declares(encoding: str, tmp_path: Path) -> None:
     head = f'<?xml version="1.0" encoding="{encoding}"?>'
-    written = "轮子" if encoding == "GB2312" else "grün"
+    source_text = "轮子" if encoding == "GB2312" else "grün"
     file = tmp_path / "r.urdf"
-    file.write_bytes(f'{head}<robot name="r"><link name="{written}"/></robot>'.encode(encoding))
-    assert [(one.code, written in one.message) for one in lint_urdf(str(file))] == [("TF501", True)]
+    file.write_bytes(f'{head}<robot name="r"><link name="{source_text}"/></robot>'.encode(encoding))
+    assert [(one.code, source_text in one.message) for one in lint_urdf(str(file))] == [("TF501", True)]
     file.write_bytes(file.read_bytes().replace(encoding.encode(), b"UTF-8"))
     (found,) = lint_urdf(str(file))
     assert (found.code, found.help[:16]) == ("TF001", "save it as UTF-8")
 
 
-def test_where_a_tag_does_not_match_is_said() -> None:
+def test_where_a_tag_does_not_match_is_reported() -> None:
     (found,) = lint_text(REFUSED["a tag that is not closed"][0])
     assert found.code == "TF018"
     assert found.span
@@ -168,7 +168,7 @@ def test_the_command_line_knows_a_urdf_by_its_name_or_by_its_option(tmp_path: Pa
 
 
 @pytest.mark.parametrize(
-    "written",
+    "source_text",
     [
         "$(find mine)/meshes/a.stl",
         "file://$(find mine)/meshes/a.stl",
@@ -178,14 +178,14 @@ def test_the_command_line_knows_a_urdf_by_its_name_or_by_its_option(tmp_path: Pa
         "package:///mine/meshes/a.stl",
     ],
 )
-def test_what_is_nearly_the_address_of_a_file_in_a_package_is_told_how_it_is_written(written: str) -> None:
-    _, found = Packages(disk()).asset(written, Span("a.urdf"))
+def test_what_is_nearly_the_address_of_a_file_in_a_package_gets_the_right_form(source_text: str) -> None:
+    _, found = Packages(disk()).asset(source_text, Span("a.urdf"))
     assert found
-    assert found.message.startswith(written)
+    assert found.message.startswith(source_text)
     assert found.help.endswith("package://mine/meshes/a.stl")
 
 
-def test_a_package_is_looked_for_where_ros_looks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_package_is_searched_where_ros_searches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = tmp_path / "share" / "mine" / "meshes" / "a.stl"
     mesh.parent.mkdir(parents=True)
     mesh.touch()
@@ -312,19 +312,19 @@ def test_what_readers_take_is_a_warning_and_no_error(what: str, tmp_path: Path) 
 
 QUAT = """<robot name="r"{}><link name="base_link"/><link name="a"/><joint name="j" type="fixed">
 <parent link="base_link"/><child link="a"/><origin {}/></joint></robot>"""
-TURN = 'quat_xyzw="0 0 3 3"'
+ROTATION = 'quat_xyzw="0 0 3 3"'
 
 
 @pytest.mark.parametrize(
     ("version", "origin", "severity", "word"),
     [
-        ("", TURN, "error", "quat_xyzw"),
-        (' version="1.0"', TURN, "error", "quat_xyzw"),
-        (' version="1.1"', TURN, "warning", "1.1"),
+        ("", ROTATION, "error", "quat_xyzw"),
+        (' version="1.0"', ROTATION, "error", "quat_xyzw"),
+        (' version="1.1"', ROTATION, "warning", "1.1"),
         (' version="1"', "", "error", "'1'"),
         ("", 'quat_xyzw="0 0 1"', "error", "quat_xyzw='0 0 1'"),
         ("", 'quat_xyzw="0 0 0 0"', "error", "quaternion"),
-        ("", f'{TURN} rpy="0 0 0"', "error", "rpy"),
+        ("", f'{ROTATION} rpy="0 0 0"', "error", "rpy"),
     ],
 )
 def test_a_rotation_as_a_quaternion_is_read_and_is_one_finding(
@@ -333,7 +333,7 @@ def test_a_rotation_as_a_quaternion_is_read_and_is_one_finding(
     text = QUAT.format(version, origin)
     robot, (found,) = robot_of(read_xml(text, "r.urdf"), "r.urdf", Packages().asset)
     assert (found.code, found.severity, word in found.message) == ("TF721", severity, True)
-    if TURN in origin:
+    if ROTATION in origin:
         assert robot.edges[0].pose.quat_xyzw == pytest.approx((0, 0, 0.5**0.5, 0.5**0.5))
 
 
@@ -422,7 +422,7 @@ def large(links: int, first: str) -> str:
     return f'<!-- {first} --><robot name="r"><link name="b"/>{"".join(parts)}<joint nmae="end"/></robot>'
 
 
-def test_letters_beyond_ascii_cost_no_more_than_others_and_places_are_right_after_them() -> None:
+def test_characters_beyond_ascii_cost_no_more_than_others_and_places_are_right_after_them() -> None:
     seconds = {}
     for first in ("u", "ü"):
         text = large(8000, first)

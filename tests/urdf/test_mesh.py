@@ -56,7 +56,7 @@ def addresses(folder: Path) -> list[str]:
     return full
 
 
-def test_addresses_stay_as_written_and_relative_ones_lead_from_the_build_folder(workspace: Path) -> None:
+def test_addresses_stay_as_in_the_source_and_relative_ones_lead_from_the_build_folder(workspace: Path) -> None:
     assert build(workspace).returncode == 0
     relative, *packages = addresses(workspace / "build/r")
     assert (workspace / "build/r" / relative).samefile(workspace / "src/robots/meshes/a b.stl")
@@ -78,7 +78,7 @@ def test_for_readers_without_ros_every_address_is_a_file_that_is_there(workspace
     ]
 
 
-def test_an_address_keeps_every_letter_that_readers_take_as_it_is(workspace: Path) -> None:
+def test_an_address_keeps_every_character_that_readers_take_as_it_is(workspace: Path) -> None:
     """Libcurl decodes what ROS reads; readers without ROS decode nothing."""
     name = "base (1)+ä,=@&'~.stl"
     (workspace / "src/robots/meshes/a b.stl").rename(workspace / "src/robots/meshes" / name)
@@ -87,7 +87,7 @@ def test_an_address_keeps_every_letter_that_readers_take_as_it_is(workspace: Pat
     assert addresses(workspace / "build/r")[0].endswith("/meshes/" + name.replace(" ", "%20"))
 
 
-def test_for_ros_every_address_is_in_a_package_or_nothing_is_written(workspace: Path) -> None:
+def test_for_ros_every_address_is_in_a_package_or_nothing_is_built(workspace: Path) -> None:
     refused = build(workspace, "--mesh", "package")
     assert refused.returncode == 1
     assert "src/robots/r.yaml:7:16: error[TF726] meshes/a b.stl" in refused.stderr
@@ -101,16 +101,16 @@ def test_for_ros_every_address_is_in_a_package_or_nothing_is_written(workspace: 
     ]
 
 
-def test_a_package_that_is_nowhere_is_said_with_the_places_that_were_looked_at(workspace: Path) -> None:
+def test_a_package_that_is_nowhere_is_reported_with_the_folders_searched(workspace: Path) -> None:
     robot = workspace / "src/robots/r.yaml"
     robot.write_text(ROBOT.replace("package://sourced", "package://sorced"))
     built = build(workspace)
     assert built.returncode == 0  # on another machine it may be installed
     assert re.search(r"r\.yaml:9:16: warning\[TF724\] .*\bsorced\b", built.stderr)
     assert f" /nowhere/share/sorced, {workspace}/install/share/sorced" in built.stderr
-    asked = build(workspace, "--mesh", "file")
-    assert asked.returncode == 1
-    assert "error[TF724] package://sorced/meshes/s.stl" in asked.stderr
+    requested = build(workspace, "--mesh", "file")
+    assert requested.returncode == 1
+    assert "error[TF724] package://sorced/meshes/s.stl" in requested.stderr
 
 
 def test_a_package_that_is_nowhere_else_is_the_one_around_the_file_that_asks(
@@ -130,8 +130,8 @@ def test_a_package_that_is_nowhere_else_is_the_one_around_the_file_that_asks(
     )
     monkeypatch.setenv("AMENT_PREFIX_PATH", "/nowhere")
     monkeypatch.chdir(workspace)
-    whole = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\nparts:\n  arm: {xacro: ../ARM, parent: base_link}\n"
-    (workspace / "src/robots/r.yaml").write_text(whole.replace("ARM", "third party/named/urdf/arm.xacro"))
+    complete = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\nparts:\n  arm: {xacro: ../ARM, parent: base_link}\n"
+    (workspace / "src/robots/r.yaml").write_text(complete.replace("ARM", "third party/named/urdf/arm.xacro"))
     assert main(["build", "src/robots/r.yaml", "--mesh", "file"]) == 0
     assert unquote(addresses(workspace / "build/r")[0]) == f"file://{source}/n.stl"
     assert main(["import", "src/third party/named/urdf/arm.xacro", "-o", "src/robots/imported.yaml"]) == 0
@@ -156,8 +156,8 @@ def test_what_to_do_about_a_package_is_what_the_command_can_do(
         '<robot name="a" xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="$(find nmd)/x"/></robot>'
     )
     assert main([command, str(file)]) != 0
-    said = capsys.readouterr()
-    assert f"AMENT_PREFIX_PATH is empty{way}" in said.err + said.out
+    output = capsys.readouterr()
+    assert f"AMENT_PREFIX_PATH is empty{way}" in output.err + output.out
 
 
 def test_a_build_is_the_same_wherever_the_workspace_is(workspace: Path) -> None:

@@ -90,28 +90,28 @@ def other(key: str, value: str) -> str:
 @pytest.mark.parametrize("text", SPECS)
 def test_whatever_value_is_another_one_is_noticed(text: str) -> None:
     robot = robot_of(text)
-    files, seen = texts(robot), 0
+    files, observed = texts(robot), 0
     joints = {edge.joint_name for edge in robot.edges if edge.joint_name}
     for name, full in (("robot.full.urdf", True), ("robot.urdf", False)):
         assert not list(differences(robot, files[name], TARGET, full=full))
         for again, what in changed(files[name], joints):
             assert list(differences(robot, again, TARGET, full=full)), what
-            seen += 1
-    assert seen > 40
+            observed += 1
+    assert observed > 40
 
 
 @pytest.mark.parametrize("text", SPECS)
 def test_whatever_is_missing_or_there_twice_is_noticed(text: str) -> None:
     robot = robot_of(text)
-    whole = texts(robot)["robot.full.urdf"]
-    pieces = re.findall(r"^  <(?:link|joint) (?:[^>]*/>|.*?^  </(?:link|joint)>)\n", whole, re.MULTILINE | re.DOTALL)
-    pieces += re.findall(r"^    <(?:visual|inertial|axis|limit|mimic|origin).*?(?:/>|>)\n", whole, re.MULTILINE)
+    complete = texts(robot)["robot.full.urdf"]
+    pieces = re.findall(r"^  <(?:link|joint) (?:[^>]*/>|.*?^  </(?:link|joint)>)\n", complete, re.MULTILINE | re.DOTALL)
+    pieces += re.findall(r"^    <(?:visual|inertial|axis|limit|mimic|origin).*?(?:/>|>)\n", complete, re.MULTILINE)
     pieces = [piece for piece in pieces if piece != AXIS_OF_ITSELF]
     for piece in dict.fromkeys(pieces):
         if piece.endswith("/>\n") or "\n  </" in piece:
-            assert list(differences(robot, whole.replace(piece, "", 1), TARGET, full=True)), piece
+            assert list(differences(robot, complete.replace(piece, "", 1), TARGET, full=True)), piece
         if piece.startswith(("  <link", "  <joint")):
-            assert list(differences(robot, whole.replace(piece, piece * 2), TARGET, full=True)), piece
+            assert list(differences(robot, complete.replace(piece, piece * 2), TARGET, full=True)), piece
 
 
 UNSEEN = {
@@ -127,13 +127,13 @@ UNSEEN = {
 def test_what_yourdfpy_does_not_read_is_not_claimed(case: str) -> None:
     """The option's help and the README leave these out; where a new yourdfpy sees more, they can say so."""
     robot = robot_of(MORE)
-    whole = texts(robot)["robot.full.urdf"]
-    changed_text = whole.replace(*UNSEEN[case], 1)
-    assert changed_text != whole
+    complete = texts(robot)["robot.full.urdf"]
+    changed_text = complete.replace(*UNSEEN[case], 1)
+    assert changed_text != complete
     assert not list(differences(robot, changed_text, TARGET, full=True))
 
 
-def test_nothing_is_written_that_is_not_the_robot(
+def test_nothing_is_emitted_that_is_not_the_robot(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def wrong(*given: Any, **more: Any) -> Any:
@@ -160,13 +160,13 @@ def test_without_yourdfpy_that_is_one_sentence(
     monkeypatch.setattr("tfcompose.cli.building.find_spec", lambda name: None if name == "yourdfpy" else name)
     words = ["build", str(ROBOTS / "rover.yaml"), "-o", str(tmp_path / "out")]
     assert main([*words, "--read-back"]) == 2
-    said = capsys.readouterr().err
-    assert "pip install 'tfcompose[view]'" in said
-    assert said.count("\n") == 1
+    output = capsys.readouterr().err
+    assert "pip install 'tfcompose[view]'" in output
+    assert output.count("\n") == 1
     assert not (tmp_path / "out").exists()
     assert main(words) == 0
 
 
 @pytest.mark.parametrize("text", ["", "<robot", "<robot/>", "<robot name='r'><joint name='a'/></robot>"])
-def test_what_is_no_robot_is_said_and_is_no_traceback(text: str) -> None:
+def test_what_is_no_robot_is_reported_and_is_no_traceback(text: str) -> None:
     assert list(differences(robot_of(MORE), text, TARGET, full=True))

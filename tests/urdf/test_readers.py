@@ -73,7 +73,7 @@ def examples() -> list[Path]:
     return sorted(file for file in ROBOTS.rglob("*.yaml") if file.stem not in several)
 
 
-def written(robot: Robot) -> dict[str, str]:
+def source_text(robot: Robot) -> dict[str, str]:
     return {file.path: file.text for file in emit(robot)}
 
 
@@ -176,7 +176,7 @@ def compare_bodies(robot: Robot, name: str, reader: Reader) -> int:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_reader_finds_every_frame_and_every_body_of_a_generated_robot(seed: int, name: str) -> None:
     robot = generated(seed, name)
-    files = written(robot)
+    files = source_text(robot)
     reader = READERS[name](files["robot.full.urdf"], robot.base or "")
     assert reader.moving >= {e.joint.name for e in robot.edges if e.joint and not e.joint.mimic}
     compare_poses(robot, reader, files)
@@ -186,10 +186,10 @@ def test_a_reader_finds_every_frame_and_every_body_of_a_generated_robot(seed: in
 @pytest.mark.parametrize("name", READERS)
 @pytest.mark.parametrize("file", examples(), ids=lambda file: file.stem)
 def test_a_reader_finds_every_frame_and_every_body_of_an_example(file: Path, name: str) -> None:
-    whole = robot_of(file.read_text("utf-8"))
-    alone = [replace(part.robot, ros=RosSettings()) for part in whole.parts]  # each has a description of its own
-    for robot in alone or [whole]:
-        files = written(robot)
+    full = robot_of(file.read_text("utf-8"))
+    alone = [replace(part.robot, ros=RosSettings()) for part in full.parts]  # each has a description of its own
+    for robot in alone or [full]:
+        files = source_text(robot)
         if name == "mujoco":
             reader: Reader = MuJoCo(files["robot.full.urdf"], robot.base or "", 'boundmass="1e-6" boundinertia="1e-9"')
         else:
@@ -215,7 +215,7 @@ FREE = {
 
 def test_what_a_reader_cannot_read_it_cannot_read() -> None:
     robot = robot_of(json.dumps(FREE))
-    files = written(robot)
+    files = source_text(robot)
     urdf = files["robot.full.urdf"]
     with pytest.raises(ValueError, match="free joint can only be used on top level"):
         MuJoCo(urdf, "base_link")
@@ -225,7 +225,7 @@ def test_what_a_reader_cannot_read_it_cannot_read() -> None:
         compare_poses(robot, yourdfpy_with_joints_in_order(urdf), files)
     compare_poses(robot, Pinocchio(urdf, "base_link"), files)
     with pytest.raises(ValueError, match="mass and inertia of moving bodies"):
-        MuJoCo(written(robot_of((ROBOTS / "my_robot.yaml").read_text("utf-8")))["robot.full.urdf"], "base_link")
+        MuJoCo(source_text(robot_of((ROBOTS / "my_robot.yaml").read_text("utf-8")))["robot.full.urdf"], "base_link")
 
 
 def yourdfpy_with_joints_in_order(urdf: str) -> Yourdfpy:

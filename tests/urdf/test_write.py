@@ -79,8 +79,8 @@ def test_yourdfpy_finds_every_frame_below_base_where_tfcompose_has_it_at_any_whe
     theirs = read_back(urdf(robot)[0])
     chance = random.Random(1)
     assert set(theirs.link_map) == {f for f in robot.frames if f not in {"map", "odom"}}
-    for turn in range(20):
-        positions = {joint: chance.uniform(-10, 10) if turn else 0.0 for joint in theirs.actuated_joint_names}
+    for sample in range(20):
+        positions = {joint: chance.uniform(-10, 10) if sample else 0.0 for joint in theirs.actuated_joint_names}
         theirs.update_cfg(positions)
         for frame in theirs.link_map:
             assert_close(pose_in_base(robot, frame, positions), theirs.get_transform(frame, robot.base))
@@ -173,7 +173,7 @@ def test_the_bodies_are_those_of_the_tutorial() -> None:
 
 
 @pytest.mark.parametrize("frame", ["camera_depth_optical_frame", "camera_color_optical_frame"])
-def test_the_camera_looks_15_degrees_down_and_its_images_are_upright(frame: str) -> None:
+def test_the_camera_points_15_degrees_down_and_its_images_are_upright(frame: str) -> None:
     found = read_back(urdf(example("autonomous_robot"))[0]).get_transform(frame, "base_link")[:3, :3]
     down = math.radians(15)
     right, image_down, forward = found[:, 0], found[:, 1], found[:, 2]
@@ -244,7 +244,7 @@ quaternions = st.builds(quat_from_rpy, angles, angles | near_the_pole, angles)
 
 @given(quaternions)
 @settings(max_examples=500)
-def test_the_angles_that_are_written_are_the_rotation_that_is_meant(quat: Quaternion) -> None:
+def test_the_angles_that_are_emitted_are_the_rotation_that_is_meant(quat: Quaternion) -> None:
     expected: Quaternion = tuple(Rotation.from_euler("xyz", clean_rpy(quat)).as_quat())
     assert angle_between(quat, expected) < 2e-9  # the worst is where a pitch begins to count as ±π/2
 
@@ -256,7 +256,7 @@ def test_a_quaternion_and_its_negative_have_one_text(quat: Quaternion) -> None:
 
 
 @pytest.mark.parametrize("quat", [(1.0, 0, 0, 1e-17), (1.0, 0, 0, -1e-17), (-1.0, 0, 0, 1e-17), (-1.0, 0.0, 0.0, 0.0)])
-def test_noise_does_not_turn_the_sign_of_a_half_turn(quat: Quaternion) -> None:
+def test_noise_does_not_flip_the_sign_of_a_half_rotation(quat: Quaternion) -> None:
     assert clean_quat(quat) == (1, 0, 0, 0)
 
 
@@ -266,6 +266,6 @@ def test_a_number_reads_back_the_same_and_has_no_negative_zero(value: float) -> 
     assert not number(value).startswith("-0") or value != 0
 
 
-def test_rotations_that_differ_in_the_sign_of_a_zero_are_written_alike() -> None:
-    turns = [(0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 1.0, -0.0), (-0.0, 0.0, 1.0, -0.0)]
-    assert len({clean_rpy(turn) for turn in turns}) == 1
+def test_rotations_that_differ_in_the_sign_of_a_zero_are_printed_alike() -> None:
+    rotations = [(0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 1.0, -0.0), (-0.0, 0.0, 1.0, -0.0)]
+    assert len({clean_rpy(rotation) for rotation in rotations}) == 1

@@ -56,8 +56,8 @@ def robots() -> list[Any]:
 @pytest.mark.parametrize("text", robots())
 def test_by_its_defaults_it_is_the_robot(text: str, tmp_path: Path) -> None:
     files = files_of(text, tmp_path)
-    whole = ET.fromstring(files["robot.full.urdf"])  # noqa: S314 (we wrote it)
-    assert tree(expanded(tmp_path / "robot.urdf.xacro")) == tree(whole)
+    full = ET.fromstring(files["robot.full.urdf"])  # noqa: S314 (we wrote it)
+    assert tree(expanded(tmp_path / "robot.urdf.xacro")) == tree(full)
 
 
 @pytest.mark.parametrize("text", robots())
@@ -116,7 +116,7 @@ def test_names_in_hardware_and_blocks_get_the_prefix_and_words_do_not(tmp_path: 
     assert [one.get("name") for one in found.iter("material")] == ["left_paint"]  # another robot has another paint
 
 
-def test_relative_meshes_can_be_told_where_they_begin(tmp_path: Path) -> None:
+def test_relative_meshes_can_have_another_base_folder(tmp_path: Path) -> None:
     files_of(EVERYTHING, tmp_path)
     outer = tmp_path / "outer.urdf.xacro"
     outer.write_text(

@@ -53,14 +53,14 @@ class Guard:
         return list(self.poses.judge())
 
 
-def moved(pose: Pose, metres: float = 0.0, turn_deg: float = 0.0) -> Pose:
+def moved(pose: Pose, metres: float = 0.0, angle_deg: float = 0.0) -> Pose:
     x, y, z = pose.xyz
-    turn = quat_from_rpy(0.0, turn_deg * 0.017453292519943295, 0.0)
-    return Pose((x, y, z + metres), multiply(turn, pose.quat_xyzw))
+    rotation = quat_from_rpy(0.0, angle_deg * 0.017453292519943295, 0.0)
+    return Pose((x, y, z + metres), multiply(rotation, pose.quat_xyzw))
 
 
 @pytest.mark.parametrize(
-    ("names", "metres", "turn_deg", "told"),
+    ("names", "metres", "angle_deg", "reported"),
     [
         ("link lens", 0.019, 4.9, False),
         ("link lens", 0.021, 0.0, True),
@@ -71,16 +71,16 @@ def moved(pose: Pose, metres: float = 0.0, turn_deg: float = 0.0) -> Pose:
     ],
 )
 def test_a_nominal_frame_may_be_calibrated_and_an_exact_one_only_rounded(
-    names: str, metres: float, turn_deg: float, *, told: bool
+    names: str, metres: float, angle_deg: float, *, reported: bool
 ) -> None:
     guard = Guard()
     guard.knows("/front/front")
     parent, child = names.split()
-    guard.hears((parent, child, moved(LENS if child == "lens" else OPTICAL, metres, turn_deg)))
-    assert [one.code for one in guard.says()] == ["TF828"] * told
+    guard.hears((parent, child, moved(LENS if child == "lens" else OPTICAL, metres, angle_deg)))
+    assert [one.code for one in guard.says()] == ["TF828"] * reported
 
 
-def test_all_frames_of_one_driver_are_one_finding_that_is_told_once() -> None:
+def test_all_frames_of_one_driver_are_one_finding_that_is_reported_once() -> None:
     guard = Guard()
     guard.knows("/front/front")
     for _ in range(3):

@@ -31,10 +31,10 @@ NOW, SIM = 1_800_000_000 * S, 100 * S
 def test_a_stamp_is_compared_with_the_clock_that_it_should_be_of(
     stamp_ns: int, sim_ns: int | None, values: list[str], *, simulated: bool
 ) -> None:
-    said = other_clock(stamp_ns, NOW, sim_ns, simulated=simulated)
-    assert bool(said) == bool(values)
-    assert [value for value in values if value not in said] == []
+    output = other_clock(stamp_ns, NOW, sim_ns, simulated=simulated)
+    assert bool(output) == bool(values)
+    assert [value for value in values if value not in output] == []
 
 
-def test_where_nobody_knows_when_it_came_nothing_is_said_of_the_systems_time() -> None:
+def test_where_nobody_knows_when_it_came_nothing_is_reported_of_the_systems_time() -> None:
     assert other_clock(NOW, 0, None, simulated=False) == ""

@@ -78,7 +78,7 @@ class Tree:
             row = (parent, child, *divmod(stamp, S), *pose.xyz, *pose.quat_xyzw)
             self.observer.take([row], static=static, gid=gid, received_ns=received)
 
-    def told(self, plan: Plan, *, graph: bool = True) -> list[Finding]:
+    def reported(self, plan: Plan, *, graph: bool = True) -> list[Finding]:
         for child, words in self.sent.items():
             self.send(child, **words)
         if graph:
@@ -95,18 +95,18 @@ def tree() -> Tree:
 
 
 def test_a_tree_as_planned_has_no_findings(plan: Plan, tree: Tree) -> None:
-    assert tree.told(plan) == []
+    assert tree.reported(plan) == []
 
 
-def test_a_missing_edge_is_told_with_its_owner_and_whether_that_is_there(plan: Plan, tree: Tree) -> None:
+def test_a_missing_edge_is_reported_with_its_owner_and_whether_that_is_there(plan: Plan, tree: Tree) -> None:
     del tree.sent["laser"]
-    [found] = tree.told(plan)
+    [found] = tree.reported(plan)
     expect(found, "TF811", "base → laser", "static (/rover/static)", "tfcompose ps")
 
 
 def test_an_edge_with_a_slip_in_its_name_is_missing_and_named(plan: Plan, tree: Tree) -> None:
     tree.sent["lasr"] = tree.sent.pop("laser")
-    missing, extra = tree.told(plan)
+    missing, extra = tree.reported(plan)
     expect(missing, "TF811", "base → laser", "lasr?")
     assert (extra.code, extra.severity) == ("TF803", "warning")
 
@@ -117,29 +117,29 @@ def test_an_edge_that_nobody_declared_counts_as_the_policy_says(
 ) -> None:
     tree.sent["tag_1"] = {"parent": "lens", "node": OTHER, "rate": 10.0}
     plan = replace(plan, guard=GuardPolicy(unknown_edges=policy))
-    assert [(one.code, one.severity) for one in tree.told(plan)] == ([("TF803", severity)] if severity else [])
+    assert [(one.code, one.severity) for one in tree.reported(plan)] == ([("TF803", severity)] if severity else [])
 
 
-def test_an_allowed_edge_is_not_told(plan: Plan, tree: Tree) -> None:
+def test_an_allowed_edge_is_not_reported(plan: Plan, tree: Tree) -> None:
     tree.sent["tag_1"] = {"parent": "lens", "node": OTHER, "rate": 10.0}
-    assert tree.told(replace(plan, guard=GuardPolicy(allow=(EdgePattern("lens", "tag_*"),)))) == []
+    assert tree.reported(replace(plan, guard=GuardPolicy(allow=(EdgePattern("lens", "tag_*"),)))) == []
 
 
-def test_a_frame_under_another_parent_is_told(plan: Plan, tree: Tree) -> None:
+def test_a_frame_under_another_parent_is_reported(plan: Plan, tree: Tree) -> None:
     tree.sent["laser"]["parent"] = "odom"
-    [found] = tree.told(plan)
+    [found] = tree.reported(plan)
     expect(found, "TF802", "static (/rover/static)", "odom → laser", "base → laser")
 
 
 def test_a_switched_edge_may_hang_on_each_of_its_parents(plan: Plan, tree: Tree) -> None:
     edges = tuple(replace(edge, switched=("rack",)) if edge.child == "base" else edge for edge in plan.edges)
     tree.sent["base"]["parent"] = "rack"
-    assert tree.told(replace(plan, edges=edges)) == []
+    assert tree.reported(replace(plan, edges=edges)) == []
 
 
-def test_a_wrong_value_is_told_in_millimetres_and_degrees(plan: Plan, tree: Tree) -> None:
+def test_a_wrong_value_is_reported_in_millimetres_and_degrees(plan: Plan, tree: Tree) -> None:
     tree.sent["laser"]["pose"] = Pose((0.0, 0.003, 0.304), quat_from_rpy(0, math.radians(2), 0))
-    [found] = tree.told(plan)
+    [found] = tree.reported(plan)
     both = ("xyz 0 0.003 0.304 m, rpy 0 2 0 deg", "xyz 0 0 0.3 m, rpy 0 0 0 deg")
     expect(found, "TF846", "laser", "base", "/rover/static", "5 mm", "2 deg", *both)
 
@@ -151,55 +151,55 @@ def test_a_wrong_value_is_told_in_millimetres_and_degrees(plan: Plan, tree: Tree
         (Pose((0.0, 0.0, 0.3), quat_from_rpy(0, 0, math.radians(-90))), "90 deg"),
     ],
 )
-def test_either_is_told_alone(plan: Plan, tree: Tree, pose: Pose, off: str) -> None:
+def test_either_is_reported_alone(plan: Plan, tree: Tree, pose: Pose, off: str) -> None:
     tree.sent["laser"]["pose"] = pose
-    [found] = tree.told(plan)
+    [found] = tree.reported(plan)
     expect(found, "TF846", f" {off}: ")
 
 
 def test_a_value_within_the_tolerance_is_right(plan: Plan, tree: Tree) -> None:
     tree.sent["laser"]["pose"] = Pose((0.0, 0.0009, 0.3), quat_from_rpy(0, math.radians(0.09), 0))
-    assert tree.told(plan) == []
+    assert tree.reported(plan) == []
 
 
 def test_the_pose_that_the_robot_gives_another_owners_fixed_edge_is_compared(plan: Plan, tree: Tree) -> None:
     tree.sent["rack"]["pose"] = Pose((1.1, 0.0, 0.0))
-    assert [found.code for found in tree.told(plan)] == ["TF846"]
+    assert [found.code for found in tree.reported(plan)] == ["TF846"]
 
 
 def test_another_owners_fixed_edge_without_a_pose_may_be_anywhere(plan: Plan, tree: Tree) -> None:
     edges = tuple(replace(edge, pose=Pose()) if edge.child == "rack" else edge for edge in plan.edges)
-    assert tree.told(replace(plan, edges=edges)) == []
+    assert tree.reported(replace(plan, edges=edges)) == []
 
 
 def test_of_a_turning_joint_the_position_is_compared(plan: Plan, tree: Tree) -> None:
     tree.sent["wheel"]["pose"] = Pose((0.0, 0.25, 0.0))
-    [found] = tree.told(plan)
+    [found] = tree.reported(plan)
     expect(found, "TF846", " 50 mm:")
 
 
-def test_an_edge_on_the_other_topic_is_told(plan: Plan, tree: Tree) -> None:
+def test_an_edge_on_the_other_topic_is_reported(plan: Plan, tree: Tree) -> None:
     tree.sent["laser"] |= {"rate": 1.0, "static": False}
-    [found] = tree.told(plan)
+    [found] = tree.reported(plan)
     expect(found, "TF809", "base → laser", "/tf ", "/rover/static", "/tf_static")
 
 
-def test_another_publisher_is_told_with_both_names(plan: Plan, tree: Tree) -> None:
+def test_another_publisher_is_reported_with_both_names(plan: Plan, tree: Tree) -> None:
     tree.send("base", "odom", "/ekf", rate=10.0)
     tree.observer.take_graph([Publisher(b"/ekf", "/ekf", static=False)])
-    [found] = tree.told(plan)
+    [found] = tree.reported(plan)
     expect(found, "TF801", "odom → base", "/ekf", "drive (/rover/drive)")
 
 
-def test_how_far_another_publishers_pose_is_off_is_told_with_who_it_is(plan: Plan, tree: Tree) -> None:
+def test_how_far_another_publishers_pose_is_off_is_reported_with_who_it_is(plan: Plan, tree: Tree) -> None:
     tree.send("laser", "base", OTHER, Pose((0.25, 0.0, 0.3)))
-    [found] = tree.told(plan)
+    [found] = tree.reported(plan)
     expect(found, "TF801", "laser", "base", OTHER, "250 mm")
 
 
-@pytest.mark.parametrize(("metres", "said"), [(0.0125, "12.5 mm"), (0.9, "900 mm"), (1.0, "1 m"), (12.34, "12.3 m")])
-def test_a_distance_is_told_as_people_say_it(metres: float, said: str) -> None:
-    assert Offset(metres, 0.0).text == said
+@pytest.mark.parametrize(("metres", "output"), [(0.0125, "12.5 mm"), (0.9, "900 mm"), (1.0, "1 m"), (12.34, "12.3 m")])
+def test_a_distance_is_shown_in_the_unit_that_people_use(metres: float, output: str) -> None:
+    assert Offset(metres, 0.0).text == output
 
 
 def test_two_nodes_of_the_owners_name_are_one_too_many(plan: Plan, tree: Tree) -> None:
@@ -212,7 +212,7 @@ def test_two_nodes_of_the_owners_name_are_one_too_many(plan: Plan, tree: Tree) -
     expect(found, "TF801", "odom → base", f"another {DRIVE}", f"drive ({DRIVE})")
 
 
-def test_a_publisher_that_has_left_is_told(plan: Plan, tree: Tree) -> None:
+def test_a_publisher_that_has_left_is_reported(plan: Plan, tree: Tree) -> None:
     for child, words in tree.sent.items():
         tree.send(child, **words)
     present = [words["node"] for child, words in tree.sent.items() if child != "laser"]
@@ -225,13 +225,13 @@ def test_a_publisher_that_has_left_is_told(plan: Plan, tree: Tree) -> None:
 def test_an_owner_that_was_started_again_has_not_left(plan: Plan, tree: Tree) -> None:
     tree.send("base", "odom", DRIVE, rate=10.0, gid=b"before", until=1.0)
     tree.observer.take_graph([Publisher(b"before", DRIVE, static=False)])
-    assert tree.told(plan) == []
+    assert tree.reported(plan) == []
 
 
 def test_a_namesake_that_left_last_does_not_make_the_owner_leave(plan: Plan, tree: Tree) -> None:
     tree.send("base", "odom", DRIVE, rate=100.0, gid=b"twin")
     tree.observer.take_graph([Publisher(b"twin", DRIVE, static=False)])
-    assert tree.told(plan) == []
+    assert tree.reported(plan) == []
 
 
 @pytest.mark.parametrize(
@@ -242,11 +242,11 @@ def test_a_namesake_that_left_last_does_not_make_the_owner_leave(plan: Plan, tre
         ({"rate": 7.0}, "TF805", ("7 Hz", "10 Hz")),
     ],
 )
-def test_an_edge_that_falls_silent_or_comes_too_rarely_is_told(
+def test_an_edge_that_falls_silent_or_comes_too_rarely_is_reported(
     plan: Plan, tree: Tree, more: dict[str, Any], code: str, names: tuple[str, ...]
 ) -> None:
     tree.sent["base"] |= more
-    [found] = tree.told(plan)
+    [found] = tree.reported(plan)
     expect(found, code, "drive (/rover/drive)", "odom → base", *names)
 
 
@@ -255,40 +255,40 @@ def test_where_a_simulation_goes_slower_than_the_time_of_day_edges_may_come_as_m
 ) -> None:
     tree.sent["base"] |= {"rate": 2.0, "speed": 0.2}
     tree.sent["wheel"] |= {"rate": 2.0, "speed": 0.2}
-    assert tree.told(replace(plan, ros=RosSettings(clock="sim"))) == []
+    assert tree.reported(replace(plan, ros=RosSettings(clock="sim"))) == []
     rarely = Tree()
     rarely.sent["base"] |= {"rate": 5.0}
-    found = rarely.told(replace(plan, ros=RosSettings(clock="sim")))
+    found = rarely.reported(replace(plan, ros=RosSettings(clock="sim")))
     assert [one.code for one in found] == ["TF805"]
 
 
 def test_a_value_is_compared_also_where_one_before_it_was_refused(plan: Plan, tree: Tree) -> None:
     tree.send("laser", "base", STATIC, Pose((float("nan"), 0.0, 0.0)))
     tree.sent["laser"]["pose"] = Pose((0.0, 0.0, 0.4))
-    assert [one.code for one in tree.told(plan)] == ["TF831", "TF846"]
+    assert [one.code for one in tree.reported(plan)] == ["TF831", "TF846"]
 
 
-def test_what_tf2_refuses_is_told(plan: Plan, tree: Tree) -> None:
+def test_what_tf2_refuses_is_reported(plan: Plan, tree: Tree) -> None:
     tree.sent["laser"]["pose"] = Pose((0.0, 0.0, 0.3), (0.0, 0.0, 0.0, 0.0))
-    [found] = tree.told(plan)
+    [found] = tree.reported(plan)
     expect(found, "TF831", "base → laser", "0.000")
 
 
 def test_a_planned_frame_that_is_published_in_itself_is_missing(plan: Plan, tree: Tree) -> None:
     tree.sent["laser"]["parent"] = "laser"
-    assert [one.code for one in tree.told(plan)] == ["TF821", "TF811"]
+    assert [one.code for one in tree.reported(plan)] == ["TF821", "TF811"]
 
 
 def test_a_publisher_that_stays_without_a_name_is_blamed_and_one_that_has_just_come_is_not(
     plan: Plan, tree: Tree
 ) -> None:
     tree.send("laser", "base", "", LASER, gid=b"raw")
-    [found] = tree.told(plan)
+    [found] = tree.reported(plan)
     expect(found, "TF801", "base → laser", NAMELESS, "static (/rover/static)")
     fresh = Tree()
     row = ("base", "laser", 109, 0, *LASER.xyz, *LASER.quat_xyzw)
     fresh.observer.take([row], static=True, gid=b"raw", received_ns=110 * S - S // 2)
-    assert fresh.told(plan) == []
+    assert fresh.reported(plan) == []
 
 
 def test_where_publishers_have_no_ids_nobody_is_blamed_who_may_be_innocent(plan: Plan) -> None:
@@ -305,20 +305,20 @@ def test_where_publishers_have_no_ids_nobody_is_blamed_who_may_be_innocent(plan:
     assert [found.code for verdict in verdicts for found in verdict.found] == []
 
 
-def test_a_frame_that_a_driver_sends_far_from_its_preset_is_told_and_a_strangers_is_not_compared(
+def test_a_frame_that_a_driver_sends_far_from_its_preset_is_reported_and_a_strangers_is_not_compared(
     plan: Plan, tree: Tree
 ) -> None:
     driven = replace(plan.process("camera").drives[0], frames={"lens": "nominal"})
     camera = replace(plan.process("camera"), drives=(driven,))
     plan = replace(plan, processes=tuple(camera if each.name == "camera" else each for each in plan.processes))
-    assert tree.told(plan) == [], "calibrated"
+    assert tree.reported(plan) == [], "calibrated"
     tree = Tree()
     tree.sent["lens"]["pose"] = Pose((0.0, 0.06, 0.0))
-    [found] = tree.told(plan)
+    [found] = tree.reported(plan)
     expect(found, "TF828", "lens", "camera", CAMERA, "45 mm", "realsense/d435i")
     tree = Tree()
     tree.send("lens", "camera", OTHER, Pose((0.0, 0.06, 0.0)))
-    assert [one.code for one in tree.told(plan)] == ["TF801"]
+    assert [one.code for one in tree.reported(plan)] == ["TF801"]
 
 
 def test_of_a_recording_nothing_is_advised_that_only_a_running_robot_can_do(plan: Plan, tree: Tree) -> None:
@@ -326,17 +326,17 @@ def test_of_a_recording_nothing_is_advised_that_only_a_running_robot_can_do(plan
     tree.sent["base"]["until"] = 5.0
     for words in tree.sent.values():
         words["gid"] = None
-    found = {one.code: one.help for one in tree.told(plan, graph=False)}
+    found = {one.code: one.help for one in tree.reported(plan, graph=False)}
     assert found == {"TF804": "", "TF811": ""}
 
 
 def test_a_bag_knows_no_publishers_and_blames_none(plan: Plan, tree: Tree) -> None:
     for words in tree.sent.values():
         words["gid"] = None
-    assert tree.told(plan, graph=False) == []
+    assert tree.reported(plan, graph=False) == []
 
 
-def test_edges_are_looked_for_on_the_topics_of_their_owners(plan: Plan) -> None:
+def test_edges_are_searched_on_the_topics_of_their_owners(plan: Plan) -> None:
     moved = replace(plan.process("static"), remap={"/tf": "/r1/tf", "/tf_static": "/r1/tf_static"})
     plan = replace(plan, processes=tuple(moved if each.name == "static" else each for each in plan.processes))
     topics = {pair: [edge.child for edge in part.edges] for pair, part in parts_of(plan).items()}
@@ -350,11 +350,11 @@ angles = st.floats(-3.1, 3.1)
 def test_the_angle_between_two_orientations_is_scipys(
     a: tuple[float, float, float], b: tuple[float, float, float], scale: float
 ) -> None:
-    expected, seen = quat_from_rpy(*a), quat_from_rpy(*b)
-    scaled = tuple(-scale * each for each in seen)
-    angle = (Rotation.from_quat(expected).inv() * Rotation.from_quat(seen)).magnitude()
+    expected, observed = quat_from_rpy(*a), quat_from_rpy(*b)
+    scaled = tuple(-scale * each for each in observed)
+    angle = (Rotation.from_quat(expected).inv() * Rotation.from_quat(observed)).magnitude()
     assert offset_of(Pose(a, expected), Pose(b, scaled)).rot_rad == pytest.approx(angle, abs=1e-7)  # type: ignore[arg-type]
-    assert offset_of(Pose(a, expected), Pose(b, seen)).xyz_m == pytest.approx(math.dist(a, b))
+    assert offset_of(Pose(a, expected), Pose(b, observed)).xyz_m == pytest.approx(math.dist(a, b))
 
 
 def test_what_a_strict_guard_passes_on_is_its_owners(plan: Plan) -> None:
@@ -362,5 +362,5 @@ def test_what_a_strict_guard_passes_on_is_its_owners(plan: Plan) -> None:
     tree = Tree()
     for sent in tree.sent.values():
         sent["node"] = "/rover/guard"
-    assert tree.told(strict) == []
-    assert {one.code for one in tree.told(plan)} == {"TF801"}
+    assert tree.reported(strict) == []
+    assert {one.code for one in tree.reported(plan)} == {"TF801"}

@@ -16,12 +16,12 @@ class Approach(Node):
         self.buffer = tf2_ros.Buffer(node=self)
         self.listener = tf2_ros.TransformListener(self.buffer, self, spin_thread=False)
         self.timer = self.create_timer(0.05, self.on_timer)
-        self.asked = self.done = False
+        self.requested = self.done = False
 
     async def on_timer(self) -> None:
-        if self.asked:
+        if self.requested:
             return
-        self.asked = True
+        self.requested = True
         try:
             self.buffer.lookup_transform("odom", "no_such_frame", Time())
         except (tf2.LookupException, tf2.ExtrapolationException) as error:

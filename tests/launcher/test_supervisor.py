@@ -32,7 +32,7 @@ from tfcompose.ipc import (
 from tfcompose.launcher.child import READ_SIZE
 from tfcompose.launcher.state import Times
 from tfcompose.launcher.supervisor import supervise
-from tfcompose.plan import Plan, PlanProcess, RosSettings
+from tfcompose.plan import Plan, PlanProcess, Ready, RosSettings
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -252,6 +252,21 @@ def test_the_guards_events_steer_the_start_and_a_line_that_is_none_is_shown(tmp_
     started = [notice.process for notice in notices if isinstance(notice, ProcessState) and notice.state == "STARTING"]
     assert started == ["guard", "a", "b"]
     assert logged(notices, "guard")[:1] == ["not an event: rubbish"]
+
+
+def test_a_pattern_that_takes_for_ever_is_given_up_and_the_launcher_goes_on(tmp_path: Path) -> None:
+    """``re`` would need years for this line, and hears no signal meanwhile."""
+    slow = program("slow", f"print('a' * 40 + 'b', flush=True); {SLEEPER}", ready=Ready("log", "(a|aa)+$"))
+    notices: list[Notice] = []
+
+    def report(notice: Notice) -> None:
+        notices.append(notice)
+        if isinstance(notice, LogLine) and notice.stream == "stderr":
+            os.kill(os.getpid(), SIGTERM)
+
+    assert supervise(plan_of(slow), tmp_path / "plan.json", report=report) == 0
+    (given_up,) = (one for one in notices if isinstance(one, LogLine) and one.stream == "stderr")
+    assert (given_up.process, "(a|aa)+$" in given_up.text) == ("slow", True)
 
 
 def test_a_guard_that_dies_before_it_is_clear_ends_everything_with_1(tmp_path: Path) -> None:

@@ -121,6 +121,16 @@ def test_an_alias_bomb_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
+    "text", ["a: &a\n  b: *a\n", "a: {ros__parameters: &p {b: *p}}\n", "a: {ros__parameters: {b: &l [*l]}}\n"]
+)
+def test_an_alias_inside_what_it_names_is_a_finding(text: str) -> None:
+    with pytest.raises(RejectedError) as rejected:
+        load_params(text, "p.yaml")
+    (found,) = rejected.value.findings
+    assert (found.code, found.span and found.span.file) == ("TF008", "p.yaml")
+
+
+@pytest.mark.parametrize(
     ("pattern", "name", "does"),
     [
         ("/a/b", "/a/b", True),

@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.plans import PLAN, built_plan, is_plan, plan_to_start
-from tfcompose.cli.terminal import counted
+from tfcompose.cli.reading import read_text
+from tfcompose.cli.terminal import counted, printable
+from tfcompose.findings import RejectedError
 from tfcompose.launcher.state import MAX_RESTARTS
 from tfcompose.plan.file import read_plan
 from tfcompose.plan.hosts import describe_share
@@ -29,7 +31,7 @@ def dry_run(arguments: Namespace) -> int:
     else:
         files = _compiled_files(arguments)
         plan = read_plan(files[PLAN], PLAN)
-    print("\n".join(_lines(plan_to_start(plan, arguments), files)))
+    print("\n".join(map(printable, _lines(plan_to_start(plan, arguments), files))))
     return 0
 
 
@@ -47,9 +49,13 @@ def _parameter_files(plan: Plan, folder: Path) -> dict[str, str]:
     files = {}
     for process in plan.processes:
         if process.params_file is not None:
+            file = folder / process.params_file
             try:
-                files[process.params_file] = (folder / process.params_file).read_text("utf-8")
-            except (OSError, UnicodeDecodeError):
+                inside = file.resolve().is_relative_to(folder.resolve())
+                files[process.params_file] = (
+                    read_text(str(file)) if inside else "(a link to outside of the plan's folder)"
+                )
+            except (RejectedError, OSError):
                 files[process.params_file] = "(cannot be read)"
     return files
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, RejectedError, Span, finding
 from tfcompose.language.overlay import lay_over, without
-from tfcompose.load import Path, Place, Source, load
+from tfcompose.load import DEEPEST, Path, Place, Source, load
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -89,6 +89,9 @@ def set_value(setting: str) -> Source:
     if not sign or not all(path):
         message = f"--set takes PATH=VALUE, not {setting!r}"
         raise RejectedError([finding("TF016", message, span, help="for example sensors.camera.tf=driver")])
+    if len(path) > DEEPEST:
+        message = f"--set names a key in {len(path)} levels; a robot has no more than {DEEPEST}"
+        raise RejectedError([finding("TF016", message, Span("--set"))])
     if path[0] == "include":
         message = "--set cannot include files: it is laid over what they hold"
         raise RejectedError([finding("TF016", message, span, help="--overlay FILE")])

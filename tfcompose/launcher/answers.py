@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -35,6 +36,9 @@ if TYPE_CHECKING:
     from tfcompose.launcher.state import State, Tracked
     from tfcompose.plan import Plan, PlanProcess
 
+
+#: A larger plan is not read.
+MOST_PLAN_BYTES = 64_000_000
 
 Answer = RobotStatus | Done | PlanChange | Refusal
 #: The answer, what it means for the machine, and another plan's file and commands.
@@ -103,12 +107,15 @@ def _update(
 ) -> Outcome:
     file = Path(request.plan)
     try:
-        plan = read_plan(file.read_text("utf-8"), str(file))
-    except (OSError, RejectedError) as error:
-        return Refusal(f"{file} cannot be used: {error}"), None, None
+        plan = read_plan(_plain_file(file).decode("utf-8"), str(file))
+    except (OSError, ValueError, RejectedError) as error:
+        return Refusal(f"{request.plan!r} cannot be used: {error}"), None, None
     if state.stop:
         return Refusal("everything is being stopped"), None, None
-    commands, found = commands_of(plan, started_by_us(plan), file, base, environment, Path(request.base))
+    try:
+        commands, found = commands_of(plan, started_by_us(plan), file, base, environment, Path(request.base))
+    except ValueError as error:  # a NUL in the folder's name
+        return Refusal(f"{request.base!r} cannot be used: {error}"), None, None
     if found:
         return Refusal("; ".join(one.message for one in found)), None, None
     different = change(state.plan, plan_file.parent, plan, file.parent)
@@ -122,6 +129,23 @@ def _update(
     if not any((answer.changed, answer.added, answer.removed, answer.held)):
         return answer, None, None
     return answer, NewPlan(plan, different.changed, different.held), (file, commands)
+
+
+def _plain_file(file: Path) -> bytes:
+    """Return what a plain file holds; a pipe or a device is not waited for.
+
+    Raises:
+        OSError: if it is none, or is too large.
+        ValueError: if its name holds NUL.
+    """
+    descriptor = os.open(file, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    with os.fdopen(descriptor, "rb") as stream:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise OSError("it is not a plain file")
+        data = stream.read(MOST_PLAN_BYTES + 1)
+    if len(data) > MOST_PLAN_BYTES:
+        raise OSError(f"it is larger than {MOST_PLAN_BYTES:,} bytes")
+    return data
 
 
 # What is different in another plan.
@@ -172,7 +196,7 @@ def _fence(plan: Plan) -> tuple[str, str] | None:
 
 def _bytes(folder: Path, name: str | None) -> bytes | None:
     try:
-        return None if name is None else (folder / name).read_bytes()
+        return None if name is None else _plain_file(folder / name)
     except OSError:
         return None
 

@@ -6,12 +6,13 @@ import contextlib
 import io
 import json
 import os
-import re
 import signal
 import subprocess
 from dataclasses import replace
 from selectors import EVENT_READ
 from typing import TYPE_CHECKING, Any
+
+import regex
 
 from tfcompose.ipc import (
     EVENTS_FD,
@@ -43,6 +44,8 @@ if TYPE_CHECKING:
 
 #: So much of a line is compared with what a gate waits for, in characters.
 LONGEST_MATCHED = 4000
+#: The launcher waits so long for one comparison, in seconds.
+MATCHED_WITHIN_S = 0.1
 #: The guard's lines hold findings with notes, so they may be longer than a log's; bytes.
 EVENT_LIMIT = 1024 * 1024
 
@@ -212,13 +215,20 @@ class Children:
 
     def _logger(self, child: Child, stream: Stream, gate: str | None) -> Callable[[str], None]:
         last = child.last_err if stream == "stderr" else child.last_out
-        waited_for = re.compile(gate) if gate is not None else None
+        matches = _matcher(gate) if gate is not None else None
 
         def log(text: str) -> None:
+            nonlocal matches
             last.append(text[:LAST_LINE_LENGTH])
             self._notify(LogLine(child.name, stream, text))
-            if waited_for and not child.gate_matched and waited_for.search(text[:LONGEST_MATCHED]):
-                child.gate_matched = True
+            if matches is None or child.gate_matched:
+                return
+            try:
+                child.gate_matched = matches(text[:LONGEST_MATCHED])
+            except TimeoutError:
+                matches = None
+                self._notify(LogLine(child.name, "stderr", f"ready: log: {gate!r} takes too long here: given up"))
+            if child.gate_matched:
                 self._happened(LogMatched(child.name, text[:LAST_LINE_LENGTH]))
 
         return log
@@ -257,6 +267,16 @@ class Children:
 
     def _descendants(self) -> dict[int, int]:
         return descendants(os.getpid(), but=self._reaper.pid)
+
+
+def _matcher(pattern: str) -> Callable[[str], bool]:
+    """Return a function that says whether a line holds the pattern.
+
+    It raises a TimeoutError where that takes too long: ``(a|aa)+$`` needs time that doubles with each character, and
+    ``re`` cannot be stopped.
+    """
+    compiled = regex.compile(pattern)
+    return lambda line: compiled.search(line, timeout=MATCHED_WITHIN_S) is not None
 
 
 def _reason(error: Exception) -> str:

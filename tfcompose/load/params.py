@@ -5,13 +5,17 @@ rcl reads these files by rules of its own (``on`` is true, 012 is ten), so value
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
 from tfcompose.findings import Finding, RejectedError, Span, finding
 from tfcompose.load.source import MOST_VALUES, refuse_unreadable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 PARAMETERS = "ros__parameters"
 
@@ -69,9 +73,14 @@ class _Reader:
         self.file = file
         self.result = ParamsFile()
         self.count = 0
+        self._open: set[int] = set()  # what is being read: an alias of one of these has no end
 
     def nodes(self, mapping: yaml.MappingNode, above: str) -> None:
         """Take the nodes of a mapping; a mapping that has no parameters holds the nodes of a namespace."""
+        with self._reading(mapping):
+            self._nodes(mapping, above)
+
+    def _nodes(self, mapping: yaml.MappingNode, above: str) -> None:
         for key, value in mapping.value:
             self._bound(key)
             if not isinstance(key, yaml.ScalarNode) or not isinstance(value, yaml.MappingNode):
@@ -90,11 +99,21 @@ class _Reader:
 
     def _value(self, node: yaml.Node) -> Any:
         self._bound(node)
-        if isinstance(node, yaml.MappingNode):
-            return self._mapping(node)
-        if isinstance(node, yaml.SequenceNode):
-            return [self._value(item) for item in node.value]
+        with self._reading(node):
+            if isinstance(node, yaml.MappingNode):
+                return self._mapping(node)
+            if isinstance(node, yaml.SequenceNode):
+                return [self._value(item) for item in node.value]
         return Word(node.value, not getattr(node, "style", None))
+
+    @contextmanager
+    def _reading(self, node: yaml.Node) -> Iterator[None]:
+        if id(node) in self._open:
+            at = _span(self.file, node)
+            raise RejectedError([finding("TF008", "an alias stands inside what it names", at)])
+        self._open.add(id(node))
+        yield
+        self._open.discard(id(node))
 
     def _bound(self, node: yaml.Node) -> None:
         self.count += 1

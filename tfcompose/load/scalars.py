@@ -73,9 +73,16 @@ def scalar(tag: str, text: str) -> str | bool | int | float | None:
 
 
 def _number(tag: str, text: str) -> int | float:
+    if tag == INT and text[:2] in {"0o", "0x"}:
+        whole = int(text, 0)  # Python bounds the digits of decimal numbers only
+        return whole if len(text) < _MOST_DIGITS else _finite(float(whole), text)
     if tag == INT and len(text) < _MOST_DIGITS:
-        return int(text, 0) if text[:2] in {"0o", "0x"} else int(text)
+        return int(text)
     value = float("nan") if "n" in text.lower().replace("inf", "") else float(text.lower().replace(".inf", "inf"))
+    return _finite(value, text)
+
+
+def _finite(value: float, text: str) -> float:
     if not math.isfinite(value):
         raise OverflowError(f"{text} is not a finite number")
     return value

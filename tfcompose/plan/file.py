@@ -3,11 +3,24 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+import re
+import unicodedata
+from collections import Counter
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, RejectedError, Span, finding
 from tfcompose.plan import VERSION, Plan
 from tfcompose.plan.codec import DecodeError, decode, encode, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+#: A robot's name, which becomes part of topics, units and programs; and a process's, in a part with the part's name.
+_ROBOT = re.compile(r"[a-z][a-z0-9_]*")
+_PROCESS = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?:/[A-Za-z][A-Za-z0-9_]*)*")
+#: Keys below which text may hold lines and tabs: what programs are given.
+_FOR_PROGRAMS = frozenset({"argv", "env", "switches"})
 
 
 def write_plan(plan: Plan) -> str:
@@ -36,9 +49,71 @@ def read_plan(text: str, file: str) -> Plan:
         message = f"the plan has version {shown(data.get('version'))}; this tfcompose reads version {VERSION}"
         raise RejectedError([_bad(message, Span(file))])
     try:
-        return decode(Plan, data)
+        plan = decode(Plan, data)
     except DecodeError as error:
         raise RejectedError([_bad(f"not a valid plan: {error}", Span(file))]) from None
+    wrong = [*_wrong_text(data, ()), *_wrong_names(plan)]
+    if wrong:
+        raise RejectedError([_bad(f"not a valid plan: {one}", Span(file)) for one in wrong])
+    return plan
+
+
+def _wrong_text(data: Any, path: tuple[str, ...]) -> Iterator[str]:
+    """Yield what is wrong with each text: control characters would move a terminal's cursor, or begin a new line."""
+    if isinstance(data, str):
+        allowed = "\n\t" if _FOR_PROGRAMS & set(path) else ""
+        if any(unicodedata.category(one) in {"Cc", "Cs"} and one not in allowed for one in data):
+            yield f"{'.'.join(path)} holds a control character: {json.dumps(data)[:60]}"
+    elif isinstance(data, dict):
+        for key, value in data.items():
+            yield from _wrong_text(key, (*path, "a key"))
+            yield from _wrong_text(value, (*path, key))
+    elif isinstance(data, list):
+        for number, value in enumerate(data):
+            yield from _wrong_text(value, (*path, str(number)))
+
+
+def _wrong_names(plan: Plan) -> Iterator[str]:
+    """Yield what is wrong with names: those that no robot file can give, of nothing, and of files elsewhere."""
+    if not _ROBOT.fullmatch(plan.robot):
+        yield f"robot is {shown(plan.robot)}, not a name of lower case letters, digits and _"
+    known = Counter(process.name for process in plan.processes)
+    for name, times in known.items():
+        if not _PROCESS.fullmatch(name):
+            yield f"a process is named {shown(name)}, not with letters, digits and _"
+        if times > 1:
+            yield f"{times} processes are named {name}"
+    yield from (
+        f"the owner of {edge.name} is {shown(edge.owner)}, which is no process"
+        for edge in plan.edges
+        if edge.owner not in known
+    )
+    yield from (
+        f"{process.name} waits for {shown(other)}, which is no process"
+        for process in plan.processes
+        for other in process.after
+        if other not in known
+    )
+    for ready, name in ((process.ready, process.name) for process in plan.processes):
+        if ready and ready.kind == "log" and (error := _regex_error(ready.text)):
+            yield f"{name} is ready at {shown(ready.text)}, not a regular expression: {error}"
+    yield from _wrong_files(plan)
+
+
+def _wrong_files(plan: Plan) -> Iterator[str]:
+    files = (plan.description, *(file for one in plan.processes for file in (one.params_file, one.description)))
+    for file in dict.fromkeys(filter(None, files)):
+        path = PurePosixPath(file)
+        if path.is_absolute() or ".." in path.parts:
+            yield f"the file {shown(file)} is not in the plan's folder"
+
+
+def _regex_error(pattern: str) -> str:
+    try:
+        re.compile(pattern)
+    except (re.error, RecursionError, OverflowError) as error:
+        return str(error)
+    return ""
 
 
 def _bad(message: str, span: Span) -> Finding:

@@ -1,0 +1,115 @@
+"""The control socket: whatever is asked for, the robot goes on."""
+
+from __future__ import annotations
+
+import json
+import os
+from selectors import DefaultSelector
+from socket import AF_UNIX, socket
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tfcompose.ipc import REQUESTS, Done, Refusal, UpdateRequest
+from tfcompose.launcher import answers
+from tfcompose.launcher.answers import answer
+from tfcompose.launcher.control import LONGEST_REQUEST, Control
+from tfcompose.launcher.state import initial
+from tfcompose.plan import Plan, RosSettings
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from tfcompose.ipc import Request
+
+PLAN = Plan("rover", "", None, RosSettings(), (), ())
+
+
+class Connection:
+    """Both ends of a control socket, served by hand."""
+
+    def __init__(self, address: str) -> None:
+        self.requests: list[Request] = []
+        self._selector, listener = DefaultSelector(), socket(AF_UNIX)
+        listener.bind(address)
+        listener.listen()
+        listener.setblocking(False)  # noqa: FBT003 (its only argument)
+        self._control = Control(listener, self._selector, self._answer)
+        self._client = socket(AF_UNIX)
+        self._client.connect(address)
+        self._client.settimeout(5)
+
+    def _answer(self, request: Request) -> Done:
+        self.requests.append(request)
+        return Done()
+
+    def ask(self, data: bytes) -> bytes:
+        """Return what comes back, after everything was served; empty where the connection ends."""
+        for start in range(0, len(data), 8192):
+            try:
+                self._client.sendall(data[start : start + 8192])
+            except OSError:
+                break
+            for key, _ in self._selector.select(0):
+                key.data()
+        for key, _ in self._selector.select(0):
+            key.data()
+        try:
+            return self._client.recv(65536)
+        except ConnectionResetError:
+            return b""
+
+    def close(self) -> None:
+        self._control.close()
+        self._client.close()
+        self._selector.close()
+
+
+@pytest.fixture
+def connection(tmp_path: Path) -> Iterator[Connection]:
+    made = Connection(str(tmp_path / "s"))
+    yield made
+    made.close()
+
+
+@pytest.mark.parametrize("line", [b"{", b"[" * 50_000, b"\xff\xfe", b"7", b'{"request": []}', b'"\\ud800"', b"\0"])
+def test_what_is_no_request_is_answered_with_an_error_and_the_next_is_heard(
+    connection: Connection, line: bytes
+) -> None:
+    assert "error" in json.loads(connection.ask(line + b"\n"))
+    update = UpdateRequest("plan.json", "/")
+    assert "error" not in json.loads(connection.ask(REQUESTS.line(update).encode()))
+    assert connection.requests == [update]
+
+
+def test_a_request_that_does_not_end_ends_the_connection(connection: Connection) -> None:
+    assert connection.ask(b"x" * (LONGEST_REQUEST + 40_000)) == b""
+    assert connection.requests == []
+
+
+def plan_file(folder: Path, kind: str) -> str:
+    """Return the name of something that cannot be the next plan."""
+    file = folder / "plan.json"
+    if kind == "pipe":
+        os.mkfifo(file)
+    elif kind == "folder":
+        file.mkdir()
+    elif kind == "large":
+        file.write_bytes(b" " * 2000)
+    elif kind == "bytes":
+        file.write_bytes(b"\xff\xfe")
+    return {"device": "/dev/zero", "NUL": "plan\0.json", "nothing": str(folder / "x")}.get(kind, str(file))
+
+
+@pytest.mark.parametrize("kind", ["device", "NUL", "nothing", "pipe", "folder", "large", "bytes"])
+def test_a_plan_that_cannot_be_read_is_refused_at_once(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(answers, "MOST_PLAN_BYTES", 1000)
+    request = UpdateRequest(plan_file(tmp_path, kind), str(tmp_path))
+    refused, event, commands = answer(
+        request, initial(PLAN), tmp_path / "old.json", {}, lambda base, *_, **__: dict(base)
+    )
+    assert isinstance(refused, Refusal)
+    assert (event, commands) == (None, None)

@@ -53,7 +53,8 @@ def _annotation(found: Finding) -> str:
         if at.end_line == at.line:
             properties["endColumn"] = at.end_column
     notes = [f"{note.span}: {note.message}" if note.span else note.message for note in found.notes]
-    message = "\n".join([found.message, *notes, *([f"help: {found.help}"] if found.help else [])])
+    lines = [found.message, *notes, *([f"help: {found.help}"] if found.help else [])]
+    message = "\n".join("".join(c if c.isprintable() else repr(c)[1:-1] for c in line) for line in lines)
     listed = ",".join(f"{name}={_escaped_property(str(value))}" for name, value in properties.items())
     return f"::{found.severity} {listed}::{_escaped(message)}\n"
 

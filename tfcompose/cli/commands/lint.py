@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     from tfcompose.findings import Finding
     from tfcompose.resolve import Library
 
-_ROBOT = re.compile(rb"^tfcompose\s*:", re.MULTILINE)
+#: What a robot file has at the begin of a line: its first key, or, with that misspelt, two others of its keys.
+_ROBOT = re.compile(
+    rb"^tfcompose\s*:|\A(?=[\s\S]*^robot\s*:)(?=[\s\S]*^(?:links|joints|frames|sensors|parts)\s*:)", re.MULTILINE
+)
 
 URDF_ENDINGS = (".urdf", ".xacro")
 
@@ -105,8 +108,19 @@ def robots_in(name: str) -> list[str]:
     for top, folders, files in os.walk(name):
         folders[:] = sorted(inner for inner in folders if not inner.startswith("."))
         paths = [Path(top, file) for file in sorted(files) if file.endswith((".yaml", ".yml"))]
-        robots += [str(path) for path in paths if path.is_file() and _ROBOT.search(path.read_bytes())]
+        robots += [str(path) for path in paths if path.is_file() and _is_robot(path)]
     return robots or [name]
+
+
+def _is_robot(file: Path) -> bool:
+    """Return whether it is one, or cannot be read: its own lint says why."""
+    from tfcompose.cli.reading import MOST_BYTES
+
+    try:
+        with file.open("rb") as stream:
+            return bool(_ROBOT.search(stream.read(MOST_BYTES)))
+    except OSError:
+        return True
 
 
 def _print(found: list[Finding], form: str, files: int) -> None:

@@ -19,6 +19,7 @@ EDGES = (
 )
 PROCESSES = (
     PlanProcess("static", "static", owns=(("base", "a"),)),
+    PlanProcess("joints", "joints"),
     PlanProcess("camera", "run", ready=Ready("topic", "/scan"), lifecycle={"/camera": "active"}),
     PlanProcess("arm", "simulate", simulate=Simulation("joints", 20.0, sweep={"b": Sweep(2.0, -1.0, 1.0)})),
 )
@@ -88,13 +89,13 @@ WRONG: tuple[tuple[tuple[str | int, ...], Any], ...] = (
     (("processes", 0, "drives"), [{}]),
     (("processes", 0, "switches"), {"/a": {"publish_tf": None}}),
     (("processes", 0, "after"), {"camera": "born"}),
-    (("processes", 1, "lifecycle", "/camera"), "on"),
-    (("processes", 1, "ready", "kind"), "soon"),
-    (("processes", 1, "log_level"), "loud"),
-    (("processes", 2, "simulate"), None),
-    (("processes", 2, "simulate", "rate"), 0),
-    (("processes", 2, "simulate", "sweep", "b", "period_s"), -1.0),
-    (("processes", 2, "simulate", "sweep", "b", "upper"), None),
+    (("processes", 2, "lifecycle", "/camera"), "on"),
+    (("processes", 2, "ready", "kind"), "soon"),
+    (("processes", 2, "log_level"), "loud"),
+    (("processes", 3, "simulate"), None),
+    (("processes", 3, "simulate", "rate"), 0),
+    (("processes", 3, "simulate", "sweep", "b", "period_s"), -1.0),
+    (("processes", 3, "simulate", "sweep", "b", "upper"), None),
 )
 
 
@@ -109,7 +110,7 @@ def test_what_is_wrong_is_refused_with_the_path_to_it() -> None:
 
 
 def test_keys_of_a_later_version_are_ignored() -> None:
-    assert read_plan(changed(("processes", 1, "colour"), "blue"), "plan.json") == PLAN
+    assert read_plan(changed(("processes", 2, "colour"), "blue"), "plan.json") == PLAN
 
 
 def test_a_value_that_is_long_is_shown_in_part() -> None:

@@ -81,7 +81,7 @@ ONLY_IN: dict[str, set[str]] = {
     "std_msgs": {"ros"},
     "builtin_interfaces": {"ros"},
     "rosgraph_msgs": {"ros"},
-    "diagnostic_msgs": {"ros"},
+    "diagnostic_msgs": {"guard"},
     "rosidl_generator_py": {"ros"},
     "rosidl_parser": {"ros"},
     "ament_index_python": {"ros"},

@@ -33,10 +33,8 @@ from tfcompose.cli.commands import (
     pose,
     presets,
     ps,
-    restart,
     schema,
-    start,
-    stop,
+    steering,
     tree,
     up,
     verify,
@@ -50,7 +48,7 @@ if TYPE_CHECKING:
 
 
 class Command(Protocol):
-    """A module of ``commands``; the first line of its docstring is its line in the list, the rest its help."""
+    """A module of ``commands``, or an object in one; its docstring is its line in the list, and below that its help."""
 
     __doc__: str | None
 
@@ -69,9 +67,9 @@ COMMANDS: dict[str, Command] = {
     "ps": ps,
     "logs": logs,
     "events": events,
-    "restart": restart,
-    "stop": stop,
-    "start": start,
+    "restart": steering.RESTART,
+    "stop": steering.STOP,
+    "start": steering.START,
     "wait": wait,
     "down": down,
     "echo": echo,

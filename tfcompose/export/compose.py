@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.emit.params import mapping
+from tfcompose.emit.argv import mapping
 from tfcompose.export.supervisors import (
     MAX_RESTARTS,
     STOP_S,

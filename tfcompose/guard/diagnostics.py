@@ -1,13 +1,13 @@
-"""What the guard knows, edge by edge, and as a page on /diagnostics."""
+"""What the guard knows, edge by edge, and as a page on /diagnostics (diagnostic_msgs/DiagnosticArray)."""
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.process import say
-from tfcompose.ros.diagnostics import ERROR, OK, STALE, WARN, DiagnosticsPublisher, Status
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -17,6 +17,58 @@ if TYPE_CHECKING:
     from tfcompose.findings import Finding
     from tfcompose.guard.judge import Judge
     from tfcompose.plan import PlanEdge
+
+
+_TOPIC = "/diagnostics"
+_SECOND_NS = 1_000_000_000
+OK, WARN, ERROR, STALE = 0, 1, 2, 3
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """One line of a diagnostics page: ``level`` is one of OK, WARN, ERROR, STALE; ``values`` are keys and values."""
+
+    name: str
+    level: int
+    message: str
+    values: Sequence[tuple[str, str]] = ()
+
+
+class DiagnosticsPublisher:
+    """Publishes statuses about the robot that is called ``hardware_id``."""
+
+    def __init__(self, node: Node, hardware_id: str) -> None:
+        from diagnostic_msgs import msg  # noqa: PLC0415 (the package is optional)
+
+        self._messages: Any = msg
+        self._hardware_id = hardware_id
+        self._publisher: Any = node.create_publisher(self._messages.DiagnosticArray, _TOPIC, 10)
+
+    @staticmethod
+    def is_installed() -> bool:
+        """Return whether the package diagnostic_msgs is there."""
+        return find_spec("diagnostic_msgs") is not None
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether anybody listens."""
+        return bool(self._publisher.get_subscription_count())
+
+    def publish(self, statuses: Sequence[Status], stamp_ns: int) -> None:
+        """Publish them with this time, in nanoseconds."""
+        array = self._messages.DiagnosticArray(status=[self._status(status) for status in statuses])
+        array.header.stamp.sec, array.header.stamp.nanosec = divmod(stamp_ns, _SECOND_NS)
+        self._publisher.publish(array)
+
+    def _status(self, status: Status) -> Any:
+        return self._messages.DiagnosticStatus(
+            level=bytes([status.level]),
+            name=status.name,
+            message=status.message,
+            hardware_id=self._hardware_id,
+            values=[self._messages.KeyValue(key=key, value=value) for key, value in status.values],
+        )
+
 
 EVERY_S = 1.0
 _NAMES = {OK: "ok", WARN: "warning", ERROR: "error", STALE: "not seen"}

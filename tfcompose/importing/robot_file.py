@@ -14,7 +14,7 @@ from tfcompose.importing.omitted import angles, omitted, with_material_names, wi
 from tfcompose.importing.sensors import recognised
 from tfcompose.importing.values import Values, rotation
 from tfcompose.importing.yaml_text import comment, dedented, entry, section
-from tfcompose.urdf.ros2_control import with_hardware
+from tfcompose.urdf.blocks import with_hardware
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping

@@ -50,9 +50,8 @@ from tfcompose.launcher.readiness import (
     unmet,
 )
 from tfcompose.launcher.restarts import backoff_s, follow_plan, process_exited, process_requested, refusal
-from tfcompose.launcher.state import Stop, by_owner
+from tfcompose.launcher.state import Stop, Transition, by_owner
 from tfcompose.launcher.stopping import edge_taken, firmer_at, send_due_signals, stop_if_requested
-from tfcompose.launcher.transition import Transition
 
 if TYPE_CHECKING:
     from tfcompose.findings import Finding

@@ -16,8 +16,7 @@ from tfcompose.launcher.failures import waits_in_vain
 
 if TYPE_CHECKING:
     from tfcompose.findings import Finding
-    from tfcompose.launcher.state import State, Tracked
-    from tfcompose.launcher.transition import Transition
+    from tfcompose.launcher.state import State, Tracked, Transition
     from tfcompose.plan import LifecycleState, PlanProcess, ReadyKind, StartCondition
 
 #: Gates that the guard watches.

@@ -14,8 +14,7 @@ from tfcompose.launcher.state import MAX_RESTARTS, Tracked
 if TYPE_CHECKING:
     from tfcompose.ipc import ProcessRequest, StateName, Verb
     from tfcompose.launcher.events import Exited, NewPlan
-    from tfcompose.launcher.state import State, Times
-    from tfcompose.launcher.transition import Transition
+    from tfcompose.launcher.state import State, Times, Transition
 
 
 def backoff_s(times: Times, failures: int) -> float:

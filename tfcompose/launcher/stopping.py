@@ -18,8 +18,7 @@ from tfcompose.launcher.state import UNREAD, Stop, by_owner
 if TYPE_CHECKING:
     from tfcompose.findings import Finding
     from tfcompose.launcher.events import Event
-    from tfcompose.launcher.state import State, Times, Tracked
-    from tfcompose.launcher.transition import Transition
+    from tfcompose.launcher.state import State, Times, Tracked, Transition
     from tfcompose.plan import PlanProcess
 
 

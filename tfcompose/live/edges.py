@@ -14,11 +14,14 @@ from tfcompose.geometry import Pose
 from tfcompose.live.arrivals import Arrivals, Timing
 from tfcompose.live.publishers import Publisher, Publishers
 from tfcompose.tf2.exceptions import DENORMALISED, Rejection, rejection_of
+from tfcompose.tree import below, children_of, drawn, loops, trees
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
+    from tfcompose.plan import PlanEdge
     from tfcompose.ros.tf_codec import Row
+
 
 #: So many edges are kept, counting an edge once for each publisher; what comes beyond is counted only.
 MOST_STREAMS = 20_000
@@ -297,3 +300,54 @@ class TreeObserver:
 
 def _order(stream: EdgeStream) -> tuple[str, str, bool, int]:
     return stream.parent, stream.child, not stream.static, stream.first_ns
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """A frame in a tree. ``indent`` draws the lines to it; ``parent`` is None for a root.
+
+    ``observed`` are all who publish where it is, the one that counts first; ``planned`` is what was expected of it.
+    """
+
+    frame: str
+    parent: str | None
+    indent: str
+    observed: tuple[EdgeState, ...] = ()
+    planned: PlanEdge | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Tree:
+    """One root and all below it, as it is drawn; or the frames of a loop, the first one again last."""
+
+    branches: tuple[Branch, ...]
+    loop: tuple[str, ...] = ()
+
+
+def forest(edges: Iterable[EdgeState], planned: Mapping[str, PlanEdge] | None = None) -> list[Tree]:
+    """Return the trees, the largest first, then the loops. Planned edges (by child) that were not seen are part of it.
+
+    A frame that was seen in several parents hangs where the newest message puts it, as in tf2.
+    """
+    by_child: dict[str, list[EdgeState]] = {}
+    for one in edges:
+        by_child.setdefault(one.child, []).append(one)
+    for some in by_child.values():
+        some.sort(key=lambda one: (one.present is False, -one.stream.arrivals.last_ns))
+    parents = {child: edge.parent for child, edge in (planned or {}).items() if child not in by_child}
+    parents |= {child: some[0].parent for child, some in by_child.items()}
+    children = children_of(sorted((parent, child) for child, parent in parents.items()))
+
+    def branch(frame: str, indent: str = "") -> Branch:
+        observed = tuple(by_child.get(frame, ()))
+        return Branch(frame, parents.get(frame), indent, observed, (planned or {}).get(frame))
+
+    grown = [
+        Tree((branch(root), *(branch(frame, lines) for lines, frame in drawn(children, root, str))))
+        for root in trees(zip(parents.values(), parents, strict=True))
+    ]
+    left = parents.keys() - {row.frame for tree in grown for row in tree.branches}
+    for loop in loops((parents[frame], frame) for frame in left):
+        rows = tuple(branch(frame) for frame in sorted(below(children, loop[0])))
+        grown.append(Tree(rows, (*loop, loop[0])))
+    return grown

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, ClassVar
 from xml.parsers import expat
 
 from tfcompose.live.state import MovingJoint, StampedData
-from tfcompose.ros.headers import HEADED, HeaderSubscription
 from tfcompose.ros.joint_codec import read_names
-from tfcompose.ros.joint_states import JOINT_STATE_TYPE, JointStateSubscription
 from tfcompose.ros.node import LATCHED, TextSubscription
+from tfcompose.ros.sensor_data import HEADED, JOINT_STATE_TYPE, HeaderSubscription, JointStateSubscription
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

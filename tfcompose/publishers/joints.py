@@ -29,8 +29,8 @@ def joints(own: Own, stop: Stop) -> None:
     from tfcompose.publishers.joint_mover import JointMover, PublishOptions  # noqa: PLC0415 (ROS, once signals are handled)
     from tfcompose.ros.clock import StampClock  # noqa: PLC0415 (ROS, once signals are handled)
     from tfcompose.ros.graph import publishing_nodes  # noqa: PLC0415 (ROS, once signals are handled)
-    from tfcompose.ros.joint_states import JointStateSubscription  # noqa: PLC0415 (ROS, once signals are handled)
     from tfcompose.ros.node import TFPublisher, open_node, parameter, wait  # noqa: PLC0415 (ROS, once signals are handled)
+    from tfcompose.ros.sensor_data import JointStateSubscription  # noqa: PLC0415 (ROS, once signals are handled)
 
     if not wait_for_go(stop):
         return

@@ -73,7 +73,7 @@ def _body(own: Own, node: Node, simulation: Simulation) -> tuple[Callable[[float
 
 
 def _joint_states(own: Own, node: Node, simulation: Simulation) -> tuple[Callable[[float, int], None], str]:
-    from tfcompose.ros.joint_states import JointStatePublisher  # noqa: PLC0415 (numpy: most stand-ins do without)
+    from tfcompose.ros.sensor_data import JointStatePublisher  # noqa: PLC0415 (numpy: most stand-ins do without)
 
     source = JointSource(simulation, [edge.joint for edge in own.plan.edges if edge.joint])
     publisher = JointStatePublisher(node, source.names)

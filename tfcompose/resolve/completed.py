@@ -12,7 +12,7 @@ from tfcompose.resolve.claims import settled
 from tfcompose.resolve.isolation import Filler, isolate
 from tfcompose.resolve.processes import has_claims
 from tfcompose.resolve.stock import with_stock
-from tfcompose.urdf.ros2_control import unknown_joints
+from tfcompose.urdf.blocks import unknown_joints
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

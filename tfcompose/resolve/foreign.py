@@ -16,10 +16,9 @@ from tfcompose.resolve.isolation import topics_below
 from tfcompose.resolve.poses import pose_of
 from tfcompose.resolve.processes import full_name
 from tfcompose.resolve.stock import with_stock
-from tfcompose.urdf.blocks import read_block
+from tfcompose.urdf.blocks import read_block, with_hardware
 from tfcompose.urdf.convert import robot_of
 from tfcompose.urdf.read import read_xml
-from tfcompose.urdf.ros2_control import with_hardware
 from tfcompose.urdf.xacro import Call, macros_in
 
 if TYPE_CHECKING:

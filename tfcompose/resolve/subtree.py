@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tfcompose.urdf.blocks import within
-from tfcompose.urdf.ros2_control import with_joints
+from tfcompose.urdf.blocks import with_joints, within
 
 if TYPE_CHECKING:
     from tfcompose.model import Robot

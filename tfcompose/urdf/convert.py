@@ -32,8 +32,7 @@ from tfcompose.model import (
 )
 from tfcompose.urdf.blocks import REFERRING, unknown_references
 from tfcompose.urdf.inertia import traces
-from tfcompose.urdf.schema import JOINT_TYPES, MOMENTS, SIZES, unknown_words
-from tfcompose.urdf.values import HUGE, Values, version_of
+from tfcompose.urdf.schema import HUGE, JOINT_TYPES, MOMENTS, SIZES, Values, unknown_words, version_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

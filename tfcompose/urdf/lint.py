@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from tfcompose.check import RULES, apply, check, unused_allows
 from tfcompose.findings import Finding, RejectedError, Span, finding
 from tfcompose.load import allows_in_xml
+from tfcompose.urdf.blocks import with_hardware
 from tfcompose.urdf.convert import robot_of
 from tfcompose.urdf.read import read_xml
-from tfcompose.urdf.ros2_control import with_hardware
 from tfcompose.urdf.xacro import macros_in
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from tfcompose.files import AS_IN_SOURCE
 from tfcompose.geometry import Pose
 from tfcompose.model import BOUNDED, JOINTS, STATIC
 from tfcompose.numbers import clean_rpy, clean_tensor, clean_xyz, number, numbers
-from tfcompose.urdf.ros2_control import ATTRIBUTES
+from tfcompose.urdf.blocks import ATTRIBUTES
 from tfcompose.urdf.schema import MOMENTS
 
 if TYPE_CHECKING:

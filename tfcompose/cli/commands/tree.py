@@ -19,7 +19,7 @@ from tfcompose.render.text import RED, YELLOW
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-    from tfcompose.live.forest import Branch, Tree
+    from tfcompose.live.edges import Branch, Tree
     from tfcompose.model import Robot
     from tfcompose.plan import Plan, PlanEdge
 
@@ -56,7 +56,7 @@ def run(arguments: Namespace) -> int:
 def _planned_json(robot: Robot) -> str:
     """Return one line of JSON, in the shape of --live: the trees with their roots, and what the robot says of edges."""
     from tfcompose.emit.plan import plan_of
-    from tfcompose.live.forest import forest
+    from tfcompose.live.edges import forest
 
     trees = [
         _tree_object(tree, [_planned_edge(branch.planned) for branch in tree.branches if branch.planned is not None])
@@ -84,8 +84,7 @@ def _planned_edge(edge: PlanEdge) -> dict[str, Any]:
 
 def _print_published(arguments: Namespace) -> None:
     from tfcompose.cli.live import observe, observed_topics, read_bag
-    from tfcompose.live.edges import SETTLE_S, TreeObserver
-    from tfcompose.live.forest import forest
+    from tfcompose.live.edges import SETTLE_S, TreeObserver, forest
     from tfcompose.plan.topics import parts_of
 
     plan, pairs = observed_topics(arguments)

@@ -1,22 +1,58 @@
-"""What stands in the header of sensor messages: their frame and their time, read from the bytes of any such type.
+"""The topics of sensors: joint states below the node's namespace, and the headers of messages that carry one.
 
-std_msgs/Header is the first member of each: int32 seconds, uint32 nanoseconds, and the frame as uint32 length, bytes
-and a NUL that the length counts, after CDR's four bytes of header.
+Messages are bytes; ``joint_codec`` reads and writes joint states. std_msgs/Header is the first member of each type in
+``HEADED``: int32 seconds, uint32 nanoseconds, and the frame as uint32 length, bytes and a NUL that the length counts,
+after CDR's four bytes of header.
 """
 
 from __future__ import annotations
 
 import struct
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from sensor_msgs.msg import JointState
 
-from tfcompose.ros.node import Subscription, qos
+from tfcompose.ros.joint_codec import encode_names, fill
+from tfcompose.ros.node import JOINT_STATES, Subscription, qos
 from tfcompose.ros.tf_codec import BIG_ENDIAN, LITTLE_ENDIAN
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rclpy.node import Node
+
+
+JOINT_STATES_TOPIC = "joint_states"
+JOINT_STATE_TYPE = "sensor_msgs/msg/JointState"
+
+
+class JointStateSubscription(Subscription):
+    """A subscription to ``joint_states``, or to another topic of its type."""
+
+    def __init__(self, node: Node, topic: str = JOINT_STATES_TOPIC) -> None:
+        super().__init__(node, JointState, topic, JOINT_STATES)
+
+
+class JointStatePublisher:
+    """Publishes the positions (rad or m) of the same joints again and again."""
+
+    def __init__(self, node: Node, names: Sequence[str]) -> None:
+        self._publisher: Any = node.create_publisher(JointState, JOINT_STATES_TOPIC, 10)
+        self._message = encode_names(names)
+
+    @property
+    def topic(self) -> str:
+        """The topic's full name."""
+        name: str = self._publisher.topic_name
+        return name
+
+    def publish(self, stamp_ns: int, positions: Sequence[float]) -> None:
+        """Publish them, in the names' order, with this time in nanoseconds."""
+        fill(self._message, stamp_ns, positions)
+        self._publisher.publish(bytes(self._message))
+
 
 #: Messages that have a header, and are looked up in TF. Images are left out: their CameraInfo has the same header.
 HEADED = (

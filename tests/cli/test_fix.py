@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.support import processes
+from tests.support.cli import tfcompose_in
 from tfcompose.cli.compiling import library
 from tfcompose.cli.fixing import Fixer, edited, rewrite
 from tfcompose.compile import compile_robot
@@ -49,8 +50,7 @@ def fixed(folder: Path, text: str) -> str:
 
 
 def run(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "tfcompose", "lint", "--fix", *words]
-    return processes.run(command, cwd=folder)
+    return tfcompose_in(folder, "lint", "--fix", *words)
 
 
 PAIR = "links: {a: {}, b: {parent: a, "

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.support import processes
+from tests.support.cli import tfcompose_in
 from tfcompose.cli.writing import write_all
 from tfcompose.files import File
 
@@ -101,8 +102,7 @@ def test_a_file_in_the_way_of_a_folder_leaves_everything_as_it_was(tmp_path: Pat
 
 
 def build(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "tfcompose", "build", *words]
-    return processes.run(command, cwd=folder)
+    return tfcompose_in(folder, "build", *words)
 
 
 @pytest.mark.parametrize("output", ["file", "file/below", "/proc/tfcompose", "/dev/null/out"])

@@ -5,7 +5,6 @@ No process runs: what judges is given what it would have seen.
 
 from __future__ import annotations
 
-import contextlib
 import os
 from dataclasses import replace
 from functools import partial
@@ -16,6 +15,7 @@ from unittest import mock
 
 from tests.support import guard_history as guarded
 from tests.support.bags import drive, write_bag
+from tests.support.cli import inside
 from tests.support.machine_history import GUARD, SLAM, STATIC, begin, run_process
 from tests.support.plans import compiled_plan
 from tests.support.presets import MAST, WRONG_IN_MAST
@@ -552,17 +552,6 @@ def compiled() -> Iterator[Finding]:
     assert sound
     files = [replace(file, text=file.text.replace("0 0 0.3", "0 0 0.4")) for file in emit(sound)]
     yield from building._differences(sound, files, Target())
-
-
-@contextlib.contextmanager
-def inside(folder: str) -> Iterator[None]:
-    """Work in this folder."""
-    before = Path.cwd()
-    os.chdir(folder)
-    try:
-        yield
-    finally:
-        os.chdir(before)
 
 
 def _with_preset(name: str, text: str, robot: str) -> Iterator[Finding]:

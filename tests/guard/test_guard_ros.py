@@ -172,7 +172,8 @@ def test_a_stranger_on_an_owned_edge_is_named_once(robot: Robot, stranger: Stran
     named = ("error[TF801]", "odom → base_link", "/strange/rogue_odom", "base_drive")
     stranger("rogue_odom", "moving", "odom base_link")
     robot.says(*named)
-    time.sleep(1)
+    stranger.leaves()
+    robot.says("over", "odom → base_link", "/strange/rogue_odom")
     assert len(robot.lines(*named)) == 1
 
 

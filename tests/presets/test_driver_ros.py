@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import signal
 import subprocess
 import sys
-import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -91,10 +92,9 @@ robot: rover
 ros: {discovery: localhost}
 links: {base_link: {}}
 sensors:
-  front: {preset: realsense/d435i, parent: base_link, options: {%s}, %s}
+  front: {preset: realsense/d435i, parent: base_link, options: {%s}
 """
 EVERYTHING = 'streams: [depth, color, infra1, infra2], imu: true, serial: "0042"'
-CLEAR_S = 3.0
 
 
 @dataclass
@@ -114,6 +114,11 @@ class Up:
         for word in words:
             assert word in self.text, self.text
 
+    def ended(self) -> list[str]:
+        """Wait until it has ended, and return the codes of what was found."""
+        self.popen.wait(TIMEOUT_S)
+        return re.findall(r"\[(TF\d{3})\]", self.text)
+
 
 @pytest.fixture
 def up(domain: object, tmp_path: Path) -> Iterator[Callable[..., Up]]:
@@ -125,13 +130,13 @@ def up(domain: object, tmp_path: Path) -> Iterator[Callable[..., Up]]:
     program.chmod(0o755)
     running: list[Up] = []
 
-    def run(text: str, **environment: str) -> Up:
+    def run(text: str, *words: str, **environment: str) -> Up:
         (tmp_path / "rover.yaml").write_text(text, encoding="utf-8")
         output = tmp_path / "output.txt"
         prefixes = os.pathsep.join(filter(None, [str(tmp_path / "ros"), os.environ.get("AMENT_PREFIX_PATH")]))
         with output.open("wb") as out:
             popen = processes.start(
-                [sys.executable, "-m", "tfcompose", "up", "rover.yaml"],
+                [sys.executable, "-m", "tfcompose", "up", "rover.yaml", *words],
                 stdout=out,
                 stderr=out,
                 cwd=tmp_path,
@@ -153,74 +158,65 @@ def up(domain: object, tmp_path: Path) -> Iterator[Callable[..., Up]]:
         assert not psutil.wait_procs(below, TIMEOUT_S)[1]
 
 
-def codes(text: str) -> list[str]:
-    return [line for line in text.splitlines() if "[TF" in line]
+@pytest.mark.parametrize(
+    ("options", "environment"),
+    [
+        (f"{EVERYTHING}}}, tf: driver", {}),
+        ("streams: [depth]}, tf: driver", {}),
+        ("streams: [infra1, infra2]}, tf: driver", {}),
+        ("imu: true, unite_imu: false}, tf: driver", {}),
+        (f"{EVERYTHING}}}, tf: tfcompose", {}),
+        (f"{EVERYTHING}}}, tf: driver", {"STAND_IN_SLEEPS": "1"}),
+    ],
+    ids=["all", "depth", "infra", "imu", "switched off", "answers nothing"],
+)
+def test_a_driver_that_does_as_its_preset_says_is_let_alone(
+    up: Callable[..., Up], options: str, environment: dict[str, str]
+) -> None:
+    robot = up(ROVER % options, "--for", "5", **environment)
+    assert robot.ended() == []
+    assert "tree complete" in robot.text
+    if "STAND_IN_SLEEPS" not in environment:
+        assert f"stand-in: /front/front{' 0042' if 'serial' in options else ''}" in robot.text
 
 
 @pytest.mark.parametrize(
-    "options", [EVERYTHING, "streams: [depth]", "streams: [infra1, infra2]", "imu: true, unite_imu: false"]
-)
-def test_a_driver_that_publishes_what_its_preset_says_is_let_alone(up: Callable[..., Up], options: str) -> None:
-    robot = up(ROVER % (options, "tf: driver"))
-    robot.says("stand-in: /front/front")
-    robot.says("edges live")
-    time.sleep(CLEAR_S)
-    assert codes(robot.text) == []
-    if "serial" in options:
-        assert "stand-in: /front/front 0042" in robot.text
-
-
-def test_a_driver_that_ignores_its_switch_is_named_with_it(up: Callable[..., Up]) -> None:
-    robot = up(ROVER % (EVERYTHING, "tf: tfcompose"), STAND_IN_IGNORES="1")
-    robot.says("TF801", "/front/front", "publish_tf: false", "realsense/d435i")
-
-
-def test_a_driver_that_keeps_to_its_switch_is_let_alone(up: Callable[..., Up]) -> None:
-    robot = up(ROVER % (EVERYTHING, "tf: tfcompose"))
-    robot.says("stand-in: /front/front")
-    time.sleep(CLEAR_S)
-    assert codes(robot.text) == []
-
-
-def test_a_driver_with_another_stream_than_its_preset_has_is_named_with_what_was_expected(
-    up: Callable[..., Up],
+    ("options", "environment", "code", "names"),
+    [
+        (f"{EVERYTHING}}}, tf: tfcompose", {"STAND_IN_IGNORES": "1"}, "TF801", ("publish_tf: false", "front (realse")),
+        ("streams: [depth]}, tf: driver", {"STAND_IN_ALSO": "infra1"}, "TF803", ("front_infra1", "sensors.front")),
+        (  # an infra2 that is 4.5 cm further to the right is that of a D455
+            f"{EVERYTHING}}}, tf: driver",
+            {"STAND_IN_OFF": "infra2_frame:-0.045"},
+            "TF828",
+            (
+                "front_infra2_frame", "front_link", " 46.", "xyz 0.0004 -0.0962 0.0003 m", "xyz 0 -0.05 0 m",
+                "sensors: {front: {frames: {front_infra2_frame: {xyz: [0.0004, -0.0962, 0.0003]",
+            ),
+        ),
+        (
+            "streams: [depth]}, tf: driver",
+            {"STAND_IN_OFF": "depth_optical_frame:0.002"},
+            "TF828",
+            ("front_depth_optical_frame", "front_depth_frame", " 2 mm"),
+        ),
+        (
+            f"{EVERYTHING}}}, tf: tfcompose",
+            {"STAND_IN_FORCES": "true"},
+            "TF829",
+            ("publish_tf: true", "publish_tf: false", "front (realsense/d435i)"),
+        ),
+        (f"{EVERYTHING}}}, tf: driver", {"STAND_IN_LACKS": "publish_tf"}, "TF829", ("publish_tf",)),
+    ],
+    ids=["ignores its switch", "another stream", "a nominal frame", "an exact frame", "forces", "lacks"],
+)  # fmt: skip
+def test_a_driver_that_does_otherwise_is_named_once(
+    up: Callable[..., Up], options: str, environment: dict[str, str], code: str, names: tuple[str, ...]
 ) -> None:
-    robot = up(ROVER % ("streams: [depth]", "tf: driver"), STAND_IN_ALSO="infra1")
-    robot.says("TF803", "realsense/d435i", "front_infra1_frame", "/front/front", "sensors.front")
-
-
-def test_a_driver_whose_frame_is_far_from_nominal_is_reported_with_both_poses(up: Callable[..., Up]) -> None:
-    """An infra2 that is 4.5 cm further to the right is that of a D455."""
-    robot = up(ROVER % (EVERYTHING, "tf: driver"), STAND_IN_OFF="infra2_frame:-0.045")
-    robot.says("warning[TF828]", "front_infra2_frame", "front_link", "/front/front", " 46.", "realsense/d435i")
-    robot.says("xyz 0.0004 -0.0962 0.0003 m", "xyz 0 -0.05 0 m")
-    robot.says("sensors: {front: {frames: {front_infra2_frame: {xyz: [0.0004, -0.0962, 0.0003]")
-    time.sleep(CLEAR_S)
-    assert len(codes(robot.text)) == 1
-
-
-def test_a_frame_that_the_preset_calls_exact_may_not_be_off_by_two_millimetres(up: Callable[..., Up]) -> None:
-    robot = up(ROVER % ("streams: [depth]", "tf: driver"), STAND_IN_OFF="depth_optical_frame:0.002")
-    robot.says("TF828", "front_depth_optical_frame", "front_depth_frame", "/front/front", " 2 mm")
-
-
-def test_a_switch_that_the_driver_has_otherwise_is_read_back_and_named(up: Callable[..., Up]) -> None:
-    robot = up(ROVER % (EVERYTHING, "tf: tfcompose"), STAND_IN_FORCES="true")
-    robot.says("error[TF829]", "/front/front", "publish_tf: true", "publish_tf: false", "front (realsense/d435i)")
-    time.sleep(CLEAR_S)
-    assert len([line for line in codes(robot.text) if "TF829" in line]) == 1
-
-
-def test_a_switch_that_the_driver_does_not_know_is_requested_a_while_and_named(up: Callable[..., Up]) -> None:
-    robot = up(ROVER % (EVERYTHING, "tf: driver"), STAND_IN_LACKS="publish_tf")
-    robot.says("TF829", "/front/front", "publish_tf")
-
-
-def test_a_driver_that_answers_no_question_is_let_alone(up: Callable[..., Up]) -> None:
-    robot = up(ROVER % (EVERYTHING, "tf: driver"), STAND_IN_SLEEPS="1")
-    robot.says("edges live")
-    time.sleep(CLEAR_S)
-    assert codes(robot.text) == []
+    robot = up(ROVER % options, **environment)
+    robot.says(code, "/front/front", *names)
+    robot.popen.send_signal(signal.SIGINT)
+    assert robot.ended().count(code) == 1
 
 
 def test_two_cameras_of_one_kind_get_names_and_serial_numbers_by_two_lines(
@@ -228,9 +224,8 @@ def test_two_cameras_of_one_kind_get_names_and_serial_numbers_by_two_lines(
 ) -> None:
     line = '  %s: {preset: realsense/d435i, parent: base_link, xyz: [%s, 0, 0], options: {serial: "%s"}}\n'
     head = "tfcompose: 1\nrobot: rover\nros: {discovery: localhost}\nlinks: {base_link: {}}\nsensors:\n"
-    robot = up(head + line % ("left", 0.1, "0001") + line % ("right", 0.2, "0002"))
-    robot.says("stand-in: /left/left 0001", "stand-in: /right/right 0002")
-    time.sleep(CLEAR_S)
-    assert codes(robot.text) == []
+    robot = up(head + line % ("left", 0.1, "0001") + line % ("right", 0.2, "0002"), "--for", "5")
+    assert robot.ended() == []
+    assert all(said in robot.text for said in ("stand-in: /left/left 0001", "stand-in: /right/right 0002"))
     plan = json.loads(next(tmp_path.rglob("plan.json")).read_text("utf-8"))
     assert {edge["child"].partition("_")[0] for edge in plan["edges"]} == {"left", "right"}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.support import processes
+from tests.support.cli import tfcompose_in
 from tests.support.findings import words
 from tfcompose.check import RULES
 from tfcompose.cli.compiling import library
@@ -52,8 +51,7 @@ def lint_text(text: str) -> tuple[Finding, ...]:
 
 
 def run(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "tfcompose", "lint", *words]
-    return processes.run(command, cwd=folder)
+    return tfcompose_in(folder, "lint", *words)
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)

@@ -14,6 +14,7 @@ import pytest
 import trimesh
 
 from tests.support import processes
+from tests.support.cli import tfcompose_in
 from tfcompose.cli import main
 
 if TYPE_CHECKING:
@@ -44,9 +45,7 @@ def workspace(tmp_path: Path) -> Path:
 
 
 def build(workspace: Path, *words: str, file: str = "src/robots/r.yaml") -> subprocess.CompletedProcess[str]:
-    env = os.environ | {"AMENT_PREFIX_PATH": f"/nowhere:{workspace}/install"}
-    command = [sys.executable, "-m", "tfcompose", "build", file, *words]
-    return processes.run(command, cwd=workspace, env=env)
+    return tfcompose_in(workspace, "build", file, *words, AMENT_PREFIX_PATH=f"/nowhere:{workspace}/install")
 
 
 def addresses(folder: Path) -> list[str]:

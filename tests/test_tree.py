@@ -8,7 +8,7 @@ import networkx as nx
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tfcompose.tree import below, children_of, drawn, loop_closed_by, loops, trees, way_up
+from tfcompose.tree import DEEPEST_DRAWN, below, children_of, drawn, loop_closed_by, loops, trees, way_up
 
 FRAMES = st.sampled_from("abcdefg")
 EDGES = st.lists(st.tuples(FRAMES, FRAMES), max_size=14)
@@ -69,3 +69,11 @@ def test_a_drawing_has_the_lines_of_a_tree() -> None:
         "│       └── arm",
         "└── dock",
     ]
+
+
+def test_a_deep_tree_is_drawn_no_wider_than_its_deepest_indented_level() -> None:
+    chain = {str(depth): [str(depth + 1)] for depth in range(5000)}
+    lines = [lines for lines, _ in drawn(chain, "0", str)]
+    assert len(lines) == 5000
+    assert max(map(len, lines)) <= 4 * DEEPEST_DRAWN + 10
+    assert [line.strip() for line in lines[DEEPEST_DRAWN - 1 : DEEPEST_DRAWN + 2]] == ["└──", "+1 └──", "+2 └──"]

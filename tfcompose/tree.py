@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 _Item = TypeVar("_Item")
 
+#: So many levels are indented in a drawing: the width of all lines grows with the depth of one.
+DEEPEST_DRAWN = 50
+
 
 def children_of(edges: Iterable[Edge]) -> dict[str, list[str]]:
     """Return the children of each parent, in the order of the edges; a child comes once."""
@@ -108,15 +111,17 @@ def drawn(
     """Yield what is below the root in the order of a drawing, each with the lines that lead to it.
 
     ``children`` are frames, or edges to them; ``name_of`` returns the frame of one. It has to be a tree: below a loop
-    this does not end.
+    this does not end. What is deeper than ``DEEPEST_DRAWN`` stays in its column, with the number of further levels.
     """
 
-    def level(frame: str, indent: str) -> list[tuple[str, _Item, bool]]:
+    def level(frame: str, indent: str, depth: int) -> list[tuple[str, int, _Item, bool]]:
         some = children.get(frame, ())
-        return [(indent, item, index == len(some) - 1) for index, item in enumerate(some)][::-1]
+        return [(indent, depth, item, index == len(some) - 1) for index, item in enumerate(some)][::-1]
 
-    waiting = level(root, "")
+    waiting = level(root, "", 1)
     while waiting:
-        indent, item, is_last = waiting.pop()
-        yield f"{indent}{'└── ' if is_last else '├── '}", item
-        waiting += level(name_of(item), indent + ("    " if is_last else "│   "))
+        indent, depth, item, is_last = waiting.pop()
+        deeper = f"+{depth - DEEPEST_DRAWN} " if depth > DEEPEST_DRAWN else ""
+        yield f"{indent}{deeper}{'└── ' if is_last else '├── '}", item
+        inner = indent if depth >= DEEPEST_DRAWN else indent + ("    " if is_last else "│   ")
+        waiting += level(name_of(item), inner, depth + 1)

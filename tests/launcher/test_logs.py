@@ -7,12 +7,12 @@ import os
 import time
 from typing import TYPE_CHECKING
 
+import pytest
+
 from tfcompose.launcher.logs import KEPT, Follower, Logs, last_modified, logged, read_logs
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    import pytest
 
 
 def texts(folder: Path, *names: str) -> list[str]:
@@ -109,3 +109,22 @@ def test_a_log_that_is_a_link_is_not_followed(tmp_path: Path) -> None:
     logs = Logs(tmp_path)
     assert "are not written" in (logs.write("a", "text") or "")
     assert (tmp_path / "elsewhere").read_text() == ""
+
+
+@pytest.mark.parametrize("process", ["a", "arm/a"])
+def test_a_folder_that_is_a_link_is_not_written_to(tmp_path: Path, process: str) -> None:
+    elsewhere, folder = tmp_path / "elsewhere", tmp_path / "logs"
+    elsewhere.mkdir()
+    folder.mkdir()
+    link = folder / "arm" if "/" in process else tmp_path / "link"
+    link.symlink_to(elsewhere)
+    logs = Logs(folder if "/" in process else link)
+    assert "link" in (logs.write(process, "text") or "")
+    assert list(elsewhere.iterdir()) == []
+
+
+def test_another_users_folder_is_not_written_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    own = os.geteuid()
+    monkeypatch.setattr(os, "geteuid", lambda: own + 1)
+    assert "another user" in (Logs(tmp_path).write("a", "text") or "")
+    assert list(tmp_path.iterdir()) == []

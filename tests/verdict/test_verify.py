@@ -364,3 +364,10 @@ def test_what_a_strict_guard_passes_on_is_its_owners(plan: Plan) -> None:
         sent["node"] = "/rover/guard"
     assert tree.reported(strict) == []
     assert {one.code for one in tree.reported(plan)} == {"TF801"}
+
+
+@pytest.mark.parametrize("metres", [0.012, 0.1, 0.7, 3.3])
+def test_what_is_off_by_the_tolerance_is_within_it(metres: float) -> None:
+    off = offset_of(Pose((1.1, 0.2, 0.3)), Pose((1.1 + metres, 0.2, 0.3)))
+    assert not off.beyond(Offset(metres, 0.0))
+    assert off.beyond(Offset(metres * 0.999, 0.0))

@@ -7,8 +7,10 @@ costs lines, and stops nobody.
 from __future__ import annotations
 
 import contextlib
+import errno
 import heapq
 import os
+import stat
 import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -71,6 +73,8 @@ class Logs:
     def _begin(self, process: str) -> _Log:
         path = self.folder / f"{process}.log"  # of a part in a folder: arm/driver
         path.parent.mkdir(parents=True, exist_ok=True)
+        for folder in {self.folder, path.parent}:
+            _ensure_own(folder)
         fd = os.open(path, os.O_CREAT | os.O_WRONLY | os.O_APPEND | os.O_NOFOLLOW, 0o640)
         log = self._open[process] = _Log(path, fd, os.fstat(fd).st_size)
         return log
@@ -91,6 +95,19 @@ class Logs:
             zone = time.strftime("%z", local)
             self._second, self._stamp = second, (time.strftime("%Y-%m-%dT%H:%M:%S", local), f"{zone[:3]}:{zone[3:]}")
         return f"{self._stamp[0]}.{int(now * 1000) % 1000:03d}{self._stamp[1]}"
+
+
+def _ensure_own(folder: Path) -> None:
+    """Refuse a folder that somebody else put there, as they may in a shared ROS_LOG_DIR, and what leads elsewhere.
+
+    Raises:
+        OSError: if it is a link, or another user's.
+    """
+    found = folder.lstat()
+    if stat.S_ISLNK(found.st_mode):
+        raise OSError(errno.EPERM, "the folder is a link", str(folder))
+    if found.st_uid != os.geteuid():
+        raise OSError(errno.EPERM, "the folder is another user's", str(folder))
 
 
 def logged(folder: Path) -> list[str]:

@@ -33,13 +33,15 @@ class Offset(NamedTuple):
         return " and ".join(parts) or "nothing"
 
     def beyond(self, limit: Offset) -> bool:
-        """Whether the distance or the angle is larger than that of ``limit``."""
-        return self.xyz_m > limit.xyz_m or self.rot_rad > limit.rot_rad
+        """Whether the distance or the angle is larger than that of ``limit``, by more than what computing adds."""
+        return self.xyz_m > limit.xyz_m + _ROUNDING or self.rot_rad > limit.rot_rad + _ROUNDING
 
 
 #: What two poses may be apart and count as the same.
 DEFAULT_TOLERANCE = Offset(1e-3, math.radians(0.1))
 _NO_MM, _NO_RAD = 1e-6, 1e-6
+#: Metres and radians.
+_ROUNDING = 1e-9
 
 
 def offset_of(expected: Pose, observed: Pose) -> Offset:

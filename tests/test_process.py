@@ -22,7 +22,7 @@ def _last_error(capsys: pytest.CaptureFixture[str]) -> str:
 
 def test_wrong_arguments_end_with_code_2_and_the_usage(capsys: pytest.CaptureFixture[str]) -> None:
     assert static.main(["plan.json"]) == 2
-    assert "usage: python -m tfcompose.publishers.static PLAN_FILE PROCESS_NAME" in _last_error(capsys)
+    assert "usage: python -m tfcompose.publishers.static " in _last_error(capsys)
 
 
 def test_a_missing_plan_ends_with_code_2_and_its_name(capsys: pytest.CaptureFixture[str]) -> None:
@@ -39,9 +39,9 @@ def test_what_is_no_plan_ends_with_code_2(capsys: pytest.CaptureFixture[str], tm
 
 def test_a_process_that_the_plan_does_not_have_is_refused(write: Callable[..., Path]) -> None:
     file = str(write([], PlanProcess("static", "static")))
-    with pytest.raises(RejectedError, match="no process other"):
+    with pytest.raises(RejectedError, match="other"):
         read_own([file, "other"], "static")
-    with pytest.raises(RejectedError, match="process static is of kind static, not joints"):
+    with pytest.raises(RejectedError, match=r"static\b.*\bjoints"):
         read_own([file, "static"], "joints")
 
 
@@ -61,6 +61,6 @@ def test_a_node_has_the_name_and_the_namespace_of_the_plan(write: Callable[..., 
 def test_without_ros_it_ends_with_code_1_and_says_what_to_install(
     write: Callable[..., Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tfcompose.process.missing_ros", lambda: "rclpy cannot be imported: install it")
+    monkeypatch.setattr("tfcompose.process.missing_ros", lambda: "no rclpy: install it")
     assert static.main([str(write([], PlanProcess("static", "static"))), "static"]) == 1
-    assert _last_error(capsys) == "rclpy cannot be imported: install it\n"
+    assert _last_error(capsys) == "no rclpy: install it\n"

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from tests.support.findings import words_of
 from tests.support.robots import DRIVEN, ON_TWO_HOSTS
 from tfcompose.cli import main
 
@@ -40,11 +41,11 @@ def test_a_hosts_share_is_exported_without_the_others(robot: Path, capsys: pytes
 
     assert services("--host", "jetson") == {"arm_drive", "guard"}
     assert services("--host", "") == {"static", "drive", "guard"}
-    assert "and is here too" not in capsys.readouterr().out
+    assert "jetson" not in capsys.readouterr().out
     assert services() == {"static", "drive", "arm_drive", "guard"}
-    assert "arm_drive runs on jetson, and is here too: --host" in capsys.readouterr().out
+    assert words_of(capsys.readouterr().out) >= {"arm_drive", "jetson", "--host"}
     assert main(["export", "compose", "two.yaml", "--host", "jetsn"]) == 1
-    assert "did you mean jetson?" in capsys.readouterr().err
+    assert " jetson?" in capsys.readouterr().err
 
 
 def test_units_name_where_things_are_on_the_robot(robot: Path) -> None:
@@ -71,12 +72,12 @@ def test_a_strict_plan_is_exported_where_a_guard_runs_and_every_owner_can_be_fen
     robot: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["export", "compose", *STRICT]) == 0
-    assert ": the fence is one of remappings" in capsys.readouterr().out
+    assert "fence" in words_of(capsys.readouterr().out)
     file = robot / "robot.yaml"
     text = file.read_text("utf-8").replace("run: [slam, --now]", "run: slam | tee log, shell: true")
     file.write_text(text, "utf-8")
     assert main(["export", "systemd", *STRICT]) == 1
-    assert "slam takes no ROS arguments" in capsys.readouterr().err
+    assert "slam" in words_of(capsys.readouterr().err)
     assert not (robot / "build" / "rover" / "systemd").exists()
 
 

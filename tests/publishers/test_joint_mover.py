@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from tests.support.findings import words_of
 from tfcompose.geometry import Pose, angle_between, normalised
 from tfcompose.plan import Joint, PlanEdge, SourceLine
 from tfcompose.publishers.joint_mover import JointMover, PublishOptions
@@ -135,7 +136,8 @@ def test_a_joint_without_a_single_position_is_never_published_and_reported_once(
     robot = Robot([joint_edge(Joint("float", kind)), slide("left"), joint_edge(Joint("f", "revolute", Z, "float"))])
     for stamp in (1, 2):
         assert heights(robot.hear({"float": 1.0, "left": 2.0}, stamp)).keys() == {"left", "f"}
-    assert robot.reports == [f"base → float is not published: a {kind} joint has no single position in joint states"]
+    (report,) = robot.reports
+    assert words_of(report) >= {"base", "float", kind}
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
@@ -143,7 +145,8 @@ def test_a_position_that_is_not_finite_drops_the_message_with_one_line_that_name
     robot = Robot([slide("left"), slide("right")])
     for stamp in range(1, 4):
         assert robot.hear({"left": 1.0, "right": bad}, stamp) == {}
-    assert robot.reports == ["dropped a joint state: the position of right is not finite (said once)"]
+    (report,) = robot.reports
+    assert "right" in words_of(report)
     assert heights(robot.hear({"left": 1.0, "right": 2.0}, 9)) == {"left": 1.0, "right": 2.0}
 
 
@@ -154,10 +157,8 @@ def test_messages_that_are_none_are_dropped_with_one_line_for_each_fault() -> No
     for _ in range(3):
         for length in (0, 3, 20, len(data) - 12):
             assert robot.answer(bytes(data[:length])) == {}
-    assert robot.reports == [
-        "dropped a joint state: its bytes are not one (said once)",
-        "dropped a joint state: it ends inside its positions (said once)",
-    ]
+    assert len(robot.reports) == len(set(robot.reports)) == 2
+    assert "positions" in words_of(robot.reports[1])
 
 
 def test_a_source_that_never_repeats_its_names_fills_neither_the_memory_nor_the_output() -> None:
@@ -188,7 +189,7 @@ def test_a_time_that_comes_twice_is_left_out_as_tf2_would_with_one_line() -> Non
     assert robot.hear({"left": 1.0}, 10) == {}
     assert robot.hear({"right": 1.0}, 10), "another driver's joints"
     assert robot.hear({"left": 1.0}, 11)
-    assert robot.reports == ["left out a joint state with the same time as the one before (said once)"]
+    assert len(robot.reports) == 1
 
 
 def test_a_recording_that_starts_anew_is_published() -> None:

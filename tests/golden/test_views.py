@@ -1,0 +1,163 @@
+"""Golden views: what commands print, one file each; other tests assert names, numbers and exit codes.
+
+No process runs: commands that look at recordings stand for those that look at a live tree, and statuses and notices are
+given as a launcher would. After an intended change: ``python -m tests.golden.test_views --write``.
+"""
+
+from __future__ import annotations
+
+import difflib
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+from unittest import mock
+
+import pytest
+
+from tests.golden.test_findings import ROOT
+from tests.support.bags import UP, drive, write_bag
+from tests.support.cli import tfcompose_in
+from tests.support.robots import ROVER
+from tfcompose.cli.commands import ps
+from tfcompose.cli.console import Console
+from tfcompose.findings import Note, finding
+from tfcompose.ipc import (
+    AllReady,
+    AllStarted,
+    Ended,
+    FindingShown,
+    LogLine,
+    Missing,
+    Notice,
+    OwnerLive,
+    ProcessReady,
+    ProcessState,
+    ProcessStatus,
+    RecoveredShown,
+    Replanned,
+    RobotStatus,
+    StartRow,
+    Stopping,
+    TreeComplete,
+    Waiting,
+)
+from tfcompose.plan import Plan, PlanProcess, RosSettings
+
+if TYPE_CHECKING:
+    from tests.support.bags import Sent
+
+GOLDEN = Path(__file__).parent / "views"
+FIXED: list[Sent] = [("/tf_static", 0.0, "base_link", "lidar", 0.0, (0.0, 0.0, 0.3), UP)]
+#: In the repository's folder, and in one with rover.yaml and a recording of it.
+COMMANDS = {
+    "pose": ["pose robots/autonomous_robot.yaml laser_link camera_link", "pose rover.yaml odom lidar"],
+    "explain": [
+        "explain TF301",
+        "explain robots/autonomous_robot.yaml base_link laser_link",
+        "explain rover.yaml base_link lidar --set frames.lidar.xyz=[0,0,1]",
+    ],
+    "tree": ["tree robots/two_rovers.yaml", "tree robots/autonomous_robot.yaml --profile demo"],
+    "presets": ["presets realsense/d455", "presets ekf", "presets lidar2d"],
+    "dry_run": ["up rover.yaml --dry-run"],
+    "recording": [
+        "monitor --bag bag",
+        "tree --bag bag",
+        "tree rover.yaml --bag bag",
+        "verify rover.yaml --bag bag",
+        "echo odom lidar --bag bag --once",
+        "echo odom lidr --bag bag --once",
+    ],
+    "wrong_use": ["lnit", "pose rover.yaml odom lidr", "lint none.yaml", "explain TF999"],
+}
+
+PLAN = Plan("rover", "0", None, RosSettings(), (), tuple(PlanProcess(name, "run") for name in ("static", "drive")))
+NOTICES: tuple[Notice, ...] = (
+    ProcessState("static", "RUNNING", 7),
+    ProcessState("drive", "EXPECTED"),
+    LogLine("drive", "stderr", "no device"),
+    AllStarted(2, ("drive",), 1.0),
+    OwnerLive("static", "/static", ("base_link → lidar", "base_link → imu"), 1.25),
+    ProcessReady("drive", "/scan", 1.5),
+    Waiting((Missing("drive", "/drive", ("odom → base_link",), 1),)),
+    FindingShown(finding("TF803", "an example", None, severity="warning", notes=[Note("a note")], help="a way out")),
+    RecoveredShown("an example is over", 3.0),
+    TreeComplete(3, 4.5),
+    AllReady((StartRow("static", 0.0, 1.25), StartRow("drive", None, 4.5)), 4.5, ("camera",)),
+    Replanned(("static",), ("slam",), ("camera",), ("base_link → camera",)),
+    ProcessState("drive", "BACKOFF", None, "exit code 1; restart 1 of 5 in 1 s"),
+    ProcessState("drive", "EXITED", None, "exit code 0"),
+    ProcessState("drive", "FATAL", None, "exit code 1, after 5 restarts"),
+    Stopping("TF808 process_failed"),
+    ProcessState("static", "STOPPING", 7, "SIGINT"),
+    Ended(1, ("drive: no device",)),
+)
+
+
+def process(name: str, state: str, **more: object) -> ProcessStatus:
+    known: dict[str, object] = {
+        "kind": "run", "host": None, "detail": "", "required": None, "failed": False, "ready": True, "waits": "",
+        "seen": "", "pid": None, "uptime": None, "restarts": 0, "edges": 0, "live": 0, "nodes": (),
+    }  # fmt: skip
+    return ProcessStatus(name=name, state=state, **{**known, **more})  # type: ignore[arg-type]
+
+
+STATUS = RobotStatus(
+    "rover", None, 5, "0", 75.0, complete=False, ready=False, stopping=False, missing=(), silent=(), processes=(
+        process("static", "RUNNING", pid=7_000_001, uptime=75.0, edges=2, live=2),
+        process("slam", "RUNNING", pid=7_000_002, uptime=4000.0, edges=1, ready=False),
+        process("nav", "STOPPED", waits="waits for slam to be ready"),
+        process("camera", "FATAL", detail="exit code 1, after 5 restarts", failed=True, restarts=5),
+        process("arm", "EXPECTED", host="jetson", edges=1),
+    ),
+)  # fmt: skip
+
+
+class Lines(list[str]):
+    """Stands in for the output of ``up``."""
+
+    def write(self, text: str, *, log: bool = False) -> None:
+        del log
+        self.append(text)
+
+
+def views() -> dict[str, str]:
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "rover.yaml").write_text(ROVER, encoding="utf-8")
+        write_bag(folder / "bag", [*FIXED, *drive(rate=20.0)])
+        made = {}
+        for view, commands in COMMANDS.items():
+            each = [printed(ROOT if "robots/" in command else folder, command) for command in commands]
+            made[view] = "\n".join(each)
+        with mock.patch.object(ps, "_robots", return_value=({"rover@0": STATUS}, 0)):
+            made["ps"] = printed(folder, "ps")
+    lines = Lines()
+    console = Console(PLAN, lines, colour=False)
+    for notice in NOTICES:
+        console(notice)
+    return made | {"up": "".join(lines)}
+
+
+def printed(folder: Path, command: str) -> str:
+    """Return the command, what it prints, and its exit code, as a terminal shows them."""
+    done = tfcompose_in(folder, *command.split(), COLUMNS="100")
+    text = (done.stdout + done.stderr).replace(f"{ROOT}/", "")
+    return f"$ tfcompose {command}\n{text}[{done.returncode}]\n"
+
+
+def test_commands_print_what_the_golden_views_say() -> None:
+    difference: list[str] = []
+    for view, text in views().items():
+        golden = (GOLDEN / f"{view}.txt").read_text("utf-8").splitlines(keepends=True)
+        difference += difflib.unified_diff(golden, text.splitlines(keepends=True), f"golden {view}", "now", n=0)
+    if difference:
+        pytest.fail(f"{len(difference)} lines of difference\n{''.join(difference)}", pytrace=False)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] != ["--write"]:
+        sys.exit("python -m tests.golden.test_views --write")
+    GOLDEN.mkdir(exist_ok=True)
+    for view, text in views().items():
+        (GOLDEN / f"{view}.txt").write_text(text, "utf-8")

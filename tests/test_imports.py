@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import graphlib
 import sys
 from pathlib import Path
 
@@ -21,7 +22,7 @@ STAGES = {"load", "language", "resolve", "check"}
 MAY_IMPORT: dict[str, set[str]] = {
     "__init__": set(),
     "catalogue": set(),
-    "interrupt": set(),
+    "signals": set(),
     "findings": {"catalogue"},
     "geometry": set(),
     "numbers": {"geometry"},
@@ -41,14 +42,14 @@ MAY_IMPORT: dict[str, set[str]] = {
     "export": {"emit", "files", "numbers", "plan"},
     "emit": {"draw", "files", "geometry", "model", "numbers", "plan", "render", "urdf"},
     "text": set(),
-    "ros": {"findings", "interrupt", "plan", "geometry"},
-    "live": {"geometry", "plan", "ros", "tf2", "tree"},
+    "ros": {"findings", "plan", "geometry", "signals"},
+    "live": {"geometry", "plan", "ros", "signals", "tf2", "tree"},
     "bags": {"geometry", "live", "plan", "ros", "tf2"},
     "verdict": {"catalogue", "findings", "geometry", "live", "plan", "ros", "text", "tree"},
-    "process": {"findings", "ipc", "plan", "ros"},
-    "guard": {"findings", "geometry", "ipc", "live", "plan", "process", "ros", "text", "verdict"},
-    "launcher": {"findings", "interrupt", "ipc", "plan", "ros"},
-    "publishers": {"geometry", "plan", "process", "ros", "text"},
+    "process": {"findings", "ipc", "plan", "ros", "signals"},
+    "guard": {"findings", "geometry", "ipc", "live", "plan", "process", "ros", "signals", "text", "verdict"},
+    "launcher": {"findings", "ipc", "plan", "ros", "signals"},
+    "publishers": {"files", "geometry", "plan", "process", "ros", "signals", "text"},
     "tf2": {"geometry", "ros"},
     "compile": FOUNDATIONS | STAGES,
     "pages": {"catalogue", "check"},
@@ -166,6 +167,23 @@ def test_a_command_is_imported_by_the_parser_alone() -> None:
     assert importers == ["cli/parser.py"]
 
 
+def test_no_module_imports_itself_by_way_of_others() -> None:
+    modules = {".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): file for file in FILES}
+    graph: dict[str, set[str]] = {}
+    for module, file in modules.items():
+        tree = ast.parse(file.read_text("utf-8"))
+        names = {
+            name
+            for node in tree.body
+            if isinstance(node, ast.ImportFrom) and node.module
+            for name in (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
+        }
+        submodules = {name for name in names if name in modules}
+        # A package that is named for one of its modules is not what is imported.
+        graph[module] = {name for name in submodules if not any(one.startswith(f"{name}.") for one in submodules)}
+    graphlib.TopologicalSorter(graph).prepare()
+
+
 #: Parts that import in a function what is optional, or heavy and rarely needed.
 LATE_IMPORTS = {"bags", "cli", "guard", "publishers", "ros", "tf2"}
 
@@ -214,7 +232,7 @@ def parts_in(modules: set[str]) -> set[str]:
 def test_help_loads_the_commands_and_nothing_of_their_work(bare: set[str]) -> None:
     loaded = loaded_by(command("--help")) - bare
     assert not foreign(loaded, bare)
-    assert parts_in(loaded) == {"cli", "geometry", "interrupt", "render"}
+    assert parts_in(loaded) == {"cli", "geometry", "render", "signals"}
     assert {name for name in loaded if name.startswith("tfcompose.cli.") and ".commands" not in name} == {
         f"tfcompose.cli.{name}" for name in ("options", "parser", "terminal")
     }

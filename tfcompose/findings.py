@@ -72,6 +72,11 @@ class Finding:
     edits: tuple[Edit, ...] = ()
 
     @property
+    def label(self) -> str:
+        """Code and name: "TF808 process_failed"."""
+        return f"{self.code} {self.name}"
+
+    @property
     def sort_key(self) -> tuple[str, int, int, str, str]:
         """By place, then by code: the order in which findings are shown."""
         at = self.span or Span("")

@@ -18,7 +18,7 @@ from tfcompose.findings import RejectedError, Span, finding
 from tfcompose.ipc import GO, HOLD_FD
 from tfcompose.plan.file import read_plan
 from tfcompose.ros.environment import RosError, child_environment, missing_ros
-from tfcompose.ros.stop import Stop
+from tfcompose.signals import Stop
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

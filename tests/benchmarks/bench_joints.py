@@ -99,7 +99,7 @@ def _sender(node: Any, joints: int) -> Callable[[], float | None]:
     from sensor_msgs.msg import JointState  # noqa: PLC0415 (the same)
 
     from tfcompose.ros.node import TFSubscription, wait  # noqa: PLC0415 (the same)
-    from tfcompose.ros.stop import Stop  # noqa: PLC0415 (the same)
+    from tfcompose.signals import Stop  # noqa: PLC0415 (the same)
 
     message = JointState(name=[f"joint_{n}" for n in range(joints)], position=[0.01 * n for n in range(joints)])
     data = bytearray(serialize_message(message))

@@ -18,8 +18,8 @@ from statistics import median, quantiles
 import pytest
 
 from tfcompose.ros.node import TFSubscription, open_node, wait
-from tfcompose.ros.stop import Stop
 from tfcompose.ros.tf_codec import decode
+from tfcompose.signals import Stop
 
 EDGES, HERTZ = 50, 200.0
 ROUNDS, ROUND_S, BEFORE_S = 5, 2.5, 1.0

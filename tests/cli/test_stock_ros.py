@@ -52,7 +52,7 @@ from sensor_msgs.msg import JointState
 from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.ros.tf_codec import Transform, encode
 from tfcompose.ros.node import JOINT_STATES, latch, open_node
-from tfcompose.ros.stop import Stop
+from tfcompose.signals import Stop
 from tfcompose.ros.node import Subscription, TFPublisher, wait
 at = sys.argv.index("--ros-args")
 with Stop() as stop, open_node("robot_state_publisher", "", args=sys.argv[at + 1:]) as node:

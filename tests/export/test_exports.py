@@ -18,10 +18,8 @@ import yaml
 from tests.support import processes
 from tests.support.plans import built, compiled_plan
 from tests.support.robots import DRIVEN
-from tfcompose.export.compose import compose
 from tfcompose.export.launch import launch
-from tfcompose.export.supervisors import Machine
-from tfcompose.export.systemd import systemd
+from tfcompose.export.supervisors import Machine, compose, systemd
 from tfcompose.plan import Plan, PlanProcess, StopRule
 from tfcompose.plan.file import read_plan
 

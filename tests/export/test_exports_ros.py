@@ -249,7 +249,7 @@ import xml.etree.ElementTree as ET
 from tfcompose.geometry import quat_from_rpy
 from tfcompose.ros.tf_codec import Transform, encode
 from tfcompose.ros.node import open_node
-from tfcompose.ros.stop import Stop
+from tfcompose.signals import Stop
 from tfcompose.ros.node import TFPublisher
 at = sys.argv.index("--ros-args")
 own, ros_args = dict(zip(sys.argv[1:at:2], sys.argv[2:at:2])), sys.argv[at + 1 :]

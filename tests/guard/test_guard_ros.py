@@ -17,8 +17,8 @@ from tests.support import processes
 from tests.support.domains import reserved_domain
 from tests.support.waiting import TIMEOUT_S, complete_lines, in_one_of_a_few, offences, until
 from tfcompose.ros.node import TFSubscription, open_node, wait
-from tfcompose.ros.stop import Stop
 from tfcompose.ros.tf_codec import decode
+from tfcompose.signals import Stop
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

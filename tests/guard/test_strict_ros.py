@@ -18,8 +18,8 @@ from tests.support.guard_without_ids import guard_without_ids
 from tests.support.waiting import TIMEOUT_S, complete_lines, gone, until
 from tfcompose.ros.graph import writers
 from tfcompose.ros.node import TFPublisher, TFSubscription, open_node, wait
-from tfcompose.ros.stop import Stop
 from tfcompose.ros.tf_codec import Transform, decode, encode
+from tfcompose.signals import Stop
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -244,7 +244,7 @@ import json, signal, sys, time
 from collections import Counter
 from tfcompose.ros.tf_codec import Transform, decode, encode
 from tfcompose.ros.node import open_node
-from tfcompose.ros.stop import Stop
+from tfcompose.signals import Stop
 from tfcompose.ros.node import TFPublisher, TFSubscription, wait
 signal.signal(signal.SIGINT, lambda *_: sys.exit())
 with open_node("ear", "/", args=sys.argv[2:]) as node:

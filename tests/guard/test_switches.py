@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.support.findings import expect
-from tfcompose.guard import switches
+from tfcompose.guard import gates
 from tfcompose.guard.channel import SwitchMemory, recalled
-from tfcompose.guard.switches import Switches
+from tfcompose.guard.gates import Switches
 from tfcompose.ipc import MEMORY_FD, Found, GuardEvent, Remember
 from tfcompose.plan import Driven, Plan, PlanProcess, RosSettings
 from tfcompose.verdict.drivers import not_taken
@@ -104,7 +104,7 @@ class Watch:
 @pytest.fixture
 def watch(monkeypatch: pytest.MonkeyPatch) -> Watch:
     one = Watch(Reader())
-    monkeypatch.setattr(switches, "_reader", lambda *_: one.reader)
+    monkeypatch.setattr(gates, "_reader", lambda *_: one.reader)
     monkeypatch.setattr("time.monotonic", lambda: one.now)
     one.follow({})
     return one

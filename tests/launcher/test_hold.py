@@ -15,7 +15,7 @@ from tests.support.waiting import TIMEOUT_S, gone, until
 from tfcompose.ipc import GO, GUARD_EVENTS, HOLD_FD, Clear, LogLine, Notice, ProcessState
 from tfcompose.launcher.supervisor import supervise
 from tfcompose.process import wait_for_go
-from tfcompose.ros.stop import Stop
+from tfcompose.signals import Stop
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -34,7 +34,7 @@ from tfcompose.ipc import (
 )
 from tfcompose.launcher.answers import status
 from tfcompose.launcher.events import Exited, LogMatched, NewPlan, Signalled
-from tfcompose.launcher.restarts import refusal
+from tfcompose.launcher.stopping import refusal
 from tfcompose.plan import GuardPolicy, Plan, PlanProcess, Ready, RestartPolicy, StopRule
 
 

@@ -23,8 +23,8 @@ from tfcompose.live.pose_query import PoseQuery
 from tfcompose.plan import PlanProcess, Simulation
 from tfcompose.ros.clock import SimClock
 from tfcompose.ros.node import TFPublisher, open_node
-from tfcompose.ros.stop import Stop
 from tfcompose.ros.tf_codec import Transform, encode
+from tfcompose.signals import Stop
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -23,8 +23,8 @@ from tfcompose.geometry import Pose, angle_between, normalised, quat_from_rpy
 from tfcompose.plan import Joint, PlanProcess, Simulation, Sweep
 from tfcompose.ros.graph import writers
 from tfcompose.ros.node import JOINT_STATES, LATCHED, Received, Subscription, TFSubscription, latch, open_node, wait
-from tfcompose.ros.stop import Stop
 from tfcompose.ros.tf_codec import Transform, decode
+from tfcompose.signals import Stop
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator

@@ -74,7 +74,7 @@ def test_without_rclpy_one_sentence_says_what_to_install(monkeypatch: pytest.Mon
 
 
 def test_the_parts_that_need_no_ros_import_none() -> None:
-    names = ["environment", "joint_codec", "processes", "stop", "tf_codec"]
+    names = ["environment", "joint_codec", "processes", "tf_codec"]
     code = "import sys; " + "; ".join(f"import tfcompose.ros.{name}" for name in names)
     code += "; import tfcompose.publishers.simulate, tfcompose.guard.__main__; sys.exit('rclpy' in sys.modules)"
     assert processes.run([sys.executable, "-c", code]).returncode == 0

@@ -13,8 +13,8 @@ from tests.support.waiting import none_but, until
 from tfcompose.ros.environment import RosError
 from tfcompose.ros.graph import writers
 from tfcompose.ros.node import JOINT_STATES, Subscription, TFPublisher, TFSubscription, open_node, wait
-from tfcompose.ros.stop import Stop
 from tfcompose.ros.tf_codec import Transform, decode, encode
+from tfcompose.signals import Stop
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

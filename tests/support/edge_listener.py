@@ -7,8 +7,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from tfcompose.ros.node import TFSubscription, open_node, wait
-from tfcompose.ros.stop import Stop
 from tfcompose.ros.tf_codec import decode
+from tfcompose.signals import Stop
 
 if TYPE_CHECKING:
     from typing_extensions import Self

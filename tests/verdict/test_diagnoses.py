@@ -20,7 +20,7 @@ from tests.support.tree_history import (
     sound_plan,
     sound_tree,
 )
-from tfcompose.live.sensors import joints_of
+from tfcompose.live.snapshot import joints_of
 from tfcompose.live.state import RosProcess, StampedData, Topic, TreeState
 from tfcompose.plan import EdgePattern, GuardPolicy, PlanProcess
 from tfcompose.ros.environment import RANGE

@@ -12,7 +12,7 @@ from tfcompose.findings import Note, finding
 from tfcompose.plan import RosSettings
 from tfcompose.plan.topics import parts_of, topics_below
 from tfcompose.ros.environment import RosError, child_environment, ros_trouble
-from tfcompose.ros.stop import Stop
+from tfcompose.signals import Stop
 from tfcompose.verdict.setup import elsewhere_help, settings_text
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from tfcompose import __version__, interrupt
+from tfcompose import __version__
 from tfcompose.cli.commands import (
     build,
     diff,
@@ -41,6 +41,7 @@ from tfcompose.cli.commands import (
     wait,
 )
 from tfcompose.cli.terminal import INTERRUPTED, OUTPUT_CLOSED, UNREADABLE, size_of
+from tfcompose.signals import RememberedInterrupt, take_interrupt
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -125,14 +126,14 @@ def _main(words: list[str]) -> int:
 
 def _run(name: str, words: list[str]) -> int:
     gc.set_threshold(200_000, 50, 1000)  # a large build makes much, and little of it is garbage
-    with interrupt.Remembered():
+    with RememberedInterrupt():
         try:
             code = _run_command(name, words)
         except BaseException:
-            if interrupt.taken():  # Python's classes and pydantic's Rust make other errors of a Ctrl-C while they load
+            if take_interrupt():  # Python's classes and pydantic's Rust make other errors of a Ctrl-C while they load
                 return INTERRUPTED
             raise
-    return INTERRUPTED if interrupt.taken() else code
+    return INTERRUPTED if take_interrupt() else code
 
 
 def _run_command(name: str, words: list[str]) -> int:

@@ -1,14 +1,21 @@
-"""What exports to supervisors share: names, what starts first, and how each process is started again."""
+"""A plan for supervisors of others: units for systemd, and services for docker compose, one for each process.
+
+What they share comes first: names, what starts first, and how each process is started again.
+"""
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
 from itertools import count
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.emit.argv import mapping
+from tfcompose.files import File
 
 if TYPE_CHECKING:
     from tfcompose.plan import Plan, PlanProcess
+
 
 #: How often a process is started again in a row, where the plan leaves that to the launcher.
 MAX_RESTARTS = 5
@@ -83,3 +90,179 @@ def gaps_of(plan: Plan) -> list[str]:
         if process.required:
             gaps.append(f"{process.name} is required: its end does not end the others here")
     return gaps
+
+
+#: Sources files, then becomes the command; bash, because ROS's setup files are bash's.
+_SOURCING = 'for file in $0; do . "$file"; done; exec "$@"'
+
+
+def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
+    """Return the units, and what they do not keep of the plan.
+
+    tfcompose's own processes say when they are ready (``Type=notify``), so that ``After=`` waits for that; of others
+    systemd knows that they were executed. One that others wait for until it is done is ``Type=oneshot``.
+    """
+    target = f"{plain_name(plan.robot)}.target"
+    awaited = {name for process in started(plan) for name, what in process.after.items() if what == "done"}
+    units = [
+        File(_unit(plan, process.name), _unit_text(plan, process, machine, target, done=process.name in awaited))
+        for process in started(plan)
+    ]
+    gaps = gaps_of(plan)
+    for process in started(plan):
+        for name, what in process.after.items():
+            other = plan.process(name)
+            if what == "ready" and other.kind == "run":
+                gaps.append(f"{process.name} waits until {name} was executed: systemd cannot see that it is ready")
+    return (File(target, _target(plan, [unit.path for unit in units])), *units), gaps
+
+
+def _unit(plan: Plan, process: str) -> str:
+    return f"{plain_name(plan.robot)}-{plain_names(plan)[process]}.service"
+
+
+def _target(plan: Plan, units: list[str]) -> str:
+    wanted = "\n".join(f"Wants={unit}" for unit in units)
+    return (
+        f"[Unit]\nDescription=Robot {plan.robot}\n"
+        f"Wants=network-online.target\nAfter=network-online.target\n{wanted}\n\n"
+        "[Install]\nWantedBy=default.target\n"
+    )
+
+
+def _unit_text(plan: Plan, process: PlanProcess, machine: Machine, target: str, *, done: bool) -> str:
+    before = [_unit(plan, name) for name in after(plan, process)]
+    most = MAX_RESTARTS if process.max_restarts is None else process.max_restarts
+    kind = "oneshot" if done else "exec" if process.kind == "run" else "notify"
+    restart = restart_of(process)
+    unit = [
+        f"Description={_plain(process.name)} of robot {plan.robot}",
+        f"PartOf={target}",
+        *(f"{key}={' '.join(before)}" for key in ("After", "Wants") if before),
+        *([] if restart == "no" else ["StartLimitIntervalSec=300", f"StartLimitBurst={most + 1}"]),
+    ]
+    service = [
+        f"Type={kind}",
+        *(["NotifyAccess=all", "TimeoutStartSec=60"] if kind == "notify" else []),
+        *(f"Environment={_quoted(f'{name}={value}')}" for name, value in sorted(machine.env.items())),
+        *_logs(plan, machine),
+        f"WorkingDirectory={_plain(machine.folder)}",
+        f"ExecStart={_exec(process, machine)}",
+        f"Restart={'on-failure' if done and restart == 'always' else restart}",
+        "RestartSec=1",
+        f"KillSignal={process.stop.signal}",
+        "KillMode=mixed",
+        f"TimeoutStopSec={STOP_S if process.stop.timeout_s is None else process.stop.timeout_s:g}",
+        f"SuccessExitStatus={process.stop.signal} 130",
+    ]
+    parts = (("Unit", unit), ("Service", service), ("Install", [f"WantedBy={target}"]))
+    return "\n".join("\n".join([f"[{name}]", *lines, ""]) for name, lines in parts)
+
+
+def _logs(plan: Plan, machine: Machine) -> list[str]:
+    """Return where ROS logs to, unless that is set: no node starts without, and a system's service has no home."""
+    if {"ROS_LOG_DIR", "ROS_HOME"} & machine.env.keys():
+        return []
+    folder = f"tfcompose/{plain_name(plan.robot)}"
+    return [f"LogsDirectory={folder}", f"Environment=ROS_LOG_DIR=%L/{folder}"]
+
+
+def _exec(process: PlanProcess, machine: Machine) -> str:
+    words = command_of(process, machine.python, f"{machine.folder}/plan.json")
+    if machine.setup:
+        words = ["/bin/bash", "-c", _SOURCING, " ".join(machine.setup), *words]
+    return " ".join(_quoted(word).replace("$", "$$") for word in words)
+
+
+def _plain(text: str) -> str:
+    return text.replace("%", "%%")
+
+
+def _quoted(word: str) -> str:
+    """Return the word as systemd reads it back; a percent sign is doubled."""
+    text = _plain(word)
+    if text and all(c.isalnum() or c in "/.:=@+,-_%" for c in text):
+        return text
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return f'"{escaped}"'
+
+
+#: Where the plan's folder is inside a container.
+INSIDE = "/robot"
+IMAGE = "${TFCOMPOSE_IMAGE:?set it to an image with ROS 2 Jazzy and tfcompose}"
+#: A health check does not come through the image's entry point, which sources the setup file for the process itself.
+_SOURCED = 'setup=/opt/ros/${ROS_DISTRO:-jazzy}/setup.sh; [ ! -f "$setup" ] || . "$setup"; exec "$@"'
+_MET = {"started": "service_started", "ready": "service_healthy", "done": "service_completed_successfully"}
+
+
+def compose(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
+    """Return the compose file, and what it does not keep of the plan.
+
+    A process that owns edges is healthy while the first of them is live; ``after: ready`` waits for that.
+    """
+    names = plain_names(plan)
+    services = {names[process.name]: _compose_service(plan, process, machine) for process in started(plan)}
+    lines = [f"name: {plain_name(plan.robot)}", "services:", *mapping(services, "  ")]
+    gaps = gaps_of(plan)
+    for process in started(plan):
+        for name, what in process.after.items():
+            if what == "ready" and plan.process(name).kind != "external" and not plan.edges_of(name):
+                gaps.append(f"{process.name} waits until {name} was started: compose cannot see that it is ready")
+        named = (*process.argv, *process.env.values(), process.cwd or "")
+        outside = [word for word in named if "${build_dir}/.." in word]
+        gaps += [f"{process.name} needs {word}, which is outside of {INSIDE}: add a volume" for word in outside]
+    return (File("compose.yaml", "\n".join([*lines, ""])),), gaps
+
+
+def _compose_service(plan: Plan, process: PlanProcess, machine: Machine) -> dict[str, Any]:
+    edges = plan.edges_of(process.name)
+    waits = after(plan, process)
+    stop_s = STOP_S if process.stop.timeout_s is None else process.stop.timeout_s
+    domain = "${ROS_DOMAIN_ID:-0}" if plan.ros.domain_id is None else str(plan.ros.domain_id)
+    service: dict[str, Any] = {
+        "image": machine.image or IMAGE,
+        "network_mode": "host",
+        "ipc": "host",
+        "init": True,
+        "command": [_kept(word) for word in command_of(process, "python3", f"{INSIDE}/plan.json")],
+        "environment": {"ROS_DOMAIN_ID": domain, **_discovery(plan)},
+        "volumes": [{"type": "bind", "source": machine.folder, "target": INSIDE, "read_only": True}],
+        "working_dir": INSIDE,
+        "restart": _restart(process),
+        "stop_signal": process.stop.signal,
+        "stop_grace_period": f"{round(stop_s * 1000)}ms",
+    }
+    if waits:
+        names = plain_names(plan)
+        service["depends_on"] = {
+            names[name]: {"condition": _MET[what if what != "ready" or plan.edges_of(name) else "started"]}
+            for name, what in waits.items()
+        }
+    if edges:
+        words = ["python3", "-m", "tfcompose", "echo", edges[0].parent, edges[0].child, "--once", "--timeout", "5"]
+        words += _namespace(process)
+        test = ["CMD", *(_kept(word) for word in ("sh", "-c", _SOURCED, "sh", *words))]
+        service["healthcheck"] = {"test": test, "interval": "10s", "timeout": "8s", "start_period": "30s", "retries": 3}
+    return service
+
+
+def _discovery(plan: Plan) -> dict[str, str]:
+    """Return what the health check needs; the process itself has it from the plan."""
+    return {"ROS_AUTOMATIC_DISCOVERY_RANGE": plan.ros.discovery.upper()} if plan.ros.discovery else {}
+
+
+def _namespace(process: PlanProcess) -> list[str]:
+    """Return what tells the health check where a robot's own topics are."""
+    namespace = process.topics[0].removesuffix("/tf")
+    return ["--namespace", namespace] if namespace else []
+
+
+def _restart(process: PlanProcess) -> str:
+    restart = restart_of(process)
+    most = MAX_RESTARTS if process.max_restarts is None else process.max_restarts
+    return f"on-failure:{most}" if restart == "on-failure" and most else "no" if restart == "on-failure" else restart
+
+
+def _kept(text: str) -> str:
+    """Return the text as compose reads it back: it fills in variables itself."""
+    return text.replace("$", "$$")

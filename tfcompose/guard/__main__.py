@@ -9,7 +9,7 @@ from tfcompose.process import start
 
 if TYPE_CHECKING:
     from tfcompose.process import Own
-    from tfcompose.ros.stop import Stop
+    from tfcompose.signals import Stop
 
 
 def _guard(own: Own, stop: Stop) -> None:

@@ -40,10 +40,9 @@ from tfcompose.process import say
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from tfcompose.guard.gates import Gates
+    from tfcompose.guard.gates import Gates, Switches
     from tfcompose.guard.judge import Judge
     from tfcompose.guard.relay import Relay
-    from tfcompose.guard.switches import Switches
 
 #: What a guard reports that is switched off: it looks, and judges nobody.
 _OBSERVATIONS = (Alive, Clear, Live, OwnerReady, Complete, GateOpen, GateShut, Remember, Silent)

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 
 from tfcompose.guard.channel import EventWriter, Memory, OrderReader, SilentEdges, SwitchMemory, recalled
 from tfcompose.guard.diagnostics import DiagnosticsPage
-from tfcompose.guard.gates import Gates, LifecycleDriver
+from tfcompose.guard.gates import Gates, LifecycleDriver, Switches
 from tfcompose.guard.judge import Judge
-from tfcompose.guard.switches import Switches
 from tfcompose.guard.watch import CHECK_EVERY_S, TopicWatch, held_back, plans_by_topics, together
 from tfcompose.ipc import JOINS, ORDERS_FD, REMAPPED, SETTLE
 from tfcompose.plan.topics import GLOBAL, private_topics
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
     from tfcompose.ipc import GuardEvent
     from tfcompose.plan import Plan
     from tfcompose.process import Own
-    from tfcompose.ros.stop import Stop
+    from tfcompose.signals import Stop
 
     Topics = tuple[str, str]
 

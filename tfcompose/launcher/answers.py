@@ -23,7 +23,7 @@ from tfcompose.ipc import (
 from tfcompose.launcher.events import NewPlan
 from tfcompose.launcher.preflight import commands_of, started_by_us
 from tfcompose.launcher.readiness import is_ready, unmet_in_words, waits_for
-from tfcompose.launcher.restarts import refusal
+from tfcompose.launcher.stopping import refusal
 from tfcompose.plan import SourceLine
 from tfcompose.plan.file import read_plan
 

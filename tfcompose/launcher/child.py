@@ -16,7 +16,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from tfcompose.ros.stop import SIGNALS
+from tfcompose.signals import SIGNALS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
@@ -187,7 +187,7 @@ def spawn(command: Command, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes
     """Start the command as the leader of a new session, with its output in pipes.
 
     One of tfcompose's own starts with the signals blocked that end it, and unblocks them when it handles them
-    (``tfcompose.ros.stop``): one that comes while Python itself starts waits, and neither kills it nor prints a
+    (``tfcompose.signals``): one that comes while Python itself starts waits, and neither kills it nor prints a
     traceback.
 
     Raises:

@@ -31,7 +31,7 @@ from tfcompose.ipc import (
 from tfcompose.launcher.child import LAST_LINE_LENGTH, Child, Pipe, has_ended, kill_group, reap_adopted, spawn
 from tfcompose.launcher.events import Exited, LogMatched, Started, StartFailed
 from tfcompose.launcher.processes import descendants, end, launcher_mark, leftovers, leftovers_of, signal_leftovers
-from tfcompose.ros.stop import SIGNALS
+from tfcompose.signals import SIGNALS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -30,11 +30,6 @@ def how_ended(returncode: int) -> str:
     return signal_name(-returncode) if returncode < 0 else f"exit code {returncode}"
 
 
-def in_short(found: Finding) -> str:
-    """Return what a finding is called, for a line that follows it: "TF808 process_failed"."""
-    return f"{found.code} {found.name}"
-
-
 def ended_by_itself(name: str, returncode: int, when: str, last_lines: tuple[str, ...]) -> Finding:
     """Return the finding for a process that should not have ended; ``when`` ends the sentence."""
     verb = "was ended by" if returncode < 0 else "ended with"

@@ -37,7 +37,7 @@ from tfcompose.ipc import (
     Waiting,
 )
 from tfcompose.launcher.events import Begin, Event, Exited, Kill, LogMatched, NewPlan, Order, Started, StartFailed
-from tfcompose.launcher.failures import guard_hangs, in_short, never_clear, not_started
+from tfcompose.launcher.failures import guard_hangs, never_clear, not_started
 from tfcompose.launcher.readiness import (
     check_gates,
     gate_of,
@@ -49,9 +49,18 @@ from tfcompose.launcher.readiness import (
     report_progress,
     unmet,
 )
-from tfcompose.launcher.restarts import backoff_s, follow_plan, process_exited, process_requested, refusal
 from tfcompose.launcher.state import Stop, Transition, by_owner
-from tfcompose.launcher.stopping import edge_taken, firmer_at, send_due_signals, stop_if_requested
+from tfcompose.launcher.stopping import (
+    backoff_s,
+    edge_taken,
+    firmer_at,
+    follow_plan,
+    process_exited,
+    process_requested,
+    refusal,
+    send_due_signals,
+    stop_if_requested,
+)
 
 if TYPE_CHECKING:
     from tfcompose.findings import Finding
@@ -231,7 +240,7 @@ def _violation(step: Transition, found: Finding, process: str) -> None:
         step.report(found)
     elif policy == "stop":
         step.report(found)
-        step.stop(Stop("failure", 1), in_short(found))
+        step.stop(Stop("failure", 1), found.label)
     elif not process:
         step.report(found)
     elif why := refusal(step.state, process, "stop"):

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from tfcompose.ipc import SETTLE, Ended, FindingShown, Notice, Present, ProcessState, StateName, Stopping
 from tfcompose.launcher.events import Action, Finish, Notify, Order, Start
-from tfcompose.launcher.failures import in_short
 
 if TYPE_CHECKING:
     from tfcompose.findings import Finding
@@ -234,7 +233,7 @@ class Transition:
         if self.state.stop is None:
             self.report(found)
             self.update(because=(found.message, *(note.message for note in found.notes)))
-            self.stop(Stop("failure", 1), in_short(found))
+            self.stop(Stop("failure", 1), found.label)
 
     def stop(self, stop: Stop, reason: str) -> None:
         """Begin to stop everything, unless that is under way."""

@@ -1,6 +1,7 @@
-"""How everything, or one process, is stopped: what requests it, and which signal a process is sent when.
+"""How everything, or one process, is stopped, and what becomes of a process that ended.
 
-A process is first sent its own signal, then SIGTERM, then SIGKILL, each when the one before did not help.
+A process is first sent its own signal, then SIGTERM, then SIGKILL, each when the one before did not help. One that ends
+is started again after a while, is requested by name, or leaves the plan.
 """
 
 from __future__ import annotations
@@ -9,17 +10,189 @@ from dataclasses import replace
 from signal import SIGKILL, SIGTERM, Signals
 from typing import TYPE_CHECKING
 
-from tfcompose.ipc import DownRequest
-from tfcompose.launcher.events import Kill, OutputLost, Signalled, TimeUp
-from tfcompose.launcher.failures import in_short, never_published, signal_name
-from tfcompose.launcher.restarts import lose_edges
-from tfcompose.launcher.state import UNREAD, Stop, by_owner
+from tfcompose.findings import did_you_mean
+from tfcompose.ipc import Absent, DownRequest, Replanned
+from tfcompose.launcher.events import Kill, Order, OutputLost, Signalled, TimeUp
+from tfcompose.launcher.failures import ended_by_itself, guard_lost, how_ended, never_published, signal_name
+from tfcompose.launcher.state import MAX_RESTARTS, UNREAD, Stop, Tracked, by_owner
 
 if TYPE_CHECKING:
     from tfcompose.findings import Finding
-    from tfcompose.launcher.events import Event
-    from tfcompose.launcher.state import State, Times, Tracked, Transition
+    from tfcompose.ipc import ProcessRequest, StateName, Verb
+    from tfcompose.launcher.events import Event, Exited, NewPlan
+    from tfcompose.launcher.state import State, Times, Transition
     from tfcompose.plan import PlanProcess
+
+
+def backoff_s(times: Times, failures: int) -> float:
+    """Return how long to wait before the restart after so many failures in a row."""
+    return min(times.backoff_s * 2.0 ** (failures - 1), times.backoff_limit_s)
+
+
+# The end of a process.
+
+
+def process_exited(step: Transition, event: Exited) -> None:
+    """Take the end of a process: meant, to be followed by a restart, or a failure."""
+    name, how = event.name, how_ended(event.returncode)
+    one = step.state.tracked[name]
+    if step.state.stop:
+        step.enter(name, "STOPPED", how)
+        return
+    if name == step.state.guard and step.state.clear is not None and not one.leaving:
+        _guard_exited(step, one, event)
+        return
+    before = one
+    lose_edges(step, one)
+    one = step.state.tracked[name]
+    if one.leaving:
+        _left(step, one, how)
+        return
+    process, ready = one.process, one.process.ready
+    meant = int(ready.number) if ready and ready.kind == "exit" else 0
+    done = event.returncode == meant and process.kind == "run"
+    if name != step.state.guard and (process.restart == "always" or (process.restart == "on-failure" and not done)):
+        _schedule_restart(step, one, event)
+        return
+    step.enter(name, "EXITED", how)
+    # What others wait for has come, and does not go with the process.
+    if done and ((before.ready and not process.owns) or (ready and ready.kind == "exit")):
+        step.track(name, replace(step.state.tracked[name], ready=True, ready_since=before.ready_since or step.now))
+    early = name == step.state.guard and step.state.clear is None
+    when = " before it said whether somebody publishes the plan's edges already" if early else ""
+    if not done or process.required:
+        when = ", and the plan requires it" if done else when
+        step.fail_process(name, ended_by_itself(name, event.returncode, when, event.last_lines))
+
+
+def _guard_exited(step: Transition, one: Tracked, event: Exited) -> None:
+    """Have a guard that died follow itself: what it reported holds, and the next one is given its memory."""
+    if not step.state.memory:
+        lose_edges(step, one)
+    unwatched = step.now if step.state.unwatched is None else step.state.unwatched
+    step.update(unwatched=unwatched)
+    _schedule_restart(step, step.state.tracked[event.name], event)
+    if step.state.stop is None:
+        step.report(guard_lost(event.name, event, strict=step.state.plan.guard.mode == "strict"))
+
+
+def lose_edges(step: Transition, one: Tracked) -> None:
+    """Take the edges of a process as not live: it has ended, or is about to."""
+    state, name = step.state, one.process.name
+    step.track(name, replace(one, ready=False, ready_since=None, observed="", late=False))
+    if name == state.guard:
+        # A strict guard's memory holds what it latched, also for one that is restarted by request.
+        memory = state.memory if state.plan.guard.mode == "strict" else {}
+        step.update(live=frozenset(), complete=not state.plan.edges, memory=memory)
+    elif one.process.owns:
+        live = state.live - {child for _, child in one.process.owns}
+        step.update(live=live, complete=False, reminded=None if state.reminded is None else step.now)
+        if state.guard is not None:
+            step.actions.append(Order(Absent(name)))
+
+
+def _left(step: Transition, one: Tracked, how: str) -> None:
+    name = one.process.name
+    step.enter(name, "STOPPED", how, level=0, failures=0)
+    if one.leaving == "drop":
+        step.update(tracked={other: each for other, each in step.state.tracked.items() if other != name})
+    else:
+        step.track(name, replace(step.state.tracked[name], leaving="", wanted=one.leaving == "again"))
+
+
+def _schedule_restart(step: Transition, one: Tracked, event: Exited) -> None:
+    name, times = event.name, step.state.times
+    most = MAX_RESTARTS if one.process.max_restarts is None else one.process.max_restarts
+    failures = 1 if step.now - one.since >= times.steady_s else one.failures + 1
+    how = how_ended(event.returncode)
+    if failures > most:
+        step.enter(name, "FATAL", how)
+        when = f", after {most} restart{'' if most == 1 else 's'}"
+        step.fail_process(name, ended_by_itself(name, event.returncode, when, event.last_lines))
+        return
+    delay = backoff_s(times, failures)
+    step.enter(name, "BACKOFF", f"{how}; restart {failures} of {most} in {delay:g} s", failures=failures)
+
+
+# Requests for one process.
+
+
+def refusal(state: State, name: str, verb: Verb) -> str | None:
+    """Return why this cannot be done with that process, in one sentence; None if it can."""
+    one = state.tracked.get(name)
+    if one is None:
+        advice = did_you_mean(name, state.tracked, f"it has {', '.join(state.tracked)}")
+        return f"the plan has no process {name}; {advice}"
+    if state.stop:
+        return "everything is being stopped"
+    if one.state == "EXPECTED":
+        return f"somebody else starts and stops {name}"
+    if name == state.guard and verb != "restart":
+        return f"{name} watches the others and is not stopped alone; tfcompose up --guard off judges nobody"
+    if verb == "start" and one.alive and one.leaving != "stop":
+        return f"{name} runs already, with pid {one.pid}"
+    if verb == "stop" and not one.alive and one.state != "BACKOFF" and not (one.state == "STOPPED" and one.wanted):
+        return f"{name} does not run"
+    return None
+
+
+def process_requested(step: Transition, request: ProcessRequest) -> None:
+    """Stop, start or restart one process."""
+    if refusal(step.state, request.name, request.do):
+        return
+    one = step.state.tracked[request.name]
+    stays = request.do == "stop"
+    if one.alive:
+        step.track(request.name, replace(one, leaving="stop" if stays else "again", wanted=not stays))
+        return
+    if one.state != "STOPPED":
+        step.enter(request.name, "STOPPED", failures=0)
+    step.track(request.name, replace(step.state.tracked[request.name], wanted=not stays))
+
+
+# Another plan.
+
+
+def follow_plan(step: Transition, event: NewPlan) -> None:
+    """Follow another plan: stop what it has no more, start what is new, restart what is different."""
+    state, plan = step.state, event.plan
+    before = state.tracked
+    guards = [process.name for process in plan.processes if process.kind == "guard"]
+    live = frozenset(edge.child for edge in plan.edges if edge.child in state.live)
+    step.update(
+        plan=plan,
+        guard=guards[0] if guards else None,
+        tracked={process.name: _taken_over(before, process.name, event) for process in plan.processes},
+        live=live,
+        complete=len(live) == len(plan.edges),
+        all_started=False,
+        all_ready=False,
+        reminded=step.now,
+        replanned=step.now,
+    )
+    if state.guard is not None and not before[state.guard].alive:
+        step.update(memory={}, live=frozenset())  # the next one begins anew, with the new plan
+    gone = {name: one for name, one in before.items() if name not in step.state.tracked}
+    for name, one in gone.items():
+        if one.alive:
+            step.track(name, replace(one, leaving="drop", wanted=False))
+    names = tuple(step.state.tracked)
+    changed = tuple(name for name in names if name in event.changed and name in before)
+    added = tuple(name for name in names if name not in before)
+    step.notify(Replanned(changed, added, tuple(gone), event.held))
+
+
+def _taken_over(before: dict[str, Tracked], name: str, event: NewPlan) -> Tracked:
+    process = event.plan.process(name)
+    one = before.get(name)
+    rests: StateName = "EXPECTED" if process.kind == "external" else "STOPPED"
+    if one is None:
+        return Tracked(process, rests)
+    if name not in event.changed:
+        return replace(one, process=process)
+    if one.alive and rests == "STOPPED":
+        return replace(one, process=process, leaving="again", wanted=True)
+    return Tracked(process, rests, order=one.order)
 
 
 # What requests that everything stops.
@@ -65,7 +238,7 @@ def edge_taken(step: Transition, found: Finding) -> None:
     stop = step.state.stop
     if stop is None or stop.cause == "taken":
         step.report(found)
-        step.stop(Stop("taken", 1), in_short(found))
+        step.stop(Stop("taken", 1), found.label)
 
 
 # Which signal is due.

@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, final
 
-from tfcompose import interrupt
 from tfcompose.findings import Note
 from tfcompose.ipc import Ended, FindingShown
 from tfcompose.launcher.answers import answer
@@ -43,6 +42,7 @@ from tfcompose.launcher.output import Notifier
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.state import initial
 from tfcompose.ros.environment import child_environment
+from tfcompose.signals import take_interrupt
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -268,7 +268,7 @@ class Signals:
                 continue
             handler = signal.signal(number, self._append)
             self._stack.callback(signal.signal, number, signal.SIG_DFL if handler is None else handler)
-        if interrupt.taken():
+        if take_interrupt():
             self._taken.append(signal.SIGINT)
             os.write(write_fd, b"\0")
         return self

@@ -17,7 +17,7 @@ from tfcompose.tf2.exceptions import Rejection
 
 if TYPE_CHECKING:
     from tfcompose.live.pose_query import OnPose, PoseQuery
-    from tfcompose.ros.stop import Stop
+    from tfcompose.signals import Stop
 
 TOO_EARLY = "echo hears the tree from its own start on; for an earlier time read a recording: --bag"
 

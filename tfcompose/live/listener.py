@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from tfcompose.live.edges import TreeObserver
     from tfcompose.live.topics import TFData
-    from tfcompose.ros.stop import Stop
+    from tfcompose.signals import Stop
 
     Topics = tuple[str, str]
 

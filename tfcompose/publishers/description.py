@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.files import with_absolute_addresses
 from tfcompose.process import say
-from tfcompose.publishers.addresses import with_absolute_addresses
 from tfcompose.ros.graph import UNKNOWN_NODE, writers
 from tfcompose.ros.node import LATCHED, TextSubscription, latch
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from tfcompose.process import Own
     from tfcompose.publishers.joint_mover import JointMover
-    from tfcompose.ros.stop import Stop
+    from tfcompose.signals import Stop
 
 MISSING_AFTER_S = 5.0
 _NAMED_AT_MOST = 8

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from tfcompose.plan import Joint, Simulation, Sweep
     from tfcompose.process import Own
-    from tfcompose.ros.stop import Stop
+    from tfcompose.signals import Stop
 
 _SECOND_NS = 1_000_000_000
 

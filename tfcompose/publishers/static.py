@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tfcompose.process import Own
-    from tfcompose.ros.stop import Stop
+    from tfcompose.signals import Stop
 
 
 def static(own: Own, stop: Stop) -> None:

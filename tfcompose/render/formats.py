@@ -46,7 +46,7 @@ def render_github(found: Sequence[Finding]) -> str:
 
 
 def _annotation(found: Finding) -> str:
-    properties: dict[str, object] = {"title": f"{found.code} {found.name}"}
+    properties: dict[str, object] = {"title": found.label}
     if found.span:
         at = found.span
         properties = {"file": at.file, "line": at.line, "col": at.column} | properties

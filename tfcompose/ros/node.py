@@ -33,7 +33,7 @@ from tfcompose.ros.typesupport import tf_message_type
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from tfcompose.ros.stop import Stop
+    from tfcompose.signals import Stop
 
 T = TypeVar("T", bool, float)
 

@@ -18,8 +18,8 @@ from rclpy.time import Time
 
 from tfcompose.ros.clock import SimClock
 from tfcompose.ros.node import TF_READER, TF_STATIC_READER, Subscription, open_node, qos, wait
-from tfcompose.ros.stop import Stop
 from tfcompose.ros.typesupport import tf_message_type
+from tfcompose.signals import Stop
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -39,7 +39,7 @@ def run(arguments: Namespace) -> int:
     from tfcompose.findings import finding
     from tfcompose.plan import RosSettings
     from tfcompose.ros.environment import RosError, child_environment, no_ros, ros_trouble
-    from tfcompose.ros.stop import Stop
+    from tfcompose.signals import Stop
 
     missing = no_ros()
     if missing:

@@ -90,7 +90,7 @@ def _live(query: PoseQuery, show: OnPose) -> NoPose | None:
     from tfcompose.cli.live import set_up_ros
     from tfcompose.findings import finding
     from tfcompose.ros.environment import RosError
-    from tfcompose.ros.stop import Stop
+    from tfcompose.signals import Stop
 
     set_up_ros()
     from tfcompose.live.echo import echo

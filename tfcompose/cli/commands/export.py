@@ -109,10 +109,10 @@ def _exported(plan: Plan, file: Path, folder: Path, arguments: Namespace) -> tup
 
         return launch(plan, Machine(relative), read_text(str(file.parent / "robot.urdf")))
     if arguments.kind == "compose":
-        from tfcompose.export.compose import compose
+        from tfcompose.export.supervisors import compose
 
         return compose(plan, Machine(relative, image=arguments.image))
-    from tfcompose.export.systemd import systemd
+    from tfcompose.export.supervisors import systemd
 
     own = {} if arguments.setup else {name: os.environ[name] for name in ROS_VARIABLES if os.environ.get(name)}
     at = Path(arguments.at or file.parent).absolute().as_posix()

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from tests.support.waiting import none_but
-from tfcompose.ros.stop import Stop
+from tfcompose.signals import Stop
 
 
 class Waker:

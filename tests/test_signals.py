@@ -9,11 +9,10 @@ import weakref
 
 import pytest
 
-from tfcompose import interrupt
 from tfcompose.cli import main
 from tfcompose.cli.parser import COMMANDS
 from tfcompose.launcher.supervisor import Signals
-from tfcompose.ros.stop import Stop
+from tfcompose.signals import RememberedInterrupt, Stop, take_interrupt
 
 
 class Loaded:
@@ -42,17 +41,17 @@ def lost(monkeypatch: pytest.MonkeyPatch) -> list[object]:
 
 
 def test_the_launcher_takes_an_interrupt_that_python_threw_away(lost: list[object]) -> None:
-    with interrupt.Remembered():
+    with RememberedInterrupt():
         lose_an_interrupt()
         assert lost == [KeyboardInterrupt]
         with Signals() as signals:
             assert os.read(signals.fd, 10)
             assert list(signals.taken()) == [signal.SIGINT]
-    assert not interrupt.taken()
+    assert not take_interrupt()
 
 
 def test_who_waits_in_ros_takes_it_once(lost: list[object]) -> None:
-    with interrupt.Remembered():
+    with RememberedInterrupt():
         lose_an_interrupt()
         with Stop() as stop:
             assert stop.requested
@@ -88,7 +87,7 @@ def test_another_error_of_a_command_is_none_of_an_interrupt(monkeypatch: pytest.
 
 def test_elsewhere_an_interrupt_ends_the_command_as_ever() -> None:
     before = signal.getsignal(signal.SIGINT)
-    with pytest.raises(KeyboardInterrupt), interrupt.Remembered():
+    with pytest.raises(KeyboardInterrupt), RememberedInterrupt():
         send_an_interrupt()
     assert signal.getsignal(signal.SIGINT) is before
-    assert interrupt.taken()
+    assert take_interrupt()

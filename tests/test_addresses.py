@@ -10,7 +10,7 @@ from xml.sax.saxutils import quoteattr
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tfcompose.publishers.addresses import with_absolute_addresses
+from tfcompose.files import with_absolute_addresses
 
 FOLDER = Path("/builds/a b & <c>/rover")
 

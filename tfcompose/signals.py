@@ -1,6 +1,9 @@
-"""How an own process ends: SIGINT, SIGTERM and SIGHUP become a flag that wakes whoever waits.
+"""How commands and processes of tfcompose's own take signals: none is lost, and each ends whoever waits.
 
-It imports no ROS, so that a process handles signals before it spends a second on starting ROS.
+While a command loads, Ctrl-C ends it also where Python can raise nothing: Python throws an exception away that comes up
+in a callback of its own, such as those that its import system has, and goes on. So what SIGINT raises there is
+remembered, for whoever handles signals next. A process then has a flag that SIGINT, SIGTERM and SIGHUP set, and that
+wakes whoever waits. ROS is not imported: a process handles signals before it spends a second on starting it.
 """
 
 from __future__ import annotations
@@ -10,13 +13,49 @@ import signal
 import threading
 from typing import TYPE_CHECKING, Protocol
 
-from tfcompose import interrupt
-
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from types import FrameType
+    from types import FrameType, TracebackType
 
     from typing_extensions import Self
+
+
+_remembered: list[int] = []
+
+
+def take_interrupt() -> bool:
+    """Return whether there was a Ctrl-C that nobody took yet, and take it."""
+    came = bool(_remembered)
+    _remembered.clear()
+    return came
+
+
+class RememberedInterrupt:
+    """Lets SIGINT raise KeyboardInterrupt, as Python does, and remembers it; ignored, as below ``nohup``, it stays so.
+
+    It is for the main thread; in others, which get no signals, it does nothing.
+    """
+
+    def __enter__(self) -> None:
+        _remembered.clear()
+        self._is_set = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        if self._is_set:
+            try:
+                signal.signal(signal.SIGINT, _interrupt)
+            except ValueError:  # in another thread
+                self._is_set = False
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._is_set:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _interrupt(number: int, _frame: FrameType | None) -> None:
+    _remembered.append(number)
+    raise KeyboardInterrupt
+
 
 #: The signals that end a process.
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -82,7 +121,7 @@ class Stop:
         self._thread = threading.Thread(target=self._watch, name="signals", daemon=True)
         self._thread.start()
         self._previous_mask = signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
-        if interrupt.taken():
+        if take_interrupt():
             self.request()
         return self
 

@@ -5,15 +5,16 @@ from __future__ import annotations
 import ast
 import graphlib
 import sys
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.support import processes
+from tests.support.house import PACKAGE, ROOT, imports_of, part_of
 from tests.support.tables import for_each
 
-ROOT = Path(__file__).parents[1]
-PACKAGE = ROOT / "tfcompose"
+if TYPE_CHECKING:
+    from pathlib import Path
 
 FOUNDATIONS = {"__init__", "catalogue", "findings", "geometry", "model", "plan"}
 STAGES = {"load", "language", "resolve", "check"}
@@ -87,32 +88,6 @@ ONLY_IN: dict[str, set[str]] = {
     "rosidl_parser": {"ros"},
     "ament_index_python": {"ros"},
 }
-
-
-def part_of(file: Path) -> str:
-    """Return the part that the file belongs to: its folder, or its name directly below the package."""
-    steps = file.relative_to(PACKAGE).with_suffix("").parts
-    return steps[0]
-
-
-def imports_of(file: Path, *, for_types: bool = True) -> set[str]:
-    """Return the modules that are imported, anywhere in the file; those for types only where it is asked for."""
-    names: set[str] = set()
-    tree = ast.parse(file.read_text("utf-8"))
-    if not for_types:
-        tree.body = [
-            node for node in tree.body if not (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test))
-        ]
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names.add(node.module)
-            if node.module == "tfcompose":
-                names |= {f"tfcompose.{alias.name}" for alias in node.names if alias.name != "__version__"}
-        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("import_module"):
-            names |= {str(word.value) for word in node.args[:1] if isinstance(word, ast.Constant)}
-    return names
 
 
 FILES = sorted(PACKAGE.rglob("*.py"))

@@ -112,7 +112,7 @@ def test_a_log_that_is_a_link_is_not_followed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("process", ["a", "arm/a"])
-def test_a_folder_that_is_a_link_is_not_written_to(tmp_path: Path, process: str) -> None:
+def test_a_folder_that_is_a_link_gets_no_logs(tmp_path: Path, process: str) -> None:
     elsewhere, folder = tmp_path / "elsewhere", tmp_path / "logs"
     elsewhere.mkdir()
     folder.mkdir()
@@ -123,7 +123,7 @@ def test_a_folder_that_is_a_link_is_not_written_to(tmp_path: Path, process: str)
     assert list(elsewhere.iterdir()) == []
 
 
-def test_another_users_folder_is_not_written_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_users_folder_gets_no_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     own = os.geteuid()
     monkeypatch.setattr(os, "geteuid", lambda: own + 1)
     assert "another user" in (Logs(tmp_path).write("a", "text") or "")

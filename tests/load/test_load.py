@@ -70,9 +70,9 @@ def test_every_float_reads_back_as_itself(value: float) -> None:
     assert read == value
 
 
-@pytest.mark.parametrize("written", ["0x" + "f" * 250, "0o" + "7" * 330, "0x" + "0" * 400 + "1"])
-def test_a_long_number_of_another_base_is_its_value(written: str) -> None:
-    assert float(load(f"a: {written}\n", "f").data["a"]) == float(int(written, 0))
+@pytest.mark.parametrize("source_text", ["0x" + "f" * 250, "0o" + "7" * 330, "0x" + "0" * 400 + "1"])
+def test_a_long_number_of_another_base_is_its_value(number: str) -> None:
+    assert float(load(f"a: {number}\n", "f").data["a"]) == float(int(number, 0))
 
 
 @given(st.integers(-(10**200), 10**200))
@@ -80,10 +80,10 @@ def test_every_integer_reads_back_as_itself(value: int) -> None:
     assert load(f"a: {value}\n", "f").data["a"] == value
 
 
-@pytest.mark.parametrize("written", [".nan", ".inf", "-.INF", "1e999", "9" * 400, "0x" + "f" * 400, "0o" + "7" * 400])
-def test_what_is_not_finite_is_a_finding_at_its_place(written: str) -> None:
-    found = load(f"a: {written}\n", "f").found
-    assert [(one.code, one.span) for one in found] == [("TF007", Span("f", 1, 4, 1, 4 + len(written)))]
+@pytest.mark.parametrize("number", [".nan", ".inf", "-.INF", "1e999", "9" * 400, "0x" + "f" * 400, "0o" + "7" * 400])
+def test_what_is_not_finite_is_a_finding_at_its_place(number: str) -> None:
+    found = load(f"a: {number}\n", "f").found
+    assert [(one.code, one.span) for one in found] == [("TF007", Span("f", 1, 4, 1, 4 + len(number)))]
 
 
 TEXT = """\

@@ -226,6 +226,6 @@ def test_two_cameras_of_one_kind_get_names_and_serial_numbers_by_two_lines(
     head = "tfcompose: 1\nrobot: rover\nros: {discovery: localhost}\nlinks: {base_link: {}}\nsensors:\n"
     robot = up(head + line % ("left", 0.1, "0001") + line % ("right", 0.2, "0002"), "--for", "5")
     assert robot.ended() == []
-    assert all(said in robot.text for said in ("stand-in: /left/left 0001", "stand-in: /right/right 0002"))
+    assert all(output in robot.text for output in ("stand-in: /left/left 0001", "stand-in: /right/right 0002"))
     plan = json.loads(next(tmp_path.rglob("plan.json")).read_text("utf-8"))
     assert {edge["child"].partition("_")[0] for edge in plan["edges"]} == {"left", "right"}

@@ -74,8 +74,8 @@ def scalar(tag: str, text: str) -> str | bool | int | float | None:
 
 def _number(tag: str, text: str) -> int | float:
     if tag == INT and text[:2] in {"0o", "0x"}:
-        whole = int(text, 0)  # Python bounds the digits of decimal numbers only
-        return whole if len(text) < _MOST_DIGITS else _finite(float(whole), text)
+        number = int(text, 0)  # Python bounds the digits of decimal numbers only
+        return number if len(text) < _MOST_DIGITS else _finite(float(number), text)
     if tag == INT and len(text) < _MOST_DIGITS:
         return int(text)
     value = float("nan") if "n" in text.lower().replace("inf", "") else float(text.lower().replace(".inf", "inf"))

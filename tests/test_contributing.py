@@ -1,0 +1,46 @@
+"""CONTRIBUTING.md says what the code says: its drawing is fresh, and what it names is there."""
+
+from __future__ import annotations
+
+import ast
+import re
+
+import yaml
+
+from tests.support.house import GUIDE, ROOT, mermaid, with_drawing
+
+TEXT = GUIDE.read_text("utf-8")
+#: What the examples would add.
+NEW = {
+    "tfcompose/presets/hokuyo/ust-30lx.yaml",
+    "tfcompose/cli/commands/frames.py",
+    "tfcompose/export/procfile.py",
+}
+
+
+def test_the_drawing_is_that_of_the_imports() -> None:
+    assert with_drawing(TEXT) == TEXT, "python -m tests.support.house --write"
+    assert "  launcher --> ros\n" in mermaid()
+
+
+def test_each_function_on_the_way_of_a_file_is_there() -> None:
+    names = set(re.findall(r"`(tfcompose(?:\.\w+){2,})`", TEXT))
+    assert len(names) > 20
+    for name in names:
+        module, _, function = name.rpartition(".")
+        tree = ast.parse((ROOT / f"{module.replace('.', '/')}.py").read_text("utf-8"))
+        assert function in {node.name for node in tree.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}, name
+
+
+def test_each_file_that_it_names_is_there() -> None:
+    names = set(re.findall(r"\b(?:tests|tfcompose)/[\w/.-]*\w", TEXT))
+    assert len(names) > 15
+    assert {name for name in names if not (ROOT / name).exists()} == NEW
+
+
+def test_the_fast_tests_are_folders_that_are_there() -> None:
+    config = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text("utf-8"))
+    hooks = {hook["id"]: hook for repo in config["repos"] for hook in repo["hooks"]}
+    folders = [word for word in hooks["fast-tests"]["entry"].split() if word.startswith("tests/")]
+    assert len(folders) > 10
+    assert all((ROOT / folder).exists() for folder in folders)

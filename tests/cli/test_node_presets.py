@@ -6,15 +6,15 @@ import json
 
 import pytest
 
-from tfcompose.cli.node_page import facts, text
 from tfcompose.cli.parser import main
+from tfcompose.cli.preset_page import node_facts, node_text
 from tfcompose.resolve.presets import node_preset, node_preset_names
 
 
 @pytest.mark.parametrize("name", node_preset_names())
 def test_a_page_names_each_edge_its_switch_and_each_parameter(name: str) -> None:
-    page, preset = text(facts(name)), node_preset(name)
-    for claim in facts(name)["publishes"]:
+    page, preset = node_text(node_facts(name)), node_preset(name)
+    for claim in node_facts(name)["publishes"]:
         assert f"{claim['parent']} → {claim['child']}" in page
         assert all(f"{key}: " in page for key in claim["off"])
         assert "{" not in claim["parent"] + claim["child"]

@@ -35,7 +35,7 @@ from tests.support.tree_history import (
 from tfcompose.bags import BagError
 from tfcompose.check.check import check
 from tfcompose.check.rule import rule
-from tfcompose.cli import building, live
+from tfcompose.cli import live, writing
 from tfcompose.cli.commands import echo
 from tfcompose.cli.compiling import library
 from tfcompose.cli.parser import main
@@ -48,8 +48,7 @@ from tfcompose.ipc import Alive, Clear, Found, GateShut, Live, ProcessRequest
 from tfcompose.language import set_value
 from tfcompose.launcher.events import Exited, StartFailed, TimeUp
 from tfcompose.launcher.preflight import commands_of
-from tfcompose.live.messages import Message
-from tfcompose.live.publishers import Publisher, Senders
+from tfcompose.live.publishers import Message, Publisher, Senders
 from tfcompose.live.state import MovingJoint, RosProcess, StampedData, Topic, TreeState
 from tfcompose.model import Robot
 from tfcompose.model.body import Asset
@@ -547,11 +546,11 @@ def compiled() -> Iterator[Finding]:
         here = Disk(mock.Mock(return_value=""), lambda _: True, lambda _: True, moments=moments)
         yield from compile_robot(mass, "r.yaml", library(), read=mock.Mock(), disk=here).found
     for form in ("package", "file"):
-        yield building._without_address(Asset("meshes/a.stl", Span("r.yaml", 7, 16, 7, 29)), form)
+        yield writing._without_address(Asset("meshes/a.stl", Span("r.yaml", 7, 16, 7, 29)), form)
     sound = compile_robot(ROVER, "rover.yaml", library()).robot
     assert sound
     files = [replace(file, text=file.text.replace("0 0 0.3", "0 0 0.4")) for file in emit(sound)]
-    yield from building._differences(sound, files, Target())
+    yield from writing._differences(sound, files, Target())
 
 
 def _with_preset(name: str, text: str, robot: str) -> Iterator[Finding]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.guard.watch import plans_by_topics, together
+from tfcompose.guard.process import plans_by_topics, together
 from tfcompose.ipc import Clear, Complete, GuardEvent, OwnerReady
 from tfcompose.plan import Plan, PlanProcess, RosSettings
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tfcompose.live.messages import MessageReader
+from tfcompose.live.publishers import MessageReader
 from tfcompose.ros.node import Received
 from tfcompose.ros.tf_codec import Transform, decode, encode
 

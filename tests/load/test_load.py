@@ -17,8 +17,7 @@ from tests.support.tables import for_each
 from tfcompose.findings import RejectedError, Span
 from tfcompose.language import composed, validate
 from tfcompose.load import Source, load
-from tfcompose.load.nodes import MOST_VALUES
-from tfcompose.load.places import Place
+from tfcompose.load.nodes import MOST_VALUES, Place
 
 # YAML 1.2.2, section 10.3.2 (core schema). YAML 1.1 reads several of these otherwise.
 SCALARS: dict[str, Any] = {

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from tfcompose.geometry import Pose
 from tfcompose.guard.judge import Judge
 from tfcompose.ipc import Clear, Found, GuardEvent, Recovered, Taken
-from tfcompose.live.messages import Message
+from tfcompose.live.publishers import Message
 from tfcompose.live.publishers import Publisher as TFPublisher
 from tfcompose.plan import Claim, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 

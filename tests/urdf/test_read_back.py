@@ -146,7 +146,7 @@ def test_nothing_is_emitted_that_is_not_the_robot(
         )
 
     work_emit = emit
-    monkeypatch.setattr("tfcompose.cli.building.emit", wrong)
+    monkeypatch.setattr("tfcompose.cli.writing.emit", wrong)
     words = ["build", str(ROBOTS / "rover.yaml"), "-o", str(tmp_path / "out")]
     assert main([*words, "--read-back"]) == 1
     assert "error[TF910] robot.full.urdf: the joint " in capsys.readouterr().err
@@ -157,7 +157,7 @@ def test_nothing_is_emitted_that_is_not_the_robot(
 def test_without_yourdfpy_that_is_one_sentence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("tfcompose.cli.building.find_spec", lambda name: None if name == "yourdfpy" else name)
+    monkeypatch.setattr("tfcompose.cli.writing.find_spec", lambda name: None if name == "yourdfpy" else name)
     words = ["build", str(ROBOTS / "rover.yaml"), "-o", str(tmp_path / "out")]
     assert main([*words, "--read-back"]) == 2
     output = capsys.readouterr().err

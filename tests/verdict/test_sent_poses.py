@@ -9,8 +9,7 @@ import pytest
 
 from tests.support.findings import expect
 from tfcompose.geometry import OPTICAL_XYZW, Pose, multiply, quat_from_rpy
-from tfcompose.live.messages import Message
-from tfcompose.live.publishers import Publisher, Senders
+from tfcompose.live.publishers import Message, Publisher, Senders
 from tfcompose.plan import Driven, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.verdict.drivers import SentPoses
 

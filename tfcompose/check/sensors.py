@@ -6,7 +6,7 @@ import math
 import re
 from typing import TYPE_CHECKING
 
-from tfcompose.check.placement import CAMERAS, are_mirrored, envelope, is_near, twins
+from tfcompose.check.poses import CAMERAS, are_mirrored, envelope, is_near, twins
 from tfcompose.check.rule import rule
 from tfcompose.findings import Finding, Note, finding
 from tfcompose.geometry import Pose, angle_between, norm

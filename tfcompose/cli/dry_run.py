@@ -36,8 +36,8 @@ def dry_run(arguments: Namespace) -> int:
 
 
 def _compiled_files(arguments: Namespace) -> dict[str, str]:
-    from tfcompose.cli.building import destination
     from tfcompose.cli.compiling import compiled_robot
+    from tfcompose.cli.writing import destination
     from tfcompose.emit import emit
 
     robot = compiled_robot(arguments.file, arguments)

@@ -92,7 +92,7 @@ def start(arguments: Namespace) -> int:
 
 def _build(arguments: Namespace) -> Path:
     """Build the robot and return its plan's file."""
-    from tfcompose.cli.building import build  # the compiler: a built plan needs none
+    from tfcompose.cli.writing import build  # the compiler: a built plan needs none
 
     return build(arguments)[0] / PLAN
 

@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 
     from tfcompose.findings import Finding
     from tfcompose.guard.reports import Case
-    from tfcompose.live.messages import Message
-    from tfcompose.live.publishers import Publisher
+    from tfcompose.live.publishers import Message, Publisher
     from tfcompose.plan import Plan
 
     Edges = tuple[tuple[str, str], ...]

@@ -11,7 +11,7 @@ from base64 import b64decode, b64encode
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.live.messages import Message
+from tfcompose.live.publishers import Message
 from tfcompose.process import say
 from tfcompose.ros.node import TFPublisher
 from tfcompose.ros.tf_codec import Transform, decode, encode

@@ -3,10 +3,8 @@
 Calibration files are read by a module of their own, which is loaded where it is used.
 """
 
-from tfcompose.load.comments import allows_in_xml
-from tfcompose.load.nodes import DEEPEST
-from tfcompose.load.places import Path, Place
-from tfcompose.load.source import MOST_VALUES, Source, load, path_named, refuse_unreadable
+from tfcompose.load.nodes import DEEPEST, Path, Place
+from tfcompose.load.source import MOST_VALUES, Source, allows_in_xml, load, path_named, refuse_unreadable
 
 __all__ = [
     "DEEPEST",

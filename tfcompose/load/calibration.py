@@ -12,8 +12,7 @@ from itertools import accumulate
 from typing import TYPE_CHECKING, Any, Literal
 
 from tfcompose.findings import Span, finding
-from tfcompose.load.nodes import Reader
-from tfcompose.load.places import Place
+from tfcompose.load.nodes import Place, Reader
 from tfcompose.load.scalars import FLOAT, INT, implicit_tag, scalar
 from tfcompose.load.source import Source, refuse_unreadable
 

@@ -1,4 +1,4 @@
-"""YAML text as plain data with places, in one pass over PyYAML's parser events.
+"""YAML text as plain data with the place of every key and value, in one pass over PyYAML's parser events.
 
 PyYAML's own composer recurses in C and a deeply nested text ends the interpreter; this one has a stack of its own and
 stops at a depth that no robot needs. Nothing is constructed by tags, no code is run. An alias *is* the value that it
@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
 from tfcompose.findings import Finding, Note, RejectedError, Span, finding
-from tfcompose.load.not_yaml import no_character, no_syntax
-from tfcompose.load.places import Place
 from tfcompose.load.scalars import MAP, SCALAR_TAGS, SEQ, STR, TAG, plain, scalar
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
 
 DEEPEST = 40
 MOST_VALUES = 400_000  # with those that aliases stand for
@@ -257,3 +259,112 @@ class Reader:
             top.merges.append((value, place))
         else:
             top.data[top.key], top.inside[top.key] = value, place
+
+
+Path = tuple[str | int, ...]
+
+_NOTHING: Mapping[Any, Any] = {}
+
+
+class Place:
+    """Where a value stands; of a mapping or a list also where its keys, and the values in it, stand.
+
+    Most places are never asked for: the parser's marks become a ``Span`` only then. Places do not change. ``inside``
+    holds the places of the values by key or index, ``keys`` those of the keys; an alias has the place of its anchor.
+    """
+
+    __slots__ = ("_at", "inside", "keys")
+
+    def __init__(
+        self,
+        at: Span | tuple[str, Any, Any],
+        inside: Mapping[Any, Place] = _NOTHING,
+        keys: Mapping[Any, Place] = _NOTHING,
+    ) -> None:
+        """``at`` is the place, or the file and the parser's marks of beginning and end, which count from 0."""
+        self._at = at
+        self.inside = inside
+        self.keys = keys
+
+    @property
+    def span(self) -> Span:
+        """The place in the file."""
+        at = self._at
+        if isinstance(at, Span):
+            return at
+        file, start, end = at
+        self._at = span = Span(file, start.line + 1, start.column + 1, end.line + 1, end.column + 1)
+        return span
+
+    def with_inside(self, inside: Mapping[Any, Place], keys: Mapping[Any, Place]) -> Place:
+        """Return the same place with other places in it."""
+        return Place(self._at, inside, keys)
+
+    def get(self, path: Path) -> Place | None:
+        """Return the place of what stands at ``path`` below, or None."""
+        place: Place | None = self
+        for step in path:
+            if place is None:
+                break
+            place = place.inside.get(step)
+        return place
+
+    def nearest(self, path: Path) -> Place:
+        """Return the place of what stands at ``path`` below, or of the nearest thing around it that there is."""
+        place = self
+        for step in path:
+            below = place.inside.get(step)
+            if below is None:
+                break
+            place = below
+        return place
+
+    def nearest_key(self, path: Path) -> Place | None:
+        """Return the place of the last key on the way to ``path`` that there is, or None."""
+        place = self
+        key: Place | None = None
+        for step in path:
+            key = place.keys.get(step, key)
+            below = place.inside.get(step)
+            if below is None:
+                break
+            place = below
+        return key
+
+    def walk(self, path: Path = ()) -> Iterator[tuple[Path, Place]]:
+        """Yield every value's path and place, this one's first."""
+        yield path, self
+        for step, place in self.inside.items():
+            yield from place.walk((*path, step))
+
+
+def no_character(error: yaml.reader.ReaderError, text: str, file: str) -> Finding:
+    """Return the finding for a character that must not stand in YAML."""
+    hit = yaml.reader.Reader.NON_PRINTABLE.search(text)  # the C parser's position counts bytes
+    position = hit.start() if hit else error.position
+    line, column = text.count("\n", 0, position) + 1, position - text.rfind("\n", 0, position)
+    return finding("TF002", "a character that YAML does not allow", Span(file, line, column, line, column + 1))
+
+
+def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Finding:
+    """Return the finding for text that the parser refuses, with where it began."""
+    mark = error.problem_mark or error.context_mark
+    line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+    message, advice = ", ".join(filter(None, (error.context, error.problem))), ""
+    lines = text.splitlines()
+    source_line = lines[line - 1] if line <= len(lines) else ""
+    if "\t" in source_line[: len(source_line) - len(source_line.lstrip())]:
+        message, advice = "a tab in the indentation", "indent with spaces; YAML does not allow tabs there"
+    notes = []
+    if error.context_mark and mark and error.context_mark.line != mark.line:
+        at = error.context_mark
+        notes = [Note("it began here", Span(file, at.line + 1, at.column + 1, at.line + 1, at.column + 2))]
+    return finding("TF002", message, Span(file, line, column, line, column + 1), help=advice, notes=notes)
+
+
+def no_yaml(text: str, file: str) -> Finding:
+    """Return the finding for XML where YAML is expected: most often a URDF as a robot file."""
+    is_xacro = "ros.org/wiki/xacro" in text
+    key = "xacro" if is_xacro else "urdf"
+    advice = f"tfcompose import {file} -o robot.yaml; or take it as a part: parts: {{NAME: {{{key}: {file}}}}}"
+    return finding("TF002", "this is XML, and YAML is expected", Span(file), help=advice if "<robot" in text else "")

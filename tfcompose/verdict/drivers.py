@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from tfcompose.findings import Span
-    from tfcompose.live.messages import Message
-    from tfcompose.live.publishers import Publishers
+    from tfcompose.live.publishers import Message, Publishers
     from tfcompose.plan import Driven, Plan, PlanEdge
     from tfcompose.verdict.ownership import Violation
 

@@ -32,7 +32,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Build; exit code 0, 1 with errors in the robot, 2 where something cannot be read or written."""
-    from tfcompose.cli.building import build
+    from tfcompose.cli.writing import build
 
     folder, names = build(arguments)
     print(f"wrote {folder}: {', '.join(names)}")

@@ -64,7 +64,7 @@ def run(arguments: Namespace) -> int:
         refuse_variant(arguments)
         file = Path(arguments.file)
     else:
-        from tfcompose.cli.building import build
+        from tfcompose.cli.writing import build
 
         file = build(arguments)[0] / PLAN
     plan = built_plan(file)

@@ -34,7 +34,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Print the list or the page; exit code 1 if there is no such preset, or one that is wrong."""
-    from tfcompose.cli import node_page, preset_page
+    from tfcompose.cli import preset_page
     from tfcompose.cli.compiling import library
     from tfcompose.findings import RejectedError
     from tfcompose.resolve.presets import node_preset_names
@@ -45,7 +45,7 @@ def run(arguments: Namespace) -> int:
         if name and known.file(name) and "/_" not in name:
             return _show(preset_page.facts(name, known), arguments.format)
         if name in node_preset_names():
-            return _show(node_page.facts(name), arguments.format)
+            return _show(preset_page.node_facts(name), arguments.format)
         return _list(name, known, arguments.format)
     except RejectedError as error:
         print_findings(error.findings, sys.stderr)
@@ -53,15 +53,15 @@ def run(arguments: Namespace) -> int:
 
 
 def _show(facts: dict[str, Any], form: str) -> int:
-    from tfcompose.cli import node_page, preset_page
+    from tfcompose.cli import preset_page
 
-    page: Any = node_page if facts["kind"] == "node" else preset_page
-    sys.stdout.write(json.dumps(facts, indent=2, ensure_ascii=False) + "\n" if form == "json" else page.text(facts))
+    text_of = preset_page.node_text if facts["kind"] == "node" else preset_page.text
+    sys.stdout.write(json.dumps(facts, indent=2, ensure_ascii=False) + "\n" if form == "json" else text_of(facts))
     return 0
 
 
 def _list(only: str | None, known: Library, form: str) -> int:
-    from tfcompose.cli import node_page
+    from tfcompose.cli import preset_page
     from tfcompose.cli.tables import shortened
     from tfcompose.findings import did_you_mean
 
@@ -71,7 +71,7 @@ def _list(only: str | None, known: Library, form: str) -> int:
         | _likeness(preset, known)
         for name, preset in presets.items()
     ]
-    rows += node_page.rows()
+    rows += preset_page.node_rows()
     words = sorted({word for row in rows for word in _words(row)})
     rows = [row for row in rows if not only or only in _words(row)]
     if not rows:

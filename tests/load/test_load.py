@@ -69,7 +69,7 @@ def test_every_float_reads_back_as_itself(value: float) -> None:
     assert read == value
 
 
-@pytest.mark.parametrize("source_text", ["0x" + "f" * 250, "0o" + "7" * 330, "0x" + "0" * 400 + "1"])
+@pytest.mark.parametrize("number", ["0x" + "f" * 250, "0o" + "7" * 330, "0x" + "0" * 400 + "1"])
 def test_a_long_number_of_another_base_is_its_value(number: str) -> None:
     assert float(load(f"a: {number}\n", "f").data["a"]) == float(int(number, 0))
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.console import Console, StatusLine, vanished
-from tfcompose.cli.plans import PLAN, built_plan, copy_plan, is_plan, plan_to_start
+from tfcompose.cli.plans import built_plan, copy_plan, is_plan, plan_to_start
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.runs import (
     complain_of_leftovers,
@@ -45,7 +45,7 @@ from tfcompose.launcher.output import NonBlockingOutput
 from tfcompose.launcher.preflight import commands_of, started_by_us
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDirError, runtime_dir_of
 from tfcompose.launcher.supervisor import Session, supervise
-from tfcompose.ros.environment import child_environment, no_ros, ros_trouble
+from tfcompose.ros.environment import child_environment, ros_trouble
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -55,12 +55,8 @@ if TYPE_CHECKING:
     from tfcompose.plan import Plan
 
 
-def start(arguments: Namespace) -> int:
-    """Build where that is needed, look at everything, and start; return the exit code as ``up`` does."""
-    missing = no_ros()
-    if missing:
-        reject([missing])
-    file = Path(arguments.file) if is_plan(arguments.file) else _build(arguments)
+def start(file: Path, arguments: Namespace) -> int:
+    """Check all that the plan in the file needs, and start it; return the exit code as ``up`` does."""
     plan = plan_to_start(built_plan(file), arguments)
     if plan.guard.mode == "off" and arguments.settle is not None:
         fail("the guard is off, so --settle has no effect: leave it out", UNREADABLE)
@@ -88,13 +84,6 @@ def start(arguments: Namespace) -> int:
         session.output = NonBlockingOutput(sys.stdout.fileno())
         stack.callback(session.output.close)
         return _run(plan, place, session, session.output, arguments.duration)
-
-
-def _build(arguments: Namespace) -> Path:
-    """Build the robot and return its plan's file."""
-    from tfcompose.cli.writing import build  # the compiler: a built plan needs none
-
-    return build(arguments)[0] / PLAN
 
 
 def _run(plan: Plan, place: RuntimeDir, session: Session, output: NonBlockingOutput, duration_s: float | None) -> int:

@@ -7,6 +7,7 @@ robot runs already, restart only what differs in the new plan.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import DEFAULT_FILE, add_variant, not_negative, positive
@@ -62,6 +63,19 @@ def run(arguments: Namespace) -> int:
         from tfcompose.cli.dry_run import dry_run
 
         return dry_run(arguments)
-    from tfcompose.cli.starting import start
+    from tfcompose.cli.terminal import reject
+    from tfcompose.ros.environment import no_ros
 
-    return start(arguments)
+    if missing := no_ros():
+        reject([missing])
+    if is_plan(arguments.file):
+        from tfcompose.cli.starting import start
+
+        return start(Path(arguments.file), arguments)
+    from tfcompose.cli.build_process import BuildProcess
+
+    with BuildProcess(arguments) as build:
+        from tfcompose.cli.starting import start  # while it is built
+
+        plan_file = build.plan_file()
+    return start(plan_file, arguments)

@@ -1,0 +1,78 @@
+"""``up`` builds a robot file in a process of its own: it ends with it, and the launcher holds no compiler."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import psutil
+import pytest
+
+from tests.support import processes
+from tests.support.robots import ROVER
+from tests.support.waiting import TIMEOUT_S, gone, until
+
+pytestmark = pytest.mark.ros
+
+
+def up(file: str | Path, *words: str) -> subprocess.Popen[str]:
+    """Start ``tfcompose up``; what it may read from its stdin is never written."""
+    command = [sys.executable, "-m", "tfcompose", "up", str(file), *words]
+    return processes.start(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+
+def build_of(launcher: subprocess.Popen[str]) -> psutil.Process:
+    """Return the process that builds, once it has loaded the compiler."""
+
+    def builds() -> list[psutil.Process]:
+        below = psutil.Process(launcher.pid).children()
+        return [one for one in below if any("pydantic_core" in each.path for each in one.memory_maps())]
+
+    assert until(builds)
+    return builds()[0]
+
+
+def test_the_launcher_of_a_robot_file_holds_no_compiler(domain: object, tmp_path: Path) -> None:
+    assert domain
+    (tmp_path / "rover.yaml").write_text(ROVER, "utf-8")
+    launcher = up(tmp_path / "rover.yaml", "-o", str(tmp_path / "build"))
+    assert launcher.stdout
+    assert any("tree complete" in line for line in launcher.stdout)
+    maps = Path(f"/proc/{launcher.pid}/maps").read_text("utf-8")
+    assert "pydantic" not in maps
+    assert "yaml" not in maps
+    launcher.send_signal(signal.SIGINT)
+    launcher.communicate(timeout=TIMEOUT_S)
+    assert launcher.returncode == 0
+
+
+def test_an_interrupt_ends_the_build_too_and_nothing_is_printed() -> None:
+    launcher = up("/dev/stdin")
+    build = build_of(launcher)
+    launcher.send_signal(signal.SIGINT)
+    assert launcher.wait(TIMEOUT_S) == 130
+    assert until(partial(gone, build))
+    assert launcher.communicate() == ("", "")
+
+
+def test_a_build_that_is_killed_ends_the_launcher_which_names_the_signal() -> None:
+    launcher = up("/dev/stdin")
+    build_of(launcher).kill()
+    _, errors = launcher.communicate(timeout=TIMEOUT_S)
+    assert launcher.returncode == 1
+    assert "SIGKILL" in errors
+
+
+@pytest.mark.parametrize(("text", "code"), [("tfcompose: 1\nrobot: r\nframes: {a: {parent: b}}\n", 1), (None, 2)])
+def test_up_ends_as_the_build_does(text: str | None, code: int, tmp_path: Path) -> None:
+    file = tmp_path / "robot.yaml"
+    if text is not None:
+        file.write_text(text, "utf-8")
+    ends = [
+        processes.run([sys.executable, "-m", "tfcompose", command, file], cwd=tmp_path) for command in ("build", "up")
+    ]
+    assert {(one.returncode, one.stdout) for one in ends} == {(code, "")}
+    assert ends[0].stderr == ends[1].stderr != ""

@@ -1,0 +1,101 @@
+"""A build in a process of its own: the launcher, which lives as long as the robot runs, never holds the compiler."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+import traceback
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.terminal import FAILED, INTERRUPTED, UNREADABLE, fail
+from tfcompose.signals import take_interrupt
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from types import TracebackType
+
+    from typing_extensions import Self
+
+
+class BuildProcess:
+    """Builds a robot while this process goes on; what is found is printed there, on the same terminal.
+
+    It has a process group of its own, so that a Ctrl-C comes to it once, from here: an error in the ``with`` block
+    interrupts the build and waits for its end.
+    """
+
+    def __init__(self, arguments: Namespace) -> None:
+        self._pipe, answer = os.pipe()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        self._pid = os.fork()
+        if self._pid == 0:
+            os._exit(_build(arguments, answer))
+        os.close(answer)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._pid:
+            os.kill(self._pid, signal.SIGINT)
+            self._exit_code()
+
+    def plan_file(self) -> Path:
+        """Wait for the end of the build, and return the file of its plan.
+
+        Raises:
+            SystemExit: with the build's exit code, if it failed, after it said why.
+            OSError: if that is what ended it.
+        """
+        with open(self._pipe, "rb", closefd=False) as pipe:
+            answer = pipe.read()
+        code = self._exit_code()
+        if code < 0:
+            fail(f"the build was ended by {signal.Signals(-code).name}")
+        if code == 0:
+            return Path(os.fsdecode(answer))
+        if answer:
+            raise OSError(int(answer), os.strerror(int(answer)))
+        raise SystemExit(code)
+
+    def _exit_code(self) -> int:
+        code = os.waitstatus_to_exitcode(os.waitpid(self._pid, 0)[1])
+        self._pid = 0
+        os.close(self._pipe)
+        return code
+
+
+def _build(arguments: Namespace, answer: int) -> int:
+    """Build and return the exit code; write the plan's file, or the number of an operating system's error."""
+    code = FAILED
+    try:
+        os.setpgid(0, 0)
+        for number in (signal.SIGTTOU, signal.SIGTTIN):  # a terminal may stop other groups that write to it, or read
+            signal.signal(number, signal.SIG_IGN)
+        from tfcompose.cli.writing import build
+        from tfcompose.cli.plans import PLAN
+
+        folder, _ = build(arguments)
+        os.write(answer, os.fsencode(folder / PLAN))
+        code = 0
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) else UNREADABLE
+    except OSError as error:
+        os.write(answer, str(error.errno).encode())
+    except KeyboardInterrupt:
+        code = INTERRUPTED
+    except BaseException:  # noqa: BLE001 (nobody further out says what it was)
+        if take_interrupt():
+            code = INTERRUPTED
+        else:
+            traceback.print_exc()
+    with contextlib.suppress(OSError):
+        sys.stdout.flush()
+        sys.stderr.flush()
+    return code

@@ -3,12 +3,12 @@
 Files named ``test_…_ros.py`` import ROS, and are left out where there is none.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -19,15 +19,9 @@ from tests.support.processes import Started
 from tests.support.skips import unexpected
 from tests.support.waiting import TIMEOUT_S
 from tfcompose.geometry import Pose
-from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
+from tfcompose.plan import Clock, Joint, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.plan.file import write_plan
 from tfcompose.ros.environment import missing_ros
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
-    from tfcompose.plan import Clock, Joint
 
 NO_ROS = missing_ros()
 collect_ignore_glob = ["*_ros.py"] if NO_ROS else []

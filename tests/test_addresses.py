@@ -1,7 +1,5 @@
 """Relative mesh addresses mean the folder of the build, and only there; who hears the description gets whole ones."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from urllib.parse import unquote

@@ -1,7 +1,5 @@
 """Whatever the text is, there is a robot or there are findings; never another exception."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

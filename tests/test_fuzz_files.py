@@ -4,8 +4,6 @@ A process of its own does the work: its memory is bounded by the system to 500 M
 take more than twenty times the processor time of the undamaged robot's.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

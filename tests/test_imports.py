@@ -1,20 +1,15 @@
 """Who may import whom: the table of the architecture, read from the syntax trees, and what commands really load."""
 
-from __future__ import annotations
-
 import ast
 import graphlib
 import sys
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from tests.support import processes
 from tests.support.house import PACKAGE, ROOT, imports_of, part_of
 from tests.support.tables import for_each
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 FOUNDATIONS = {"__init__", "catalogue", "findings", "geometry", "model", "plan"}
 STAGES = {"load", "language", "resolve", "check"}

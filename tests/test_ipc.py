@@ -1,7 +1,5 @@
 """Whatever the processes of a run tell each other is read as it was written."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import fields
 from typing import Any, get_args, get_type_hints

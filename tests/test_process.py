@@ -1,6 +1,5 @@
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -8,10 +7,6 @@ from tfcompose.findings import RejectedError
 from tfcompose.plan import PlanProcess, Simulation
 from tfcompose.process import read_own
 from tfcompose.publishers import joints, static
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
 
 def _last_error(capsys: pytest.CaptureFixture[str]) -> str:

@@ -1,12 +1,10 @@
 """The README says what the code says."""
 
-from __future__ import annotations
-
 import re
+import subprocess
 import sys
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -16,9 +14,6 @@ from tests.support.tables import for_each
 from tfcompose.catalogue import CATALOGUE
 from tfcompose.cli.compiling import library
 from tfcompose.cli.parser import COMMANDS, parser_of, summary_of
-
-if TYPE_CHECKING:
-    import subprocess
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

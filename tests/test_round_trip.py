@@ -4,8 +4,6 @@ The specs are generated. What they mean is computed here with scipy from the num
 the URDF, the plan is read as plain JSON.
 """
 
-from __future__ import annotations
-
 import io
 import json
 from dataclasses import dataclass, field

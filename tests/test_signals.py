@@ -1,7 +1,5 @@
 """Ctrl-C while a command loads, also where Python throws away what a signal's handler raises."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

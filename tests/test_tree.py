@@ -1,7 +1,5 @@
 """What networkx says of a graph of frames, for any graph; and drawings as they look."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import networkx as nx

@@ -1,7 +1,5 @@
 """The catalogue has every code, with its family, severity and page; what is generated from it is up to date."""
 
-from __future__ import annotations
-
 import inspect
 import re
 import sys

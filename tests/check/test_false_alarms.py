@@ -1,7 +1,5 @@
 """Robots as people build them: what the rules must not cry wolf about."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """A file in which everything is wrong takes no longer than others of its size."""
 
-from __future__ import annotations
-
 import time
 
 from tfcompose.cli.compiling import library

@@ -1,11 +1,9 @@
 """Marked specs: each line that should give a finding says which, and the set of lines and codes must match exactly."""
 
-from __future__ import annotations
-
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -19,14 +17,10 @@ from tfcompose.cli.disk import moments as measured
 from tfcompose.cli.reading import read_text
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.findings import Finding, Span, finding
+from tfcompose.geometry import Vector
+from tfcompose.model import Robot
 from tfcompose.resolve import Disk
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from tfcompose.geometry import Vector
-    from tfcompose.model import Robot
-    from tfcompose.urdf.inertia import Moments
+from tfcompose.urdf.inertia import Moments
 
 SPECS = sorted((Path(__file__).parent / "specs").glob("*.yaml"))
 MARK = re.compile(r"# expect(?:-with (?P<profile>\w+))?: (?P<codes>TF\d{3}(?: TF\d{3})*)$")

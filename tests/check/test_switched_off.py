@@ -1,7 +1,5 @@
 """What is switched off, or allowed, is out of the way; what is left can be built."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Bad input: one clear finding with its place, exit 1 or 2, no traceback, nothing written."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os

@@ -1,17 +1,12 @@
 """The schema as users run it: ``check-jsonschema --schemafile schemas/robot.schema.json robot.yaml``."""
 
-from __future__ import annotations
-
+import subprocess
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.support import processes
-
-if TYPE_CHECKING:
-    import subprocess
 
 ROOT = Path(__file__).parents[2]
 ROBOTS = sorted((ROOT / "robots").glob("*.yaml"))

@@ -1,7 +1,5 @@
 """Robots in the background: started, listed, steered, changed and ended by other commands."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os
@@ -10,8 +8,10 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
@@ -21,10 +21,6 @@ from tests.support.edge_listener import EdgeListener
 from tests.support.robots import EXTERNAL, ROVER
 from tests.support.waiting import gone, until
 from tfcompose.launcher.control import ANSWER_S
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
 
 pytestmark = pytest.mark.ros
 #: What is true of publishers on a machine that does much else.

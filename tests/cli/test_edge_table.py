@@ -1,7 +1,5 @@
 """The table of live edges in windows of all widths: nothing that is shown is cut within a number."""
 
-from __future__ import annotations
-
 import pytest
 
 from tfcompose.cli.edge_table import lines_of

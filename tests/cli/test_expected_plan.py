@@ -1,20 +1,15 @@
 """What the commands that look at a running robot expect of it: the names that frames have there."""
 
-from __future__ import annotations
-
+from argparse import Namespace
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
 import pytest
 
 from tfcompose.cli import main
 from tfcompose.cli.commands import doctor
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Callable
-
-    from tfcompose.plan import Plan
+from tfcompose.plan import Plan
 
 ROBOT = Path(__file__).parents[2] / "robots" / "my_robot.yaml"
 
@@ -32,6 +27,7 @@ def plans(monkeypatch: pytest.MonkeyPatch) -> list[Plan | None]:
     return known
 
 
+@pytest.mark.ros
 def test_the_doctor_expects_frames_by_their_names_on_the_live_tree(plans: list[Plan | None]) -> None:
     words = ["doctor", str(ROBOT), "--set", "ros.frame_prefix=r1/"]
     assert main(words) == 77
@@ -39,6 +35,7 @@ def test_the_doctor_expects_frames_by_their_names_on_the_live_tree(plans: list[P
     assert {edge.child.partition("/")[0] for edge in plans[0].edges} == {"r1"}
 
 
+@pytest.mark.ros
 def test_the_doctor_lays_nothing_over_a_built_plan(
     plans: list[Plan | None], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,7 +1,5 @@
 """``tfcompose export``: from a robot or a built plan to files for other launchers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

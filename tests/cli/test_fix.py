@@ -1,14 +1,13 @@
 """``lint --fix`` writes the one safe answer, where there is one, and leaves every other byte as it is."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os
 import re
+import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given, settings
@@ -19,15 +18,9 @@ from tests.support.cli import tfcompose_in
 from tfcompose.cli.compiling import library
 from tfcompose.cli.fixing import Fixer, edited, rewrite
 from tfcompose.compile import compile_robot
-from tfcompose.findings import Edit, RejectedError, Span, finding, slip_of
+from tfcompose.findings import Edit, Finding, RejectedError, Span, finding, slip_of
 from tfcompose.language import with_includes
 from tfcompose.load import load
-
-if TYPE_CHECKING:
-    import subprocess
-    from collections.abc import Callable
-
-    from tfcompose.findings import Finding
 
 HEAD = "tfcompose: 1  # version\nrobot: r\n"
 PRESETS = library()

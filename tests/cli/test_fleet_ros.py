@@ -1,15 +1,11 @@
 """Two rovers from one file, isolated from each other, as they run: each on its own topics, one guard for both."""
 
-from __future__ import annotations
-
 import os
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 pytestmark = pytest.mark.ros
 

@@ -1,17 +1,12 @@
 """The example robots: no finding in any of them, and nothing in a demo that needs hardware."""
 
-from __future__ import annotations
-
 import json
+import subprocess
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.support.cli import tfcompose_in
-
-if TYPE_CHECKING:
-    import subprocess
 
 ROOT = Path(__file__).parents[2]
 ROBOTS = sorted(path.name for path in (ROOT / "robots").glob("*.yaml"))

@@ -1,19 +1,13 @@
 """The demos of the gallery run: every edge live, and no finding."""
 
-from __future__ import annotations
-
 import re
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.support.processes import Started
 from tests.support.waiting import TIMEOUT_S
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tests.support.processes import Started
 
 pytestmark = pytest.mark.ros
 ROOT = Path(__file__).parents[2]

@@ -1,18 +1,13 @@
 """``tfcompose graph``: each ending gives its format, and what cannot be drawn is said in one sentence."""
 
-from __future__ import annotations
-
 import re
+import subprocess
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.support import processes
-
-if TYPE_CHECKING:
-    import subprocess
 
 ROOT = Path(__file__).parents[2]
 ROBOT = ROOT / "robots" / "two_rovers.yaml"

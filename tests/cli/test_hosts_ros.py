@@ -1,22 +1,16 @@
 """Two launchers with two hosts' shares of one plan, in one ROS domain."""
 
-from __future__ import annotations
-
 import json
 import sys
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from tests.support import processes
+from tests.support.processes import Started
 from tests.support.robots import ON_TWO_HOSTS
 from tests.support.waiting import offences, until
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from tests.support.processes import Started
 
 pytestmark = pytest.mark.ros
 

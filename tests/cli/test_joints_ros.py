@@ -1,10 +1,10 @@
 """A robot with moving joints and no hardware: up moves it, and up again gives it another description while it runs."""
 
-from __future__ import annotations
-
 import sys
+from collections.abc import Callable, Iterator
 from io import BytesIO
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 import yourdfpy
@@ -16,10 +16,6 @@ from tests.support import processes
 from tests.support.waiting import until
 from tfcompose.ros.node import JOINT_STATES, LATCHED, Subscription, open_node
 from tfcompose.tf2 import Buffer, TransformListener
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
 
 pytestmark = pytest.mark.ros
 

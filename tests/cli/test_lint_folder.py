@@ -1,14 +1,9 @@
 """``tfcompose lint FOLDER``: the robot files below it, and no other YAML."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from tfcompose.cli import main
 from tfcompose.cli.commands.lint import robots_in
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 ROBOT = "# a robot\ntfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
 

@@ -1,7 +1,5 @@
 """The published tree as a picture: each edge with its publisher, second parents too, and what has no pose."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

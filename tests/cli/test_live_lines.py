@@ -1,22 +1,17 @@
 """Tables that are drawn again in their place, on a terminal of a test's own."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import pty
 import struct
 import termios
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import TextIO
 
 import pytest
 
 from tfcompose.cli.tables import LiveLines
 from tfcompose.cli.terminal import can_redraw
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from typing import TextIO
 
 END = "<the end>"
 

@@ -1,7 +1,5 @@
 """What ``tfcompose presets`` says of nodes is what the presets say."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

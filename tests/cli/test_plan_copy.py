@@ -1,7 +1,5 @@
 """Two that start a robot at the same moment copy its plan to the same folder."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 from typing import Any

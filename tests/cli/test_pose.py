@@ -1,9 +1,7 @@
 """``tfcompose pose``: what it prints is the pose of B in A, and it says what moves on the way."""
 
-from __future__ import annotations
-
 import json
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,9 +9,6 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.findings import words_of
 from tfcompose.cli import main
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 ROBOT = """
 tfcompose: 1

@@ -1,7 +1,5 @@
 """Where each value is from, and what it was laid over: in findings, and in ``tfcompose explain FILE A B``."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The JSON Schema is fresh, takes what the compiler takes and refuses what it refuses."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

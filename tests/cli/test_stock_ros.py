@@ -1,26 +1,21 @@
 """A plan with a stock robot_state_publisher, which a node stands in for that does what that one is known to do."""
 
-from __future__ import annotations
-
 import os
 import stat
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
+from tests.support.processes import Started
 from tests.support.waiting import until
 from tfcompose.ros.graph import UNKNOWN_NODE, writers
 from tfcompose.ros.node import LATCHED, Subscription, open_node
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tests.support.processes import Started
 
 pytestmark = pytest.mark.ros
 

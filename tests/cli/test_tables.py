@@ -1,7 +1,5 @@
 """Tables: whole into a pipe, fitted and coloured on a terminal."""
 
-from __future__ import annotations
-
 import pytest
 
 from tfcompose.cli.tables import Table, shortened

@@ -1,16 +1,15 @@
 """``tfcompose up`` as people run it: a process with children, signals, strangers, and ends."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import psutil
 import pytest
@@ -18,10 +17,6 @@ import pytest
 from tests.support import processes
 from tests.support.robots import EXTERNAL, ROVER
 from tests.support.waiting import TIMEOUT_S, gone, until
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
 
 pytestmark = pytest.mark.ros
 

@@ -1,14 +1,12 @@
 """Pictures: everything is in them once, nothing lies on anything else, and other people's readers open them."""
 
-from __future__ import annotations
-
 import ctypes
 import io
 import random
 import re
 from collections import Counter
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import pydot
@@ -19,15 +17,13 @@ from PIL import Image
 
 from tests.support.tables import for_each
 from tfcompose.draw import Arrow, Graph, Group
+from tfcompose.draw.graph import Kind
 from tfcompose.draw.markup import dot, mermaid
 from tfcompose.draw.pdf import pdf
 from tfcompose.draw.picture import Box, Drawing, Text, draw
 from tfcompose.draw.png import png
 from tfcompose.draw.style import STYLES, width_of
 from tfcompose.draw.svg import svg
-
-if TYPE_CHECKING:
-    from tfcompose.draw.graph import Kind
 
 SVG = "{http://www.w3.org/2000/svg}"
 KINDS: tuple[Kind, ...] = ("static", "joint", "dynamic")

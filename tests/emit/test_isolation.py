@@ -1,7 +1,5 @@
 """Robots beside each other: prefixes, shared frames, topics below a namespace, names that processes are given."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 
 import pytest

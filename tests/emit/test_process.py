@@ -1,10 +1,9 @@
 """What is said of a process reaches the plan, and what cannot be meant is refused with its place."""
 
-from __future__ import annotations
-
 import json
 import os
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -15,15 +14,10 @@ from tfcompose.cli.disk import disk
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
 from tfcompose.files import Target
-from tfcompose.findings import RejectedError
+from tfcompose.findings import Finding, RejectedError
 from tfcompose.launcher.preflight import filled_in, folder_of, own_env
 from tfcompose.plan import PlanProcess, Ready, StopRule
 from tfcompose.plan.file import read_plan, write_plan
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tfcompose.findings import Finding
 
 HEAD = "tfcompose: 1\nrobot: r\nros: {namespace: r1}\nframes: {map: {}}\nrules: {TF818: off, TF848: off}\nprocesses:\n"
 EXE = "run: {package: p, executable: e}"

@@ -1,7 +1,5 @@
 """``state_publisher: stock``: robot_state_publisher gets what is ours below base, and everybody else keeps theirs."""
 
-from __future__ import annotations
-
 import json
 import xml.etree.ElementTree as ET
 from typing import Any

@@ -1,7 +1,5 @@
 """The plan for other launchers: units, a compose file, a launch file."""
 
-from __future__ import annotations
-
 import configparser
 import os
 import shutil

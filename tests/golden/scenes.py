@@ -3,14 +3,13 @@
 No process runs: what judges is given what it would have seen.
 """
 
-from __future__ import annotations
-
 import os
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from unittest import mock
 
 from tests.support import guard_history as guarded
@@ -73,9 +72,6 @@ from tfcompose.urdf.inertia import UnmeasurableError
 from tfcompose.urdf.packages import Disk
 from tfcompose.verdict.doctor import diagnose
 from tfcompose.verdict.drivers import SentPoses, not_taken
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
 AN_EXAMPLE = finding("TF801", "an example's", None)

@@ -5,18 +5,17 @@ A golden holds one row per finding: ``case: code line:col-line:col``, with the f
 After an intended change: ``python -m tests.golden.test_findings --write``, and read the difference.
 """
 
-from __future__ import annotations
-
 import difflib
 import json
 import os
 import sys
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
@@ -29,13 +28,8 @@ from tfcompose.cli.reading import read_text
 from tfcompose.compile import compile_robot
 from tfcompose.findings import Edit, Finding, RejectedError, Span
 from tfcompose.language import profiles_in, set_value, validate_node_preset
-from tfcompose.load import load
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
-
-    from tfcompose.load import Source
-    from tfcompose.resolve import Library
+from tfcompose.load import Source, load
+from tfcompose.resolve import Library
 
 ROOT = Path(__file__).parents[2]
 #: A case's name, the file that it is about, and what is found.

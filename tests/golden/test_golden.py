@@ -3,8 +3,6 @@
 After an intended change: ``TFCOMPOSE_UPDATE_GOLDEN=1 pytest tests/golden``, and read the difference.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

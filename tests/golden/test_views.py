@@ -4,19 +4,16 @@ No process runs: commands that look at recordings stand for those that look at a
 given as a launcher would. After an intended change: ``python -m tests.golden.test_views --write``.
 """
 
-from __future__ import annotations
-
 import difflib
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
 from unittest import mock
 
 import pytest
 
 from tests.golden.test_findings import ROOT
-from tests.support.bags import UP, drive, write_bag
+from tests.support.bags import UP, Sent, drive, write_bag
 from tests.support.cli import tfcompose_in
 from tests.support.robots import ROVER
 from tfcompose.cli.commands import ps
@@ -43,9 +40,6 @@ from tfcompose.ipc import (
     Waiting,
 )
 from tfcompose.plan import Plan, PlanProcess, RosSettings
-
-if TYPE_CHECKING:
-    from tests.support.bags import Sent
 
 GOLDEN = Path(__file__).parent / "views"
 FIXED: list[Sent] = [("/tf_static", 0.0, "base_link", "lidar", 0.0, (0.0, 0.0, 0.3), UP)]

@@ -5,15 +5,13 @@ presets, URDFs of others, and histories of live trees and processes (``scenes``)
 ``python -m tests.golden.test_wording --write``.
 """
 
-from __future__ import annotations
-
 import difflib
 import os
 import re
 import sys
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -21,14 +19,10 @@ from tests.golden.scenes import SCENES
 from tests.golden.test_findings import CORPORA, ROOT, in_the_repository, refusals, within
 from tfcompose.catalogue import CATALOGUE
 from tfcompose.cli.disk import disk
+from tfcompose.findings import Finding
 from tfcompose.render.text import render_text
 from tfcompose.urdf.lint import lint_urdf
 from tfcompose.urdf.packages import Packages
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from tfcompose.findings import Finding
 
 GOLDEN = Path(__file__).parent / "wording"
 IN_SOURCE = ("robots", "specs", "bad_input", "values")

@@ -1,7 +1,5 @@
 """What tests of the guard begin with."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.support.guard_history import History

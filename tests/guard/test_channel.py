@@ -1,15 +1,8 @@
 """What the launcher hears of edges that come no more."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 from tests.support.guard_history import FIXED, History, edge
 from tfcompose.guard.channel import SilentEdges
-from tfcompose.ipc import Silent
-
-if TYPE_CHECKING:
-    from tfcompose.ipc import GuardEvent
+from tfcompose.ipc import GuardEvent, Silent
 
 
 def test_each_edge_that_falls_silent_or_whose_publisher_is_gone_is_reported_once_and_when_it_is_back() -> None:

@@ -1,14 +1,14 @@
 """Faults of owners and strangers on the real thing: loops, stamps, QoS, leaks; the guard names each."""
 
-from __future__ import annotations
-
 import json
 import re
 import signal
 import subprocess
 import sys
 import time
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
@@ -20,11 +20,6 @@ from tests.support.guard_without_ids import guard_without_ids
 from tests.support.waiting import TIMEOUT_S, complete_lines, in_one_of_a_few, until
 from tfcompose.guard.judge import FINDING_S
 from tfcompose.plan import SILENT_PERIODS
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
 
 pytestmark = pytest.mark.ros
 

@@ -1,14 +1,13 @@
 """The guard as it runs: the demo robot, started once for all of these tests, and strangers that join it."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import psutil
 import pytest
@@ -19,9 +18,6 @@ from tests.support.waiting import TIMEOUT_S, complete_lines, in_one_of_a_few, of
 from tfcompose.ros.node import TFSubscription, open_node, wait
 from tfcompose.ros.tf_codec import decode
 from tfcompose.signals import Stop
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 pytestmark = [pytest.mark.ros, pytest.mark.xdist_group("one robot for all of these")]
 

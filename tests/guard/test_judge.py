@@ -1,7 +1,5 @@
 """What the guard finds of publishers and edges, from histories with a clock that is set by hand."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """What stamps say of clocks."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.support.findings import expect, words_of

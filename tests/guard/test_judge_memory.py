@@ -1,7 +1,5 @@
 """What the guard remembers, shows, hands on to the next guard, and lets pass."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

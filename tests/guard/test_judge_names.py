@@ -1,7 +1,5 @@
 """Whom the guard names: names that come late, two of one name, ids that do not say whose they are."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from tests.support.findings import expect

@@ -1,7 +1,5 @@
 """What was there before the start, and what began after it."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st

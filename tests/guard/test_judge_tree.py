@@ -1,7 +1,5 @@
 """Switched edges, loops, frames in themselves, edges that are allowed to anybody, and how they are published."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,32 +1,25 @@
 """A strict guard on the real thing: children that send what is not theirs, late joiners, and a guard that is killed."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
 import signal
 import sys
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import psutil
 import pytest
 
 from tests.support import processes
 from tests.support.guard_without_ids import guard_without_ids
+from tests.support.processes import Started
 from tests.support.waiting import TIMEOUT_S, complete_lines, gone, until
 from tfcompose.ros.graph import writers
-from tfcompose.ros.node import TFPublisher, TFSubscription, open_node, wait
+from tfcompose.ros.node import Received, TFPublisher, TFSubscription, open_node, wait
 from tfcompose.ros.tf_codec import Transform, decode, encode
 from tfcompose.signals import Stop
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
-    from tests.support.processes import Started
-    from tfcompose.ros.node import Received
 
 pytestmark = pytest.mark.ros
 

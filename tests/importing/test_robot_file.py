@@ -1,18 +1,14 @@
 """What ``tfcompose import`` writes, says and refuses."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.support.importing import PRESETS, built, imported, urdf_of
 from tfcompose.cli import compiling, main
 from tfcompose.load import load
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 HEAD = '<robot name="r"><link name="base_link"/>'
 

@@ -1,7 +1,5 @@
 """``tfcompose import``: building what it writes gives the URDF that it was written from."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

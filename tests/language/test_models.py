@@ -1,8 +1,7 @@
 """Every model of the language: its errors have words of ours, and its keys tell an editor what they are."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any, get_args
+from collections.abc import Iterator
+from typing import Any, get_args
 
 import pytest
 from pydantic_core import core_schema
@@ -13,9 +12,6 @@ from tfcompose.language.reading import UNKNOWN_KEYS, WORDS, read
 from tfcompose.language.reference import reference
 from tfcompose.language.robot import RobotSpec
 from tfcompose.language.spec import Spec, described, examples_of, fields_of, walk
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 #: The kinds of errors that each kind of schema can raise, as strict or lax as the language uses it.
 RAISES: dict[str, set[str]] = {

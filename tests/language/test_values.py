@@ -1,7 +1,5 @@
 """Quantities, expressions and rotations: exact values, and refusals in one sentence."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

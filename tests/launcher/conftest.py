@@ -1,18 +1,12 @@
 """What tests of the launcher begin with."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
 from tests.support.launcher import Launcher, launched
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
-    from tfcompose.plan import PlanProcess
+from tfcompose.plan import PlanProcess
 
 
 @pytest.fixture

@@ -1,12 +1,10 @@
 """Bytes into lines, and signals into values."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys
 import time
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -16,9 +14,6 @@ from tfcompose.launcher.child import BURST, LINE_LIMIT, Bucket, Lines, Pipe, spa
 from tfcompose.launcher.children import Reaper
 from tfcompose.launcher.preflight import Command
 from tfcompose.launcher.supervisor import Signals
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 @given(st.text(alphabet="ab\né", max_size=60), st.integers(1, 7))

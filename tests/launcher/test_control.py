@@ -1,27 +1,20 @@
 """The control socket: whatever is asked for, the robot goes on."""
 
-from __future__ import annotations
-
 import json
 import os
+from collections.abc import Iterator
+from pathlib import Path
 from selectors import DefaultSelector
 from socket import AF_UNIX, socket
-from typing import TYPE_CHECKING
 
 import pytest
 
-from tfcompose.ipc import REQUESTS, Done, Refusal, UpdateRequest
+from tfcompose.ipc import REQUESTS, Done, Refusal, Request, UpdateRequest
 from tfcompose.launcher import answers
 from tfcompose.launcher.answers import answer
 from tfcompose.launcher.control import LONGEST_REQUEST, Control
 from tfcompose.launcher.state import initial
 from tfcompose.plan import Plan, RosSettings
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from tfcompose.ipc import Request
 
 PLAN = Plan("rover", "", None, RosSettings(), (), ())
 

@@ -1,23 +1,17 @@
 """One process of a plan, as other supervisors start it."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.support import processes
+from tests.support.processes import Started
 from tests.support.robots import ROVER
 from tests.support.waiting import until
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tests.support.processes import Started
 
 pytestmark = pytest.mark.ros
 

@@ -1,7 +1,5 @@
 """What goes wrong on real robots, without ROS: floods, readers that stop, full disks, daemons, many processes."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import re
@@ -10,8 +8,10 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
@@ -26,10 +26,6 @@ from tfcompose.launcher.runtime_dir import RuntimeDir
 from tfcompose.launcher.supervisor import LONGEST_SLEEP_S
 from tfcompose.plan import Plan, PlanProcess, RosSettings
 from tfcompose.plan.file import write_plan
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
 
 #: A launcher with all that ``up`` gives it, for a plan without ROS.
 LAUNCHER = """

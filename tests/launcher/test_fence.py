@@ -1,13 +1,12 @@
 """How a strict plan's processes are fenced off: by profiles with a partition, or by remappings; and what cannot be."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
 from dataclasses import replace
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -15,18 +14,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.support.findings import expect
+from tfcompose.findings import Finding
 from tfcompose.geometry import Pose
 from tfcompose.ipc import REMAPPED
-from tfcompose.launcher.preflight import LAUNCH, commands_of
+from tfcompose.launcher.preflight import LAUNCH, Command, commands_of
 from tfcompose.plan import FenceWay, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.plan.topics import private_topics
 from tfcompose.ros.environment import child_environment
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tfcompose.findings import Finding
-    from tfcompose.launcher.preflight import Command
 
 GUARD = PlanProcess("guard", "guard", argv=("true",))
 SLAM = PlanProcess("slam", "run", argv=("true",), nodes=("/slam",), owns=(("map", "odom"),))

@@ -1,25 +1,19 @@
 """Gates at real nodes: a topic, a service, and a lifecycle node that is configured and activated."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.support.findings import expect, words_of
+from tfcompose.findings import Finding
 from tfcompose.geometry import Pose
 from tfcompose.ipc import AllReady, FindingShown, Notice, ProcessReady
 from tfcompose.launcher.supervisor import supervise
-from tfcompose.plan import Plan, PlanEdge, PlanProcess, Ready, RosSettings, Simulation, SourceLine
+from tfcompose.plan import LifecycleState, Plan, PlanEdge, PlanProcess, Ready, RosSettings, Simulation, SourceLine
 from tfcompose.plan.file import write_plan
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tfcompose.findings import Finding
-    from tfcompose.plan import LifecycleState
 
 pytestmark = pytest.mark.ros
 

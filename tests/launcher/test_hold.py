@@ -1,28 +1,21 @@
 """Publishers that load Python while the guard looks, and join ROS only when they are started."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from pathlib import Path
 
 import psutil
 import pytest
 
-from tests.support.launcher import LISTEN, SLEEPER, plan_of, program
+from tests.support.launcher import LISTEN, SLEEPER, Launcher, plan_of, program
 from tests.support.waiting import TIMEOUT_S, gone, until
 from tfcompose.ipc import GO, GUARD_EVENTS, HOLD_FD, Clear, LogLine, Notice, ProcessState
 from tfcompose.launcher.supervisor import supervise
+from tfcompose.plan import PlanProcess
 from tfcompose.process import wait_for_go
 from tfcompose.signals import Stop
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from tests.support.launcher import Launcher
-    from tfcompose.plan import PlanProcess
 
 #: Says what it has loaded before it is let go, as an own process would.
 HELD = f"""

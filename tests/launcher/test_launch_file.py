@@ -1,27 +1,20 @@
 """A launch file as a process; a stand-in for ``ros2 launch`` says what it would do."""
 
-from __future__ import annotations
-
 import json
 import os
 import sys
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from tests.support.findings import expect
+from tfcompose.findings import Finding
 from tfcompose.ipc import LogLine, Notice
-from tfcompose.launcher.preflight import commands_of
+from tfcompose.launcher.preflight import Command, commands_of
 from tfcompose.launcher.supervisor import supervise
 from tfcompose.plan import Plan, PlanProcess, RosSettings
 from tfcompose.ros.environment import child_environment
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tfcompose.findings import Finding
-    from tfcompose.launcher.preflight import Command
 
 NAV2 = PlanProcess(
     "nav2", "run", ("${launch:nav2_bringup/navigation_launch.py}", "use_composition:=False"), remap={"/tf": "/r/tf"}

@@ -1,24 +1,18 @@
 """A launch file as a process, with the real ``ros2 launch``; left out where there is none."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal
 import sys
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from pathlib import Path
 
 import psutil
 import pytest
 
 from tests.support import processes
+from tests.support.processes import Started
 from tests.support.waiting import gone, until
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from tests.support.processes import Started
 
 
 def _can_launch() -> bool:

@@ -1,18 +1,13 @@
 """Logs on disk: merged, turned over, followed, and lost without harm."""
 
-from __future__ import annotations
-
 import errno
 import os
 import time
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from tfcompose.launcher.logs import KEPT, Follower, Logs, last_modified, logged, read_logs
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def texts(folder: Path, *names: str) -> list[str]:

@@ -1,7 +1,5 @@
 """Histories replayed to the process machine with a clock that is set by hand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from signal import SIGHUP, SIGINT, SIGKILL, SIGSEGV, SIGTERM
 from typing import Literal

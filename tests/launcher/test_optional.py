@@ -1,7 +1,5 @@
 """Processes that the run goes on without: ``required: false``."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from signal import SIGINT
 from typing import Any

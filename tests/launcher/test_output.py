@@ -1,7 +1,5 @@
 """Output to a reader that is slow, stopped, or gone."""
 
-from __future__ import annotations
-
 import os
 import pty
 from pathlib import Path

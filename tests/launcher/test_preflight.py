@@ -1,25 +1,17 @@
 """What is looked at before anything is started."""
 
-from __future__ import annotations
-
 import os
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from tests.support.findings import expect
-from tfcompose.launcher.preflight import commands_of
-from tfcompose.plan import Plan, PlanProcess, RosSettings
+from tfcompose.findings import Finding
+from tfcompose.launcher.preflight import Command, commands_of
+from tfcompose.plan import Plan, PlanProcess, RosSettings, StartCondition
 from tfcompose.ros.environment import child_environment
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-
-    from tfcompose.findings import Finding
-    from tfcompose.launcher.preflight import Command
-    from tfcompose.plan import StartCondition
 
 
 @pytest.fixture

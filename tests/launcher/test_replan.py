@@ -1,16 +1,11 @@
 """What a changed plan changes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from tfcompose.geometry import Pose
 from tfcompose.launcher.answers import Change, change
 from tfcompose.plan import GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def edge(child: str, owner: str = "static", x: float = 0.0, line: int = 1) -> PlanEdge:

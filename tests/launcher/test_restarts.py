@@ -1,7 +1,5 @@
 """Histories of single processes: gates, restarts, requests by name, and plans that change, with a clock set by hand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from signal import SIGINT, SIGKILL, SIGQUIT, SIGTERM
 from typing import Any

@@ -1,7 +1,5 @@
 """Where a run is found: folders that nobody else can open, and a lock that ends with its holder."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import re
@@ -9,7 +7,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
@@ -18,9 +16,6 @@ from tests.support.waiting import until
 from tfcompose.launcher import runtime_dir
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDirError, runtime_dir_of, runtime_dirs
 from tfcompose.plan import Plan, RosSettings
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 ROVER = Plan("rover", "", None, RosSettings(domain_id=7), (), ())
 HOLD = """

@@ -1,13 +1,12 @@
 """Real processes, without ROS: plain Python children stand in for what a plan starts."""
 
-from __future__ import annotations
-
 import os
 import signal
 import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 from signal import SIGHUP, SIGINT, SIGKILL, SIGTERM
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import psutil
 import pytest
@@ -33,9 +32,6 @@ from tfcompose.launcher.child import READ_SIZE
 from tfcompose.launcher.state import Times
 from tfcompose.launcher.supervisor import supervise
 from tfcompose.plan import Plan, PlanProcess, Ready, RosSettings
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 #: Starts a child of its own that heeds no signal but SIGKILL, and says both process numbers.
 PARENT = """

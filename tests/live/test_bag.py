@@ -1,25 +1,19 @@
 """``--bag``: MCAP and SQLite, without ROS."""
 
-from __future__ import annotations
-
 import json
+import subprocess
 import sys
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 from rosbags.rosbag2 import CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from tests.support import processes
-from tests.support.bags import START_S, STORE, UP, drive, tfcompose_without_ros, write_bag
+from tests.support.bags import START_S, STORE, UP, Sent, drive, tfcompose_without_ros, write_bag
 from tests.support.cli import tfcompose
 from tfcompose.cli import main
-
-if TYPE_CHECKING:
-    import subprocess
-    from pathlib import Path
-
-    from tests.support.bags import Sent
 
 FIXED: list[Sent] = [("/tf_static", 0.0, "base_link", "laser_link", 0.0, (0.0, 0.0, 0.3), UP)]
 

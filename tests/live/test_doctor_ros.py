@@ -1,7 +1,5 @@
 """``tfcompose doctor`` on the real thing: real nodes do what is wrong, and it says so."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -10,9 +8,10 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 from nav_msgs.msg import Odometry
@@ -23,17 +22,11 @@ from std_msgs.msg import String
 
 from tests.support import processes
 from tests.support.doctor import at_last, doctor, doctor_finds, finds_nothing, messages_of
-from tests.support.fake_nodes import message
+from tests.support.fake_nodes import FakeNodes, message
+from tests.support.processes import Started
 from tests.support.waiting import until
 from tfcompose.ros.node import LATCHED, TFPublisher, open_node, qos
 from tfcompose.ros.typesupport import tf_message_type
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tests.support.fake_nodes import FakeNodes
-    from tests.support.processes import Started
-
 
 pytestmark = pytest.mark.ros
 

@@ -1,7 +1,5 @@
 """``tfcompose echo`` on the real thing."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -9,30 +7,25 @@ import signal
 import subprocess
 import sys
 import threading
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
 
 import pytest
 from builtin_interfaces.msg import Time
 from rosgraph_msgs.msg import Clock
 
 from tests.support import processes
+from tests.support.processes import Started
 from tests.support.waiting import until
 from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.live.echo import echo as run_echo
 from tfcompose.live.pose_query import PoseQuery
-from tfcompose.plan import PlanProcess, Simulation
+from tfcompose.plan import PlanEdge, PlanProcess, Simulation
 from tfcompose.ros.clock import SimClock
 from tfcompose.ros.node import TFPublisher, open_node
 from tfcompose.ros.tf_codec import Transform, encode
 from tfcompose.signals import Stop
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-    from pathlib import Path
-
-    from tests.support.processes import Started
-    from tfcompose.plan import PlanEdge
-
 
 pytestmark = pytest.mark.ros
 

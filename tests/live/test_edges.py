@@ -1,7 +1,5 @@
 """What is known of edges after messages, without ROS."""
 
-from __future__ import annotations
-
 import random
 import statistics
 

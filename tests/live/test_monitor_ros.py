@@ -1,7 +1,5 @@
 """``tfcompose monitor`` on real nodes."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess

@@ -1,23 +1,16 @@
 """``verify --bag`` and ``tree --bag`` at the command line, without ROS."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
-from typing import TYPE_CHECKING
+from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
 
-from tests.support.bags import UP, drive, tfcompose_without_ros, write_bag
+from tests.support.bags import UP, Sent, drive, tfcompose_without_ros, write_bag
 from tests.support.cli import tfcompose
 from tfcompose.geometry import quat_from_rpy
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tests.support.bags import Sent
 
 ROBOT = """\
 tfcompose: 1

@@ -1,28 +1,21 @@
 """``verify`` and ``tree --live`` on a robot that runs, and on one where somebody interferes."""
 
-from __future__ import annotations
-
 import json
 import sys
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.support import processes
 from tests.support.doctor import at_last
 from tests.support.fake_nodes import sending
+from tests.support.processes import Started
 from tfcompose.geometry import Pose
-from tfcompose.plan import PlanProcess, Simulation
+from tfcompose.plan import PlanEdge, PlanProcess, Simulation
 from tfcompose.plan.file import read_plan, write_plan
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from tests.support.processes import Started
-    from tfcompose.plan import PlanEdge
-
 
 pytestmark = pytest.mark.ros
 

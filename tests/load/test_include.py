@@ -1,7 +1,5 @@
 """Robots from several files: what is laid over what, and where each value is from."""
 
-from __future__ import annotations
-
 import pytest
 
 from tfcompose.findings import Finding, RejectedError, Span, finding

@@ -1,7 +1,5 @@
 """YAML 1.2 with places; duplicates, merges and limits; overlays."""
 
-from __future__ import annotations
-
 import gc
 import math
 import re

@@ -1,7 +1,5 @@
 """What a plan or a message holds is written and read alike, and what is of another type is refused."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, NamedTuple

@@ -1,10 +1,9 @@
 """A plan over several machines: what each starts, and what it expects of the others."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,9 +16,6 @@ from tfcompose.plan.file import read_plan, write_plan
 from tfcompose.plan.hosts import describe_share, hosts_of, share_of
 from tfcompose.plan.topics import partition_of
 from tfcompose.verdict.ownership import relays_of
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 NAMED = ON_TWO_HOSTS + "  static: {host: main}\n"
 

@@ -1,20 +1,16 @@
 """A plan is input, as a robot file is: what no build writes is refused, and a review shows what is there."""
 
-from __future__ import annotations
-
 import json
 import os
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from tfcompose.cli import main
 from tfcompose.findings import RejectedError
 from tfcompose.plan.file import read_plan
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 BUILT = json.loads((Path(__file__).parents[1] / "golden" / "my_robot" / "plan.json").read_text("utf-8"))
 

@@ -1,11 +1,10 @@
 """The schema of plan.json takes what build writes, and refuses what ``up`` would refuse to read."""
 
-from __future__ import annotations
-
 import copy
 import json
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jsonschema
 import pytest
@@ -13,9 +12,6 @@ import pytest
 from tfcompose.cli.commands.schema import schema_text
 from tfcompose.plan import VERSION, Plan
 from tfcompose.plan.codec import DecodeError, decode
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 PLANS = sorted(GOLDEN.glob("*/plan.json"))

@@ -1,7 +1,5 @@
 """A plan's file that is broken is refused, with the path to what is wrong."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,25 +1,20 @@
 """A driver that publishes as realsense2_camera does, started by ``tfcompose up`` as its preset says, and guarded."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import psutil
 import pytest
 
 from tests.support import processes
 from tests.support.waiting import TIMEOUT_S, until
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
 
 pytestmark = pytest.mark.ros
 

@@ -1,23 +1,18 @@
 """Every frame is where the vendor's package has it: figures read apart from the presets, to 1e-9."""
 
-from __future__ import annotations
-
+from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import yaml
 
 from tests.support.tables import for_each
 from tfcompose.cli.compiling import library
 from tfcompose.geometry import IDENTITY_XYZW, OPTICAL_XYZW, angle_between, quat_from_rpy
+from tfcompose.language.preset import PresetFrame
 from tfcompose.resolve.poses import rotation_of
 from tfcompose.resolve.presets import filled
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from tfcompose.language.preset import PresetFrame
 
 FACTS: dict[str, dict[str, dict[str, Any]]] = yaml.safe_load(Path(__file__).with_name("facts.yaml").read_text("utf-8"))
 KNOWN = library()

@@ -3,20 +3,15 @@
 Positions are metres in the mount frame, with the axes of the mount. A rotation is the frame's three axes there.
 """
 
-from __future__ import annotations
-
 import json
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tests.support.tables import for_each
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
-from tfcompose.geometry import Pose, rotate
-
-if TYPE_CHECKING:
-    from tfcompose.geometry import Vector
-    from tfcompose.model import Robot
+from tfcompose.geometry import Pose, Vector, rotate
+from tfcompose.model import Robot
 
 KNOWN = library()
 HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"

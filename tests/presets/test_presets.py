@@ -1,23 +1,18 @@
 """Every preset that comes with tfcompose, with every variant: one tree, right axes, a driver that can be told."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
 from functools import cache
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tests.support.tables import for_each
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.geometry import angle_between, rotate
-from tfcompose.model import is_optical
+from tfcompose.model import Robot, is_optical
 from tfcompose.resolve.presets import filled
-
-if TYPE_CHECKING:
-    from tfcompose.model import Robot
 
 KNOWN = library()
 NAMES = KNOWN.names

@@ -1,11 +1,9 @@
 """What a robot makes of presets: who publishes, what the driver is told, what is refused, and presets of one's own."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 import yaml
@@ -21,10 +19,8 @@ from tfcompose.cli.reading import read_text
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
 from tfcompose.language.preset import Chosen
+from tfcompose.model import Edge, Process, Robot
 from tfcompose.resolve.presets import filled
-
-if TYPE_CHECKING:
-    from tfcompose.model import Edge, Process, Robot
 
 KNOWN = library()
 NAMES = KNOWN.names

@@ -1,11 +1,8 @@
 """Joint states in, TF messages out, as bytes and without ROS; scipy computes the poses a second time."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from random import Random
-from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given
@@ -14,15 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.findings import words_of
 from tfcompose.geometry import Pose, angle_between, normalised
-from tfcompose.plan import Joint, PlanEdge, SourceLine
+from tfcompose.plan import Joint, JointType, PlanEdge, SourceLine
 from tfcompose.publishers.joint_mover import JointMover, PublishOptions
 from tfcompose.ros.joint_codec import encode_names, fill
 from tfcompose.ros.tf_codec import Transform, decode
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from tfcompose.plan import JointType
 
 Z = (0.0, 0.0, 1.0)
 SECOND_NS = 1_000_000_000

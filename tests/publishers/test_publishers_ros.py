@@ -1,15 +1,14 @@
 """The publishing processes as they run: real processes, heard by a node of the test."""
 
-from __future__ import annotations
-
 import math
 import signal
 import time
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise, repeat
 from statistics import median
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import pytest
 from rclpy.serialization import deserialize_message
@@ -25,9 +24,6 @@ from tfcompose.ros.graph import writers
 from tfcompose.ros.node import JOINT_STATES, LATCHED, Received, Subscription, TFSubscription, latch, open_node, wait
 from tfcompose.ros.tf_codec import Transform, decode
 from tfcompose.signals import Stop
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
 
 pytestmark = pytest.mark.ros
 

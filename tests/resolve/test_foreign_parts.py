@@ -1,9 +1,8 @@
 """A URDF, a xacro file or a macro as a part: whole, under a prefix, where the holder puts it."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,9 +16,6 @@ from tfcompose.cli.reading import read_text
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
 from tfcompose.plan.file import read_plan
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 ARM = """<?xml version="1.0"?>
 <robot name="arm">

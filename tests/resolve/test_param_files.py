@@ -1,7 +1,5 @@
 """Parameter files that processes name: which parameters are taken, under which name, and how they are written."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 

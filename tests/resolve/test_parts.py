@@ -1,7 +1,5 @@
 """A robot file as a part of another one: names, poses, processes, and what is said when it does not fit."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from typing import Any
 

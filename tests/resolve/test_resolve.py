@@ -1,10 +1,8 @@
 """Poses that are solved, presets that are expanded, owners that are given."""
 
-from __future__ import annotations
-
 import json
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 import yaml
@@ -15,10 +13,8 @@ from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
 from tfcompose.geometry import Pose, angle_between
+from tfcompose.model import Edge, Robot
 from tfcompose.plan.file import read_plan
-
-if TYPE_CHECKING:
-    from tfcompose.model import Edge, Robot
 
 HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
 CAMERA = "sensors: {c: {preset: realsense/d435i, parent: base_link, %s}}\n"

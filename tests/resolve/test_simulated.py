@@ -1,7 +1,5 @@
 """Stand-ins for joint states: positions, sweeps, and what is refused."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Simulated time is read from bytes, and bytes that are none do no harm."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

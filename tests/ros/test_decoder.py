@@ -1,7 +1,5 @@
 """What is decoded by a remembered layout is what ``decode`` reads."""
 
-from __future__ import annotations
-
 import random
 import struct
 import time

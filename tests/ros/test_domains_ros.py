@@ -1,17 +1,12 @@
 """The domains that tests have to themselves."""
 
-from __future__ import annotations
-
 import itertools
-from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.support import domains
+from tests.support.domains import Domain
 from tfcompose.ros.node import open_node
-
-if TYPE_CHECKING:
-    from tests.support.domains import Domain
 
 pytestmark = pytest.mark.ros
 

@@ -1,7 +1,5 @@
-from __future__ import annotations
-
 import sys
-from typing import TYPE_CHECKING
+from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -14,9 +12,6 @@ from tfcompose.ros.environment import (
     child_environment,
     missing_ros,
 )
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 SPACE = "{http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles}"
 

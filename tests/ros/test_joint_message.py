@@ -1,7 +1,5 @@
 """sensor_msgs/JointState as bytes, without ROS; what ROS itself writes and reads is in the file with _ros."""
 
-from __future__ import annotations
-
 import struct
 import tracemalloc
 from contextlib import suppress

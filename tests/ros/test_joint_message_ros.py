@@ -1,7 +1,5 @@
 """Against ROS's own serialisation."""
 
-from __future__ import annotations
-
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState

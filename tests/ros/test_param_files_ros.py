@@ -1,19 +1,13 @@
 """What rcl reads from the built file is what it reads from the user's own, value by value and type by type."""
 
-from __future__ import annotations
-
 import json
 import sys
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from tests.support import processes
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tests.support.domains import Domain
+from tests.support.domains import Domain
 
 pytestmark = pytest.mark.ros
 

@@ -1,7 +1,5 @@
 """Which ports of Fast DDS's shared memory a process reads: who first writes to an idle one may wait for 333 ms."""
 
-from __future__ import annotations
-
 import os
 import sys
 

@@ -1,10 +1,9 @@
-from __future__ import annotations
-
 import os
 import signal
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from sensor_msgs.msg import JointState
@@ -15,9 +14,6 @@ from tfcompose.ros.graph import writers
 from tfcompose.ros.node import JOINT_STATES, Subscription, TFPublisher, TFSubscription, open_node, wait
 from tfcompose.ros.tf_codec import Transform, decode, encode
 from tfcompose.signals import Stop
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
 

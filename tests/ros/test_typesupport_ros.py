@@ -1,7 +1,6 @@
-from __future__ import annotations
-
 import gc
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -9,9 +8,6 @@ from tfcompose.ros import typesupport
 from tfcompose.ros.environment import RosError
 from tfcompose.ros.node import TFPublisher, open_node
 from tfcompose.ros.tf_codec import TF_MESSAGE_HASH, Transform, encode
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 pytestmark = pytest.mark.ros
 

@@ -1,7 +1,5 @@
 """Files that are no robot: what each of them is, and where its one fault is."""
 
-from __future__ import annotations
-
 #: The smallest robot.
 GOOD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
 

@@ -1,19 +1,15 @@
 """Bags as ros2 bag records them, written with the library rosbags and its own encoder."""
 
-from __future__ import annotations
-
+import subprocess
 import sys
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
 
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from tests.support import processes
-
-if TYPE_CHECKING:
-    import subprocess
-    from collections.abc import Iterable
-    from pathlib import Path
 
 #: Topic, seconds of the recording, and (parent, child, stamp in seconds, xyz, quaternion x y z w).
 Sent = tuple[str, float, str, str, float, tuple[float, float, float], tuple[float, float, float, float]]

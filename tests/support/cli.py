@@ -1,19 +1,14 @@
 """The command line, run in the test's own process: most of what it claims needs none of its own."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 from unittest import mock
 
 from tfcompose.cli import disk, main, reading
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 
 def tfcompose(*words: object, code: int = 0) -> subprocess.CompletedProcess[str]:

@@ -1,16 +1,12 @@
 """``tfcompose doctor``, run until it sees what is to be seen."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import sys
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from tests.support import processes
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
 
 #: So long it is looked, again and again: where much else runs, publishers are found late, and late in truth.
 OBSERVE_S = (3.0, 3.0, 3.0, 6.0, 12.0)

@@ -1,18 +1,13 @@
 """ROS domains that tests have to themselves."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import tempfile
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
 
 #: The domains that tests may have; CI's own run of a robot has 101.
 DOMAINS = range(1, 101)

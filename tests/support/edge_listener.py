@@ -1,17 +1,13 @@
 """Whether an edge is really late: what a busy machine holds up is rightly blamed."""
 
-from __future__ import annotations
-
 import threading
 from itertools import pairwise
-from typing import TYPE_CHECKING
+
+from typing_extensions import Self
 
 from tfcompose.ros.node import TFSubscription, open_node, wait
 from tfcompose.ros.tf_codec import decode
 from tfcompose.signals import Stop
-
-if TYPE_CHECKING:
-    from typing_extensions import Self
 
 
 class EdgeListener:

@@ -1,18 +1,14 @@
 """Real nodes that publish what a test wants."""
 
-from __future__ import annotations
-
 import threading
 import time
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tfcompose.ros.node import TFPublisher, open_node
 from tfcompose.ros.tf_codec import Transform, encode
 from tfcompose.ros.typesupport import tf_message_type
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
 

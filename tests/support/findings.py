@@ -1,11 +1,6 @@
 """What a finding names. How it says so stands in tests/golden/wording."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from tfcompose.findings import Finding
+from tfcompose.findings import Finding
 
 
 def words(found: Finding) -> set[str]:

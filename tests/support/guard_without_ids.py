@@ -1,13 +1,8 @@
 """A guard whose rmw does not say with a message who sent it, as that of Cyclone DDS, where there is none such."""
 
-from __future__ import annotations
-
 import os
 import sys
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from pathlib import Path
 
 #: Read by each Python that starts.
 _SITE = """

@@ -1,9 +1,8 @@
 """Importing a URDF with ``tfcompose import``, and building what it writes."""
 
-from __future__ import annotations
-
 import json
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from tfcompose.cli import main
 from tfcompose.cli.compiling import library
@@ -12,9 +11,6 @@ from tfcompose.cli.reading import read_text
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
 from tfcompose.files import Target
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 PRESETS = library()
 

@@ -1,13 +1,13 @@
 """The launcher as a process of its own, for plans of plain Python processes."""
 
-from __future__ import annotations
-
 import contextlib
 import os
+import subprocess
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 from signal import SIGKILL
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import psutil
 
@@ -16,10 +16,6 @@ from tests.support.waiting import TIMEOUT_S, complete_lines
 from tfcompose.ipc import GUARD_EVENTS
 from tfcompose.plan import GuardPolicy, Plan, PlanProcess, RosSettings
 from tfcompose.plan.file import write_plan
-
-if TYPE_CHECKING:
-    import subprocess
-    from pathlib import Path
 
 PYTHON = ("${python}", "-I", "-S", "-c")
 SLEEPER = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); time.sleep(180)"

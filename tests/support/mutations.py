@@ -4,18 +4,14 @@ The place of each key and value comes from PyYAML's own nodes, so that most resu
 the same text on every Python: only ``random()`` of a generator seeded with a text is used.
 """
 
-from __future__ import annotations
-
 import random
 import re
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import yaml
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
 
 T = TypeVar("T")
 

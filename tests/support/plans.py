@@ -1,16 +1,10 @@
 """A robot's text as its plan and files, for tests of what is made of plans."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
+from tfcompose.plan import Plan
 from tfcompose.plan.file import read_plan
-
-if TYPE_CHECKING:
-    from tfcompose.plan import Plan
 
 
 def built(text: str, *profiles: str) -> dict[str, str]:

@@ -1,7 +1,5 @@
 """A sensor's preset of one's own, and what can be wrong in one."""
 
-from __future__ import annotations
-
 MAST = """
 preset: 1
 vendor: me

@@ -1,20 +1,16 @@
 """Processes that tests start: in a session of their own, with no signal ignored, bounded, and ended with the test."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal
 import subprocess
 import threading
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from tests.support.waiting import TIMEOUT_S, until
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-    from pathlib import Path
 
 #: What a script that puts the tests into the background, or nohup, has them ignore; a child would inherit that.
 _IGNORABLE = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

@@ -1,7 +1,5 @@
 """A family of robots that only a seed tells apart: random trees with every joint type, shape and way to give a mass."""
 
-from __future__ import annotations
-
 import random
 from typing import Any
 

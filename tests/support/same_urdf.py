@@ -1,16 +1,12 @@
 """Whether two URDFs describe the same robot; read with the standard library, poses computed with scipy."""
 
-from __future__ import annotations
-
 import os
 import xml.etree.ElementTree as ET
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 FAR = 1e-12
 #: An emitted tensor has 12 significant digits.

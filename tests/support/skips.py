@@ -1,13 +1,8 @@
 """Which tests may be skipped where all is installed that this project's own environment installs."""
 
-from __future__ import annotations
+from collections.abc import Iterable
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from _pytest.reports import BaseReport
+from _pytest.reports import BaseReport
 
 #: The beginning of a test's id, and why nothing is lost.
 ACCEPTED = {

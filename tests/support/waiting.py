@@ -1,17 +1,12 @@
 """How tests wait: for what is to come to pass, and no longer."""
 
-from __future__ import annotations
-
 import re
 import threading
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from pathlib import Path
 
 import psutil
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
 #: So long a busy machine may keep what comes to pass; where all is well nobody waits for it.
 TIMEOUT_S = 60.0

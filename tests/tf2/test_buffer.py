@@ -1,7 +1,5 @@
 """The buffer answers as tf2 does; scipy is the oracle for poses."""
 
-from __future__ import annotations
-
 import math
 import random
 

@@ -1,7 +1,5 @@
 """What holds for any tree and any history; pytransform3d and scipy are the oracles for numbers."""
 
-from __future__ import annotations
-
 import random
 
 import numpy as np

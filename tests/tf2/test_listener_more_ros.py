@@ -1,11 +1,10 @@
 """The listener with rclpy's futures, clocks, profiles and threads, as tf2_ros's users have them."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import threading
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from rclpy.executors import SingleThreadedExecutor
@@ -19,9 +18,6 @@ from tfcompose.geometry import Pose
 from tfcompose.ros.node import TFPublisher, open_node
 from tfcompose.ros.tf_codec import Transform, encode
 from tfcompose.tf2 import Buffer, TransformListener
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
 

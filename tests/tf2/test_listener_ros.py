@@ -1,15 +1,14 @@
 """Programs written for tf2_ros run with this package's classes, and the listener takes what tf2's would."""
 
-from __future__ import annotations
-
 import re
 import signal
 import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 import rclpy
@@ -20,16 +19,11 @@ from rclpy.time import Time
 from tests.support import processes
 from tests.support.waiting import none_but, until
 from tfcompose.geometry import Pose
-from tfcompose.plan import PlanProcess, Simulation
+from tfcompose.plan import PlanEdge, PlanProcess, Simulation
 from tfcompose.ros.graph import writers
 from tfcompose.ros.node import TFPublisher, open_node
 from tfcompose.ros.tf_codec import Transform, encode
 from tfcompose.tf2 import Buffer, LookupException, TransformException, TransformListener
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from tfcompose.plan import PlanEdge
 
 pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
 

@@ -1,7 +1,5 @@
 """Whole trajectories at once."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,8 +1,7 @@
 """ROS's own messages are moved by their registered functions and are still ROS's messages; scipy says where to."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,9 +21,6 @@ from sensor_msgs.msg import PointCloud2, PointField
 
 from tfcompose.geometry import Pose, normalised
 from tfcompose.tf2 import Buffer, TypeException
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 pytestmark = pytest.mark.ros
 

@@ -1,7 +1,5 @@
 """Every name of tf2_ros's and tf2_py's buffer is there, is called as theirs, and does what it says; without ROS."""
 
-from __future__ import annotations
-
 import asyncio
 import inspect
 import pickle

@@ -3,8 +3,6 @@
 PyPI has no tf2; with a ROS installation on the path (``tf2_py``) this runs.
 """
 
-from __future__ import annotations
-
 import math
 import random
 from typing import Any

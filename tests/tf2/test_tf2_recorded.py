@@ -4,8 +4,6 @@
 ``python tests/tf2/test_tf2_recorded.py`` asks it anew.
 """
 
-from __future__ import annotations
-
 import json
 import random
 import sys

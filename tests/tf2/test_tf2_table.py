@@ -1,9 +1,8 @@
 """What tf2's BufferCore does (geometry2 for Jazzy), line by line: what it takes, and what it answers when."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import pytest
 
@@ -18,9 +17,6 @@ from tfcompose.tf2 import (
 )
 from tfcompose.tf2.exceptions import Rejection
 from tfcompose.tf2.messages import Header, Quaternion, Time, Transform, TransformStamped, Vector3
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 S = 1_000_000_000
 MS = 1_000_000

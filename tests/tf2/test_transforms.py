@@ -1,7 +1,5 @@
 """Points, vectors, poses and clouds are moved; scipy and numpy's structured arrays say where to."""
 
-from __future__ import annotations
-
 import random
 import struct
 from array import array

@@ -1,7 +1,5 @@
 """What stands beside links and joints: hardware as ros2_control reads it, raw blocks as they were written."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 
 import pytest

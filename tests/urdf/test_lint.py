@@ -1,12 +1,10 @@
 """A URDF that somebody else wrote is judged with the lines of that file."""
 
-from __future__ import annotations
-
 import json
 import re
+import subprocess
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given, settings
@@ -24,9 +22,6 @@ from tfcompose.urdf.convert import robot_of
 from tfcompose.urdf.lint import lint_urdf as lint_with
 from tfcompose.urdf.packages import Packages
 from tfcompose.urdf.read import read_xml
-
-if TYPE_CHECKING:
-    import subprocess
 
 ROOT = Path(__file__).parents[2]
 FILES = sorted((Path(__file__).parent / "urdfs").glob("*.urdf"))

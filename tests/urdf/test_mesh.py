@@ -1,13 +1,12 @@
 """Mesh addresses: as they are written, and for a target; found by packages of the robot and of the workspace."""
 
-from __future__ import annotations
-
 import os
 import re
+import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import unquote
 
 import pytest
@@ -16,9 +15,6 @@ import trimesh
 from tests.support import processes
 from tests.support.cli import tfcompose_in
 from tfcompose.cli import main
-
-if TYPE_CHECKING:
-    import subprocess
 
 ROBOT = """tfcompose: 1
 robot: r

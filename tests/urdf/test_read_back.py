@@ -1,12 +1,11 @@
 """``build --read-back``: a description that is not the robot is not written, whatever in it is other."""
 
-from __future__ import annotations
-
 import json
 import re
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
@@ -17,12 +16,8 @@ from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
 from tfcompose.files import Target
+from tfcompose.model import Robot
 from tfcompose.urdf.read_back import differences
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from tfcompose.model import Robot
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 PRESETS = library()

@@ -4,13 +4,12 @@ What a reader cannot read is in ``CANNOT``, with the reason, and is tried all th
 can, the entry is wrong.
 """
 
-from __future__ import annotations
-
 import json
 import random
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,17 +21,12 @@ from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
 from tfcompose.geometry import Pose
-from tfcompose.plan import RosSettings
+from tfcompose.model import Robot
+from tfcompose.plan import Plan, RosSettings
 from tfcompose.plan.file import read_plan
 from tfcompose.publishers.joint_mover import JointMover, PublishOptions
 from tfcompose.ros.joint_codec import encode_names, fill
 from tfcompose.ros.tf_codec import decode
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from tfcompose.model import Robot
-    from tfcompose.plan import Plan
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 PRESETS = library()

@@ -1,14 +1,12 @@
 """The URDF, read by somebody else's reader, says what the robot says and what the tutorial says."""
 
-from __future__ import annotations
-
 import io
 import json
 import math
 import random
 import xml.etree.ElementTree as ET
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 import yourdfpy
@@ -19,14 +17,10 @@ from scipy.spatial.transform import Rotation
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
-from tfcompose.geometry import Pose, angle_between, quat_from_axis_angle, quat_from_rpy
-from tfcompose.model import JOINTS, STATIC
+from tfcompose.geometry import Pose, Quaternion, angle_between, quat_from_axis_angle, quat_from_rpy
+from tfcompose.model import JOINTS, STATIC, Robot
 from tfcompose.numbers import clean_quat, clean_rpy, number
 from tfcompose.urdf.write import urdf
-
-if TYPE_CHECKING:
-    from tfcompose.geometry import Quaternion
-    from tfcompose.model import Robot
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 CASES = [("my_robot", ()), ("autonomous_robot", ()), ("autonomous_robot", ("demo",))]

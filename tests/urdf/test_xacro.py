@@ -1,11 +1,10 @@
 """The macro, expanded by real xacro: the robot itself, and as many others of it as somebody asks for."""
 
-from __future__ import annotations
-
 import json
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,9 +16,6 @@ from tests.support.robots import EVERYTHING
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 PRESETS = library()

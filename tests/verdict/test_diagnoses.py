@@ -1,9 +1,6 @@
 """The doctor's diagnoses over histories: what is found, and when nothing is. How it is worded: tests/golden/scenes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -20,7 +17,7 @@ from tests.support.tree_history import (
     sound_plan,
     sound_tree,
 )
-from tfcompose.live.snapshot import joints_of
+from tfcompose.findings import Finding
 from tfcompose.live.state import RosProcess, StampedData, Topic, TreeState
 from tfcompose.plan import EdgePattern, GuardPolicy, PlanProcess
 from tfcompose.ros.environment import RANGE
@@ -28,9 +25,6 @@ from tfcompose.ros.tf_codec import TF_MESSAGE
 from tfcompose.text import duration
 from tfcompose.verdict.doctor import diagnose
 from tfcompose.verdict.setup import settings_apart
-
-if TYPE_CHECKING:
-    from tfcompose.findings import Finding
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 
@@ -350,15 +344,6 @@ def test_processes_with_other_settings_cannot_be_heard_and_why_is_reported() -> 
 )
 def test_settings_that_cannot_be_meant_are_found(settings: dict[str, str], name: str) -> None:
     expect(only(sound_tree().observed(settings=settings)), "TF909", name)
-
-
-def test_a_description_gives_its_moving_joints_and_nothing_where_it_is_none() -> None:
-    text = "<robot name='r'><link name='a'/><link name='b'/>"
-    text += "<joint name='j' type='revolute'><parent link='a'/><child link='b'/><mimic joint='k'/></joint>"
-    text += "<joint name='f' type='fixed'><parent link='a'/><child link='c'/></joint></robot>"
-    joints = joints_of(text)
-    assert [(j.name, j.parent, j.child, j.mimic) for j in joints] == [("j", "a", "b", True)]
-    assert joints_of("<robot") == joints_of("<!DOCTYPE a [<!ENTITY b 'c'>]><robot/>") == ()
 
 
 def test_times_are_shown_in_the_unit_that_people_use() -> None:

@@ -1,7 +1,5 @@
 """Each code that the doctor can give is provoked by real nodes in some test."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,20 +1,15 @@
 """Where drivers say that their frames are, against nominal and exact values."""
 
-from __future__ import annotations
-
 from math import nan
-from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.support.findings import expect
+from tfcompose.findings import Finding
 from tfcompose.geometry import OPTICAL_XYZW, Pose, multiply, quat_from_rpy
 from tfcompose.live.publishers import Message, Publisher, Senders
 from tfcompose.plan import Driven, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.verdict.drivers import SentPoses
-
-if TYPE_CHECKING:
-    from tfcompose.findings import Finding
 
 LENS, OPTICAL = Pose((0.0, -0.05, 0.0)), Pose((0.0, 0.0, 0.0), OPTICAL_XYZW)
 DRIVEN = Driven("front", "realsense/d435i", publishes=True, frames={"lens": "nominal", "optical": "exact"})

@@ -1,7 +1,5 @@
 """What is said of stamps that are of another clock."""
 
-from __future__ import annotations
-
 import pytest
 
 from tfcompose.verdict.stamps import other_clock

@@ -1,10 +1,9 @@
 """Expected against seen, replayed: each thing that can be wrong with an edge, and nothing where all is right."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -12,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from tests.support.findings import expect
+from tfcompose.findings import Finding
 from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.live.edges import TreeObserver
 from tfcompose.live.publishers import Publisher
@@ -20,11 +20,6 @@ from tfcompose.plan import Driven, EdgePattern, GuardPolicy, Joint, Plan, PlanEd
 from tfcompose.plan.topics import parts_of
 from tfcompose.verdict.poses import Offset, offset_of
 from tfcompose.verdict.verify import verify
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tfcompose.findings import Finding
 
 S = 10**9
 TOPICS = ("/tf", "/tf_static")

@@ -1,11 +1,10 @@
 """Messages read by their layout say what a plain decoder says, however publishers change what they send."""
 
-from __future__ import annotations
-
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tfcompose.live.publishers import MessageReader
+from tfcompose.live.snapshot import joints_of
 from tfcompose.ros.node import Received
 from tfcompose.ros.tf_codec import Transform, decode, encode
 
@@ -75,3 +74,12 @@ def test_poses_are_read_of_the_first_message_that_holds_a_frame_to_be_compared()
     (pose,) = reader.read(received(data), static=True).poses
     assert pose == ((1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8))
     assert reader.read(received(data), static=True).poses == ()
+
+
+def test_a_description_gives_its_moving_joints_and_nothing_where_it_is_none() -> None:
+    text = "<robot name='r'><link name='a'/><link name='b'/>"
+    text += "<joint name='j' type='revolute'><parent link='a'/><child link='b'/><mimic joint='k'/></joint>"
+    text += "<joint name='f' type='fixed'><parent link='a'/><child link='c'/></joint></robot>"
+    joints = joints_of(text)
+    assert [(j.name, j.parent, j.child, j.mimic) for j in joints] == [("j", "a", "b", True)]
+    assert joints_of("<robot") == joints_of("<!DOCTYPE a [<!ENTITY b 'c'>]><robot/>") == ()

@@ -1,17 +1,10 @@
 """Judges of robots on topics of their own: what each of them is given, and what is said of all together."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from tfcompose.guard.process import plans_by_topics, together
 from tfcompose.ipc import Clear, Complete, GuardEvent, OwnerReady
-from tfcompose.plan import Plan, PlanProcess, RosSettings
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tfcompose.plan import PlanEdge
+from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings
 
 OWN = {"/tf": "/one/tf", "/tf_static": "/one/tf_static"}
 

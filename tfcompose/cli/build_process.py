@@ -78,8 +78,8 @@ def _build(arguments: Namespace, answer: int) -> int:
         os.setpgid(0, 0)
         for number in (signal.SIGTTOU, signal.SIGTTIN):  # a terminal may stop other groups that write to it, or read
             signal.signal(number, signal.SIG_IGN)
-        from tfcompose.cli.writing import build
         from tfcompose.cli.plans import PLAN
+        from tfcompose.cli.writing import build
 
         folder, _ = build(arguments)
         os.write(answer, os.fsencode(folder / PLAN))

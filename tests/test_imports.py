@@ -2,6 +2,7 @@
 
 import ast
 import graphlib
+import re
 import sys
 from pathlib import Path
 
@@ -90,6 +91,24 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 def test_every_part_of_the_package_is_in_the_table() -> None:
     assert {part_of(file) for file in FILES} == set(MAY_IMPORT)
+
+
+ROOMS = sorted(file for file in PACKAGE.glob("*/__init__.py"))
+
+
+@for_each(ROOMS)
+def test_a_room_says_what_it_is_for_and_what_it_must_not_import(file: Path) -> None:
+    """The sentence that begins with "Must not import" names parts and packages that the tables do not allow."""
+    part, docstring = part_of(file), ast.get_docstring(ast.parse(file.read_text("utf-8"))) or ""
+    if part == "cli":
+        return
+    _, says, rest = docstring.partition("Must not import")
+    assert says, part
+    names = re.findall(r"``(\w+)``", re.split(r"[:.]", rest)[0])
+    assert len(names) >= 3, part
+    allowed = MAY_IMPORT[part] | {name for name, parts in ONLY_IN.items() if part in parts}
+    assert not set(names) & allowed, part
+    assert set(names) <= MAY_IMPORT.keys() | ONLY_IN.keys(), part
 
 
 @for_each(FILES)

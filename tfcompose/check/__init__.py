@@ -1,4 +1,10 @@
-"""Stage ``check``: a Robot becomes findings, one rule a function, the rules of a family in one module."""
+"""Judges a ``Robot``: each rule is a function that yields the findings of one code.
+
+A module holds the rules of one family; a rule's docstring is the page that ``tfcompose explain`` prints. ``check`` runs
+the rules and applies the comments that allow findings.
+
+Must not import ``language``, ``resolve``, ``urdf``, ``cli``: a rule knows the resolved robot, not how it was written.
+"""
 
 from tfcompose.check.check import RULES, apply, check, silenced, unused_allows, with_replaced
 from tfcompose.check.rule import Rule

@@ -1,4 +1,8 @@
-"""The command line: the only part that reads, writes, prints and exits."""
+"""The command line: the only part that reads files, writes files, prints and exits.
+
+``parser`` finds the command, ``commands`` has one module for each; what several commands share is here. A command
+imports what is heavy in its ``run``. Any part may be imported here, and nothing imports ``cli``.
+"""
 
 from __future__ import annotations
 

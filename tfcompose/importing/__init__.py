@@ -1,5 +1,5 @@
-"""What ``tfcompose import`` does: from a URDF that was read to the text of a robot file.
+"""Turns a URDF into the text of a robot file, for ``tfcompose import``.
 
-``convert`` looks for the sensors in it and takes down what a robot file has no place for; ``robot_file`` writes the
-text. It may import what resolves and reads robots; only the command imports it.
+``convert`` recognises sensors by their presets and lists what a robot file cannot hold; ``robot_file`` writes the text.
+Must not import ``cli``, ``emit``, ``plan``.
 """

@@ -1,6 +1,7 @@
-"""Stage ``language``: sources, merged over each other, become a typed spec.
+"""The language of robot files, presets and calibration sections: pydantic models, and what merges files.
 
-pydantic models are the one description of the language: of its validation, its JSON Schema and its reference.
+The models are the one description of validation, JSON Schema and reference. ``overlay`` and ``include`` merge sources,
+``validate`` makes a ``RobotSpec`` of one. Must not import ``resolve``, ``check``, ``urdf``, ``yaml``.
 """
 
 from tfcompose.language.include import set_value, with_includes

@@ -1,6 +1,6 @@
-"""What starts a plan, keeps it going and ends it.
+"""Starts a plan, restarts what fails and stops all of it.
 
-``machine`` decides, as a pure function over the values in ``state`` and ``events``; ``supervisor`` acts: it turns
-pipes, signals and time into events, and starts, signals and reads the processes. It knows the plan, not the compiler,
-and loads neither pydantic nor YAML.
+``machine`` decides: a pure function over the values of ``state`` and ``events``. ``supervisor`` acts: it turns pipes,
+signals and time into events, and starts, signals and reads processes. Must not import ``guard``, ``publishers``,
+``model``, ``pydantic``, ``yaml``: it knows the plan, and talks to other processes through ``ipc``.
 """

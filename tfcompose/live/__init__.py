@@ -1,6 +1,6 @@
-"""One observation of the live tree, for the guard, monitor, doctor, verify, tree, graph and echo.
+"""Observes the live tree once, for the guard, monitor, doctor, verify, tree, graph and echo.
 
-``topics`` brings messages and says who publishes (``publishers`` remembers it), ``edges`` and ``arrivals`` say what was
-seen of each edge, ``sensors`` what came besides TF. ``listener`` feeds observers, and ``snapshot`` puts all of it into
-one ``state``. What that means is for ``tfcompose.verdict`` to say; nothing here knows a verdict.
+``topics`` receives messages, ``publishers`` keeps who published, ``edges`` and ``arrivals`` keep what came of each
+edge; ``listener`` feeds observers, and ``snapshot`` fills a ``TreeState``. Must not import ``verdict``, ``guard``,
+``findings``: what an observation means is decided elsewhere.
 """

@@ -1,6 +1,7 @@
-"""Stage ``load``: text becomes plain data with the place of every key and value.
+"""Reads text into plain data: a ``Source`` has the data, and the span of each key and value.
 
-Calibration files are read by a module of their own, which is loaded where it is used.
+YAML robot files, calibration files and parameter files of ROS; text comes from the caller. Must not import
+``language``, ``model``, ``plan``, ``pydantic``: it knows no key of the language.
 """
 
 from tfcompose.load.nodes import DEEPEST, Path, Place

@@ -1,7 +1,8 @@
 """The robot: frames, edges, bodies, joints and processes, with every name, pose and owner decided.
 
-A ``Robot`` can hold a wrong robot: two parents, a cycle, two owners can all be said, and a rule says so with both
-places. Lengths are metres, angles radians, rates hertz; an edge's pose is the pose of its child in its parent.
+A ``Robot`` can hold a wrong robot: two parents, a cycle or two owners are for a rule to report. Lengths are metres,
+angles radians, rates hertz; an edge's pose is the pose of its child in its parent. Must not import ``language``,
+``load``, ``resolve``, ``check``.
 """
 
 from tfcompose.model.body import Asset, Inertial, Link, Material, Shape, colour_name, materials

@@ -1,8 +1,9 @@
-"""The plan: what is started, and which TF edge each process owns.
+"""The plan: which processes are started, and which TF edge each of them owns.
 
-The plan is the border between the compiler and everything that runs on a robot; ``tfcompose.plan.file`` writes and
-reads it. Poses are the pose of the child in the parent: metres, unit quaternions x y z w. Rates are
-in hertz. What is one of a few words is a ``Literal`` here, for the language and for messages too.
+It is the border between the compiler and everything that runs on a robot; ``file`` writes and reads plan.json. Poses
+are the pose of the child in the parent, in metres with unit quaternions x, y, z, w; rates are hertz, times seconds.
+Enumerations are ``Literal``, for the language and the messages too. Must not import ``model``, ``load``, ``language``,
+``ros``, ``pydantic``.
 """
 
 from tfcompose.plan.plan import (

@@ -1,1 +1,4 @@
-"""What commands print: findings for people and for programs, a robot's tree, and poses."""
+"""Makes text of what commands print: findings for people and programs, a robot's tree, and poses.
+
+Must not import ``cli``, ``compile``, ``plan``: it returns text and prints nothing.
+"""

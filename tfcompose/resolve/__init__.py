@@ -1,4 +1,8 @@
-"""Stage ``resolve``: a RobotSpec becomes a Robot with presets expanded, poses solved and owners given."""
+"""Turns a ``RobotSpec`` into a ``Robot``: presets expanded, parts included, poses solved, owners given.
+
+What cannot be resolved is a finding, and the robot goes on without it. Must not import ``check``, ``emit``, ``cli``: a
+robot is judged when it is there.
+"""
 
 from tfcompose.resolve.parts import Collected
 from tfcompose.resolve.presets import Library

@@ -1,1 +1,5 @@
-"""The only importer of rclpy: nodes, the bytes of TFMessage, and who published them."""
+"""All that touches ROS: nodes, QoS, the bytes of TFMessage, the graph, and services.
+
+The only importer of rclpy. Stamps are nanoseconds; poses are metres and quaternions x, y, z, w. Must not import
+``live``, ``model``, ``tf2``, ``verdict``: it observes nothing by itself.
+"""

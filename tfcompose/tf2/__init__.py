@@ -21,6 +21,7 @@ nothing else. The buffer needs only Python; arrays of poses and points need nump
 - ``exceptions``: why there is no transform, and why one was not taken
 
 This package imports ``tfcompose.geometry`` and, for a listener or a node, ``tfcompose.ros``; nothing else of tfcompose.
+Must not import ``plan``, ``live``, ``findings``, ``rclpy``: people use it without the rest.
 """
 
 from tfcompose.tf2.buffer import Buffer, BufferInterface

@@ -1,6 +1,6 @@
-"""URDF and xacro, both ways: text to elements to a ``Robot``, a ``Robot`` to text.
+"""URDF and xacro, both ways: text to a ``Robot``, a ``Robot`` to text.
 
-``read`` gives elements with places, ``convert`` makes a robot of them, ``lint`` judges a file; ``write`` and ``macro``
-write a robot, ``read_back`` compares what was written with it, ``expand`` runs xacro. Nothing here knows the robot
-file's own language, nor what resolves it: ``resolve`` and ``importing`` import this folder, never the other way round.
+``read`` gives elements with their spans, ``convert`` makes a robot of them, ``lint`` reports on a file; ``write`` and
+``macro`` write a robot, ``read_back`` compares the result with it, ``expand`` runs xacro. Must not import ``language``,
+``resolve``, ``importing``, ``emit``: these use it.
 """

@@ -1,5 +1,6 @@
-"""What was seen of an edge, against what the plan says of it: the verdict of the guard, of verify and of the doctor.
+"""Judges what was observed against what the plan expects: for the guard, doctor, verify and monitor.
 
-Pure functions over a planned edge and what was seen of it. The guard gives its verdicts message by message, verify edge
-by edge, the doctor by publisher: with the same codes and in the same words.
+Pure functions over observations; ages and gaps are seconds, rates hertz. The guard judges message by message, verify
+edge by edge, doctor publisher by publisher, with the same codes and in the same words. Must not import ``guard``,
+``launcher``, ``cli``, ``rclpy``.
 """

@@ -299,7 +299,7 @@ def node_text(preset: dict[str, Any]) -> str:
         lines = [f"  {role:<{width}}  {_role_text(frame)}" for role, frame in preset["frames"].items()]
         parts.append("frames\n" + "\n".join(lines))
     if preset["set"]:
-        parts.append(f"told as well\n  {_pairs(preset['set'])}")
+        parts.append(f"told as well\n  {_parameters(preset['set'])}")
     if preset["hint"]:
         parts.append(f"note\n  {preset['hint']}")
     sources = [" ".join(str(part) for part in fact.values()) for fact in preset["source"]]
@@ -310,10 +310,10 @@ def node_text(preset: dict[str, Any]) -> str:
 def _claim_text(claim: dict[str, Any]) -> str:
     how = [claim["topic"]]
     if claim["chosen_by"]:
-        how.append(f"with {_pairs(claim['chosen_by'])}")
+        how.append(f"with {_parameters(claim['chosen_by'])}")
     elif not claim["by_default"]:
-        how.append(f"only with {_pairs(claim['on'])}")
-    how.append(f"off: {_pairs(claim['off'])}" if claim["off"] else "no switch")
+        how.append(f"only with {_parameters(claim['on'])}")
+    how.append(f"off: {_parameters(claim['off'])}" if claim["off"] else "no switch")
     return f"{claim['parent']} → {claim['child']}  {', '.join(how)}"
 
 
@@ -321,3 +321,10 @@ def _role_text(frame: dict[str, Any]) -> str:
     if frame["parameter"] is None:
         return f"{frame['default']}, which cannot be told"
     return f"{frame['parameter']}, by default {frame['default']}"
+
+
+def _parameters(values: dict[str, Any]) -> str:
+    """Return parameters as ROS takes them: 0.0 is another type than 0."""
+    return ", ".join(
+        f"{key}: {str(value).lower() if isinstance(value, bool) else value}" for key, value in values.items()
+    )

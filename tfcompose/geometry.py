@@ -161,3 +161,32 @@ def angle_between(a: Quaternion, b: Quaternion) -> float:
     ax, ay, az, aw = a
     x, y, z, w = multiply((-ax, -ay, -az, aw), b)
     return 2 * math.atan2(norm((x, y, z)), abs(w))
+
+
+#: What is no distance and no angle for people, in metres and radians, and what computing adds to either.
+_NO_MM, _NO_RAD, _ROUNDING = 1e-6, 1e-6, 1e-9
+
+
+class Offset(NamedTuple):
+    """A distance in metres, and the angle of the one rotation between two orientations, in radians, 0 to π."""
+
+    xyz_m: float
+    rot_rad: float
+
+    @property
+    def text(self) -> str:
+        """Both in millimetres and degrees, without what is nothing."""
+        distance = f"{self.xyz_m * 1e3:.3g} mm" if self.xyz_m < 1 else f"{self.xyz_m:.3g} m"
+        parts = [distance] if self.xyz_m >= _NO_MM else []
+        parts += [f"{math.degrees(self.rot_rad):.3g} deg"] if self.rot_rad >= _NO_RAD else []
+        return " and ".join(parts) or "nothing"
+
+    def beyond(self, limit: Offset) -> bool:
+        """Whether the distance or the angle is larger than that of ``limit``, by more than what computing adds."""
+        return self.xyz_m > limit.xyz_m + _ROUNDING or self.rot_rad > limit.rot_rad + _ROUNDING
+
+
+def offset_of(expected: Pose, observed: Pose) -> Offset:
+    """Return how far ``observed`` is from ``expected``; quaternions need not be of length 1."""
+    angle = angle_between(normalised(expected.quat_xyzw), normalised(observed.quat_xyzw))
+    return Offset(math.dist(expected.xyz, observed.xyz), angle)

@@ -13,7 +13,7 @@ from tfcompose.catalogue import CATALOGUE
 from tfcompose.check import RULES, check, unused_allows
 from tfcompose.check.rule import rule
 from tfcompose.cli.compiling import library
-from tfcompose.cli.disk import moments as measured
+from tfcompose.cli.compiling import moments as measured
 from tfcompose.cli.reading import read_text
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.findings import Finding, Span, finding

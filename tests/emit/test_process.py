@@ -9,8 +9,7 @@ import pytest
 import yaml
 
 from tests.support.tables import for_each
-from tfcompose.cli.compiling import library
-from tfcompose.cli.disk import disk
+from tfcompose.cli.compiling import disk, library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
 from tfcompose.files import Target

@@ -22,8 +22,7 @@ import pytest
 from tests.support.bad_input import BAD
 from tests.support.mutations import mutated
 from tfcompose.check import unused_allows
-from tfcompose.cli.compiling import PRESETS, library
-from tfcompose.cli.disk import disk
+from tfcompose.cli.compiling import PRESETS, disk, library
 from tfcompose.cli.reading import read_text
 from tfcompose.compile import compile_robot
 from tfcompose.findings import Edit, Finding, RejectedError, Span

@@ -18,7 +18,7 @@ import pytest
 from tests.golden.scenes import SCENES
 from tests.golden.test_findings import CORPORA, ROOT, in_the_repository, refusals, within
 from tfcompose.catalogue import CATALOGUE
-from tfcompose.cli.disk import disk
+from tfcompose.cli.compiling import disk
 from tfcompose.findings import Finding
 from tfcompose.render.text import render_text
 from tfcompose.urdf.lint import lint_urdf

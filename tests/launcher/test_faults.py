@@ -34,7 +34,7 @@ from pathlib import Path
 from tfcompose.cli.console import Console
 from tfcompose.plan.file import read_plan
 from tfcompose.launcher.control import listen
-from tfcompose.launcher.logs import Logs
+from tfcompose.launcher.output import Logs
 from tfcompose.launcher.output import NonBlockingOutput
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDir
 from tfcompose.launcher.supervisor import Session, supervise

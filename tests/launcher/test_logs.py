@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tfcompose.launcher.logs import KEPT, Follower, Logs, last_modified, logged, read_logs
+from tfcompose.launcher.output import KEPT_FILES, Follower, Logs, last_modified, logged, read_logs
 
 
 def texts(folder: Path, *names: str) -> list[str]:
@@ -56,7 +56,7 @@ def test_a_file_that_is_full_is_turned_over_and_the_oldest_lines_go(tmp_path: Pa
         logs.write("a", f"line {number}")
     logs.close()
     files = sorted(tmp_path.iterdir())
-    assert len(files) == KEPT + 1
+    assert len(files) == KEPT_FILES + 1
     assert all(file.stat().st_size <= 1000 for file in files)
     kept = texts(tmp_path, "a")
     assert kept == [f"line {number}" for number in range(1000 - len(kept), 1000)]
@@ -92,7 +92,7 @@ def test_a_full_disk_is_reported_once_costs_lines_and_stops_nobody(
     assert str(tmp_path) in (output[0] or "")
     assert output[1:] == [None] * 99
     monkeypatch.setattr(os, "write", write)
-    monkeypatch.setattr("tfcompose.launcher.logs.LEFT_ALONE_S", 0.0)
+    monkeypatch.setattr("tfcompose.launcher.output.LEFT_ALONE_S", 0.0)
     logs.write("a", "after")
     logs.close()
     assert texts(tmp_path, "a") == ["before", "after"]

@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
-from tfcompose.cli.compiling import library
-from tfcompose.cli.disk import disk
+from tfcompose.cli.compiling import disk, library
 from tfcompose.compile import compile_robot
 from tfcompose.model import Inertial
 

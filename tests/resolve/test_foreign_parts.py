@@ -10,8 +10,7 @@ import yourdfpy
 from scipy.spatial.transform import Rotation
 
 from tests.support.findings import words
-from tfcompose.cli.compiling import library
-from tfcompose.cli.disk import disk
+from tfcompose.cli.compiling import disk, library
 from tfcompose.cli.reading import read_text
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit

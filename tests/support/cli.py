@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from unittest import mock
 
-from tfcompose.cli import disk, main, reading
+from tfcompose.cli import compiling, main, reading
 
 
 def tfcompose(*words: object, code: int = 0) -> subprocess.CompletedProcess[str]:
@@ -22,7 +22,7 @@ def tfcompose_in(folder: Path, *words: object, **environment: str) -> subprocess
     """Run a command in this folder, with these variables too; return how it ended, and what it printed."""
     output, errors = (io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2))
     texts = [str(word) for word in words]
-    for remembered in (reading._lines, disk._is_pointer, disk.moments):  # of files by names that are relative
+    for remembered in (reading._lines, compiling._is_pointer, compiling.moments):  # of files by names that are relative
         remembered.cache_clear()
     streams = contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors)
     with inside(folder), mock.patch.dict(os.environ, environment), streams[0], streams[1]:

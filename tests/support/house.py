@@ -16,7 +16,7 @@ GUIDE = ROOT / "CONTRIBUTING.md"
 #: The drawing stands between these lines of the guide.
 BEGIN, END = "```mermaid\n", "```\n"
 #: Every part may import these; the drawing has one box for all of them, and no arrow to it.
-GROUND = ("catalogue", "findings", "geometry", "interrupt", "numbers", "text", "tree", "units")
+GROUND = ("catalogue", "findings", "geometry", "numbers", "text", "tree", "units")
 
 
 def part_of(file: Path) -> str:

@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from tfcompose.cli import main
-from tfcompose.cli.compiling import library
-from tfcompose.cli.disk import disk
+from tfcompose.cli.compiling import disk, library
 from tfcompose.cli.reading import read_text
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit

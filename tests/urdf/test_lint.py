@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from tests.support.cli import tfcompose_in
 from tests.support.findings import words
 from tfcompose.check import RULES
-from tfcompose.cli.compiling import library
-from tfcompose.cli.disk import disk
+from tfcompose.cli.compiling import disk, library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
 from tfcompose.findings import Finding, RejectedError, Span

@@ -12,13 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.findings import expect
 from tfcompose.findings import Finding
-from tfcompose.geometry import Pose, quat_from_rpy
+from tfcompose.geometry import Offset, Pose, offset_of, quat_from_rpy
 from tfcompose.live.edges import TreeObserver
 from tfcompose.live.publishers import Publisher
 from tfcompose.live.state import NAMELESS
 from tfcompose.plan import Driven, EdgePattern, GuardPolicy, Joint, Plan, PlanEdge, PlanProcess, RosSettings
 from tfcompose.plan.topics import parts_of
-from tfcompose.verdict.poses import Offset, offset_of
 from tfcompose.verdict.verify import verify
 
 S = 10**9

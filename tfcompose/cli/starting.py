@@ -40,8 +40,7 @@ from tfcompose.cli.terminal import (
 from tfcompose.findings import RejectedError
 from tfcompose.ipc import AllReady, AllStarted, Ended, PlanChange, UpdateRequest
 from tfcompose.launcher.control import listen
-from tfcompose.launcher.logs import Logs
-from tfcompose.launcher.output import NonBlockingOutput
+from tfcompose.launcher.output import Logs, NonBlockingOutput
 from tfcompose.launcher.preflight import commands_of, started_by_us
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDirError, runtime_dir_of
 from tfcompose.launcher.supervisor import Session, supervise

@@ -1,17 +1,23 @@
-"""Where the launcher's notices go: to a person who may read slowly, and to whoever listens at the control socket.
+"""Where the launcher's notices and the output of processes go: to a person, to the control socket, and into files.
 
 The robot does not wait for its reader: a terminal that was stopped, a pipe to a pager. What cannot be written at once
 is kept, up to a limit; beyond it, lines of processes are left out and counted, and they are in the logs.
+
+A log is one file for each process, ``TIME TEXT`` a line, rotated when it is full. The times are local, with
+milliseconds and zone, so that lines of several files can be merged. A disk that is full costs lines, and stops nobody.
 """
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import heapq
 import os
 import select
 import selectors
 import stat
 import time
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -19,10 +25,12 @@ from tfcompose.ipc import LogLine, notice_line
 from tfcompose.launcher.control import Control
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
 
     from tfcompose.ipc import Notice, Request
     from tfcompose.launcher.supervisor import Session
+
 
 #: So much is kept for a slow reader; what the launcher itself says may take as much again; bytes.
 KEPT = 256 * 1024
@@ -173,3 +181,171 @@ class Notifier:
                 self._selector.unregister(self._owing)
             self._output = self._report = self._owing = None
             self._lost()
+
+
+#: A file is turned over beyond this size; so many old ones are kept beside it.
+FILE_BYTES = 8_000_000
+KEPT_FILES = 2
+#: After a failure the disk is left alone for so long, in seconds.
+LEFT_ALONE_S = 5.0
+
+
+@dataclass(slots=True)
+class _Log:
+    path: Path
+    fd: int
+    size: int
+
+
+@dataclass(slots=True)
+class Logs:
+    """The log files of one run, in ``folder``."""
+
+    folder: Path
+    file_bytes: int = FILE_BYTES
+    lost: int = 0
+    _open: dict[str, _Log] = field(default_factory=dict)
+    _failed: float = -LEFT_ALONE_S
+    _second: int = -1
+    _stamp: tuple[str, str] = ("", "")
+
+    def write(self, process: str, text: str) -> str | None:
+        """Append a line; return why that failed, the first time, and None otherwise."""
+        now = time.time()
+        if time.monotonic() - self._failed < LEFT_ALONE_S:
+            self.lost += 1
+            return None
+        data = f"{self._time(now)} {text}\n".encode(errors="replace")
+        try:
+            log = self._open.get(process) or self._begin(process)
+            if log.size + len(data) > self.file_bytes:
+                log = self._rotate(process, log)
+            if os.write(log.fd, data) != len(data):
+                os.write(log.fd, b"\n")  # no room for all of it: the next attempt says why
+            log.size += len(data)
+        except OSError as error:
+            first, self._failed, self.lost = self.lost == 0, time.monotonic(), self.lost + 1
+            return f"logs are not written to {self.folder}: {error.strerror}" if first else None
+        return None
+
+    def close(self) -> None:
+        """Close the files."""
+        for log in self._open.values():
+            os.close(log.fd)
+        self._open.clear()
+
+    def _begin(self, process: str) -> _Log:
+        path = self.folder / f"{process}.log"  # of a part in a folder: arm/driver
+        path.parent.mkdir(parents=True, exist_ok=True)
+        for folder in {self.folder, path.parent}:
+            _ensure_own(folder)
+        fd = os.open(path, os.O_CREAT | os.O_WRONLY | os.O_APPEND | os.O_NOFOLLOW, 0o640)
+        log = self._open[process] = _Log(path, fd, os.fstat(fd).st_size)
+        return log
+
+    def _rotate(self, process: str, log: _Log) -> _Log:
+        os.close(log.fd)
+        del self._open[process]
+        for number in range(KEPT_FILES, 0, -1):
+            newer = log.path.with_suffix(f".log.{number - 1}") if number > 1 else log.path
+            with contextlib.suppress(FileNotFoundError):
+                newer.replace(log.path.with_suffix(f".log.{number}"))
+        return self._begin(process)
+
+    def _time(self, now: float) -> str:
+        second = int(now)
+        if second != self._second:
+            local = time.localtime(second)
+            zone = time.strftime("%z", local)
+            self._second, self._stamp = second, (time.strftime("%Y-%m-%dT%H:%M:%S", local), f"{zone[:3]}:{zone[3:]}")
+        return f"{self._stamp[0]}.{int(now * 1000) % 1000:03d}{self._stamp[1]}"
+
+
+def _ensure_own(folder: Path) -> None:
+    """Refuse a folder that somebody else put there, as they may in a shared ROS_LOG_DIR, and what leads elsewhere.
+
+    Raises:
+        OSError: if it is a link, or another user's.
+    """
+    found = folder.lstat()
+    if stat.S_ISLNK(found.st_mode):
+        raise OSError(errno.EPERM, "the folder is a link", str(folder))
+    if found.st_uid != os.geteuid():
+        raise OSError(errno.EPERM, "the folder is another user's", str(folder))
+
+
+def logged(folder: Path) -> list[str]:
+    """Return the names of the processes that have a log, the launcher's among them."""
+    return sorted(file.relative_to(folder).as_posix().removesuffix(".log") for file in folder.rglob("*.log"))
+
+
+def last_modified(folder: Path) -> float:
+    """Return when a line was last written below the folder, in seconds since 1970; 0 where there is none.
+
+    A folder's own time says only when its last file was made.
+    """
+    return max((file.stat().st_mtime for file in folder.rglob("*.log")), default=0.0)
+
+
+def read_logs(folder: Path, names: list[str]) -> Iterator[tuple[str, str, str]]:
+    """Yield (time, process, text) of these processes' lines, oldest first."""
+    return heapq.merge(*(_lines(folder, name) for name in names), key=lambda line: line[0])
+
+
+def _lines(folder: Path, name: str) -> Iterator[tuple[str, str, str]]:
+    for file in [*(folder / f"{name}.log.{number}" for number in range(KEPT_FILES, 0, -1)), folder / f"{name}.log"]:
+        with (
+            contextlib.suppress(FileNotFoundError),
+            file.open(encoding="utf-8", errors="replace", newline="\n") as lines,
+        ):
+            for line in lines:
+                at, _, text = line.rstrip("\n").partition(" ")
+                yield at, name, text
+
+
+class Follower:
+    """Reads what is added to the logs, across turning over."""
+
+    def __init__(self, folder: Path, names: list[str]) -> None:
+        """Begin at the end of what is there now."""
+        self._folder, self._names = folder, names
+        self._at = {name: self._end(name) for name in names}
+        self._rest = dict.fromkeys(names, b"")
+
+    def more(self) -> list[tuple[str, str, str]]:
+        """Return (time, process, text) of the lines that came since the last call, oldest first."""
+        found = [line for name in self._names for line in self._more(name)]
+        return sorted(found, key=lambda line: line[0])
+
+    def _end(self, name: str) -> tuple[int, int]:
+        try:
+            found = (self._folder / f"{name}.log").stat()
+        except OSError:
+            return (0, 0)
+        return (found.st_ino, found.st_size)
+
+    def _more(self, name: str) -> Iterator[tuple[str, str, str]]:
+        inode, offset = self._at[name]
+        end = self._end(name)
+        if end == (inode, offset):
+            return
+        data = b""
+        if end[0] != inode:  # it was turned over: first the rest of the old one
+            old = self._folder / f"{name}.log.1"
+            with contextlib.suppress(OSError):
+                if old.stat().st_ino == inode:
+                    data = _from(old, offset)
+            offset = 0
+        with contextlib.suppress(OSError):
+            data += _from(self._folder / f"{name}.log", offset)
+        self._at[name] = end
+        *complete, self._rest[name] = (self._rest[name] + data).split(b"\n")
+        for line in complete:
+            at, _, text = line.decode(errors="replace").partition(" ")
+            yield at, name, text
+
+
+def _from(file: Path, offset: int) -> bytes:
+    with file.open("rb") as opened:
+        opened.seek(offset)
+        return opened.read()

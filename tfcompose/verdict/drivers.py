@@ -12,9 +12,9 @@ from math import isfinite, radians
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, Note, finding
-from tfcompose.geometry import Pose, norm
+from tfcompose.geometry import Offset, Pose, norm, offset_of
 from tfcompose.text import counted
-from tfcompose.verdict.poses import Offset, compared, offset_of
+from tfcompose.verdict.publishers import compared
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

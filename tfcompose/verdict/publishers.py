@@ -1,22 +1,25 @@
-"""Publishers: settings that no listener accepts, the wrong topic or type, and two publishers of one edge."""
+"""Publishers: settings that no listener accepts, the wrong topic or type, two of one edge, and poses that are off."""
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, Note, finding
+from tfcompose.geometry import Offset, Pose, normalised, offset_of
 from tfcompose.live.state import NAMELESS, who
 from tfcompose.plan.topics import GLOBAL
 from tfcompose.ros.tf_codec import TF_MESSAGE
 from tfcompose.text import counted, listed, with_more
-from tfcompose.verdict.poses import Offset, offset_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from tfcompose.findings import Span
     from tfcompose.live.edges import EdgeState
     from tfcompose.live.state import TreeState
+    from tfcompose.plan import PlanEdge
 
 #: A listener keeps the last 100 messages on /tf_static, one of each publisher.
 MOST_STATIC = 100
@@ -201,3 +204,34 @@ def _where(state: TreeState, edge: EdgeState) -> str:
     where, rate = state.where(edge), edge.timing.rate
     how = "once" if edge.stream.static or rate is None else f"at {rate:.3g} Hz"
     return f"{who(edge)} sends it {how}{', and runs ' if where else ''}{where}"
+
+
+def shown(pose: Pose) -> str:
+    """Return the pose in one line: metres, and fixed-axis angles in degrees."""
+    xyz = " ".join(f"{round(value, 5) + 0.0:g}" for value in pose.xyz)
+    angles = Pose(pose.xyz, normalised(pose.quat_xyzw)).rpy
+    rpy = " ".join(f"{round(math.degrees(angle), 3) + 0.0:g}" for angle in angles)
+    return f"xyz {xyz} m, rpy {rpy} deg"
+
+
+def compared(expected: Pose, observed: Pose) -> str:
+    """Return both poses as people read them."""
+    return f"seen {shown(observed)}; expected {shown(expected)}"
+
+
+def pose_differs(off: Sequence[tuple[PlanEdge, str, Pose]], publisher: str, place: Span | None = None) -> Finding:
+    """Return the finding for edges that come with another pose than the plan's: each with its parent, as it was sent.
+
+    ``publisher`` is empty where it is not known; ``place`` is where the first edge stands in the robot's file.
+    """
+    (edge, parent, pose), *others = off
+    by = f" from {publisher}" if publisher else ""
+    more = f", and of {counted(len(others), 'more frame')} too" if others else ""
+    message = f"the pose of {edge.child} in {parent}{by} is off by {offset_of(edge.pose, pose).text}{more}"
+    notes = [
+        Note(f"{one.child} in {above} by {offset_of(one.pose, sent).text}: {compared(one.pose, sent)}")
+        for one, above, sent in others[:LISTED_AT_MOST]
+    ]
+    notes += [] if place else [Note(f"{edge.name} is declared in {edge.source[0]}:{edge.source[1]}")]
+    advice = "was it changed after the start? tfcompose restart; else correct the one that is wrong"
+    return finding("TF846", f"{message}: {compared(edge.pose, pose)}", place, notes=notes, help=advice)

@@ -9,18 +9,19 @@ may be calibrated: they are compared as far as the preset says how well it knows
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, Note, did_you_mean
-from tfcompose.geometry import Pose
+from tfcompose.geometry import Offset, Pose, offset_of
 from tfcompose.live.state import TreeState
 from tfcompose.plan import SLOW_BELOW
 from tfcompose.plan.topics import parts_of
 from tfcompose.verdict.drivers import Expected, driver_pose_differs, drives_of, expected_of, is_off, sensor_of
 from tfcompose.verdict.ownership import SELF, Violation, code_of, may_be_owners, relays_of, violation_finding
-from tfcompose.verdict.poses import DEFAULT_TOLERANCE, Offset, offset_of, pose_differs
+from tfcompose.verdict.publishers import pose_differs
 from tfcompose.verdict.rates import left, never_received, silent, slow
 from tfcompose.verdict.tree import rejected_transforms
 
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
     Topics = tuple[str, str]
     Group = Sequence["Difference"]
 
+#: What two poses may be apart and count as the same.
+DEFAULT_TOLERANCE = Offset(1e-3, math.radians(0.1))
 #: A rate is judged from so many messages on.
 FEWEST = 4
 #: How long a publisher may stay without a name before it is judged all the same.

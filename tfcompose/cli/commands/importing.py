@@ -42,7 +42,7 @@ def run(arguments: Namespace) -> int:
     """Import; exit code 0, 1 with errors in the source, 2 after wrong use or where something cannot be read."""
     from dataclasses import replace
 
-    from tfcompose.cli.disk import disk
+    from tfcompose.cli.compiling import disk
     from tfcompose.findings import RejectedError, Span
     from tfcompose.urdf.lint import read_urdf
     from tfcompose.urdf.packages import Packages
@@ -95,8 +95,7 @@ def _check_use(arguments: Namespace) -> None:
 
 def _robot_file(document: Document, arguments: Namespace, packages: dict[str, str]) -> tuple[str, list[Finding]]:
     """Return the robot file, and the errors that it has where the source has none."""
-    from tfcompose.cli.compiling import library
-    from tfcompose.cli.disk import disk
+    from tfcompose.cli.compiling import disk, library
     from tfcompose.cli.reading import read_text
     from tfcompose.compile import Compiled, compile_robot
     from tfcompose.files import Target

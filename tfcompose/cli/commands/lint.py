@@ -78,7 +78,7 @@ def run(arguments: Namespace) -> int:
 
 def _lint_urdf(file: str) -> list[Finding]:
     """Return what is wrong with a URDF or xacro file."""
-    from tfcompose.cli.disk import disk
+    from tfcompose.cli.compiling import disk
     from tfcompose.urdf.lint import lint_urdf
     from tfcompose.urdf.packages import Packages
 
@@ -149,8 +149,7 @@ def lint_file(file: str, presets: Library, arguments: Namespace, read: Callable[
     from dataclasses import replace
 
     from tfcompose.check import unused_allows
-    from tfcompose.cli.compiling import overlays_of
-    from tfcompose.cli.disk import disk
+    from tfcompose.cli.compiling import disk, overlays_of
     from tfcompose.compile import compile_source
     from tfcompose.findings import Note, RejectedError
     from tfcompose.language import profiles_in, with_includes

@@ -40,7 +40,7 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Print the logs; exit code 0, 1 where there are none."""
     from tfcompose.findings import did_you_mean
-    from tfcompose.launcher.logs import Follower, logged, read_logs
+    from tfcompose.launcher.output import Follower, logged, read_logs
 
     place = _place(arguments.robot)
     known = logged(place.logs)
@@ -67,7 +67,7 @@ def run(arguments: Namespace) -> int:
 def _place(robot: str | None) -> RuntimeDir:
     """Return the robot that runs, or the one that has run last."""
     from tfcompose.cli.runs import chosen_run, running
-    from tfcompose.launcher.logs import last_modified
+    from tfcompose.launcher.output import last_modified
     from tfcompose.launcher.runtime_dir import runtime_dirs
 
     if robot is None and len(alive := running()) == 1:

@@ -21,8 +21,8 @@ from tfcompose.cli.terminal import print_findings
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
+    from tfcompose.geometry import Offset
     from tfcompose.plan import Plan
-    from tfcompose.verdict.poses import Offset
     from tfcompose.verdict.verify import Verdict
 
 _UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "deg": math.pi / 180, "rad": 1.0}
@@ -97,7 +97,8 @@ def tolerance(text: str) -> Offset:
     Raises:
         ArgumentTypeError: if it is neither.
     """
-    from tfcompose.verdict.poses import DEFAULT_TOLERANCE, Offset
+    from tfcompose.geometry import Offset
+    from tfcompose.verdict.verify import DEFAULT_TOLERANCE
 
     given: dict[bool, float] = {}
     for part in text.split(","):

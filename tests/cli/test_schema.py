@@ -2,6 +2,7 @@
 
 import json
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ HEAD = "tfcompose: 1\nrobot: r\n"
 LINKS = "links: {base_link: {}}\n"
 
 
+@cache
 def validator(language: str) -> Any:
     schema = json.loads(schema_text(language))
     jsonschema.Draft202012Validator.check_schema(schema)

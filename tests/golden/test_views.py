@@ -6,6 +6,7 @@ given as a launcher would. After an intended change: ``python -m tests.golden.te
 
 import difflib
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from unittest import mock
@@ -16,9 +17,11 @@ from tests.golden.test_findings import ROOT
 from tests.support.bags import UP, Sent, drive, write_bag
 from tests.support.cli import tfcompose_in
 from tests.support.robots import ROVER
+from tests.support.tree_history import SECOND_NS
 from tfcompose.cli.commands import ps
 from tfcompose.cli.console import Console
 from tfcompose.findings import Note, finding
+from tfcompose.geometry import Pose
 from tfcompose.ipc import (
     AllReady,
     AllStarted,
@@ -40,6 +43,8 @@ from tfcompose.ipc import (
     Waiting,
 )
 from tfcompose.plan import Plan, PlanProcess, RosSettings
+from tfcompose.tf2 import Buffer, TransformException, TypeException
+from tfcompose.tf2.messages import Header
 
 GOLDEN = Path(__file__).parent / "views"
 FIXED: list[Sent] = [("/tf_static", 0.0, "base_link", "lidar", 0.0, (0.0, 0.0, 0.3), UP)]
@@ -107,6 +112,46 @@ STATUS = RobotStatus(
 )  # fmt: skip
 
 
+def buffer_errors() -> str:
+    """Return what the buffer answers where it has no transform, and what moves nothing."""
+    buffer = Buffer()
+    for second in (1, 3):
+        buffer.set("odom", "base", Pose((float(second), 0.0, 0.0)), second * SECOND_NS, static=False)
+    for parent, child in (("base", "laser"), ("world", "table"), ("a", "b"), ("b", "a"), ("a", "tool")):
+        buffer.set(parent, child, Pose(), 0, static=True)
+    below_map = Buffer()
+    for parent, child, second in (("map", "odom", 9), ("odom", "base", 1)):
+        below_map.set(parent, child, Pose(), second * SECOND_NS, static=False)
+    cleared = Buffer()
+    cleared.set("odom", "base", Pose(), SECOND_NS, static=False)
+    cleared.clear()
+    questions: tuple[Callable[[], object], ...] = (
+        lambda: buffer.lookup("odom", "lasr"),
+        lambda: buffer.lookup("/odom", "laser"),
+        lambda: buffer.lookup("", "laser"),
+        lambda: buffer.lookup("odom", "table"),
+        lambda: buffer.lookup("tool", "b"),
+        lambda: buffer.lookup("odom", "laser", SECOND_NS // 2),
+        lambda: buffer.lookup("odom", "laser", 4 * SECOND_NS),
+        lambda: below_map.lookup("map", "odom", 8 * SECOND_NS),
+        lambda: below_map.lookup("map", "base"),
+        lambda: cleared.lookup("odom", "base"),
+        lambda: buffer.lookup_velocity("base", "odom", 2 * SECOND_NS, 0),
+        lambda: buffer.lookup_transform("odom", "base", "now"),
+        lambda: buffer.transform(Header(), "odom"),
+        lambda: buffer.transform_points([1.0, 2.0], "odom", "base"),
+    )
+    return "".join(map(refusal, questions))
+
+
+def refusal(ask: Callable[[], object]) -> str:
+    try:
+        ask()
+    except (TransformException, TypeException, TypeError, ValueError) as error:
+        return f"{type(error).__name__}: {error}\n"
+    return "an answer\n"
+
+
 class Lines(list[str]):
     """Stands in for the output of ``up``."""
 
@@ -130,7 +175,7 @@ def views() -> dict[str, str]:
     console = Console(PLAN, lines, colour=False)
     for notice in NOTICES:
         console(notice)
-    return made | {"up": "".join(lines)}
+    return made | {"up": "".join(lines), "buffer": buffer_errors()}
 
 
 def printed(folder: Path, command: str) -> str:

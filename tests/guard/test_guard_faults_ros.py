@@ -170,21 +170,22 @@ def test_what_strangers_do_to_the_tree_is_named_as_what_it_is(up: Callable[[str]
     assert "TF803" not in robot.output.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
-    ("stamps", "code", "reports"),
-    [
-        ("since start", "error[TF825]", "simulated"),
-        ("none", "error[TF825]", "without"),
-        ("frozen", "warning[TF823]", ""),
-        ("back", "warning[TF824]", ""),
-    ],
-)
-def test_an_owner_whose_stamps_are_wrong_is_named(
-    up: Callable[[str], Running], stamps: str, code: str, reports: str
-) -> None:
-    robot = up(ROBOT)
-    robot.joins("/drive", "odom base_link", stamps=stamps)
-    robot.says(code, "/drive", "odom → base_link", reports)
+def test_owners_whose_stamps_are_wrong_are_named(up: Callable[[str], Running]) -> None:
+    wrong = {
+        "since start": "error[TF825]",
+        "none": "error[TF825]",
+        "frozen": "warning[TF823]",
+        "back": "warning[TF824]",
+    }
+    names = {stamps: stamps.replace(" ", "_") for stamps in wrong}
+    frames = "".join(f"  on_{name}: {{parent: base_link, owner: {name}}}\n" for name in names.values())
+    owners = "".join(f"  {name}: {{external: true, node: /{name}}}\n" for name in names.values())
+    robot = up(ROBOT.replace("processes:\n", f"{frames}processes:\n{owners}"))
+    robot.joins("/drive", "odom base_link")
+    for stamps, name in names.items():
+        robot.joins(f"/{name}", f"base_link on_{name}", stamps=stamps)
+    for stamps, code in wrong.items():
+        robot.says(code, f"/{names[stamps]} ", f"base_link → on_{names[stamps]}")
     robot.says("complete")
 
 

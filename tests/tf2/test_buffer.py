@@ -58,7 +58,7 @@ def test_a_leading_slash_is_dropped_as_tf2_does() -> None:
     buffer = rover()
     buffer.set("/base_link", "/imu", at(0.5), 0, static=True)
     assert buffer.latest("base_link", "imu")[0] == at(0.5)
-    with pytest.raises(InvalidArgumentException, match="starts with a slash in tf2: /base_link is known as base_link"):
+    with pytest.raises(InvalidArgumentException, match=r"/base_link .*base_link"):
         buffer.latest("/base_link", "imu")
 
 
@@ -106,16 +106,14 @@ def test_interpolation_takes_the_short_way_whatever_the_signs() -> None:
 
 
 def test_an_unknown_frame_is_named_with_the_nearest_known() -> None:
-    with pytest.raises(LookupException, match="no frame lasr; did you mean laser"):
+    with pytest.raises(LookupException, match=r"lasr\b.*\blaser\?"):
         rover().latest("odom", "lasr")
 
 
 def test_two_trees_are_reported_with_their_roots() -> None:
     buffer = rover()
     buffer.set("world", "table", at(1), 0, static=True)
-    with pytest.raises(
-        ConnectivityException, match=r"odom and table are in two trees: one begins at odom, .* at world"
-    ):
+    with pytest.raises(ConnectivityException, match=r"odom\b.*\btable\b.*\bodom\b.*\bworld"):
         buffer.latest("odom", "table")
 
 
@@ -123,7 +121,7 @@ def test_edges_without_a_common_time_say_which_and_by_how_much() -> None:
     buffer = Buffer()
     buffer.set("map", "odom", at(0), 1 * S, static=False)
     buffer.set("odom", "base", at(0), 3 * S, static=False)
-    with pytest.raises(ExtrapolationException, match="odom → base begins 2000 ms after the last of map → odom"):
+    with pytest.raises(ExtrapolationException, match=r"odom → base .*2000 ms .*map → odom"):
         buffer.latest("map", "base")
 
 

@@ -228,6 +228,6 @@ def test_a_wait_of_half_a_second_ends_after_half_a_second_and_callbacks_of_tf_ar
             "odom", "base_link", Time(seconds=10), timeout=S // 2, return_debug_tuple=True
         )
         assert not possible
-        assert "odom → base_link at 10.000000000 s would be extrapolation" in why
+        assert "odom → base_link at 10.000000000 s " in why
     buffer.set("odom", "base_link", Pose(), 10 * S, static=False)
     assert buffer.can_transform("odom", "base_link", Time(seconds=10))

@@ -182,7 +182,7 @@ def test_malformed_messages_and_transforms_that_tf2_refuses_are_reported_once_an
     listener.close()
     output = capfd.readouterr().err
     assert output.count("no TFMessage") == 1
-    assert output.count("TF_SELF_TRANSFORM: a transform of base_link was dropped: it is its own parent") == 1
+    assert output.count("TF_SELF_TRANSFORM: ") == 1
     assert output.count("TF_NAN_INPUT") == 1
 
 

@@ -158,7 +158,7 @@ def test_between_two_times_a_point_is_moved_through_the_fixed_frame() -> None:
 
 
 def test_a_type_that_is_not_known_is_named() -> None:
-    with pytest.raises(TypeException, match="a Header cannot be transformed; what can is PointStamped, "):
+    with pytest.raises(TypeException, match=r"Header\b.*\bPointStamped"):
         laser().transform(Header(), "base")
 
 
@@ -273,14 +273,14 @@ def xyz_cloud(**changes: Any) -> PointCloud2:
 @pytest.mark.parametrize(
     ("changes", "why"),
     [
-        ({"fields": []}, "no field x; its fields are: none"),
-        ({"fields": [PointField("x", 0, 7), PointField("y", 4, 7), PointField("i", 8, 7)]}, "no field z.*x, y, i"),
-        ({"fields": [PointField(name, 0, 5) for name in "xyz"]}, "x is of type 5, not float32"),
-        ({"data": bytes(23)}, r"has 23 bytes, and 1 × 2 points need 24"),
+        ({"fields": []}, r"\bx\b"),
+        ({"fields": [PointField("x", 0, 7), PointField("y", 4, 7), PointField("i", 8, 7)]}, r"\bz\b.*x, y, i"),
+        ({"fields": [PointField(name, 0, 5) for name in "xyz"]}, r"\bx\b.*\b5\b.*float32"),
+        ({"data": bytes(23)}, r" 23 bytes.* 24"),
         ({"width": 4_000_000_000}, "need 48000000000"),
         ({"width": 4_000_000_000, "point_step": 0}, "steps do not fit"),
-        ({"point_step": 8}, "z ends at byte 12 of a point, a point has 8 bytes"),
-        ({"height": 2, "row_step": 12}, "a row has 2 points and 12 bytes"),
+        ({"point_step": 8}, r"\bz\b.* 12 .* 8 bytes"),
+        ({"height": 2, "row_step": 12}, " 2 points .*12 bytes"),
         ({"height": 4_000_000_000}, "steps do not fit|need"),
     ],
 )

@@ -209,7 +209,7 @@ def test_a_parameter_of_another_type_is_refused_with_a_sentence(start: Callable[
     assert process.process.wait(UNTIL_S) == 1
     process.close()
     (line,) = process.errors
-    assert line.startswith("the parameter publish_frequency is not right: ")
+    assert "publish_frequency" in line
 
 
 @pytest.mark.parametrize("name", ["static", "joints"])

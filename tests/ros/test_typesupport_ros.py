@@ -53,14 +53,14 @@ def test_the_description_is_that_of_tf_message(own: Any) -> None:
 
 def test_another_rmw_is_refused_with_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(typesupport, "get_rmw_implementation_identifier", lambda: "rmw_cyclonedds_cpp")
-    with pytest.raises(RosError, match="with rmw_cyclonedds_cpp the package tf2_msgs is needed"):
+    with pytest.raises(RosError, match=r"rmw_cyclonedds_cpp\b.*\btf2_msgs\b"):
         typesupport.own_type()
 
 
 @pytest.mark.parametrize("what", ["_FASTRTPS", "_INTROSPECTION", "_STAMPED"])
 def test_another_layout_is_refused_with_a_sentence(monkeypatch: pytest.MonkeyPatch, what: str) -> None:
     monkeypatch.setattr(typesupport, what, type(getattr(typesupport, what))(getattr(typesupport, what)[:-1]))
-    with pytest.raises(RosError, match="not laid out as Jazzy's"):
+    with pytest.raises(RosError, match="Jazzy"):
         typesupport.own_type()
 
 

@@ -136,12 +136,10 @@ def test_a_package_that_is_nowhere_else_is_the_one_around_the_file_that_asks(
     (workspace / "install/share/named").mkdir()
     monkeypatch.setenv("AMENT_PREFIX_PATH", f"{workspace}/install")
     assert main(["build", "src/robots/r.yaml"]) == 1
-    assert f"No such file or directory: {workspace}/install/share/named/urdf/height.xacro" in capsys.readouterr().err
+    assert f"{workspace}/install/share/named/urdf/height.xacro" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("command", "way"), [("import", "; --package nmd=FOLDER, or source"), ("lint", "; source the")]
-)
+@pytest.mark.parametrize(("command", "way"), [("import", "--package nmd=FOLDER"), ("lint", "source")])
 def test_what_to_do_about_a_package_is_what_the_command_can_do(
     workspace: Path, capsys: pytest.CaptureFixture[str], command: str, way: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -152,7 +150,8 @@ def test_what_to_do_about_a_package_is_what_the_command_can_do(
     )
     assert main([command, str(file)]) != 0
     output = capsys.readouterr()
-    assert f"AMENT_PREFIX_PATH is empty{way}" in output.err + output.out
+    (line,) = [line for line in (output.err + output.out).splitlines() if "AMENT_PREFIX_PATH" in line]
+    assert (way in line, "--package" in line) == (True, command == "import")
 
 
 def test_a_build_is_the_same_wherever_the_workspace_is(workspace: Path) -> None:

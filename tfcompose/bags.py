@@ -272,9 +272,9 @@ def _files_at(path: Path) -> list[Path]:
     if path.suffix == ".bag":
         raise BagError(f"{path} is a bag of ROS 1", "rosbags-convert makes one of ROS 2 from it")
     if path.suffix in {".zstd", ".zst"}:
-        raise BagError(f"{path} is compressed as a whole", "name its folder with metadata.yaml, or unzstd it first")
+        raise BagError(f"{path} is compressed as one file", "name its folder with metadata.yaml, or unzstd it first")
     if path.suffix not in ENDINGS:
-        raise BagError(f"{path} is no recording: these end in .mcap or .db3", "or name the folder of one")
+        raise BagError(f"{path} is not a recording: those end in .mcap or .db3", "or name the folder of one")
     return [path]
 
 

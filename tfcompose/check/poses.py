@@ -148,7 +148,7 @@ def quaternion_w_first(robot: Robot) -> Iterator[Finding]:
         identity = abs(first) == 1 and not (second or third or fourth)
         small = _SMALL_ROTATION_W < abs(first) < 1 and second == 0 and (third == 0) != (fourth == 0)
         if identity or small:
-            rotations = f"turns by {_degrees(fourth)} deg, and by {_degrees(first)} deg if w is first"
+            rotations = f"rotates by {_degrees(fourth)} deg, and by {_degrees(first)} deg if w is first"
             message = f"{value.entry}: quat_xyzw {_listed(value.numbers)} {rotations}"
             advice = f"if w is first, write {_listed((second, third, fourth, first))}"
             if identity:

@@ -62,7 +62,7 @@ def text(preset: dict[str, Any]) -> str:
     parts.append(f"frames of a sensor {NAME}\n" + _tree(preset))
     if preset["body"]:
         parts.append(f"body\n  {_body_text(preset['body'])}")
-    parts.append("driver\n" + (_driver_text(preset) if preset["driver"] else "  none is known"))
+    parts.append("driver\n" + (_driver_text(preset) if preset["driver"] else "  none known"))
     if preset["topics"]:
         parts.append("messages\n" + _table([_topic(topic) for topic in preset["topics"]]))
     if preset["source"]:
@@ -161,7 +161,7 @@ def _pairs(values: dict[str, Any]) -> str:
 
 
 def _option_text(option: dict[str, Any]) -> str:
-    kind = {"set": "some of ", "choice": "one of ", "bool": "true or false", "text": "a text"}[option["type"]]
+    kind = {"set": "some of ", "choice": "one of ", "bool": "true or false", "text": "a string"}[option["type"]]
     default = f", default {_value(option['default'])}" if "default" in option else ""
     about = f": {option['about']}" if "about" in option else ""
     return f"{kind}{', '.join(option.get('values', []))}{default}{about}"
@@ -194,7 +194,7 @@ def _facts_of(frame: dict[str, Any]) -> tuple[str, str, str, str]:
     if any(rpy):
         parts.append(f"rpy {' '.join(number(round(math.degrees(angle), 4)) for angle in rpy)} deg")
     if "by_driver" in frame:
-        parts.append(f"the driver hangs it on {frame['by_driver']['parent']}")
+        parts.append(f"the driver makes it a child of {frame['by_driver']['parent']}")
     return "nominal" if frame["nominal"] else "exact", topic, when, "  ".join(parts)
 
 
@@ -319,7 +319,7 @@ def _claim_text(claim: dict[str, Any]) -> str:
 
 def _role_text(frame: dict[str, Any]) -> str:
     if frame["parameter"] is None:
-        return f"{frame['default']}, which cannot be told"
+        return f"{frame['default']}, which no parameter changes"
     return f"{frame['parameter']}, by default {frame['default']}"
 
 

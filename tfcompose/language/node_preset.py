@@ -35,7 +35,7 @@ class ClaimSpec(Spec):
     child: Text = key(..., "the child frame", "base_link")
     off: Off = key(..., "the parameters that stop it; none where there are none", {"publish_tf": False}, NO_SWITCH)
     on: Parameters = key({}, "the parameters that start it", {"publish_tf": True})
-    by_default: Boolean = key(True, "false: it publishes the edge only if it is told to")
+    by_default: Boolean = key(True, "false: it publishes the edge only where a parameter turns that on")
     static: Boolean = key(False, "true: it sends the edge on /tf_static")
     chosen_by: Parameters = key({}, "the parameters that choose this edge among several", {"two_d_mode": True})
 

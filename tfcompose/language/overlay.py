@@ -190,7 +190,7 @@ def as_part(  # noqa: PLR0913, PLR0917 (two files, and what the one says of the 
         wanted = getattr(ros, name)
         if isinstance(own, dict) and name in own and own[name] != wanted:
             message = f"{name} of the part {path[-1]} is {own[name]}, and of the robot that holds it {wanted}"
-            notes = [Note("it is said here", part.at(("ros", name)))]
+            notes = [Note("set here", part.at(("ros", name)))]
             advice = f"ros: {{{name}: {own[name]}}} here, or leave it out there"
             found.append(finding("TF312", message, key, notes=notes, help=advice))
     frames = _frame_names(part.data)
@@ -250,11 +250,11 @@ def _wrong_profiles(source: Source) -> list[Finding]:
     profiles = source.data.get("profiles", {})
     if not isinstance(profiles, dict):
         advice = "for example profiles: {demo: {…}}"
-        return [finding("TF103", "profiles is no mapping", source.at(("profiles",)), help=advice)]
+        return [finding("TF103", "profiles is not a mapping", source.at(("profiles",)), help=advice)]
     found = []
     for name, profile in profiles.items():
         if not isinstance(profile, dict):
-            message, span = f"the profile {name} is no mapping", source.at_key(("profiles", name))
+            message, span = f"the profile {name} is not a mapping", source.at_key(("profiles", name))
             found.append(finding("TF103", message, span, help=f"for example {name}: {{sensors: {{…}}}}"))
         elif "profiles" in profile:
             message, span = f"the profile {name} holds profiles", source.at_key(("profiles", name, "profiles"))

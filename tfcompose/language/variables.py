@@ -139,7 +139,7 @@ class _Variables:
             return value
         if name in self.open:
             circle = " → ".join([*self.open[self.open.index(name) :], name])
-            raise ExpressionError(f"the variable {self.open[-1]} needs itself: {circle}")
+            raise ExpressionError(f"the variable {self.open[-1]} depends on itself: {circle}")
         there = f"vars has {', '.join(self.given)}" if self.given else "the file has no vars"
         raise ExpressionError(f"unknown variable {name}", did_you_mean(name, self.given, there))
 
@@ -149,7 +149,7 @@ class _Variables:
         if not IDENTIFIER.fullmatch(name):
             raise ExpressionError(f"{name!r} cannot name a variable", "letters, digits and _: for example mast_height")
         if isinstance(given, bool) or not isinstance(given, (int, float, str)):
-            raise ExpressionError(f"the variable {name} is {shown(given)}", "a number, a quantity or a text")
+            raise ExpressionError(f"the variable {name} is {shown(given)}", "a number, a quantity or a string")
         if not isinstance(given, str):
             return Quantity(given)
         value = fill(given, self.lookup) if "${" in given else given

@@ -43,7 +43,7 @@ def guard_lost(name: str, event: Exited, *, strict: bool) -> Finding:
     blind = "nothing of the plan passes to /tf" if strict else "nobody watches the tree"
     message = f"{name} {verb} {how_ended(event.returncode)}: {blind} until it is back"
     notes = [Note(f"{name}: {line}") for line in event.last_lines]
-    advice = "it is started again, and knows what it has told"
+    advice = "it is restarted, and repeats no report"
     return finding("TF808", message, None, severity="warning", notes=notes, help=advice)
 
 
@@ -66,7 +66,7 @@ def waits_in_vain(name: str, other: str, what: str, why: str) -> Finding:
 
 def never_clear(name: str, seconds: float) -> Finding:
     """Return the finding for a guard that does not report whether the plan's edges are free."""
-    message = f"{name} did not say within {seconds:g} s whether somebody publishes the plan's edges already"
+    message = f"{name} did not report within {seconds:g} s whether the plan's edges are published already"
     return finding("TF808", message, None, help="its own log says how far it came; --guard off starts without it")
 
 

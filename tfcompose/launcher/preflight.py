@@ -234,7 +234,9 @@ def executable_of(process: PlanProcess, word: str, folder: Path, env: Mapping[st
         path = folder / word
         if _can_run(path):
             return str(path)
-        advice = "" if word.startswith("/") else f"${{file({word})}} is beside the robot file, wherever up is called"
+        advice = (
+            "" if word.startswith("/") else f"${{file({word})}} is relative to the robot file, wherever up is called"
+        )
         return NotFound(process.name, word, (_why_not(path),), advice=advice)
     path_variable = env.get("PATH", os.defpath)
     return shutil.which(word, path=path_variable) or NotFound(process.name, word, (), path_variable)

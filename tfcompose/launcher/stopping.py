@@ -59,7 +59,7 @@ def process_exited(step: Transition, event: Exited) -> None:
     if done and ((before.ready and not process.owns) or (ready and ready.kind == "exit")):
         step.track(name, replace(step.state.tracked[name], ready=True, ready_since=before.ready_since or step.now))
     early = name == step.state.guard and step.state.clear is None
-    when = " before it said whether somebody publishes the plan's edges already" if early else ""
+    when = " before it reported whether the plan's edges are published already" if early else ""
     if not done or process.required:
         when = ", and the plan requires it" if done else when
         step.fail_process(name, ended_by_itself(name, event.returncode, when, event.last_lines))

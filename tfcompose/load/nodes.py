@@ -218,7 +218,7 @@ class Reader:
         top = self._stack[-1]
         if top.waits_for_key:
             key = part.value if isinstance(part.value, str) else None
-            self._key(top, key, self._place(event), "not a text")
+            self._key(top, key, self._place(event), "not a string")
         else:
             self.found += part.found
             self._put(part.value, part.place, part.size, part.height)
@@ -227,11 +227,11 @@ class Reader:
         """Take a key; the value of one that is no text, or is given twice, or holds anchors only, is not kept."""
         top.key, top.waits_for_key, top.is_merge, top.keeps = key or "", False, is_merge, True
         if key is None:
-            message = f"a key must be a text; this one is {what}"
+            message = f"a key must be a string; this one is {what}"
             self.found.append(finding("TF004", message, place.span, help="put it in quotes"))
             top.keeps = False
         elif key in top.keys:
-            note = Note("it stands here first", top.keys[key].span)
+            note = Note("first defined here", top.keys[key].span)
             self.found.append(finding("TF003", f"the key {key} is given twice", place.span, notes=[note]))
             top.keeps = False
         else:

@@ -64,7 +64,7 @@ def scalar(tag: str, text: str) -> str | bool | int | float | None:
     if tag == STR:
         return text
     if not _PATTERNS[tag].match(text):
-        raise ValueError(f"{text!r} is no {tag.removeprefix(TAG)}")
+        raise ValueError(f"{text!r} is not of type {tag.removeprefix(TAG)}")
     if tag == NULL:
         return None
     if tag == BOOL:

@@ -57,7 +57,7 @@ def narrowed(kind: type[T], value: T, **changes: Any) -> T:
 
 
 _NONE = type(None)
-_PLAIN: dict[Any, str] = {str: "a text", int: "a whole number", float: "a finite number", bool: "true or false"}
+_PLAIN: dict[Any, str] = {str: "a string", int: "a whole number", float: "a finite number", bool: "true or false"}
 #: So much of a value is shown in an error, in characters.
 _LONGEST_SHOWN = 60
 

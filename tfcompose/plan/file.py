@@ -84,12 +84,12 @@ def _wrong_names(plan: Plan) -> Iterator[str]:
         if times > 1:
             yield f"{times} processes are named {name}"
     yield from (
-        f"the owner of {edge.name} is {shown(edge.owner)}, which is no process"
+        f"the owner of {edge.name} is {shown(edge.owner)}, which is not a process"
         for edge in plan.edges
         if edge.owner not in known
     )
     yield from (
-        f"{process.name} waits for {shown(other)}, which is no process"
+        f"{process.name} waits for {shown(other)}, which is not a process"
         for process in plan.processes
         for other in process.after
         if other not in known

@@ -73,7 +73,7 @@ class _Files:
             wrong = tuple(replace(one, code="TF610", span=None if one.span == file_span else one.span) for one in found)
             loaded = CalibrationFile(path, form, (), wrong)
         for one in wrong:
-            notes = [Note("it stands here", one.span), *one.notes] if one.span else one.notes
+            notes = [Note("here", one.span), *one.notes] if one.span else one.notes
             message = f"{path} {one.message}" if one.code == "TF611" else f"{path}: {one.message}"
             self.found.append(finding(one.code, message, at, help=one.help, notes=notes))
         return loaded
@@ -145,14 +145,14 @@ class _Work:
         names = [name for entry in file.entries for name in (entry.child, entry.parent) if name]
         near = next((hint for name in (child, parent) if name not in names and (hint := nearest(name, names))), None)
         shown = [one for one in file.entries if near in {one.child, one.parent}] or list(file.entries)
-        notes = [Note(f"{entry.name} stands here", entry.at) for entry in shown[:1]]
+        notes = [Note(f"{entry.name} is defined here", entry.at) for entry in shown[:1]]
         there = f"there is {', '.join(entry.name for entry in file.entries[:6])}; parent: and child: pick one"
         advice = f"did you mean {near}? {there}" if near else there
         message = f"{file.file} holds no pose of {child} in {parent}"
         self.found.append(finding("TF612", message, at, help=advice, notes=notes))
 
     def _ambiguous(self, message: str, at: Span, matches: Sequence[_Match]) -> None:
-        notes = [Note(f"{one.entry.name} stands here", one.entry.at) for one in matches[:4]]
+        notes = [Note(f"{one.entry.name} is defined here", one.entry.at) for one in matches[:4]]
         names = {one.entry.name for one in matches}
         advice = "pick one with child: and parent:" if len(names) > 1 else "keep one of them in the file"
         self.found.append(finding("TF613", message, at, help=advice, notes=notes))
@@ -216,8 +216,8 @@ class _Work:
             advice = "calibration: beside the mount takes it" if entry.child is None else "no such mount: remove it"
             if entry.child is not None and entry.child not in self.frames:
                 advice = did_you_mean(entry.child, self.frames, advice)
-            message = f"{file.file}: nothing takes {entry.name}"
-            note = Note("it stands here", entry.at)
+            message = f"{file.file}: no mount uses {entry.name}"
+            note = Note("defined here", entry.at)
             self.found.append(finding("TF619", message, at, help=advice, notes=[note]))
 
 

@@ -137,7 +137,7 @@ class _Work:
         if given is None:
             claimant.computed[key] = value
         elif given != value:
-            message = f"{key} of {claimant.process.name} is {given!r}, and by the tree it is {value!r}"
+            message = f"{key} of {claimant.process.name} is {given!r}, but in the tree it is {value!r}"
             self.found.append(finding("TF333", message, self._at(claimant, key), help="remove it: tfcompose writes it"))
 
     def _is_own(self, claimant: Claimant, claim: ClaimSpec) -> bool:
@@ -175,7 +175,7 @@ class _Work:
             self._tell(claimant, key, value)
         if claimant.has(claim.off):
             message = (
-                f"{claimant.process.name} owns {edge.name}, and is told not to publish it: {switch_text(claim.off)}"
+                f"{claimant.process.name} owns {edge.name}, but a parameter turns that off: {switch_text(claim.off)}"
             )
             place = self._at(claimant, next(iter(claim.off)))
             self.found.append(finding("TF333", message, place, help="remove it, or name another owner"))

@@ -229,7 +229,7 @@ class PartEntry:
         """Return the part under the names that it has in the holder; ``implied`` are frames that only that has."""
         if not _PREFIX.fullmatch(self.prefix):
             at, advice = self.source.at((*self.at, "prefix")), "letters, digits and _: left_, or left/"
-            raise RejectedError([finding("TF501", f"{self.prefix!r} is no good prefix", at, help=advice)])
+            raise RejectedError([finding("TF501", f"invalid prefix {self.prefix!r}", at, help=advice)])
         shared = frozenset(robot.ros.shared_frames) & robot.frames.keys() | implied
         if self.declared.root is not None:
             robot = self._subtree(robot, self.declared.root)
@@ -260,9 +260,9 @@ class PartEntry:
             raise RejectedError([])  # what would be the root, or would hang on it, was refused
         held = (edge.parent for edge in robot.edges if edge.parent in names.shared)
         listed = ", ".join(roots or dict.fromkeys((*robot.roots(), *held)))
-        what = f"has several roots: {listed}" if roots else f"hangs on {listed} already"
+        what = f"has several roots: {listed}" if roots else f"is a child of {listed} already"
         at = self.source.at((*self.at, "parent"))
-        advice = f"say which: root: {roots[0]}" if roots else "leave parent out, or take a part of it: root: FRAME"
+        advice = f"choose one: root: {roots[0]}" if roots else "leave parent out, or take a part of it: root: FRAME"
         raise RejectedError([finding("TF313", f"the part {self.name} {what}", at, help=advice)])
 
 

@@ -97,7 +97,7 @@ def sensor_of(name: str, spec: SensorSpec, library: Library, source: Source) -> 
         return None, list(error.findings)
     hidden = library.hides(spec.preset)
     if hidden:
-        message = f"{spec.preset} is {library.file(spec.preset)}, which stands before tfcompose's own preset"
+        message = f"{spec.preset} is {library.file(spec.preset)}, which takes precedence over tfcompose's own preset"
         notes = [Note("its own", Span(hidden))]
         found.append(finding("TF607", message, span, notes=notes, help="give it another name"))
     sensor = Sensor(name, spec, preset, options, DRIVER)
@@ -155,7 +155,7 @@ def _refusal(option: Option, key: str, value: Any, place: Span) -> Finding | Non
     if option.type == "bool" and not isinstance(value, bool):
         return finding("TF603", f"the option {key} is {value!r}", place, help="true or false")
     if option.type == "text" and not isinstance(value, str):
-        return finding("TF603", f"the option {key} is {value!r}, not a text", place, help="put it in quotes")
+        return finding("TF603", f"the option {key} is {value!r}, not a string", place, help="put it in quotes")
     if option.type == "choice" and value not in option.variants:
         advice = did_you_mean(str(value), option.variants, f"one of: {', '.join(option.variants)}")
         return finding("TF603", f"the option {key} cannot be {value!r}", place, help=advice)
@@ -163,7 +163,7 @@ def _refusal(option: Option, key: str, value: Any, place: Span) -> Finding | Non
         return None
     known = ", ".join(option.values)
     if not isinstance(value, list):
-        return finding("TF603", f"the option {key} is no list", place, help=f"a list of some of: {known}")
+        return finding("TF603", f"the option {key} is not a list", place, help=f"a list of some of: {known}")
     for item in value:
         if item not in option.values:
             advice = did_you_mean(str(item), option.values, f"there is {known}")

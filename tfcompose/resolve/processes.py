@@ -94,7 +94,7 @@ def name_clashes(processes: list[Process], spec: RobotSpec, source: Source) -> l
     for process in processes:
         other = first.setdefault(process.name, process)
         if other.at != process.at:
-            notes = [Note(f"{other.name} stands here too", other.at)]
+            notes = [Note(f"{other.name} is also defined here", other.at)]
             advice = "rename one of them"
             if process.name in spec.sensors:
                 advice += f", or, if it drives the sensor, driver: {process.name}"
@@ -125,7 +125,7 @@ def unknown_names(
                 place = source.at_key((section, process.name, *inside, other))
                 advice = did_you_mean(other, names, f"there is {', '.join(names)}")
                 found.append(
-                    finding("TF813", f"{process.name} waits for {other}, which is no process", place, help=advice)
+                    finding("TF813", f"{process.name} waits for {other}, which is not a process", place, help=advice)
                 )
     return found
 
@@ -393,14 +393,14 @@ def _wrong_positions(wanted: dict[str, Any], robot: Robot, process: Process, sou
         place = source.at_key(("processes", process.name, "simulate", "joints", name))
         joint = joints.get(name)
         if joint and joint.mimic:
-            advice = f"say the position of {joint.mimic}"
+            advice = f"give the position of {joint.mimic}"
             yield finding("TF703", f"{name} has no position of its own: it mimics {joint.mimic}", place, help=advice)
         elif name not in movable:
             if not robot.excuses(name):
                 advice = did_you_mean(name, movable, f"there is {', '.join(movable)}" if movable else "no joint moves")
                 yield finding("TF703", f"no moving joint {name}", place, help=advice)
         elif joint and what == SWEEP and _sweep(joint) is None:
-            advice = f"give {name} a limit: {{lower, upper}}, or say a position here"
+            advice = f"give {name} a limit: {{lower, upper}}, or give a position here"
             yield finding("TF106", f"{name} slides and has no limits to sweep between", place, help=advice)
 
 

@@ -9,6 +9,7 @@ from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.geometry import Pose
 from tfcompose.language.preset import Chosen
 from tfcompose.model import BUILT_IN, STATIC, Edge, Link, MountedSensor, Node, Process
+from tfcompose.plan import switch_text
 from tfcompose.resolve.isolation import settings_of
 from tfcompose.resolve.poses import Draft, rotation_of
 from tfcompose.resolve.presets import DRIVER, TFCOMPOSE
@@ -345,7 +346,9 @@ def _named_driver(sensor: Sensor, name: str, validated: Validated) -> list[Findi
     if name != "none" and name not in known:
         advice = did_you_mean(name, known, f"processes: {{{name}: {{external: true}}}}")
         found.append(
-            finding("TF813", f"the driver of {sensor.name} is {name}, which is no process", source.at(at), help=advice)
+            finding(
+                "TF813", f"the driver of {sensor.name} is {name}, which is not a process", source.at(at), help=advice
+            )
         )
     driver = sensor.spec.driver
     for key in driver.model_fields_set - {"process"} if driver else ():
@@ -360,7 +363,7 @@ def _given_parameters(sensor: Sensor, computed: dict[str, Any], source: Source) 
     found = []
     for key in sensor.spec.driver.params if sensor.spec.driver else ():
         if key in computed:
-            message = f"{key} is computed by tfcompose for {sensor.spec.preset}: {computed[key]!r}"
+            message = f"tfcompose sets {switch_text({key: computed[key]})} itself, for {sensor.spec.preset}"
             place = source.at_key(("sensors", sensor.name, "driver", "params", key))
             found.append(finding("TF604", message, place, help="remove it; options and tf set it"))
     return found

@@ -82,7 +82,7 @@ def _domain(domain: str) -> Finding | None:
     if not domain or (domain.isascii() and domain.isdigit() and int(domain) <= LAST_DOMAIN):
         return None
     advice = f"unset {DOMAIN}, which is domain 0, or set it to the robot's"
-    return finding("TF909", f"{DOMAIN}={domain} is no domain: they go from 0 to {LAST_DOMAIN}", None, help=advice)
+    return finding("TF909", f"{DOMAIN}={domain} is not a domain: domains are 0 to {LAST_DOMAIN}", None, help=advice)
 
 
 def _middleware(name: str) -> Finding | None:

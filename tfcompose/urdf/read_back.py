@@ -93,7 +93,7 @@ def _of_joint(there: yourdfpy.Joint, edge: Edge, kind: str) -> Iterator[str]:
     if there.parent != edge.parent:
         yield f"its parent is {there.parent}, not {edge.parent}"
     if _is_moved(there.origin, edge.pose):
-        yield "its origin is another one"
+        yield "its origin differs"
     joint = edge.joint or edge.free
     if joint is None or kind != joint.type or kind == "floating":
         return
@@ -133,7 +133,7 @@ def _of_link(there: yourdfpy.Link, link: Link | None, body: Inertial | None, tar
     if (there.inertial is None) != (body is None):
         yield f"its mass is {'missing' if there.inertial is None else 'new'}"
     elif body is not None and _is_another_body(there.inertial, body):
-        yield "its mass is another one"
+        yield "its mass differs"
     visuals, collisions = (link.visuals, link.collisions) if link else ((), ())
     for tag, found, shapes in (("visual", there.visuals, visuals), ("collision", there.collisions, collisions)):
         meant = [(shape, solid) for shape in shapes for solid in _solids(shape, target)]
@@ -142,9 +142,9 @@ def _of_link(there: yourdfpy.Link, link: Link | None, body: Inertial | None, tar
             continue
         for one, (shape, (kind, values, pose)) in zip(found, meant, strict=True):
             if _form(getattr(one.geometry, kind)) != values or _is_moved(one.origin, pose):
-                yield f"a {kind} of its {tag} is another one"
+                yield f"a {kind} of its {tag} differs"
             if tag == "visual" and _paint(one.material) != _meant_paint(shape.material, target):
-                yield f"the material of a {kind} is another one"
+                yield f"the material of a {kind} differs"
 
 
 def _is_another_body(there: yourdfpy.Inertial, body: Inertial) -> bool:

@@ -91,7 +91,7 @@ def _silence(  # noqa: PLR0913 (a finding has that many parts; the others are na
     message = f"{publisher} {what}: nothing on {listed(names)} for {duration(silence_s)}"
     advice = f"is {node} still running, and does it get its data?"
     if gone:
-        advice = f"start {node} again, and look why it ended"
+        advice = f"start {node} again, and find out why it ended"
     if over:
         advice = f"what held {node} up? An overloaded machine or network does, or a callback that blocks"
     return finding("TF804", message, place, notes=notes, help=advice)
@@ -133,7 +133,7 @@ def low_rate(state: TreeState) -> Iterator[Finding]:
         if edge.stream.arrivals.count < FEWEST and state.seconds < 2 * SURE_S:
             continue
         often = f"{rate:.2g} Hz" if rate < least / 2 else f"{rate:.3g} Hz"
-        message = f"{edge.name} comes with {often} from {who(edge)}, and should with {least:.3g} Hz or more"
+        message = f"{edge.name} comes at {often} from {who(edge)}; it needs at least {least:.3g} Hz"
         notes = [Note(f"between two messages, {duration(1 / rate)}, lookups of now are extrapolation into the future")]
         advice = "raise its rate: publish_rate, publish_frequency, frequency, transform_publish_period"
         yield finding("TF838", message, None, severity="warning", notes=notes, help=advice)
@@ -147,7 +147,9 @@ def gap(state: TreeState) -> Iterator[Finding]:
         if not _has_gap(edge) or edge.child in rated or parents[edge.child] > 1:
             continue
         rate, longest = edge.timing.rate or 0.0, edge.timing.longest_gap_s or 0.0
-        message = f"{edge.name} from {who(edge)} stayed away for {duration(longest)}, and comes with {rate:.3g} Hz else"
+        message = (
+            f"{edge.name} from {who(edge)} was missing for {duration(longest)}; otherwise it comes at {rate:.3g} Hz"
+        )
         advice = "is its computer, or the network, overloaded? A node that blocks in a callback sends nothing meanwhile"
         yield finding("TF839", message, None, severity="warning", help=advice)
 

@@ -107,10 +107,10 @@ def settings_contradict(state: TreeState) -> Iterator[Finding]:
             message = f"{LOCALHOST_ONLY}=1 is set, so {RANGE}={value} does not count: other machines are not heard"
             yield finding("TF909", message, None, severity="warning", help=f"unset {LOCALHOST_ONLY}; it is out of use")
     elif value not in {"", "SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT"}:
-        message = f"{RANGE}={value} is none of SUBNET, LOCALHOST, OFF, SYSTEM_DEFAULT"
+        message = f"{RANGE}={value} is not one of SUBNET, LOCALHOST, OFF, SYSTEM_DEFAULT"
         yield finding("TF909", message, None, severity="warning", help="ROS takes SUBNET instead, with a warning")
     elif value == "OFF":
-        message = f"{RANGE}=OFF: nobody is discovered, on this machine neither"
+        message = f"{RANGE}=OFF: nobody is discovered, not even on this machine"
         yield finding("TF909", message, None, help=f"export {RANGE}=LOCALHOST, or SUBNET for several machines")
 
 

@@ -306,9 +306,9 @@ def two_clocks(state: TreeState) -> Iterator[Finding]:
     """Two nodes publish the time."""
     for topic in state.graph:
         if topic.name == "/clock" and len(topic.publishers) > 1:
-            message = f"/clock is published by {' and by '.join(sorted(topic.publishers))}: time jumps to and fro"
+            message = f"/clock is published by {' and by '.join(sorted(topic.publishers))}: time jumps back and forth"
             yield finding(
-                "TF837", message, None, help="end one: a second simulator, or a bag played with --clock beside it"
+                "TF837", message, None, help="end one: a second simulator, or a bag that is played with --clock"
             )
 
 

@@ -92,7 +92,7 @@ def rejected_transforms(edge: EdgeState) -> Iterator[Finding]:
     if stream.rejected.name == "DENORMALISED":
         why = f"its quaternion has length {length:.3f}"
         if length > _ZERO:
-            what, advice = "which is no rotation", _NORMALISE
+            what, advice = "which is not a rotation", _NORMALISE
     name = f"{stream.parent or '(no frame)'} → {stream.child or '(no frame)'}"
     often = "" if stream.static else f" ({stream.rejections} of {stream.arrivals.count})"
     message = f"{who(edge)} publishes {name}, {what}: {why}{often}"

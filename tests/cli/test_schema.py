@@ -89,6 +89,26 @@ def test_what_the_compiler_refuses_by_its_form_the_schema_refuses(text: str) -> 
     assert not validator("robot").is_valid(load(HEAD + text, "r.yaml").data)
 
 
+@pytest.mark.parametrize(
+    ("profile", "fine"),
+    [
+        ("{sensors: {laser: {driver: none, xyz: null}}, ros: {clock: sim}}", True),
+        ("{links: {mast: null}, processes: {player: {external: true}}, frames: {dock: {parent: base_link}}}", True),
+        ("{processes: {player: {run: [play], publishes: [{parent: base_link, child: dock, off: {}}]}}}", True),
+        ("{sensors: {laser: {drivr: none}}}", False),
+        ("{processes: {player: {restart: sometimes}}}", False),
+        ("{processes: {player: {run: [play], publishes: [{parent: base_link}]}}}", False),
+        ("{profiles: {}}", False),
+    ],
+)
+def test_a_profile_may_hold_a_part_of_what_a_robot_does(profile: str, *, fine: bool) -> None:
+    laser = "sensors: {laser: {preset: generic/lidar2d, parent: base_link, xyz: [0, 0, 1]}}\n"
+    text = f"{HEAD}links: {{base_link: {{}}, mast: {{parent: base_link}}}}\n{laser}profiles: {{p: {profile}}}\n"
+    assert not compile_robot(text, "r.yaml", library()).errors or not fine
+    assert bool(compile_robot(text, "r.yaml", library(), ["p"]).errors) is not fine
+    assert validator("robot").is_valid(load(text, "r.yaml").data) is fine
+
+
 def test_a_robot_without_its_name_or_version_is_refused() -> None:
     assert not validator("robot").is_valid({"tfcompose": 1})
     assert not validator("robot").is_valid({"robot": "r"})

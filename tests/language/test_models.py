@@ -108,6 +108,13 @@ def test_every_key_has_a_meaning_and_every_key_of_a_robot_an_example(language: s
     assert not missing
 
 
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_mapping_s_own_keys_stand_before_those_that_it_inherits(language: str) -> None:
+    for _, kind in walk(LANGUAGES[language]):
+        own = [name for name in kind.__annotations__ if name in fields_of(kind)]
+        assert list(fields_of(kind))[: len(own)] == own, kind
+
+
 def test_the_reference_has_every_key_of_the_language_with_its_unit() -> None:
     text = reference("robot")
     for _, kind in walk(RobotSpec):

@@ -16,7 +16,7 @@ from tfcompose.language.spec import described, examples_of, fields_of, walk
 from tfcompose.load.scalars import plain
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Collection, Iterable, Mapping
 
     from pydantic.fields import FieldInfo
 
@@ -47,9 +47,10 @@ def json_schema(language: str, presets: Mapping[str, PresetSpec], nodes: Iterabl
     if language == "robot":
         own["patternProperties"] = {"^x-": {"description": "your own anchors, which tfcompose does not read"}}
         _add_codes(own["properties"]["rules"])
-        _add_presets(own, definitions["SensorSpec"], presets)
+        _add_presets(own, definitions, presets)
         for kind in ("NamedNode", "NodeSpec"):
             definitions[kind]["properties"]["preset"] |= {"enum": sorted(nodes)}
+        _add_profiles(own, definitions)
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": f"tfcompose {language}, version 1"}
     return head | own | {"$defs": dict(sorted(definitions.items()))}
 
@@ -153,11 +154,47 @@ def _add_codes(rules: dict[str, Any]) -> None:
     rules["additionalProperties"] = False
 
 
-def _add_presets(own: dict[str, Any], sensor: dict[str, Any], presets: Mapping[str, PresetSpec]) -> None:
+def _add_profiles(own: dict[str, Any], definitions: dict[str, Any]) -> None:
+    """Let a profile hold whatever a robot file does but profiles, with nothing required and null for what it removes.
+
+    That goes for each mapping in it too, but not for those in lists, which a profile replaces as a whole.
+    """
+    mappings = {f"#/$defs/{name}": schema for name, schema in definitions.items() if "properties" in schema}
+    for at, schema in mappings.items():
+        definitions[f"{at.rpartition('/')[2]}Overlay"] = _overlay(at, schema, mappings)
+    robot = {key: own[key] for key in ("type", "properties", "additionalProperties", "patternProperties")}
+    robot["properties"] = {name: schema for name, schema in own["properties"].items() if name != "profiles"}
+    definitions["Profile"] = {"description": "What is merged over the robot."} | _overlay("#", robot, mappings)
+    own["properties"]["profiles"]["additionalProperties"] = {"$ref": "#/$defs/Profile"}
+
+
+def _overlay(at: str, schema: dict[str, Any], mappings: Collection[str]) -> dict[str, Any]:
+    """Return the schema of a mapping that is merged over one of the schema that stands at a pointer."""
+
+    def merged(value: Any) -> Any:
+        if isinstance(value, list):
+            return [merged(item) for item in value]
+        if not isinstance(value, dict):
+            return value
+        if value.get("$ref") in mappings:
+            return value | {"$ref": f"{value['$ref']}Overlay"}
+        return {key: item if key in {"items", "default", "examples"} else merged(item) for key, item in value.items()}
+
+    def optional(name: str, value: dict[str, Any]) -> dict[str, Any]:
+        again = merged(value)
+        form = {"$ref": f"{at}/properties/{name}"} if again == value else again
+        return _removable({"description": value["description"]} | form)
+
+    made = {key: value for key, value in schema.items() if key != "required"}
+    return made | {"properties": {name: optional(name, value) for name, value in schema["properties"].items()}}
+
+
+def _add_presets(own: dict[str, Any], definitions: dict[str, Any], presets: Mapping[str, PresetSpec]) -> None:
     """Let ``preset`` know the presets, and ``options`` those of the one that is chosen.
 
     A name that is not known can only be a user's own, from ``preset_path`` or an included file that has one.
     """
+    sensor = definitions["SensorSpec"]
     sensor["properties"]["preset"] |= {"anyOf": [{"enum": sorted(presets)}, {"pattern": "^[^/]+/[^/]+$"}]}
     by_options: dict[str, list[str]] = {}
     schemas: dict[str, dict[str, Any]] = {}
@@ -165,13 +202,16 @@ def _add_presets(own: dict[str, Any], sensor: dict[str, Any], presets: Mapping[s
         options = {key: _option(option) for key, option in preset.options.items()}
         by_options.setdefault(repr(options), []).append(name)
         schemas[repr(options)] = options
-    sensor["allOf"] += [
-        {
-            "if": {"properties": {"preset": {"enum": names}}, "required": ["preset"]},
-            "then": {"properties": {"options": {"properties": schemas[key], "additionalProperties": False}}},
-        }
-        for key, names in by_options.items()
-    ]
+    sensor["allOf"].append({"$ref": "#/$defs/SensorOptions"})
+    definitions["SensorOptions"] = {
+        "allOf": [
+            {
+                "if": {"properties": {"preset": {"enum": names}}, "required": ["preset"]},
+                "then": {"properties": {"options": {"properties": schemas[key], "additionalProperties": False}}},
+            }
+            for key, names in by_options.items()
+        ]
+    }
     vendors = sorted({re.escape(name.partition("/")[0]) for name in presets})
     known = {"anyOf": [{"enum": sorted(presets)}, {"pattern": f"^(?!({'|'.join(vendors)})/)"}]}
     own["if"] = {"anyOf": [{"required": ["preset_path"]}, {"required": ["include"]}]}

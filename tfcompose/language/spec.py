@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import types
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union, get_args, get_origin, get_type_hints
@@ -109,12 +110,17 @@ def is_mapping(kind: Any) -> bool:
 
 @cache
 def fields_of(kind: Any) -> Mapping[str, FieldInfo]:
-    """Return the keys of a mapping with known keys, in their order."""
+    """Return the keys of a mapping with known keys: its own, then those that it inherits."""
     if issubclass(kind, Spec):
         spec: type[Spec] = kind
-        return spec.model_fields
-    hints = get_type_hints(kind, include_extras=True)
-    return {one.name: FieldInfo.from_annotated_attribute(hints[one.name], one) for one in dataclasses.fields(kind)}
+        fields = spec.model_fields
+    else:
+        hints = get_type_hints(kind, include_extras=True)
+        fields = {
+            one.name: FieldInfo.from_annotated_attribute(hints[one.name], one) for one in dataclasses.fields(kind)
+        }
+    names = dict.fromkeys(name for one in kind.__mro__ for name in inspect.get_annotations(one))
+    return {name: fields[name] for name in names if name in fields}
 
 
 def below(annotation: Any, step: str | int) -> Any:

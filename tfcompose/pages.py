@@ -415,6 +415,13 @@ Publish all fixed edges in each message, as tf2's StaticTransformBroadcaster doe
 An external process is neither restarted nor stopped by tfcompose, and its environment, folder, remappings and log level
 are up to whoever starts it; a simulated process has no parameters of the node that it replaces. Keys of a base file are
 exempt if an overlay makes the process simulated or external: they apply when the base is started.""",
+    "TF852": """A process of a strict plan sends TF past the fence.
+
+With guard: strict, a profile file of Fast DDS moves what the plan's processes send on TF into a partition that only the
+guard receives. The process was started with another file, or without one: a shell that starts it exports
+FASTRTPS_DEFAULT_PROFILES_FILE, or clears the environment. What it sends reaches every listener, so tfcompose stops it,
+whatever on_violation says. Name that file under env: of the process, and tfcompose adds the fence to it; or let the
+guard fence off by remapping: guard: {fence: remap}.""",
     "TF901": """ROS 2 is missing, or cannot be used.
 
 pip install 'tfcompose[ros]' brings it on x86-64 Linux; elsewhere source your distribution's setup file.""",

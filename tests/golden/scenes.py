@@ -48,7 +48,7 @@ from tfcompose.language import set_value
 from tfcompose.launcher.events import Exited, StartFailed, TimeUp
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.live.publishers import Message, Publisher, Senders
-from tfcompose.live.state import MovingJoint, RosProcess, StampedData, Topic, TreeState
+from tfcompose.live.state import NO_NODE, MovingJoint, RosProcess, StampedData, Topic, TreeState
 from tfcompose.model import Robot
 from tfcompose.model.body import Asset
 from tfcompose.plan import (
@@ -251,7 +251,18 @@ def _strangers() -> Iterator[guarded.History]:
     yield _sent("/rogue", "base lidar, base camera", static=True)
     yield _sent("/rogue", "map odom, odom base")
     yield _sent(None, "map odom", 60)
-    yield _sent("/rogue", "map odom", guard=GuardPolicy("strict"))
+    for fenced in (None, True, False):
+        strict = _running(guard=GuardPolicy("strict"))
+        rogue = strict.joins("/rogue")
+        rogue.fenced = fenced
+        yield strict.repeat(rogue, "map odom", 3)
+    past = _running(guard=GuardPolicy("strict"))
+    past.joins("/slam", process="slam").fenced = False
+    yield past.wait(1)
+    yield _sent(NO_NODE, "map odom")
+    yield _sent(NO_NODE, "map odom", settle_s=9)
+    stops = GuardPolicy(on_violation="stop-offender")
+    yield _sent("/slam", "odom base", guard=stops, processes=(PlanProcess("slam", "run", nodes=("/slam",)),))
     for switch in ("enable_odom_tf: false", ""):
         yield _sent("/diff", "odom base", claims=(Claim("/diff", "odom", "base", switch),))
     nodes = tuple(replace(one, nodes=(f"/{one.name}er",)) for one in guarded.PROCESSES)

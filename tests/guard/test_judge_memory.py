@@ -174,26 +174,15 @@ def test_a_message_may_pass_when_all_of_it_is_its_senders_and_only_once_that_has
         assert running.judge.admitted == admitted, edges
 
 
-def test_only_an_offender_that_is_surely_of_the_run_can_be_stopped_for_it() -> None:
+@pytest.mark.parametrize(("process", "stopped"), [("slam", "slam"), ("", ""), (None, ""), ("drive", "")])
+def test_only_a_process_that_is_proven_to_have_done_it_can_be_stopped_for_it(process: str | None, stopped: str) -> None:
+    """A node's name proves nothing: whoever has it may be of another run, or of no ROS at all."""
     processes = (PlanProcess("slam", "run", nodes=("/slam",)), PlanProcess("drive", "external", nodes=("/drive",)))
-    for namesakes, process in ((0, "slam"), (1, "")):
-        running = History(processes=processes).clear()
-        slam = running.joins("/slam")
-        for _ in range(namesakes):
-            running.joins("/slam")
-        running.repeat(slam, "odom base", 5)
-        assert [event.process for event in running.events if isinstance(event, Found)] == [process]
-
-
-@pytest.mark.parametrize(("ours", "process"), [(True, "slam"), (False, ""), (None, "slam")])
-def test_an_offender_whose_process_is_known_is_of_the_run_or_is_not(*, ours: bool | None, process: str) -> None:
-    running = History(processes=(PlanProcess("slam", "run", nodes=("/slam",)),)).clear()
-    slam = running.joins("/slam")
-    running.send(slam, "odom base")
-    running.judge.graph([Publisher(slam.gid, "/slam", static=False, ours=ours)], running.now)
-    (found,) = running.judge.tick(running.now + 0.2)
-    assert isinstance(found, Found)
-    assert found.process == process
+    running = History(GuardPolicy(on_violation="stop-offender"), processes).clear()
+    running.repeat(running.joins("/slam", process=process), "odom base", 5)
+    (found,) = [event for event in running.events if isinstance(event, Found)]
+    assert (found.found.code, found.process) == ("TF801", stopped)
+    assert bool(found.found.notes) is True
 
 
 @pytest.mark.parametrize(

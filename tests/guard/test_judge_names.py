@@ -2,12 +2,16 @@
 
 from dataclasses import replace
 
+import pytest
+
 from tests.support.findings import expect
 from tests.support.guard_history import EDGES, FIXED, PROCESSES, SETTLE_S, TICK_S, History
 from tfcompose.guard.judge import Judge
-from tfcompose.ipc import Live, Recovered, Taken
-from tfcompose.live.state import NAMELESS
-from tfcompose.plan import Plan, RosSettings
+from tfcompose.ipc import Found, Live, Recovered, Taken
+from tfcompose.live.publishers import Publisher
+from tfcompose.live.state import NAMELESS, NO_NODE
+from tfcompose.live.topics import Identity, RunMarks
+from tfcompose.plan import GuardPolicy, Plan, RosSettings
 
 
 def test_a_publisher_whose_name_comes_later_is_judged_when_it_is_known(running: History) -> None:
@@ -170,3 +174,107 @@ def test_a_name_that_is_part_of_the_owners_does_not_pass_for_it() -> None:
     running.joins("/slam_toolbox")
     running.repeat(running.joins("/other"), "map odom", 10)
     assert [found.code for found in running.found()] == ["TF801"]
+
+
+# Two with the owner's name: which is the owner is proven by processes, not by names.
+
+
+@pytest.mark.parametrize("foreign_first", [False, True])
+@pytest.mark.parametrize("process", ["", None, "joints"])
+@pytest.mark.parametrize(("node", "edges", "owner"), [("/slam", "map odom", "slam"), ("/static", FIXED, "static")])
+def test_of_two_with_the_owners_name_the_runs_own_process_is_the_owner(
+    node: str, edges: str, owner: str, process: str | None, *, foreign_first: bool
+) -> None:
+    """The other is of another run, cannot be seen, or is another process of this run, and may come first."""
+    running = History(GuardPolicy(mode="strict")).clear()
+    static = owner == "static"
+    pair = [
+        running.joins(node, static=static, process=process),
+        running.joins(node, static=static, process=owner),
+    ]
+    other, own = pair
+    running.repeat(other, edges, 3) if foreign_first else running.check()
+    for _ in range(10):
+        running.send(own, edges)
+        assert running.judge.admitted is None, "the owner's messages pass"
+        running.send(other, edges).wait(0.1)
+        assert running.judge.admitted == frozenset(), "the other's do not"
+    found = [event for event in running.events if isinstance(event, Found)]
+    assert {one.found.code for one in found} == {"TF801"}
+    assert {one.process for one in found} == ({"joints"} if process == "joints" else {""})
+    expect(found[0].found, "TF801", f"another {node}")
+
+
+def test_a_child_with_a_stopped_owners_name_is_not_the_owner() -> None:
+    running = History(GuardPolicy(mode="strict")).clear()
+    slam = running.joins("/slam", process="slam")
+    running.repeat(slam, "map odom", 3)
+    running.leaves(slam)
+    running.judge.absent("slam")
+    child = running.joins("/slam", process="joints")
+    running.repeat(child, "map odom", 3)
+    assert running.judge.admitted == frozenset()
+    expect(running.only(), "TF801", "another /slam")
+
+
+def test_an_owner_that_is_started_again_is_the_owner_and_one_that_runs_out_of_sight_is_too() -> None:
+    for before, after in (("slam", "slam"), (None, None), ("", "")):
+        running = History().clear()
+        slam = running.joins("/slam", process=before)
+        running.repeat(slam, "map odom", 5)
+        running.leaves(slam)
+        running.repeat(running.joins("/slam", process=after), "map odom", 5)
+        assert running.found() == []
+
+
+def test_an_external_owner_may_be_started_by_another_process_of_the_plan() -> None:
+    running = History().clear()
+    running.repeat(running.joins("/drive", process="slam"), "odom base", 5)
+    assert running.found() == []
+
+
+def test_a_program_without_ros_is_called_one_and_not_by_what_the_middleware_calls_it() -> None:
+    running = History().clear()
+    running.repeat(running.joins(NO_NODE, process=""), "map odom", 3)
+    found = running.only()
+    expect(found, "TF801", NO_NODE)
+    assert found.help.startswith("end it")
+
+
+# A process of a strict plan that is not behind its fence.
+
+
+def identity(process: str, *, fenced: bool) -> Identity:
+    return Identity(ours=True, process=process, fenced=fenced)
+
+
+@pytest.mark.parametrize(
+    ("environments", "expected"),
+    [
+        (None, Identity()),
+        ([], Identity(ours=False, fenced=False)),
+        ([{"RUN": "other"}], Identity(ours=False, fenced=False)),
+        ([{"RUN": "1", "P": "arm/a", "XML": "/run/plan-1/fence/arm.a.xml"}], identity("arm/a", fenced=True)),
+        ([{"RUN": "1", "P": "a", "XML": "/home/me/fast.xml"}], identity("a", fenced=False)),
+        ([{"RUN": "1", "P": "a", "XML": "/run/plan-1/fence/b.xml"}], identity("a", fenced=False)),
+        ([{"RUN": "1", "P": "a"}], identity("a", fenced=False)),
+        ([{"RUN": "1", "P": "a"}, {}], identity("a", fenced=False)),
+        ([{"RUN": "1", "P": "a"}, {"RUN": "1", "P": "b"}], Identity(ours=True)),
+    ],
+)
+def test_the_environment_of_a_process_says_whose_it_is_and_whether_it_is_fenced(
+    environments: list[dict[str, str]] | None, expected: Identity
+) -> None:
+    assert RunMarks("RUN", "1", "P", "XML").identify(environments) == expected
+    without = RunMarks("RUN", "1", "P").identify(environments)
+    assert without == replace(expected, fenced=None)
+
+
+def test_a_process_of_the_run_that_sends_past_the_fence_is_reported_once_to_be_stopped() -> None:
+    running = History(GuardPolicy(mode="strict")).clear()
+    for fenced, process in ((True, "slam"), (None, "slam"), (False, ""), (False, "slam"), (False, "slam")):
+        gid = b"1" * 16 if fenced is False and process else bytes([7]) * 16
+        one = Publisher(gid, "/slam", static=False, ours=bool(process), process=process, fenced=fenced)
+        running.events += running.judge.graph([one], running.now)
+    (found,) = [event for event in running.events if isinstance(event, Found)]
+    assert (found.found.code, found.process) == ("TF852", "slam")

@@ -146,9 +146,9 @@ def test_where_a_publisher_runs_is_a_note(running: History) -> None:
 
 def test_the_process_that_can_be_stopped_is_named_only_where_it_is_sure() -> None:
     running = History(processes=tuple(replace(one, nodes=(f"/{one.name}",)) for one in PROCESSES)).clear()
-    running.repeat(running.joins("/slam"), "odom base", 3)
-    running.repeat(running.joins("/rogue"), "base lidar", 3)
-    running.repeat(running.joins("/drive"), "base camera", 3)
+    running.repeat(running.joins("/slam", process="slam"), "odom base", 3)
+    running.repeat(running.joins("/rogue", process=""), "base lidar", 3)
+    running.repeat(running.joins("/drive", process=""), "base camera", 3)
     found = [event for event in running.events if isinstance(event, Found)]
     assert [(event.found.code, event.process) for event in found] == [("TF801", "slam"), ("TF801", ""), ("TF801", "")]
 

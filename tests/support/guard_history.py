@@ -62,6 +62,9 @@ class Publisher:
     volatile: bool = False
     gid: bytes = b""
     sent: int = 0
+    ours: bool | None = None
+    process: str = ""
+    fenced: bool | None = None
 
 
 @dataclass
@@ -93,11 +96,23 @@ class History:
         return 1_700_000_000_000_000_000 + round(self.now * 1e9)
 
     def joins(
-        self, node: str | None, *, static: bool = False, volatile: bool = False, hidden: bool = False
+        self,
+        node: str | None,
+        *,
+        static: bool = False,
+        volatile: bool = False,
+        hidden: bool = False,
+        process: str | None = None,
     ) -> Publisher:
-        """Let a publisher come; one that is hidden is not in the graph yet."""
+        """Let a publisher come; one that is hidden is not in the graph yet.
+
+        ``process`` is the plan's process that it is seen to be of, empty: one that is not of this run; None: its
+        process cannot be seen.
+        """
         self.made += 1
-        publisher = Publisher(node, static, volatile, bytes([self.made]) * 16)
+        ours = None if process is None else bool(process)
+        gid = bytes([self.made]) * 16
+        publisher = Publisher(node, static, volatile, gid, ours=ours, process=process or "")
         if not hidden:
             self.graph.append(publisher)
         return publisher
@@ -126,7 +141,12 @@ class History:
         return self
 
     def check(self) -> History:
-        writers = [TFPublisher(p.gid, p.node, p.static, latched=not p.volatile) for p in self.graph]
+        writers = [
+            TFPublisher(
+                p.gid, p.node, p.static, latched=not p.volatile, ours=p.ours, process=p.process, fenced=p.fenced
+            )
+            for p in self.graph
+        ]
         self.events += self.judge.graph(writers, self.now)
         self.events += self.judge.tick(self.now)
         return self

@@ -16,6 +16,7 @@ ELSEWHERE = {
     "TF807": "cli/test_hosts_ros.py",
     "TF829": "presets/test_driver_ros.py",
     "TF850": "guard/test_guard_faults_ros.py",
+    "TF852": "guard/test_liars_ros.py",
 }
 
 

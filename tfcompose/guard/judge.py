@@ -102,6 +102,7 @@ class Judge:
         """Take who publishes on /tf and /tf_static now, and return what that means."""
         self._senders.update(publishers)
         events = [*self._see_again(now), *self._publishers.wrong_settings(publishers)]
+        events += self._publishers.unfenced(publishers)
         if self._start.cleared is not None and now >= self._finds_until:
             events += self.live.static_writers({one.node for one in publishers if one.static and one.node is not None})
         return events

@@ -20,10 +20,11 @@ from tfcompose.guard.judge import FINDING_S, Judge
 from tfcompose.guard.relay import Feedback, Relay
 from tfcompose.ipc import JOINS, ORDERS_FD, PROCESS, REMAPPED, RUN_ID, SETTLE, Clear, Complete
 from tfcompose.live.publishers import MessageReader
-from tfcompose.live.topics import TFGraph, TFTopics
+from tfcompose.live.topics import RunMarks, TFGraph, TFTopics
 from tfcompose.plan.topics import GLOBAL, parts_of, private_topics
 from tfcompose.process import ready, say
 from tfcompose.ros.clock import ClockWatch, SimClock
+from tfcompose.ros.environment import PROFILE_VARIABLES
 from tfcompose.ros.graph import ids_say_who
 from tfcompose.ros.node import open_node, wait
 from tfcompose.text import counted
@@ -66,15 +67,11 @@ class TopicWatch:
         self.data = TFTopics(node, topics, private, deep=True)
         self._clock = SimClock(node) if judge.clocks.simulated else None
         self._reader = MessageReader(frozenset(expected_of(judge.plan)))
-        self._graph = TFGraph(
-            node,
-            topics,
-            None if private is None else tuple(private.values()),
-            run=f"{RUN_ID}={os.environ[RUN_ID]}" if RUN_ID in os.environ else "",
-            process_variable=PROCESS,
-        )
-        feedback = None if private is None else Feedback(node, private, self.data.own)
         strict = judge.plan.guard.mode == "strict"
+        profile = PROFILE_VARIABLES[0] if strict and private is None else ""
+        marks = RunMarks(RUN_ID, os.environ[RUN_ID], PROCESS, profile) if RUN_ID in os.environ else None
+        self._graph = TFGraph(node, topics, None if private is None else tuple(private.values()), ours=marks)
+        feedback = None if private is None else Feedback(node, private, self.data.own)
         self.relay = Relay(node, self._graph, judge.plan, self.data.own, feedback) if strict else None
         self.judge = judge
         self._emit = emit

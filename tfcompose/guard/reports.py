@@ -15,7 +15,7 @@ from tfcompose.live.state import NAMELESS
 from tfcompose.plan.topics import GLOBAL
 from tfcompose.verdict.drivers import drives_of, sensor_of
 from tfcompose.verdict.ownership import Violation, misnamed_help, taken_finding, violation_finding
-from tfcompose.verdict.publishers import best_effort_publisher, leak, replaced_latched, volatile_publisher
+from tfcompose.verdict.publishers import best_effort_publisher, leak, replaced_latched, unfenced, volatile_publisher
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -43,6 +43,12 @@ OVER_IN_LINES = 3
 ALL_HEARD_S = 2.0
 #: What a publisher can do before the start that keeps the plan from starting.
 _TAKES = frozenset({"TF801", "TF802", "TF820"})
+#: What becomes of it in a strict plan, by whether it is behind the fence.
+_FATE = {
+    True: "held back: no listener gets it",
+    False: "not behind the fence, so it cannot be held back: listeners get it",
+    None: "whether it is behind the fence cannot be seen: what is, is held back",
+}
 #: Violations that ``stop-offender`` ends: who commits them breaks the tree.
 _STOPPED_FOR = frozenset({"TF801", "TF802", "TF803", "TF820"})
 
@@ -74,9 +80,9 @@ class Cases:
         self._drives = drives_of(plan)
         self._reported: dict[Group, tuple[float, float]] = {}
         self._ended: dict[Group, list[Violation]] = {}
-        self._processes = {
-            node: process.name for process in plan.processes if process.kind != "external" for node in process.nodes
-        }
+        started = [process for process in plan.processes if process.kind not in {"external", "guard"}]
+        self._started = {process.name for process in started}
+        self._nodes = {node for process in started for node in process.nodes}
 
     def note(self, violation: Violation, gid: bytes | None, now: float) -> Case:
         """Note that the violation was seen now."""
@@ -147,14 +153,21 @@ class Cases:
         if advice := misnamed_help(violations, self._plan, self._senders.process(cases[0].gid)):
             found = replace(found, help=advice)
         if self._plan.guard.mode == "strict" and not violations[0].is_of_stamps:
-            found = replace(found, notes=(*found.notes, Note(_fate(held=self._senders.is_held_back(cases[0].gid)))))
-        return Found(found, self._process(violations[0], cases[0].gid))
+            found = replace(found, notes=(*found.notes, Note(_FATE[self._senders.is_held_back(cases[0].gid)])))
+        process = self._process(violations[0], cases[0].gid)
+        if not process and self._may_be_ours(violations[0]):
+            found = replace(found, notes=(*found.notes, Note("it is not proven which process did it: none is stopped")))
+        return Found(found, process)
 
     def _process(self, violation: Violation, gid: bytes | None) -> str:
-        """Return the plan's process that did it, where that is sure and it can be stopped for it."""
-        if violation.namesake or len(violation.nodes) != 1 or violation.code not in _STOPPED_FOR:
-            return ""
-        return self._processes.get(violation.nodes[0], "") if self._senders.is_of_this_run(gid) else ""
+        """Return the plan's process that is proven to have done it, where it can be stopped for it."""
+        process = self._senders.process(gid) if violation.code in _STOPPED_FOR else ""
+        return process if process in self._started else ""
+
+    def _may_be_ours(self, violation: Violation) -> bool:
+        """Return whether somebody would be stopped for it, if it were proven to be a process of this run."""
+        is_policy = self._plan.guard.on_violation == "stop-offender" and violation.code in _STOPPED_FOR
+        return is_policy and not self._nodes.isdisjoint(violation.nodes)
 
     def _may_learn_more(self, gid: bytes | None, now: float) -> bool:
         """Whether more messages of this publisher can tell if it was there before the start."""
@@ -201,14 +214,6 @@ class Cases:
         if self._senders.is_present(case.gid) and not case.violation.is_of_stamps:
             return not case.violation.static and now - case.last > OVER_WHILE_PRESENT_S
         return now - case.last > OVER_S
-
-
-def _fate(*, held: bool) -> str:
-    return (
-        "held back: no listener gets it"
-        if held
-        else "not behind the fence, so it cannot be held back: listeners get it"
-    )
 
 
 def _over(ended: list[Violation]) -> list[str]:
@@ -261,6 +266,15 @@ class PublisherReports:
             yield volatile_publisher(one.node, topic, owned)
         if not one.reliable:
             yield best_effort_publisher(one.node, topic)
+
+    def unfenced(self, publishers: Sequence[Publisher]) -> list[Found]:
+        """Return the findings for the run's own processes that send past the fence of a strict plan."""
+        return [
+            replace(found, process=one.process)
+            for one in publishers
+            if one.node and one.ours and one.process and one.fenced is False
+            for found in self._once(one, unfenced(one.node, one.process, one.topic or GLOBAL[one.static]))
+        ]
 
     def leaks(self, publishers: Sequence[Publisher], topics: tuple[str, str]) -> list[Found]:
         """Return the findings for the plan's nodes on the global topics, while its own (moving, static) are others."""

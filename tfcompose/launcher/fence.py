@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, finding
-from tfcompose.plan.topics import GLOBAL, judged_topics, partition_of, private_topics, takes_remappings
+from tfcompose.plan.topics import GLOBAL, fence_file, judged_topics, partition_of, private_topics, takes_remappings
 from tfcompose.ros.environment import PROFILE_VARIABLES, RosError
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ def by_partition(plan: Plan, commands: Mapping[str, Command], folder: Path) -> t
         except _CannotFenceError as error:
             wrong.setdefault((error.message, error.advice), []).append(name)
             continue
-        file = folder / "fence" / f"{name.replace('/', '.')}.xml"
+        file = fence_file(folder, name)
         env = command.env | dict.fromkeys(PROFILE_VARIABLES, str(file))
         fenced[name] = replace(command, env=env, fence=(file, text))
     return {**commands, **fenced}, [

@@ -68,6 +68,9 @@ if TYPE_CHECKING:
     from tfcompose.launcher.state import State, Tracked
     from tfcompose.plan import Plan, PlanEdge
 
+#: What a strict plan's own processes are stopped for, also where violations are only reported.
+_STOPPED_BY_STRICT = frozenset({"TF852"})
+
 
 def step(state: State, event: Event, now: float) -> tuple[State, tuple[Action, ...]]:
     """Return what is known after the event, and what is to be done, in that order. ``now`` is in seconds."""
@@ -236,6 +239,8 @@ def _violation(step: Transition, found: Finding, process: str) -> None:
     ``process`` is empty where it is not sure, or not a process of the plan.
     """
     policy = step.state.plan.guard.on_violation
+    if found.code in _STOPPED_BY_STRICT and policy == "report":
+        policy = "stop-offender"
     if found.severity != "error" or policy == "report":
         step.report(found)
     elif policy == "stop":
@@ -246,7 +251,8 @@ def _violation(step: Transition, found: Finding, process: str) -> None:
     elif why := refusal(step.state, process, "stop"):
         step.report(_noted(found, f"nothing is stopped: {why}"))
     else:
-        step.report(_noted(found, f"{process} is stopped for it, and stays so: on_violation is stop-offender"))
+        why = "guard is strict" if found.code in _STOPPED_BY_STRICT else "on_violation is stop-offender"
+        step.report(_noted(found, f"{process} is stopped for it, and stays so: {why}"))
         process_requested(step, ProcessRequest("stop", process))
 
 

@@ -100,7 +100,7 @@ class Publisher:
         reliable: whether its reliability is reliable.
         where: on which machine and as which process it runs; empty if that is not known.
         ours: whether that process is of the guard's own run; None: not known.
-        fenced: whether it sends behind the fence of a strict plan; None: if it is ours.
+        fenced: whether it sends behind the fence of a strict plan; None: there is no fence.
         others: further nodes of which it may be one.
         process: the plan's process that it is of, where that was seen.
     """
@@ -235,26 +235,21 @@ class Senders(Publishers):
         return None if gid is None else self._heard.get(gid)
 
     def process(self, gid: bytes | None) -> str:
-        """Return the plan's process that the publisher was seen to be of, or nothing."""
-        one = self.present.get(gid) if gid is not None else None
-        return one.process if one else ""
+        """Return the plan's process that the publisher is proven to be of, by its environment; empty: none is."""
+        one = (self.present.get(gid) or self.known.get(gid)) if gid is not None else None
+        return one.process if one and one.ours else ""
 
-    def is_of_this_run(self, gid: bytes | None) -> bool:
-        """Whether the publisher is surely a process of the guard's own run.
+    def shows_process(self, process: str, node: str, *, static: bool) -> bool:
+        """Return whether a publisher of that node on that kind of topic is there, and proven to be of the process."""
+        return any(
+            one.ours and one.process == process and one.node == node and one.static == static
+            for one in self.present.values()
+        )
 
-        Where its process cannot be seen, its node's name says so if no other participant has a node of that name.
-        """
+    def is_held_back(self, gid: bytes | None) -> bool | None:
+        """Whether what the publisher may not send reaches nobody in a strict plan; None: that is not known."""
         one = self.present.get(gid) if gid is not None else None
-        if one is None or one.ours is not None:
-            return one is not None and bool(one.ours)
-        if one.fenced:
-            return True
-        return len({other.gid[:PARTICIPANT] for other in self.present.values() if other.node == one.node}) == 1
-
-    def is_held_back(self, gid: bytes | None) -> bool:
-        """Whether what the publisher may not send reaches nobody in a strict plan."""
-        one = self.present.get(gid) if gid is not None else None
-        return self.is_of_this_run(gid) if one is None or one.fenced is None else one.fenced
+        return one.fenced if one else None
 
     @property
     def mark(self) -> tuple[int, int]:

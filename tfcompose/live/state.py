@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 #: How a publisher is called whose node has no name.
 NAMELESS = "a publisher without a node name"
+#: Who publishes with DDS and without ROS.
+NO_NODE = "a DDS program that is no ROS node"
 
 
 @dataclass(frozen=True, slots=True)

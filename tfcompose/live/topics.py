@@ -7,10 +7,11 @@ from hashlib import blake2b
 from typing import TYPE_CHECKING
 
 from tfcompose.live.publishers import PARTICIPANT, Publisher
-from tfcompose.plan.topics import GLOBAL
-from tfcompose.ros.graph import UNKNOWN_NODE, ids_say_who, own_gid, writers, writers_unmapped
+from tfcompose.live.state import NO_NODE
+from tfcompose.plan.topics import GLOBAL, is_fence
+from tfcompose.ros.graph import BARE_DDS, UNKNOWN_NODE, ids_say_who, own_gid, writers, writers_unmapped
 from tfcompose.ros.node import TFSubscription
-from tfcompose.ros.processes import has_variable, origin, variable_of
+from tfcompose.ros.processes import environments, origin
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -74,6 +75,45 @@ class TFTopics:
                 yield TFData(received, static, process)
 
 
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """Whose process a publisher is of; what is not known, or not proven, is None or empty.
+
+    Attributes:
+        ours: whether it is of one's own run.
+        process: the plan's process that it is of.
+        fenced: whether it was started with its profile of the fence.
+    """
+
+    ours: bool | None = None
+    process: str = ""
+    fenced: bool | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RunMarks:
+    """What the environments of one's own run say: ``variable`` holds ``run``, ``process`` the plan's process.
+
+    ``profile`` names the profile file that fences the process off; empty: there is no such fence.
+    """
+
+    variable: str
+    run: str
+    process: str
+    profile: str = ""
+
+    def identify(self, found: Sequence[Mapping[str, str]] | None) -> Identity:
+        """Return whose process it is of which one of these is the environment; None: nobody can say."""
+        if found is None:
+            return Identity()
+        own = [one for one in found if one.get(self.variable) == self.run]
+        if len(own) != 1:
+            return Identity(ours=bool(own), fenced=False if self.profile and not own else None)
+        process = own[0].get(self.process, "")
+        fenced = is_fence(own[0].get(self.profile, ""), process) if self.profile and process else None
+        return Identity(ours=True, process=process, fenced=fenced)
+
+
 class TFGraph:
     """The publishers on a pair of TF topics (moving, fixed), and on the global ones; the node's own are left out.
 
@@ -81,8 +121,7 @@ class TFGraph:
         node: the node that asks.
         topics: the pair of topics.
         private: the pairs of topics that processes are remapped to, where they are.
-        run: NAME=VALUE that processes of one's own run have in their environment; empty: nobody has.
-        process_variable: the variable that says to which process of the plan they belong.
+        ours: what the environments of one's own run say; None: there is none.
     """
 
     def __init__(
@@ -90,19 +129,15 @@ class TFGraph:
         node: Node,
         topics: Topics,
         private: Sequence[Topics] | None = None,
-        *,
-        run: str = "",
-        process_variable: str = "",
+        ours: RunMarks | None = None,
     ) -> None:
         self.topics = topics
         self.says_who = ids_say_who(node)
         self._node = node
         self._private = private
-        self._run = run
-        self._process_variable = process_variable
+        self._marks = ours
         self._where: dict[bytes, str] = {}
-        self._ours: dict[bytes, bool | None] = {}
-        self._process: dict[bytes, str] = {}
+        self._ours: dict[bytes, Identity] = {}
         self._own = b""
 
     def publishers(self) -> list[Publisher]:
@@ -122,8 +157,8 @@ class TFGraph:
         """
         if gid not in self._ours:
             return None
-        ours = self._ours[gid]
-        return bool(ours) if self._private is None else ours is not False
+        known = self._ours[gid]
+        return bool(known.ours and known.fenced) if self._private is None else known.ours is not False
 
     def sends_clock(self) -> bool:
         """Return whether somebody is there who publishes /clock."""
@@ -149,33 +184,34 @@ class TFGraph:
         """Yield what stands for all that send on a topic, as a message does not say which of them did."""
         for static, topic in zip((False, True), topics, strict=True):
             gid = id_of_topic(topic)
-            nodes = sorted({one.node for one in there if one.static == static and one.node})
+            those = [one for one in there if one.static == static]
+            nodes = sorted({one.node for one in those if one.node})
             if nodes:
-                self._ours[gid] = None
-                yield Publisher(gid, nodes[0], static, topic, fenced=True, others=tuple(nodes[1:]))
+                proven = {(one.ours, one.process) for one in those}
+                ours, process = proven.pop() if len(proven) == 1 else (None, "")
+                self._ours[gid] = Identity(ours or None, process)
+                others = tuple(nodes[1:])
+                yield Publisher(gid, nodes[0], static, topic, ours=ours, fenced=True, others=others, process=process)
 
     def _publisher(self, one: Writer, topic: str, *, static: bool, fenced: bool | None) -> Publisher:
         if one.gid not in self._where:
-            self._find_process(one.gid)
+            own = self._own_gid()
+            self._where[one.gid] = origin(one.gid, own)
+            self._ours[one.gid] = self._marks.identify(environments(one.gid, own)) if self._marks else Identity()
+        known = self._ours[one.gid]
         return Publisher(
             one.gid,
-            None if one.node.endswith(UNKNOWN_NODE) else one.node,
+            None if one.node.endswith(UNKNOWN_NODE) else NO_NODE if one.node == BARE_DDS else one.node,
             static,
             topic,
             one.type,
             one.durability == "transient_local",
             one.reliability == "reliable",
             self._where[one.gid],
-            self._ours[one.gid],
-            fenced,
-            process=self._process[one.gid],
+            known.ours,
+            known.fenced if fenced is None else fenced,
+            process=known.process,
         )
-
-    def _find_process(self, gid: bytes) -> None:
-        own = self._own_gid()
-        self._where[gid] = origin(gid, own)
-        ours = self._ours[gid] = has_variable(gid, own, self._run) if self._run else None
-        self._process[gid] = variable_of(gid, own, self._process_variable) if ours and self._process_variable else ""
 
     def _own_gid(self) -> bytes:
         """Return an id of this process's: that of its reader."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 from zlib import crc32
 
@@ -20,6 +21,8 @@ Topics = tuple[str, str]
 
 #: The topics of moving and of fixed edges, where nothing moves them.
 GLOBAL = ("/tf", "/tf_static")
+#: The folder with profile files, beside a run's plan.
+_FENCE = "fence"
 #: What no part of a topic's name may hold.
 _UNDERSCORES = re.compile(r"__+|_(?=/|$)")
 
@@ -48,6 +51,16 @@ def parts_of(plan: Plan) -> dict[Topics, Plan]:
 def partition_of(plan: Plan) -> str:
     """Return the partition that the plan's processes send TF in: those of one host, where it runs on several."""
     return f"tfc_{plan.robot}.{re.sub(r'[^A-Za-z0-9.-]', '_', plan.host)}" if plan.host else f"tfc_{plan.robot}"
+
+
+def fence_file(folder: Path, process: str) -> Path:
+    """Return the profile file, in the folder of a run's plan, that moves a process's writers into the partition."""
+    return folder / _FENCE / f"{process.replace('/', '.')}.xml"
+
+
+def is_fence(file: str, process: str) -> bool:
+    """Return whether a profile file is one that fences the process off; that of the run's plan before is one, too."""
+    return PurePosixPath(file).parts[-2:] == PurePosixPath(fence_file(Path(), process)).parts[-2:]
 
 
 def judged_topics(plan: Plan) -> set[Topics]:

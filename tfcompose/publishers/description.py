@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.files import with_absolute_addresses
 from tfcompose.process import say
-from tfcompose.ros.graph import UNKNOWN_NODE, writers
+from tfcompose.ros.graph import BARE_DDS, UNKNOWN_NODE, writers
 from tfcompose.ros.node import LATCHED, TextSubscription, latch
 
 if TYPE_CHECKING:
@@ -66,4 +66,4 @@ class Description:
 
     def _name(self, gid: bytes | None) -> str | None:
         names = [writer.node for writer in writers(self._node, self.subscription.topic) if writer.gid == gid]
-        return names[0] if names and names[0] != UNKNOWN_NODE else None
+        return names[0] if names and names[0] not in {UNKNOWN_NODE, BARE_DDS} else None

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 #: What rmw says instead of a name while it does not know whose node a publisher is.
 UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
+#: What rmw_fastrtps says instead of name and namespace where a publisher is of no ROS node.
+BARE_DDS = "_CREATED_BY_BARE_DDS_APP_"
 #: Where the rmw is asked whose ids come with messages; hidden from lists of topics by its first underscore.
 ASKING = "/_tfcompose/who_am_i"
 #: How long one's own publisher may take to come into the graph, in seconds.
@@ -42,8 +44,8 @@ class Writer:
 
     ``gid`` is its id, 16 bytes, and equals ``Received.gid`` of its messages. ``node`` is the full name, such as
     ``/rover/static``. A publisher is discovered before its node's name is: until then, and for good when it belongs
-    to no ROS node, ``node`` is ``UNKNOWN_NODE``, while id, type and QoS are right. ``type`` reads like
-    ``tf2_msgs/msg/TFMessage``.
+    to no ROS node, ``node`` is ``UNKNOWN_NODE``, or ``BARE_DDS`` where rmw knows that, while id, type and QoS are
+    right. ``type`` reads like ``tf2_msgs/msg/TFMessage``.
     """
 
     gid: bytes
@@ -108,6 +110,8 @@ def _writer(info: TopicEndpointInfo) -> Writer:
 def _full_name(namespace: str, name: str) -> str:
     if name == UNKNOWN_NODE:
         return UNKNOWN_NODE
+    if name == BARE_DDS:
+        return BARE_DDS
     return f"{namespace.rstrip('/')}/{name}"
 
 

@@ -60,28 +60,20 @@ def origin(gid: bytes, own_gid: bytes) -> str:
     return f"on this machine as pid {pid}: {line}"
 
 
-def has_variable(gid: bytes, own_gid: bytes, variable: str) -> bool | None:
-    """Return whether a publisher's process has ``variable`` (NAME=VALUE) in its environment; None: nobody can say."""
+def environments(gid: bytes, own_gid: bytes) -> list[dict[str, str]] | None:
+    """Return the environments of the processes of which one is the publisher's, as they were started with them.
+
+    Several have the id's half of a process id, or none has, where it runs on another machine, or has ended. None:
+    nobody can say, because the id is another vendor's, or a process's environment another user's.
+    """
     if not _is_known(gid, own_gid):
         return None
     if gid[2:4] != own_gid[2:4]:
-        return False
-    found = [_environment(pid) for pid in _candidates(gid) if _command(pid)]
-    return any(variable.encode() in one for one in found)
-
-
-def variable_of(gid: bytes, own_gid: bytes, name: str) -> str:
-    """Return an environment variable of a publisher's process; empty where it has none, or nobody can say."""
-    if not _is_known(gid, own_gid) or gid[2:4] != own_gid[2:4]:
-        return ""
-    begin = f"{name}=".encode()
-    found = {
-        word.removeprefix(begin).decode(errors="replace")
-        for pid in _candidates(gid)
-        for word in _environment(pid)
-        if word.startswith(begin)
-    }
-    return found.pop() if len(found) == 1 else ""
+        return []
+    try:
+        return [_environment(pid) for pid in _candidates(gid) if _command(pid)]
+    except PermissionError:
+        return None
 
 
 def _is_known(gid: bytes, own_gid: bytes) -> bool:
@@ -97,11 +89,20 @@ def _candidates(gid: bytes) -> range:
     return range(int.from_bytes(gid[4:6], "little"), most + 1, _WORD)
 
 
-def _environment(pid: int) -> list[bytes]:
+def _environment(pid: int) -> dict[str, str]:
+    """Return the environment of a process; empty where it has just ended.
+
+    Raises:
+        PermissionError: if it is another user's.
+    """
     try:
-        return (_PROC / str(pid) / "environ").read_bytes().split(b"\0")
+        data = (_PROC / str(pid) / "environ").read_bytes()
+    except PermissionError:
+        raise
     except OSError:
-        return []
+        return {}
+    words = (word.decode(errors="replace").partition("=") for word in data.split(b"\0"))
+    return {name: value for name, _, value in words if name}
 
 
 def _command(pid: int) -> str:

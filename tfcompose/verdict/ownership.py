@@ -13,7 +13,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, Note, finding
-from tfcompose.live.state import NAMELESS
+from tfcompose.live.state import NAMELESS, NO_NODE
 from tfcompose.text import counted
 from tfcompose.tree import loop_closed_by
 from tfcompose.verdict import drivers, publishers, stamps, tree
@@ -79,7 +79,7 @@ class Violation:
     @property
     def whom(self) -> str:
         """The publisher, as the one to do something about: one without a name was named just before."""
-        if not self.nodes and not self.recorded and not self.namesake:
+        if (not self.nodes and not self.recorded and not self.namesake) or self.nodes == (NO_NODE,):
             return "it"
         return f"the other {self.nodes[0]}" if self.namesake and len(self.nodes) == 1 else self.who
 
@@ -161,7 +161,7 @@ def taken_finding(found: Sequence[Violation], where: str = "") -> Finding:
     advice = f"end {first.whom}"
     if first.namesake:
         advice += ": is the robot running already?"
-    elif len(first.nodes) == 1:
+    elif len(first.nodes) == 1 and first.nodes[0] != NO_NODE:
         owner = f"processes: {{NAME: {{external: true, node: {first.nodes[0]}}}}}"
         advice += f", or let it own the edge: {owner}, and owner: NAME at the edge"
     return finding("TF807", message, None, help=advice, notes=notes)
@@ -437,17 +437,26 @@ class OwnershipRules:
     def _is_namesake(self, edge: PlanEdge, sent: SentEdge) -> bool:
         """Return whether a publisher has the owner's name and is not the owner.
 
-        It is where the plan starts the owner and this one spoke before; where two take turns: A, B, and A again; and
-        where tfcompose's own publisher, which is never restarted, is there twice.
+        A process of this run proves by its environment which one it is: where the plan starts the owner, no other
+        process is it, and nobody else while it is there itself. Without proof it is another where it spoke before the
+        start; where two take turns: A, B, and A again; and where tfcompose's own publisher, which is never restarted,
+        is there twice.
         """
         gid, sender, start = sent.gid, self._senders.sender(sent.gid), self._start
         if gid is None or sender is None:
             return False
-        ours = self.started.get(edge.owner, False)
-        if ours and (start.cleared is None or sender.first_ns < start.cleared_ns):
-            return True
+        proven = ""
+        if self.started.get(edge.owner, False):
+            proven = self._senders.process(gid)
+            if proven != edge.owner:
+                early = start.cleared is None or sender.first_ns < start.cleared_ns
+                shown = self._senders.shows_process(edge.owner, edge.node, static=sent.static)
+                if proven or early or (shown and self._senders.is_sure(gid)):
+                    return True
         current, before = self.owners.take(edge.child, gid)
         if current == gid:
             return False
         self.changes += 1
+        if proven and self._senders.process(current) != proven:
+            return False
         return (before == gid and not sent.static) or (edge.owner in _OWN and self._senders.is_present(current))

@@ -49,6 +49,14 @@ def topics_message(edges: str, topics: Sequence[tuple[str, str]], declared: str 
     return f"{edges} {'are' if several else 'is'} published {on}{', declared for ' if declared else ''}{declared}"
 
 
+def unfenced(node: str, process: str, topic: str) -> Finding:
+    """Return the finding for a process of a strict plan that was started without its profile of the fence."""
+    message = f"{node} of {process} publishes {topic} past the fence of guard: strict: every listener receives it"
+    advice = f"name its profile file in the robot's file, and the fence is added: processes: {{{process}: {{env: "
+    advice += "{FASTRTPS_DEFAULT_PROFILES_FILE: FILE}}}; or guard: {fence: remap}"
+    return finding("TF852", message, None, help=advice)
+
+
 def best_effort_publisher(node: str, topic: str) -> Finding:
     """Return the finding for a publisher that sends best effort, which no TF listener accepts."""
     message = f"{node} publishes {topic} best effort, so no listener receives it: all ask for reliable"

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from random import Random
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -198,6 +198,7 @@ def test_a_time_that_no_transform_can_hold_is_dropped() -> None:
 
 @pytest.mark.parametrize(("source", "most"), [(100, 30), (100, 100), (100, 50), (500, 20), (50, 100)])
 @given(seed=st.integers(0, 10**6))
+@settings(max_examples=25)
 def test_publish_frequency_gives_that_frequency_and_says_when_it_leaves_something_out(
     source: int, most: int, seed: int
 ) -> None:
@@ -206,8 +207,7 @@ def test_publish_frequency_gives_that_frequency_and_says_when_it_leaves_somethin
     stamps = [SECOND_NS + int(SECOND_NS * (n + jitter.uniform(-0.2, 0.2)) / source) for n in range(500)]
     published = sum(bool(robot.hear({"left": 1.0}, stamp)) for stamp in stamps)
     assert published == pytest.approx(500 * min(1, most / source), rel=0.02, abs=2)
-    left_out = f"joint states come with more than {most} Hz: some are left out, as publish_frequency says"
-    assert robot.reports == ([left_out] if most < source else [])
+    assert [f"{most} Hz" in report for report in robot.reports] == [True] * (most < source)
 
 
 def test_without_publish_frequency_everything_is_published() -> None:

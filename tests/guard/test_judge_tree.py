@@ -39,11 +39,6 @@ def test_an_edge_that_closes_a_loop_is_an_error_whatever_is_allowed_and_the_loop
     assert running.only().severity == "error"
 
 
-def test_a_second_parent_among_its_own_descendants_is_a_loop(running: History) -> None:
-    running.repeat(running.joins("/rogue"), "base odom", 5)
-    expect(running.only(), "TF820", "odom → base → odom", "base → odom from /rogue")
-
-
 def test_a_loop_through_several_strangers_is_found_when_the_last_edge_comes(running: History) -> None:
     one, other = running.joins("/one"), running.joins("/other")
     for _ in range(5):
@@ -85,13 +80,6 @@ def test_a_loop_is_reported_to_be_over_and_to_have_been_there_before_the_start(r
     assert early.all(Found) == []
     assert isinstance(early.events[0], Taken)
     expect(early.only(), "TF807", "base → map", "/rogue", "map → odom → base → map")
-
-
-def test_a_frame_in_itself_is_reported_to_be_dropped_and_is_no_second_parent(running: History) -> None:
-    running.repeat(running.joins("/slam"), "odom odom", 5)
-    expect(running.only(), "TF821", "/slam", "odom → odom")
-    assert running.only().severity == "warning"
-    assert not [event for event in running.events if type(event).__name__ == "Live"]
 
 
 def test_two_nodes_that_publish_one_allowed_frame_are_named(running: History) -> None:

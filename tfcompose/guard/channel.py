@@ -66,7 +66,7 @@ class OrderReader:
             os.set_blocking(self._fd, False)
 
     def take(self) -> None:
-        """Follow the orders that have come, and look at the gates."""
+        """Carry out the orders that have come, and check the gates."""
         for line in self._lines():
             match GUARD_ORDERS.read(line):
                 case Absent(process):
@@ -90,7 +90,7 @@ class OrderReader:
 
 
 class EventWriter:
-    """Writes the events of one look at once, so that a guard that is killed has not written half of them."""
+    """Writes the events of one cycle at once, so that a guard that is killed leaves no half of them."""
 
     def __init__(self, *, judges: bool) -> None:
         self._judges = judges
@@ -99,7 +99,7 @@ class EventWriter:
         self._alive_due = 0.0
 
     def emit(self, event: GuardEvent) -> None:
-        """Take an event; a guard that judges nobody keeps what it finds to itself."""
+        """Take an event; a guard with mode off keeps its findings to itself."""
         if not self._judges and not isinstance(event, _OBSERVATIONS):
             return
         if self._pipe is not None:
@@ -108,7 +108,7 @@ class EventWriter:
             say(GUARD_EVENTS.line(event).rstrip())
 
     def heartbeat(self) -> None:
-        """Write from time to time that the guard looks; a launcher that does not listen is not waited for."""
+        """Write a heartbeat when it is due; never wait for a launcher that does not read."""
         now = time.monotonic()
         if self._pipe is None or now < self._alive_due:
             return
@@ -189,7 +189,7 @@ class Memory:
 
 
 class SwitchMemory:
-    """Hands on which nodes have answered what their switches are, so that nobody is told twice."""
+    """Remembers which nodes have answered for their switches, so that nothing is reported twice."""
 
     def __init__(self, switches: Switches, emit: Callable[[GuardEvent], None], left: Mapping[str, Any]) -> None:
         self._switches = switches

@@ -76,7 +76,7 @@ _NAMES = {OK: "ok", WARN: "warning", ERROR: "error", STALE: "not seen"}
 
 @dataclass(frozen=True, slots=True)
 class EdgeHealth:
-    """One planned edge: who sends it (a node's full name, empty while nobody has), and how.
+    """One planned edge: which node publishes it (full name, empty while none has), and how.
 
     ``rate`` is in hertz, ``age_s`` counts since it came last, ``delay_s`` is how old its stamp was then; None: not
     known. ``silent`` and ``slow`` are against what the plan says.
@@ -144,7 +144,7 @@ class DiagnosticsPage:
             say("nothing on /diagnostics: the package diagnostic_msgs is not installed")
 
     def publish(self, judges: Sequence[Judge], held: Callable[[], Mapping[tuple[str, str, str], int] | None]) -> None:
-        """Publish if it is time to, and somebody listens; ``held`` says what a strict guard held back."""
+        """Publish if it is due and there is a subscriber; ``held`` says what a strict guard held back."""
         now = time.monotonic()
         if self._publisher is None or now < self._due:
             return

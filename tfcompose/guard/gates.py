@@ -1,4 +1,4 @@
-"""What the guard asks of nodes: whether gates are open, which the plan waits for, and whether switches were taken.
+"""What the guard requests from nodes: whether gates that the plan waits for are open, and whether switches apply.
 
 Gates are topics, services, and the lifecycle states of nodes, which the guard may also drive. Where no launcher gives
 orders, in units and containers, the guard brings nodes into their states by itself: a node that was started again is
@@ -123,7 +123,7 @@ class LifecycleDriver:
         self._nodes = [_DrivenNode(name, _lifecycle(node, name, state, drive=True)) for name, state in wanted.items()]
 
     def check(self) -> None:
-        """Go on with each node that is due, and say what has changed of it."""
+        """Drive each node that is due one step further, and print what has changed."""
         now = time.monotonic()
         for one in self._nodes:
             if now < one.due:
@@ -186,7 +186,7 @@ class Switches:
 
     @property
     def answered(self) -> list[str]:
-        """The nodes that have been asked, and are there since."""
+        """The nodes that have answered and have not left since."""
         return [one.node for one in self._nodes if one.done]
 
     def recall(self, answered: Collection[str]) -> None:
@@ -196,7 +196,7 @@ class Switches:
             one.done = one.node in answered
 
     def check(self) -> None:
-        """Take what was answered, ask whom there is to ask, and wait for nothing."""
+        """Take the answers that have come and send the requests that are due, without blocking."""
         now = time.monotonic()
         if not self._nodes or now < self._due:
             return

@@ -43,7 +43,7 @@ STRANGE_S = 1.0
 
 @dataclass(slots=True)
 class Judge:
-    """The state of one watch over one plan. ``settle_s`` is how long it looks before it says that all is clear.
+    """The state of one watch over one plan. ``settle_s`` is how many seconds it observes before it reports all clear.
 
     ``says_who`` says whether the ids of messages are those of the graph; where they are not, they tell senders apart.
     ``admitted`` are the edges of the last message that may pass in a strict plan; None: all.
@@ -182,7 +182,7 @@ class Judge:
         }
 
     def recall(self, memory: dict[str, Any], now: float) -> list[GuardEvent]:
-        """Know what the guard before knew, and return that the look before the start is over."""
+        """Restore the state of the guard before this one, and return that the observation before the start is over."""
         self._finds_until = now + FINDING_S
         start = self._start
         start.begun, start.begun_ns, start.cleared, start.cleared_ns = memory["start"]

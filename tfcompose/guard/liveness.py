@@ -142,7 +142,7 @@ class Liveness:
         self._watched = WatchedTime()
 
     def absent(self, owner: str) -> None:
-        """Take the owner as stopped on purpose: nobody misses its edges, and none of them is live."""
+        """Note that the owner was stopped on purpose: its edges are not live, and not missing either."""
         self._absent.add(owner)
         self.changes += 1
         self._gone.discard(owner)
@@ -154,7 +154,7 @@ class Liveness:
             track.forget()
 
     def present(self, owner: str) -> None:
-        """Take the owner as started: its edges are to be seen anew."""
+        """Note that the owner was started: its edges must be observed anew."""
         self._absent.discard(owner)
 
     def memory(self) -> dict[str, Any]:
@@ -164,7 +164,7 @@ class Liveness:
         return {"live": _children(live), "slow": _children(slow), "silent": silent, "gone": sorted(self._gone)}
 
     def recall(self, memory: dict[str, Any], now: float, until: float) -> None:
-        """Know what the guard before knew, and miss nobody before ``until``: publishers have to be found again."""
+        """Restore the previous guard's state, and report no silence before ``until``: discovery starts anew."""
         self._watched.begins_late(until)
         self._gone = set(memory["gone"])
         for track in self._parted(self._planned(memory["live"])):

@@ -85,7 +85,7 @@ class TopicWatch:
         self._leaks_to = self._graph.topics
 
     def begin(self, now: float, memory: dict[str, Any] | None) -> None:
-        """Look at nothing before the start: it was long ago, or is nobody's business."""
+        """Skip the observation before the start: the start was long ago."""
         self._pass_on(self.judge.tick(now) if memory is None else self.judge.recall(memory, now))
         if self.relay and memory:
             self.relay.recall(memory, lambda message: self.judge.admits(message, now), now + FINDING_S)
@@ -173,7 +173,7 @@ def plans_by_topics(plan: Plan, guard: PlanProcess) -> dict[Topics, Plan]:
 def together(emit: Callable[[GuardEvent], None], plans: Sequence[Plan]) -> Callable[[GuardEvent], None]:
     """Return what passes on the events of the judges of these plans.
 
-    That all is clear, and that the tree is complete, is reported once: when the last judge has said so.
+    All clear and tree complete are reported once, when the last judge has reported them.
     """
     waiting = {Clear: len(plans), Complete: sum(bool(plan.edges) for plan in plans)}
 
@@ -242,7 +242,7 @@ def guard(own: Own, stop: Stop) -> None:
 def _watches(
     own: Own, node: Node, plans: dict[Topics, Plan], emit: Callable[[GuardEvent], None], left: dict[str, Any]
 ) -> list[TopicWatch]:
-    """Return the watch over each pair of topics; one that follows another, or judges nobody, has begun."""
+    """Return the watch over each pair of topics; one that follows another guard, or has mode off, has begun."""
     judges, joins = own.plan.guard.mode != "off", bool(os.environ.get(JOINS))
     settle_s = float(os.environ.get(SETTLE, DEFAULT_SETTLE_S)) if judges and not joins else 0.0
     private = private_topics(own.plan) if REMAPPED in os.environ else None

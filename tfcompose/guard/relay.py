@@ -103,7 +103,7 @@ class Relay:
         }
 
     def recall(self, memory: Mapping[str, Any], admits: Admits, until: float) -> None:
-        """Latch what the guard before this one latched and may still pass, and forget nobody before ``until``.
+        """Latch what the guard before this one latched and may still pass, and forget no sender before ``until``.
 
         Until then the senders are found again.
         """
@@ -211,7 +211,7 @@ class HeldBack:
 
 @dataclass(slots=True)
 class _Listener:
-    """A process's topics, and what is sent to them: nothing (None) until somebody listens."""
+    """A process's topics, and their publishers: None until there is a subscriber."""
 
     topics: Topics
     moving: TFPublisher | None = None
@@ -222,8 +222,8 @@ class _Listener:
 class Feedback:
     """Sends to processes that are fenced off by remapping what others send, which their listeners would miss.
 
-    Moving edges go on as they come, fixed ones latched, all in one message, as long as somebody listens. ``own`` takes
-    the ids of its publishers; the node listens there itself.
+    Moving edges go on as they come, fixed ones latched, all in one message, as long as there is a subscriber. ``own``
+    takes the ids of its publishers; the node listens there itself.
     """
 
     def __init__(self, node: Node, private: Mapping[str, Topics], own: set[bytes | None]) -> None:
@@ -250,7 +250,7 @@ class Feedback:
                 one.moving.publish(data)
 
     def fixed(self, source: bytes, edges: Mapping[str, Transform], sender: str) -> None:
-        """Latch the fixed edges of one source, by their child, with the next look."""
+        """Latch the fixed edges of one source, by their child, at the next update."""
         known = self._fixed.pop(source, (sender, {}))[1]  # the newest comes last
         self._fixed[source] = (sender, {**known, **edges})
         self._outdate_all_but(sender)

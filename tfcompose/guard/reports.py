@@ -59,7 +59,7 @@ Group = tuple[str, str, bool]
 
 @dataclass(slots=True)
 class Case:
-    """A violation that was seen first at ``since`` and again at ``last``; ``reported`` says whether that was done."""
+    """A violation, observed first at ``since`` and last at ``last``, and whether it was ``reported``."""
 
     violation: Violation
     gid: bytes | None
@@ -69,7 +69,7 @@ class Case:
 
 
 class Cases:
-    """All that were seen and are not over; ``changes`` counts what was reported."""
+    """All violations that are not over; ``changes`` counts the reports."""
 
     def __init__(self, plan: Plan, senders: Senders, start: Start) -> None:
         self.open: dict[Key, Case] = {}
@@ -85,7 +85,7 @@ class Cases:
         self._nodes = {node for process in started for node in process.nodes}
 
     def note(self, violation: Violation, gid: bytes | None, now: float) -> Case:
-        """Note that the violation was seen now."""
+        """Note that the violation is observed now."""
         key = self._key(violation, gid)
         case = self.open.setdefault(key, Case(violation, gid, now, now))
         case.gid, case.last = gid, now
@@ -201,7 +201,7 @@ class Cases:
             self.open[self._key(case.violation, case.gid)] = case
 
     def over(self, now: float) -> list[GuardEvent]:
-        """Forget violations that have ended, and say so; the next of their kind is a new case."""
+        """Forget violations that have ended, and report that; the next of their kind is a new case."""
         ended = [key for key, case in self.open.items() if case.reported and self._has_ended(case, now)]
         self.changes += len(ended)
         for key in ended:
@@ -238,7 +238,7 @@ def _from_json(data: list[Any], planned: dict[str, PlanEdge], last: float) -> Ca
 
 
 class PublisherReports:
-    """Publishers that nobody hears, or not wholly, or that are where they do not belong; each is reported once.
+    """Publishers whose QoS or topic keeps listeners from receiving all of their messages; each is reported once.
 
     That holds for as long as guards follow each other; ``changes`` counts what was reported.
     """

@@ -160,7 +160,7 @@ class Change:
 
 
 def change(old: Plan, old_folder: Path, new: Plan, new_folder: Path) -> Change:
-    """Return what is different; the folders hold what stands beside the plans."""
+    """Return what differs; the folders hold the files that belong to the plans."""
     described = _bytes(old_folder, old.description) != _bytes(new_folder, new.description)
     before = {process.name: process for process in old.processes}
     changed = set()
@@ -179,7 +179,7 @@ def change(old: Plan, old_folder: Path, new: Plan, new_folder: Path) -> Change:
 
 
 def _data(plan: Plan, process: PlanProcess, folder: Path) -> tuple[object, ...]:
-    """Return what the process reads beside its own entry; where an edge stands in the file does not matter."""
+    """Return what the process reads besides its own entry; an edge's place in the file does not matter."""
     edges = plan.edges if process.kind == "guard" else plan.edges_of(process.name)
     policy = plan.guard if process.kind == "guard" else None
     return (

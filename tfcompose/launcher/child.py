@@ -54,7 +54,7 @@ class Lines:
         self._rest = b""
 
     def feed(self, data: bytes) -> Iterator[str]:
-        """Yield the lines that are whole now, and pieces of a line that is too long."""
+        """Yield the lines that are complete now, and pieces of a line that is too long."""
         *complete, self._rest = (self._rest + data).split(b"\n")
         for line in complete:
             yield from self._pieces(line)
@@ -63,7 +63,7 @@ class Lines:
             yield _text(piece)
 
     def end(self) -> Iterator[str]:
-        """Yield what stands after the last line's end, if anything does."""
+        """Yield what follows the last line's end, if anything does."""
         if self._rest:
             yield _text(self._rest)
         self._rest = b""
@@ -74,7 +74,7 @@ class Lines:
 
 
 def _text(line: bytes) -> str:
-    """Return the line as a terminal shows it in the end: a progress bar is written over and over in its place."""
+    """Return the line as a terminal shows it in the end: a progress bar overwrites itself."""
     return line.rstrip(b"\r").rpartition(b"\r")[2].decode(errors="replace")
 
 
@@ -179,7 +179,7 @@ class Child:
 
     @property
     def last_lines(self) -> tuple[str, ...]:
-        """What it said last; the errors come last and count first, because two pipes have no common order."""
+        """Its last lines of output; stderr comes last and takes precedence, because two pipes have no common order."""
         return (*self.last_out, *self.last_err)[-LAST_LINES:]
 
 

@@ -270,7 +270,7 @@ class Children:
 
 
 def _matcher(pattern: str) -> Callable[[str], bool]:
-    """Return a function that says whether a line holds the pattern.
+    """Return a function that returns whether a line contains the pattern.
 
     It raises a TimeoutError where that takes too long: ``(a|aa)+$`` needs time that doubles with each character, and
     ``re`` cannot be stopped.
@@ -372,7 +372,7 @@ class Reaper:
 
     @property
     def ended(self) -> bool:
-        """Whether somebody killed it."""
+        """Whether it was killed from outside."""
         return self.returncode is not None
 
     def watch(self, groups: Iterable[int]) -> None:

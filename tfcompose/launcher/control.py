@@ -1,4 +1,4 @@
-"""The control socket: other commands ask the launcher, and listen to its notices.
+"""The control socket: other commands send requests to the launcher, and receive its notices.
 
 One request is one line of JSON, as ``tfcompose.ipc`` describes it; each answer is one line, too. Whoever asks for
 events is sent the last ones again, and then each as it comes. Only the user who runs the robot is answered.
@@ -38,7 +38,7 @@ ANSWER_S = 20.0
 
 
 class RefusedError(Exception):
-    """Raised where the launcher does not do what it is asked; the message is its reason."""
+    """Raised where the launcher refuses a request; the message is its reason."""
 
 
 @dataclass(slots=True, eq=False)
@@ -81,7 +81,7 @@ def connect(place: RuntimeDir) -> socket.socket:
     """Return a connection to whoever runs the robot.
 
     Raises:
-        OSError: if nobody does, or whoever does was stopped (by Ctrl-Z) and cannot answer.
+        OSError: if no launcher does, or it was stopped (by Ctrl-Z) and cannot answer.
     """
     _ensure_it_runs(place)
     connection = socket.socket(socket.AF_UNIX)
@@ -108,7 +108,7 @@ def ask(place: RuntimeDir, request: Request, answer: type[A]) -> A:
 
     Raises:
         RefusedError: with the launcher's reason, if it does not do it.
-        OSError: if nobody runs the robot, or does not answer.
+        OSError: if no launcher runs the robot, or it does not answer.
     """
     with connect(place) as connection:
         connection.sendall(REQUESTS.line(request).encode())

@@ -71,7 +71,7 @@ def never_clear(name: str, seconds: float) -> Finding:
 
 
 def never_published(owner: Tracked, edges: tuple[PlanEdge, ...]) -> Finding:
-    """Return the finding for the edges of one owner that nobody published until the time was up."""
+    """Return the finding for the edges of one owner that were not published in time."""
     names = ", ".join(edge.name for edge in edges[:NAMED_AT_MOST])
     more = f" and {len(edges) - NAMED_AT_MOST} more" if len(edges) > NAMED_AT_MOST else ""
     name = owner.process.name

@@ -60,7 +60,7 @@ def profile(env: Mapping[str, str], topics: Sequence[str], partition: str, *, re
     ``env`` names holds stays.
 
     Raises:
-        RosError: if that file cannot be read, or says something about these topics itself.
+        RosError: if that file cannot be read, or has profiles of these topics itself.
     """
     file = next((env[name] for name in PROFILE_VARIABLES if env.get(name)), None)
     try:

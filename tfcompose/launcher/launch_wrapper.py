@@ -1,4 +1,4 @@
-"""What ``ros2 launch`` is given in place of a launch file: that file, with what the plan says for all of its nodes.
+"""The launch file that ``ros2 launch`` runs: the user's, with the plan's settings for all of its nodes.
 
 The variable ``TFCOMPOSE_LAUNCH`` holds it as JSON: ``file``, ``arguments``, ``namespace``, ``remap``, ``sim_time``. The
 Python of ROS runs this file, and tfcompose need not be installed there.

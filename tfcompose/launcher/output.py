@@ -49,14 +49,14 @@ class NonBlockingOutput:
 
     @property
     def owes(self) -> bool:
-        """Whether something is still to be written."""
+        """Whether there is output left to write."""
         return bool(self._owed)
 
     def write(self, text: str, *, log: bool = False) -> None:
         """Write what can be written now; a log line is left out where too much is kept already.
 
         Raises:
-            OSError: if nobody reads any more.
+            OSError: if the reader has gone.
         """
         limit = KEPT if log else 2 * KEPT
         if len(self._owed) > limit:
@@ -74,7 +74,7 @@ class NonBlockingOutput:
         """Write what can be written now.
 
         Raises:
-            OSError: if nobody reads any more.
+            OSError: if the reader has gone.
         """
         while self._owed:
             if not self._own and not select.select([], [self.fd], [], 0)[1]:
@@ -124,7 +124,7 @@ def _not_waiting(fd: int) -> tuple[int, bool]:
 class Notifier:
     """Passes notices on to the person at the output, and to whoever listens at the control socket.
 
-    ``lost`` is called once, when nobody reads the output any more.
+    ``lost`` is called once, when the reader of the output has gone.
     """
 
     def __init__(
@@ -262,7 +262,7 @@ class Logs:
 
 
 def _ensure_own(folder: Path) -> None:
-    """Refuse a folder that somebody else put there, as they may in a shared ROS_LOG_DIR, and what leads elsewhere.
+    """Refuse a folder of another user, as a shared ROS_LOG_DIR may have, and a link that leads elsewhere.
 
     Raises:
         OSError: if it is a link, or another user's.
@@ -282,7 +282,7 @@ def logged(folder: Path) -> list[str]:
 def last_modified(folder: Path) -> float:
     """Return when a line was last written below the folder, in seconds since 1970; 0 where there is none.
 
-    A folder's own time says only when its last file was made.
+    A folder's own time is only that of its last new file.
     """
     return max((file.stat().st_mtime for file in folder.rglob("*.log")), default=0.0)
 

@@ -168,7 +168,7 @@ def _promises(process: PlanProcess) -> tuple[str, ...]:
 
 
 def folder_of(process: PlanProcess, plan_file: Path, build_dir: Path) -> Path:
-    """Return the folder that the process runs in, an absolute path without ``..`` where the plan says one."""
+    """Return the folder that the process runs in, an absolute path without ``..`` where the plan has one."""
     if process.cwd is None:
         return _here()
     return Path(os.path.normpath(build_dir / _filled(process.cwd, process, plan_file, build_dir)))
@@ -201,7 +201,7 @@ def _filled(text: str, process: PlanProcess, plan_file: Path, build_dir: Path | 
 
 @dataclass(frozen=True, slots=True)
 class NotFound:
-    """A program that is not there: whose it is, what it is called, where it was looked for, and what may help."""
+    """A program that was not found: its process, its name, the folders searched, and what may help."""
 
     process: str
     program: str

@@ -124,7 +124,7 @@ def environment_of(pid: int) -> dict[str, str]:
     """Return the environment that a process was started with.
 
     Raises:
-        OSError: if the process has ended, or is somebody else's.
+        OSError: if the process has ended, or belongs to another user.
     """
     words = (PROC / str(pid) / "environ").read_bytes().decode(errors="replace").split("\0")
     return {name: value for name, _, value in (word.partition("=") for word in words)}

@@ -63,7 +63,7 @@ def _is_met(other: Tracked, what: StartCondition) -> bool:
 
 
 def gate_of(process: PlanProcess) -> ReadyKind | Literal["started"]:
-    """Return what the process's readiness hangs on."""
+    """Return what the process's readiness depends on."""
     if process.ready:
         return process.ready.kind
     if process.lifecycle:
@@ -72,7 +72,7 @@ def gate_of(process: PlanProcess) -> ReadyKind | Literal["started"]:
 
 
 def has_own_gate(process: PlanProcess) -> bool:
-    """Return whether the plan says by what this process is ready."""
+    """Return whether the plan declares a readiness check for this process."""
     return process.ready is not None or bool(process.lifecycle)
 
 
@@ -105,7 +105,7 @@ def open_gate(step: Transition, name: str, observed: str = "") -> None:
 
 
 def check_gates(step: Transition) -> None:
-    """Open the gates that nobody watches, and report those that are late."""
+    """Open the gates that no guard watches, and report those that are late."""
     for name, one in step.state.tracked.items():
         if one.ready or one.state not in ("RUNNING", "EXPECTED"):
             continue

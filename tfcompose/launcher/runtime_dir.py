@@ -57,7 +57,7 @@ class RuntimeDir:
 
     @property
     def plan(self) -> Path:
-        """The plan that runs, with what stands beside it: a copy, so that a build does not reach into a run."""
+        """The plan that runs, with its files: a copy, so that a build does not affect a run."""
         return self.folder / "plan" / "plan.json"
 
     def holder(self) -> Holder | None:
@@ -99,7 +99,7 @@ class Lock:
 
 
 def _is_held(descriptor: int) -> bool:
-    """Return whether somebody runs the robot: who only looks shares the lock for a moment with others who look."""
+    """Return whether a launcher runs the robot: a check shares the lock for a moment with other checks."""
     try:
         fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:

@@ -21,7 +21,7 @@ class Times:
     """How long the launcher waits, in seconds."""
 
     clear_s: float = 20.0
-    """for the guard's word that nobody publishes a planned edge yet, besides the time that it was told to look"""
+    """for the guard's report that no planned edge is published yet, besides the time that it observes"""
     interrupt_s: float = 5.0
     """between SIGINT and SIGTERM"""
     terminate_s: float = 5.0
@@ -35,7 +35,7 @@ class Times:
     steady_s: float = 10.0
     """a run as long as this makes earlier failures forgotten"""
     ready_s: float = 30.0
-    """for a process to be ready, where it says by what and not until when"""
+    """for a process to be ready, where it has a readiness check without a timeout"""
     guard_silent_s: float = 10.0
     """without a sign of life of the guard's, until it is overdue"""
     guard_overdue_s: float = 5.0
@@ -92,7 +92,7 @@ class Tracked:
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """Why everything stops, and how it will have ended. ``signals`` counts those that asked for it."""
+    """Why everything stops, and the exit code. ``signals`` counts those that requested it."""
 
     cause: Literal["signal", "time", "taken", "failure"]
     exit_code: int
@@ -104,7 +104,7 @@ class Stop:
 class State:
     """Everything that is known about a running plan.
 
-    ``clear`` is when the guard reported that nobody publishes an edge of the plan yet. ``live`` holds the children of
+    ``clear`` is when the guard reported that no edge of the plan is published yet. ``live`` holds the children of
     the edges that were received, ``silent`` those that come no more. ``reported`` are the codes of the errors that were
     shown, ``reminded_of`` the missing edges that were named last. ``replanned`` is when another plan came, if one did.
     ``memory`` is what the guard wants the next one to know; ``unwatched`` is since when it is dead, if it is;
@@ -170,7 +170,7 @@ def by_owner(edges: tuple[PlanEdge, ...]) -> tuple[tuple[str, tuple[PlanEdge, ..
 
 
 class Transition:
-    """The step's state and actions. It lives no longer than the step, and its state is replaced, never changed."""
+    """The step's state and actions, for one step only; its state is replaced, never changed."""
 
     def __init__(self, state: State, now: float) -> None:
         self.state = state
@@ -195,7 +195,7 @@ class Transition:
         self.actions.append(Notify(notice))
 
     def enter(self, name: str, state: StateName, detail: str = "", **changes: float | None) -> None:
-        """Put the process into the state, since now, and tell."""
+        """Put the process into the state, since now, and notify."""
         pid = changes.pop("pid", None)
         before = self.state.tracked[name]
         one = replace(before, state=state, since=self.now, pid=pid, detail=detail, failed=(), **changes)  # type: ignore[arg-type]

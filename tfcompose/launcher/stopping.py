@@ -234,7 +234,7 @@ def _time_up(step: Transition) -> None:
 
 
 def edge_taken(step: Transition, found: Finding) -> None:
-    """Stop everything, because somebody publishes an edge of the plan already; each such edge is reported."""
+    """Stop everything, because an edge of the plan is published already; each such edge is reported."""
     stop = step.state.stop
     if stop is None or stop.cause == "taken":
         step.report(found)

@@ -189,7 +189,7 @@ class _Supervisor:
         return answer
 
     def _end(self, duration_s: float | None) -> float | None:
-        """Return when the time is up: it counts from the end of the look before the start."""
+        """Return when the time is up: it counts from the end of the observation before the start."""
         state = self._state
         if duration_s is None or state.clear is None or state.stop:
             return None

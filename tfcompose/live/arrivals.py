@@ -76,7 +76,7 @@ class Timing:
 
 @dataclass(slots=True)
 class Arrivals:
-    """Counts arrivals. What it says is about the last one to two ``window_ns``, or about all where that is 0.
+    """Counts arrivals. Its figures cover the last one to two ``window_ns``, or all where that is 0.
 
     Of arrivals in the first ``settle_ns`` only the number counts: a new subscriber gets at once what was kept for it.
     """

@@ -1,4 +1,4 @@
-"""Who publishes which edge, how often and how late: what monitor, verify, the live tree and doctor look at.
+"""Who publishes which edge, how often and how late, for monitor, verify, the live tree and doctor.
 
 An observer is given messages as they come, from a subscription or a bag, and who is in the graph; it reads no clock and
 no topic. What it keeps does not grow with time, and with strange names up to a bound only. Times are nanoseconds.
@@ -96,7 +96,7 @@ class EdgeStream:
 
     @property
     def speed(self) -> float:
-        """How fast its stamps go on: seconds of them in a second, 1 where that cannot be said."""
+        """How fast its stamps advance, in seconds per second; 1 where that is unknown."""
         took_ns, stamped_ns = self.arrivals.last_ns - self.first_ns, self.newest_ns - self.oldest_ns
         return stamped_ns / took_ns if took_ns > 0 and stamped_ns > 0 else 1.0
 
@@ -202,7 +202,7 @@ class EdgeState:
 
 @dataclass(slots=True)
 class TreeObserver:
-    """Everything that was seen of a TF tree.
+    """Everything that was observed of a TF tree.
 
     ``window_s`` is the stretch of time to which rates, jitter, gaps and delays refer (one to two of them); 0: all. Of
     the first ``settle_s`` of each edge they take nothing. ``end_ns`` is when a recording ended, of any topic; 0 for a
@@ -273,7 +273,7 @@ class TreeObserver:
 
     @property
     def recorded(self) -> bool:
-        """Whether there is no graph to ask, as with a recording."""
+        """Whether there is no graph to query, as with a recording."""
         return not self.publishers.queried
 
     def edges(self, now_ns: int) -> list[EdgeState]:
@@ -325,9 +325,9 @@ class Tree:
 
 
 def forest(edges: Iterable[EdgeState], planned: Mapping[str, PlanEdge] | None = None) -> list[Tree]:
-    """Return the trees, the largest first, then the loops. Planned edges (by child) that were not seen are part of it.
+    """Return the trees, the largest first, then the loops. Planned edges (by child) without messages are part of it.
 
-    A frame that was seen in several parents hangs where the newest message puts it, as in tf2.
+    A frame with several parents is drawn below that of the newest message, as in tf2.
     """
     by_child: dict[str, list[EdgeState]] = {}
     for one in edges:

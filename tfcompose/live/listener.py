@@ -76,7 +76,7 @@ class TreeListener:
         return taken
 
     def _ask_graph(self, senders: set[bytes]) -> None:
-        """Ask who publishes, where it is time, or somebody without a name sends."""
+        """Query the graph if it is due, or if a sender has no name yet."""
         since = time.monotonic() - self._requested_at
         nameless = not all(self.observer.publishers.is_named(gid) for gid in senders)
         if since >= ASK_EVERY_S or (nameless and since >= ASK_AGAIN_S):

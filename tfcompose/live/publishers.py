@@ -220,7 +220,7 @@ class Senders(Publishers):
         self._heard: dict[bytes, Sender] = {}
 
     def heard(self, message: Message, now: float) -> None:
-        """Count a message. Without ids nobody's messages can be counted."""
+        """Count a message. Without ids messages cannot be counted."""
         if message.gid is None:
             return
         sender = self._heard.get(message.gid)

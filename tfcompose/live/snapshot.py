@@ -210,7 +210,7 @@ def observe(expected: Mapping[Topics, Plan | None], seconds: float, stop: Stop) 
 
 @dataclass(slots=True)
 class _View:
-    """What is seen on one pair of topics, and below its namespace."""
+    """What is observed on one pair of topics, and below its namespace."""
 
     node: Node
     topics: Topics
@@ -264,7 +264,7 @@ class _View:
 
 
 def topics_in(node: Node) -> dict[str, Topic]:
-    """Return the topics that say something about TF, with the nodes at their ends, by name and type."""
+    """Return the topics that matter to TF, with their publishers and subscribers, by name and type."""
     found = {}
     for name, types in topics(node):
         if name not in GLOBAL and not set(types) & {*INTERESTING, *SensorTopics.TYPES}:

@@ -69,7 +69,7 @@ class RosProcess:
 
 @dataclass(frozen=True, slots=True)
 class TreeState:
-    """What was seen in ``seconds``, of the topics (moving, fixed).
+    """What was observed in ``seconds`` on the topics (moving, fixed).
 
     Attributes:
         edges: each edge of each publisher.
@@ -121,12 +121,12 @@ class TreeState:
 
     @property
     def planned(self) -> frozenset[str]:
-        """The frames of which a plan says who publishes them."""
+        """The frames whose owner a plan declares."""
         return frozenset(edge.child for edge in self.plan.edges) if self.plan else frozenset()
 
     @property
     def rated(self) -> frozenset[str]:
-        """The frames of which a plan says how often they come: they are judged by that."""
+        """The frames whose rate a plan declares: they are judged by that."""
         return frozenset(edge.child for edge in self.plan.edges if edge.rate) if self.plan else frozenset()
 
     @property

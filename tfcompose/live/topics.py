@@ -161,7 +161,7 @@ class TFGraph:
         return bool(known.ours and known.fenced) if self._private is None else known.ours is not False
 
     def sends_clock(self) -> bool:
-        """Return whether somebody is there who publishes /clock."""
+        """Return whether /clock has a publisher."""
         return bool(writers(self._node, "/clock"))
 
     def global_publishers(self) -> list[Publisher]:

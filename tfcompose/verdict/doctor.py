@@ -118,7 +118,7 @@ def _latest_above(state: TreeState, each: StampedData) -> list[tuple[float, floa
 
 
 def keeps_data_waiting(state: TreeState) -> set[tuple[str, str]]:
-    """Return the edges, parent and child, whose stamps are behind data that need them: they are told with the data."""
+    """Return the edges, parent and child, whose stamps lag data that need them: they are reported with the data."""
     found = [way for each in state.stamped for way in _latest_above(state, each)]
     return {(edge.parent, edge.child) for lack_s, _, edge in found if lack_s > LACK_S}
 
@@ -173,7 +173,7 @@ def _moving_above(state: TreeState, frame: str) -> list[EdgeState]:
 
 
 def joint_states_unheard(state: TreeState) -> Iterator[Finding]:
-    """Joint states come, and nobody makes transforms of them."""
+    """Joint states come, and no node turns them into transforms."""
     missing = _missing(state)
     for topic in _joint_topics(state):
         if not topic.publishers or _transformers(state, topic) or (state.moving_joints and not missing):
@@ -185,7 +185,7 @@ def joint_states_unheard(state: TreeState) -> Iterator[Finding]:
 
 
 def no_joint_states(state: TreeState) -> Iterator[Finding]:
-    """A robot state publisher waits for joint states that nobody sends."""
+    """A robot state publisher waits for joint states that no node publishes."""
     missing = _missing(state)
     for topic in _joint_topics(state):
         nodes = _transformers(state, topic)
@@ -213,7 +213,7 @@ def joint_without_state(state: TreeState) -> Iterator[Finding]:
 
 
 def _missing(state: TreeState) -> list[MovingJoint]:
-    """Return the moving joints whose frames nobody publishes; a frame_prefix may stand before them."""
+    """Return the moving joints whose frames are not published; a frame_prefix may precede them."""
     children = {edge.child for edge in state.taken}
     plain = children | {child.rpartition("/")[2] for child in children}
     return [joint for joint in state.moving_joints if joint.child not in plain]
@@ -242,9 +242,9 @@ def _transformers(state: TreeState, topic: Topic) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """What was found, and what was looked at: edges, publishing nodes, seconds, the trees' roots.
+    """What was found, and what was observed: edges, publishing nodes, seconds, the trees' roots.
 
-    ``elsewhere`` are topics with TF that were not looked at.
+    ``elsewhere`` are topics with TF that were not observed.
     """
 
     findings: list[Finding]
@@ -297,13 +297,13 @@ DIAGNOSES: tuple[Callable[[TreeState], Iterator[Finding]], ...] = (
 
 
 def diagnose(state: TreeState) -> list[Finding]:
-    """Return everything that is wrong, errors first, else in the order in which one looks."""
+    """Return everything that is wrong, errors first, else in the order of the checks."""
     found = [one for diagnosis in DIAGNOSES for one in diagnosis(state)]
     return sorted(dict.fromkeys(found), key=lambda one: one.severity)
 
 
 def examine(states: Sequence[TreeState]) -> Diagnosis:
-    """Judge all states of one look, of one or more pairs of topics."""
+    """Judge all states of one observation, of one or more pairs of topics."""
     findings = list(dict.fromkeys(one for state in states for one in diagnose(state)))
     edges = {(edge.parent, edge.child) for state in states for edge in state.taken}
     names = {name for state in states for edge in state.taken for name in edge.nodes}

@@ -1,4 +1,4 @@
-"""Sensors' drivers against their presets: frames, poses and switches that are not what the preset says.
+"""Sensors' drivers against their presets: frames, poses and switches that differ from the preset.
 
 A driver sends what its device was calibrated to, which is a few millimetres from nominal; far from it the device is
 another one than the preset's. What a preset calls exact, such as the turn of an optical frame, no device changes.
@@ -52,7 +52,7 @@ def sensor_of(found: Violation, drives: Mapping[str, Sequence[Driven]]) -> Drive
 
 
 def unexpected_frames(found: Violation, more: str, driven: Driven | None) -> str:
-    """Return the message for frames that a driver sends otherwise than its preset says, or nothing."""
+    """Return the message for frames that a driver sends otherwise than its preset has them, or nothing."""
     if driven is None or not driven.publishes or found.code not in _OTHERWISE or not _is_own(found):
         return ""
     expected = found.edge.name if found.edge else f"no frame {found.child}"
@@ -74,7 +74,7 @@ def switch_help(found: Violation, driven: Driven | None) -> str:
 
 
 def _is_own(found: Violation) -> bool:
-    """Return whether the edge is the publisher's own by the plan, or nobody's."""
+    """Return whether the plan gives the edge to the publisher, or to no process."""
     return found.edge is None or found.edge.node in found.nodes
 
 

@@ -1,4 +1,4 @@
-"""Who may publish which edge, and in what way: violations of a plan, and what there is to say of them.
+"""Who may publish which edge, and how: violations of a plan, and their findings.
 
 A ``Violation`` is one edge that was published by somebody who may not, or in a way that it may not. The guard finds
 violations message by message, with ``OwnershipRules``; verify and the doctor find them at the end, by ``code_of``. All
@@ -41,7 +41,7 @@ MOST_FRAMES = 10_000
 
 @dataclass(frozen=True, slots=True)
 class Violation:
-    """One edge that was published by somebody who may not, or in a way that it may not.
+    """One edge that was published by a node that may not, or in a way that it may not.
 
     Attributes:
         code: the finding's code.
@@ -85,7 +85,7 @@ class Violation:
 
     @property
     def name(self) -> str:
-        """The edge that was seen."""
+        """The edge that was received."""
         return f"{self.parent} → {self.child}"
 
     @property
@@ -99,7 +99,7 @@ class Violation:
         return self.code in _OF_STAMPS
 
     def over(self, more: int = 0) -> str:
-        """Return the sentence that says that it has ended, and that so many ``more`` of its kind have."""
+        """Return the sentence that it, and so many ``more`` of its kind, have ended."""
         named = f"{self.name} and {more} more edges" if more else self.name
         if self.is_of_stamps:
             return f"{self.who} stamps {named} as it should again"
@@ -230,7 +230,7 @@ _HELP = {
 
 
 def _help_about(first: Violation, plan: Plan) -> str:
-    """Return what to do about a publisher of somebody else's edge, or one with the wrong parent."""
+    """Return what to do about a publisher of another's edge, or one with the wrong parent."""
     if first.namesake:
         return f"end {first.whom}: is the robot running twice? tf2 takes whatever came last"
     if first.recorded:
@@ -311,7 +311,7 @@ class LastSenders:
         self._gids.pop(child, None)
 
     def is_known(self, child: str) -> bool:
-        """Return whether somebody has sent the frame."""
+        """Return whether the frame was sent before."""
         return child in self._gids
 
     def current(self, child: str) -> bytes | None:
@@ -336,7 +336,7 @@ class KnownTree:
         self._others: OrderedDict[str, tuple[str, float]] = OrderedDict()
 
     def add(self, parent: str, child: str, now: float, *, static: bool) -> bool:
-        """Note an edge that nobody planned, and return whether it changes the tree."""
+        """Note an edge that is not in the plan, and return whether it changes the tree."""
         before = self._others.get(child)
         self._others[child] = (parent, float("inf") if static else now)
         self._others.move_to_end(child)
@@ -376,7 +376,7 @@ class Start:
 
 @dataclass(frozen=True, slots=True)
 class SentEdge:
-    """An edge that somebody published on a topic."""
+    """An edge as it was published on a topic."""
 
     gid: bytes | None
     parent: str
@@ -439,7 +439,7 @@ class OwnershipRules:
 
         A process of this run proves by its environment which one it is: where the plan starts the owner, no other
         process is it, and nobody else while it is there itself. Without proof it is another where it spoke before the
-        start; where two take turns: A, B, and A again; and where tfcompose's own publisher, which is never restarted,
+        start; where two alternate: A, B, and A again; and where tfcompose's own publisher, which is never restarted,
         is there twice.
         """
         gid, sender, start = sent.gid, self._senders.sender(sent.gid), self._start

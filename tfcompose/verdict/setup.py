@@ -94,7 +94,7 @@ def other_settings(state: TreeState) -> Iterator[Finding]:
 
 
 def _elsewhere(state: TreeState) -> list[str]:
-    """Return the topics with TF that are not looked at."""
+    """Return the topics with TF that are not observed."""
     return [topic.name for topic in state.typed(TF_MESSAGE) if topic.publishers and topic.name not in state.topics]
 
 
@@ -115,7 +115,7 @@ def settings_contradict(state: TreeState) -> Iterator[Finding]:
 
 
 def settings_apart(theirs: Mapping[str, str], ours: Mapping[str, str]) -> dict[str, str]:
-    """Return with which of their settings processes on one machine do not hear each other; none if nothing says so."""
+    """Return the settings in which processes on one machine differ so that they do not discover each other."""
     apart = {}
     for name, default in DEFAULTS.items():
         their, our = theirs.get(name) or default, ours.get(name) or default

@@ -138,7 +138,7 @@ class Clocks:
             self._since = (now, sim_ns)
 
     def stands(self, now: float) -> bool:
-        """Return whether time came and does not go on: nobody sends anything then, and nobody is silent."""
+        """Return whether time came and has stopped: no node sends anything then, and none counts as silent."""
         return self.simulated and self.sent and self.sim_ns is not None and now - self._moved > STANDS_S
 
     def speed(self, now: float) -> float:
@@ -166,7 +166,7 @@ class StampHistory:
     wrong: int = 0
 
     def judge(self, stamps_ns: Sequence[int], received_ns: int, clocks: Clocks) -> tuple[str, str]:
-        """Take a message's stamps and return the fault's code and what was seen; empty where all is well."""
+        """Take a message's stamps and return the fault's code and what was observed; empty where all is well."""
         last, self.last = self.last, stamps_ns
         off = self._clock(stamps_ns, received_ns, clocks)
         step = self._step(stamps_ns, last) if last else ("", "")

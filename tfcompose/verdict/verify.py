@@ -1,4 +1,4 @@
-"""A plan against what was seen: a running tree or a recording, edge by edge.
+"""Compares a plan with what was observed, a running tree or a recording, edge by edge.
 
 What is fixed is compared by value: what tfcompose publishes itself, what another owner sends on /tf_static with a pose
 that the robot says, and of a joint what its motion leaves as it is. Frames inside a sensor that its driver publishes
@@ -290,7 +290,7 @@ def _violation_finding(group: Group, state: TreeState, plan: Plan, place: Span |
 
 
 def _elsewhere(group: Group) -> list[Note]:
-    """Return how far the poses are off that came from somebody who is not the owner."""
+    """Return how far the poses are off that came from a node other than the owner."""
     off = [(one.violation, one.off) for one in group if one.violation and one.off]
     notes = [Note(f"its pose of {what.child} in {what.parent} is off by {far.text}") for what, far in off[:MOST_POSES]]
     return [*notes, Note(f"and {len(off) - len(notes)} more are off")] if len(off) > len(notes) else notes
@@ -306,7 +306,7 @@ def _poses(group: Group, place: Span | None) -> Finding:
 
 
 def differs_from_plan(state: TreeState) -> Iterator[Finding]:
-    """What comes is not what the plan says."""
+    """What is published differs from the plan."""
     if state.plan is None or not (state.edges or state.publishers):
         return  # nobody publishes at all, which is another finding
     found = [one for one in differences(state, state.plan) if one.code != SELF]  # found for every edge, planned or not
@@ -332,8 +332,8 @@ def verify(
 ) -> list[Verdict]:
     """Return a verdict for each planned edge, in the plan's order, then one for each edge that is not in the plan.
 
-    ``now_ns`` is the time of the last look, by the clock of the arrivals; ``places`` is where the edges stand in the
-    robot's file, by child.
+    ``now_ns`` is the time of the last observation, by the clock of the arrivals; ``places`` is where the edges stand in
+    the robot's file, by child.
     """
     found: dict[str, list[Finding]] = {edge.child: [] for edge in plan.edges}
     extra = []
@@ -354,7 +354,7 @@ def verify(
 
 
 def state_of(observer: TreeObserver, now_ns: int, topics: Topics) -> TreeState:
-    """Return what an observer has seen until ``now_ns`` on the topics (moving, fixed)."""
+    """Return what an observer has received until ``now_ns`` on the topics (moving, fixed)."""
     return TreeState(
         max(0, now_ns - observer.begun_ns) / 1e9,
         topics,

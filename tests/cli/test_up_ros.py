@@ -252,6 +252,8 @@ def test_the_same_edges_by_another_robots_name_are_refused(up: Callable[..., Up]
     first.says("tree complete")
     second = up(ROVER.replace("robot: rover", "robot: other"), "--settle", "40")
     assert second.ends() == 1
+    assert f"rover (pid {first.popen.pid}, since " in second.text
+    assert second.text.index("isolate: topics") < second.text.index("started guard")
     assert re.search(r"error\[TF807\] .* another /(drive|tfcompose_static)\b", second.text)
     assert re.findall(r"started (\w+)", second.text) == ["guard"]
     assert first.popen.poll() is None

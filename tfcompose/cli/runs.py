@@ -8,6 +8,7 @@ import time
 from typing import TYPE_CHECKING, TypeVar
 
 from tfcompose.cli.terminal import FAILED, UNREADABLE, complain, fail, listed, wait_for_data
+from tfcompose.findings import RejectedError
 from tfcompose.ipc import (
     REQUESTS,
     Done,
@@ -20,6 +21,8 @@ from tfcompose.ipc import (
 from tfcompose.launcher.control import RefusedError, ask, connect
 from tfcompose.launcher.processes import environment_of, leftovers
 from tfcompose.launcher.runtime_dir import RuntimeDirError, runtime_dirs
+from tfcompose.plan.file import read_plan
+from tfcompose.plan.topics import judged_topics
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -28,6 +31,7 @@ if TYPE_CHECKING:
 
     from tfcompose.ipc import Notice, ProcessStatus, Request, Verb
     from tfcompose.launcher.runtime_dir import Holder, RuntimeDir
+    from tfcompose.plan import Plan
 
 A = TypeVar("A")
 
@@ -193,6 +197,37 @@ def hidden_run(place: RuntimeDir) -> str | None:
         where = f"XDG_RUNTIME_DIR={folder}" if folder else "no XDG_RUNTIME_DIR"
         return f"{place.name} runs already: pid {led[0].launcher}, with {where}; set it for ps and down"
     return None
+
+
+def complain_of_neighbours(place: RuntimeDir, plan: Plan) -> None:
+    """Complain about other robots that run in the domain on the same TF topics: each guard would report the other's."""
+    own, domain = _robot_of(place), place.name.rpartition("@")[2]
+    found = [
+        (_robot_of(other), holder)
+        for other, holder in running()
+        if other.name.rpartition("@")[2] == domain and _robot_of(other) != own and _share_topics(other, plan)
+    ]
+    for robot, holder in found:
+        complain(f"{robot} (pid {holder.pid}, since {since(holder)}) runs in domain {domain} on the same TF topics")
+    if found:
+        complain(
+            "each guard will report the other's edges: give one ros: {domain_id: N}, "
+            "or ros: {namespace: NAME, isolate: topics}"
+        )
+
+
+def _robot_of(place: RuntimeDir) -> str:
+    return place.name.rpartition("@")[0].partition(".")[0]
+
+
+def _share_topics(other: RuntimeDir, plan: Plan) -> bool:
+    """Return whether the plan that runs there, as far as it can be read, has TF topics of this one."""
+    copies = sorted(other.folder.glob("plan-*/plan.json"), key=lambda file: file.stat().st_mtime)
+    try:
+        running_plan = read_plan(copies[-1].read_text("utf-8"), "plan.json")
+    except (OSError, ValueError, IndexError, RejectedError):
+        return False
+    return not judged_topics(plan).isdisjoint(judged_topics(running_plan))
 
 
 def complain_of_leftovers(place: RuntimeDir, run_id: str) -> None:

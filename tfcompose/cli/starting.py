@@ -19,6 +19,7 @@ from tfcompose.cli.plans import built_plan, copy_plan, is_plan, plan_to_start
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.runs import (
     complain_of_leftovers,
+    complain_of_neighbours,
     hidden_run,
     notices,
     print_missing,
@@ -92,6 +93,7 @@ def _run(plan: Plan, place: RuntimeDir, session: Session, output: NonBlockingOut
     console = Console(plan, output, colour=coloured(sys.stdout), keep=logs.write, status=status)
     session.refresh = console.refresh if status else None
     complain_of_leftovers(place, session.run_id)
+    complain_of_neighbours(place, plan)
     try:
         return supervise(plan, session.plan_file, report=console, duration_s=duration_s, session=session)
     finally:
@@ -163,6 +165,7 @@ def _starts_with(profile: str, arguments: Namespace) -> bool:
 def detach(plan: Plan, place: RuntimeDir, lock: Lock, session: Session, arguments: Namespace) -> int:
     """Start the launcher as a process of its own; return 0 when all is started, or ready; 1 when it is not."""
     complain_of_leftovers(place, session.run_id)
+    complain_of_neighbours(place, plan)
     sys.stdout.flush()
     sys.stderr.flush()
     pid = os.fork()

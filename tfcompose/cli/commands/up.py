@@ -1,7 +1,8 @@
 """Start a robot, or a built plan, and guard its TF tree.
 
 Build a robot and start it, or start a built plan. Print which edges are live, who owns them, and when the tree is
-complete. Ctrl-C, SIGTERM and SIGHUP end everything. If a node already publishes an edge, refuse and name it. If the
+complete. Ctrl-C, SIGTERM and SIGHUP end everything, with exit code 0; before anything is started, with that of the
+signal, such as 130 for Ctrl-C. If a node already publishes an edge, refuse and name it. If the
 robot runs already, restart only what differs in the new plan.
 """
 

@@ -10,7 +10,7 @@ import pytest
 from tests.support.findings import expect
 from tfcompose.findings import Finding
 from tfcompose.launcher.preflight import Command, commands_of
-from tfcompose.plan import Plan, PlanProcess, RosSettings, StartCondition
+from tfcompose.plan import Plan, PlanProcess, RosSettings
 from tfcompose.ros.environment import child_environment
 
 
@@ -51,19 +51,38 @@ def test_a_ros_executable_that_no_prefix_has_is_taken_from_the_path(tmp_path: Pa
     assert os.path.basename(commands["lidar"].argv[0]) == "true"  # noqa: PTH119 (a text, not a place)
 
 
-def test_a_misspelt_ros_executable_is_reported_with_the_folders_searched_and_the_nearest_name(
-    tmp_path: Path, prefix: Path
-) -> None:
-    _, (found,) = inspect(
-        tmp_path, lidar("${executable:sllidar_ros2/slidar_node}"), env={"AMENT_PREFIX_PATH": str(prefix)}
-    )
-    expect(found, "TF810", "sllidar_ros2/slidar_node of lidar", "sllidar_node?")
-    expect(found, "TF810", f"{prefix}/lib/sllidar_ros2/slidar_node", f": {os.environ['PATH']}")
+STATIC = PlanProcess("static", "static", argv=("true",))
+WAITING = PlanProcess("lidar", "run", argv=("true",))
+#: What cannot be started, in an environment with PREFIX, a ROS prefix, or without one.
+UNSTARTABLE: dict[str, tuple[PlanProcess, bool, str, list[str]]] = {
+    "misspelt": (
+        lidar("${executable:sllidar_ros2/slidar_node}"),
+        True,
+        "TF810",
+        ["sllidar_ros2/slidar_node of lidar", "sllidar_node?", "PREFIX/lib/sllidar_ros2/slidar_node", "PATH: "],
+    ),
+    "not installed": (lidar("${executable:nope/no_such_node}"), True, "TF810", ["package nope"]),
+    "nothing sourced": (lidar("${executable:nope/no_node}"), False, "TF810", ["setup file", "AMENT_PREFIX_PATH"]),
+    "not executable": (
+        lidar("PREFIX/lib/sllidar_ros2/notes.txt"),
+        True,
+        "TF810",
+        ["PREFIX/lib/sllidar_ros2/notes.txt"],
+    ),
+    "relative": (lidar("bin/lidar"), True, "TF810", ["${file(bin/lidar)}"]),
+    "no command": (PlanProcess("lidar", "run"), True, "TF902", ["lidar"]),
+    "waits for nobody": (replace(WAITING, after={"nobody": "started"}), True, "TF902", ["lidar", "nobody"]),
+    "waits in vain": (replace(WAITING, after={"static": "done"}), True, "TF902", ["lidar", "static"]),
+    "waits for itself": (replace(WAITING, after={"lidar": "ready"}), True, "TF812", ["lidar"]),
+}
 
 
-def test_a_package_that_is_not_installed_is_to_be_installed(tmp_path: Path, prefix: Path) -> None:
-    _, (found,) = inspect(tmp_path, lidar("${executable:nope/no_such_node}"), env={"AMENT_PREFIX_PATH": str(prefix)})
-    expect(found, "TF810", "package nope")
+@pytest.mark.parametrize("case", UNSTARTABLE)
+def test_what_cannot_be_started_is_one_finding_with_its_names(tmp_path: Path, prefix: Path, case: str) -> None:
+    process, sourced, code, names = UNSTARTABLE[case]
+    process = replace(process, argv=tuple(word.replace("PREFIX", str(prefix)) for word in process.argv))
+    _, (found,) = inspect(tmp_path, process, STATIC, env={"AMENT_PREFIX_PATH": str(prefix)} if sourced else None)
+    expect(found, code, *(name.replace("PREFIX", str(prefix)) if "/" in name else name for name in names))
 
 
 def test_all_that_is_missing_is_one_finding_that_names_the_folders_searched_once(tmp_path: Path) -> None:
@@ -72,18 +91,6 @@ def test_all_that_is_missing_is_one_finding_that_names_the_folders_searched_once
     missing = "sllidar_ros2/sllidar_node of laser, slam_toolbox/slam of slam, no_a of a"
     expect(found, "TF810", "3 executables", missing, "AMENT_PREFIX_PATH", f": {os.environ['PATH']}", "setup file")
     assert len(found.notes) == 2
-
-
-def test_without_any_prefix_the_setup_file_is_to_be_sourced(tmp_path: Path) -> None:
-    _, (found,) = inspect(tmp_path, lidar("${executable:nope/no_such_node}"))
-    expect(found, "TF810", "setup file", "AMENT_PREFIX_PATH")
-
-
-def test_a_file_that_may_not_be_executed_is_reported_to_be_there(tmp_path: Path, prefix: Path) -> None:
-    notes = f"{prefix}/lib/sllidar_ros2/notes.txt"
-    _, (found,) = inspect(tmp_path, lidar(notes))
-    (note,) = found.notes
-    assert note.message.startswith(f"{notes} may not")
 
 
 def test_a_relative_program_is_found_in_the_processs_folder(tmp_path: Path, prefix: Path) -> None:
@@ -102,31 +109,10 @@ def test_a_folder_that_is_not_there_is_found_before_anything_is_started(tmp_path
     assert (commands["lidar"].missing, found_of_optional) == (found.message, [])
 
 
-def test_a_relative_program_that_is_not_there_can_be_named_from_the_robot_file(tmp_path: Path) -> None:
-    _, (found,) = inspect(tmp_path, lidar("bin/lidar"))
-    expect(found, "TF810", "${file(bin/lidar)}")
-
-
 def test_a_placeholder_in_a_value_is_not_replaced_again(tmp_path: Path) -> None:
     process = PlanProcess("lidar", "run", argv=("true", "${params_file}"), params_file="${plan}.yaml")
     commands, _ = inspect(tmp_path, process)
     assert commands["lidar"].argv[1] == f"{tmp_path}/${{plan}}.yaml"
-
-
-def test_a_process_that_the_plan_does_not_say_how_to_start_is_a_finding(tmp_path: Path) -> None:
-    _, (found,) = inspect(tmp_path, PlanProcess("lidar", "run"))
-    expect(found, "TF902", "lidar")
-
-
-@pytest.mark.parametrize(
-    ("after", "code"), [({"nobody": "started"}, "TF902"), ({"static": "done"}, "TF902"), ({"lidar": "ready"}, "TF812")]
-)
-def test_a_process_that_waits_for_what_cannot_come_is_a_finding(
-    tmp_path: Path, after: dict[str, StartCondition], code: str
-) -> None:
-    waiting = PlanProcess("lidar", "run", argv=("true",), after=after)
-    _, (found,) = inspect(tmp_path, waiting, PlanProcess("static", "static", argv=("true",)))
-    expect(found, code, "lidar", *after)
 
 
 def test_processes_that_wait_for_each_other_are_a_finding(tmp_path: Path) -> None:

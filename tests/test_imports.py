@@ -29,13 +29,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "model": {"findings", "plan", "geometry", "tree", "units"},
     "files": {"model"},
     "load": {"findings"},
-    "render": {"catalogue", "draw", "findings", "geometry", "model", "numbers", "tree"},
+    "render": {"catalogue", "draw", "findings", "geometry", "model", "numbers", "text", "tree"},
     "units": {"findings"},
     "language": {"catalogue", "findings", "geometry", "load", "model", "plan", "units"},
     "resolve": {"catalogue", "findings", "geometry", "language", "load", "model", "plan", "units", "urdf"},
-    "check": {"catalogue", "findings", "load", "model", "geometry", "tree"},
-    "draw": set(),
-    "urdf": {"catalogue", "check", "files", "findings", "geometry", "load", "model", "numbers"},
+    "check": {"catalogue", "findings", "geometry", "load", "model", "text", "tree"},
+    "draw": {"text"},
+    "urdf": {"catalogue", "check", "files", "findings", "geometry", "load", "model", "numbers", "text"},
     "export": {"emit", "files", "numbers", "plan"},
     "emit": {"draw", "files", "geometry", "model", "numbers", "plan", "render", "urdf"},
     "text": set(),
@@ -45,7 +45,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "verdict": {"catalogue", "findings", "geometry", "live", "plan", "ros", "text", "tree"},
     "process": {"findings", "ipc", "plan", "ros", "signals"},
     "guard": {"findings", "geometry", "ipc", "live", "plan", "process", "ros", "signals", "text", "verdict"},
-    "launcher": {"findings", "ipc", "plan", "ros", "signals"},
+    "launcher": {"findings", "ipc", "plan", "ros", "signals", "text"},
     "publishers": {"files", "geometry", "plan", "process", "ros", "signals", "text"},
     "tf2": {"geometry", "ros"},
     "compile": FOUNDATIONS | STAGES,
@@ -221,7 +221,7 @@ def parts_in(modules: set[str]) -> set[str]:
 def test_help_loads_the_commands_and_nothing_of_their_work(bare: set[str]) -> None:
     loaded = loaded_by(command("--help")) - bare
     assert not foreign(loaded, bare)
-    assert parts_in(loaded) == {"cli", "geometry", "render", "signals"}
+    assert parts_in(loaded) == {"cli", "geometry", "render", "signals", "text"}
     assert {name for name in loaded if name.startswith("tfcompose.cli.") and ".commands" not in name} == {
         f"tfcompose.cli.{name}" for name in ("options", "parser", "terminal")
     }

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.check.rule import rule
 from tfcompose.findings import Finding, Note, did_you_mean, finding
 from tfcompose.model import BUILT_IN
+from tfcompose.text import with_more
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -45,9 +46,8 @@ def unknown_owner(robot: Robot) -> Iterator[Finding]:
         if edge.owner not in names and not robot.excuses(edge.owner):
             lost.setdefault((edge.owner, edge.owner_at or edge.at), []).append(edge)
     for (owner, at), edges in lost.items():
-        more = f" and {len(edges) - 1} more edges" if edges[1:] else ""
         declare = f"declare it: processes: {{{owner}: {{external: true}}}}, if somebody else starts it"
-        message = f"unknown owner {owner} of {edges[0].name}{more}"
+        message = f"unknown owner {owner} of {with_more(edges[0].name, len(edges) - 1)}"
         yield finding("TF302", message, at, help=did_you_mean(owner, names, declare))
 
 

@@ -7,7 +7,7 @@ from functools import singledispatchmethod
 from typing import TYPE_CHECKING, Protocol
 
 from tfcompose.cli.reading import line_of
-from tfcompose.cli.terminal import coloured_only, counted, listed, plain
+from tfcompose.cli.terminal import coloured_only, plain
 from tfcompose.ipc import (
     AllReady,
     AllStarted,
@@ -24,6 +24,7 @@ from tfcompose.ipc import (
     Waiting,
 )
 from tfcompose.render.text import BOLD, GREEN, PLAIN, RED, YELLOW, render_text
+from tfcompose.text import counted, listed
 
 if TYPE_CHECKING:
     from collections.abc import Callable

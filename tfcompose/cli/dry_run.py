@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.plans import PLAN, built_plan, is_plan, plan_to_start
 from tfcompose.cli.reading import read_text
-from tfcompose.cli.terminal import counted, printable
+from tfcompose.cli.terminal import printable
 from tfcompose.findings import RejectedError
 from tfcompose.launcher.state import MAX_RESTARTS
 from tfcompose.plan.file import read_plan
 from tfcompose.plan.hosts import describe_share
 from tfcompose.plan.topics import partition_of, private_topics
 from tfcompose.ros.environment import FASTDDS_PROFILE, child_environment
+from tfcompose.text import counted
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -115,7 +116,7 @@ def _times(process: PlanProcess) -> Iterator[str]:
         yield f"  ready    {ready.kind} {what}{late}".rstrip()
     if process.restart != "no":
         most = MAX_RESTARTS if process.max_restarts is None else process.max_restarts
-        yield f"  restart  {process.restart}, {most} time{'' if most == 1 else 's'} in a row"
+        yield f"  restart  {process.restart}, {counted(most, 'time')} in a row"
     if process.required is not None:
         yield "  required its end ends everything" if process.required else "  optional the rest goes on when it fails"
     if process.stop.signal != "SIGINT" or process.stop.timeout_s is not None:

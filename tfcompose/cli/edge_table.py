@@ -7,8 +7,9 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.tables import Table
-from tfcompose.cli.terminal import counted, printable
+from tfcompose.cli.terminal import printable
 from tfcompose.render.text import YELLOW
+from tfcompose.text import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

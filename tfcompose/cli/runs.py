@@ -7,7 +7,7 @@ import os
 import time
 from typing import TYPE_CHECKING, TypeVar
 
-from tfcompose.cli.terminal import FAILED, UNREADABLE, complain, fail, listed, wait_for_data
+from tfcompose.cli.terminal import FAILED, UNREADABLE, complain, fail, wait_for_data
 from tfcompose.findings import RejectedError
 from tfcompose.ipc import (
     REQUESTS,
@@ -23,6 +23,7 @@ from tfcompose.launcher.processes import environment_of, leftovers
 from tfcompose.launcher.runtime_dir import RuntimeDirError, runtime_dirs
 from tfcompose.plan.file import read_plan
 from tfcompose.plan.topics import judged_topics
+from tfcompose.text import listed
 
 if TYPE_CHECKING:
     from argparse import Namespace

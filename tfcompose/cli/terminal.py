@@ -88,17 +88,6 @@ def size_of(fd: int) -> tuple[int, int]:
     return size.columns or 80, size.lines or 24
 
 
-def counted(number: int, word: str) -> str:
-    """Return the number with its word: 1 edge, 2 edges."""
-    return f"{number} {word}{'' if number == 1 else 's'}"
-
-
-def listed(names: Sequence[str], most: int) -> str:
-    """Return the first names, and how many more there are."""
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return f"{', '.join(names[:most])}{more}"
-
-
 def printable(text: str) -> str:
     """Return the text without what would move a terminal's cursor."""
     return "".join(character if character.isprintable() else "?" for character in text)

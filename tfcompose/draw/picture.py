@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Union
 from tfcompose.draw.graph import forest_of
 from tfcompose.draw.layout import BADGE_WIDTH, BETWEEN, LABEL_STRIP, PAD, POSE_HEIGHT, layout
 from tfcompose.draw.style import STYLES, colour_of, shortened, width_of
+from tfcompose.text import counted
 
 if TYPE_CHECKING:
     from tfcompose.draw.graph import Arrow, Forest, Graph
@@ -210,15 +211,15 @@ def _legend(graph: Graph, owners: dict[str, int], width: float, margin: float) -
     """Return the title and the legend, the width of everything without margins, and the y where the tree begins."""
     edges = Counter(arrow.owner for arrow in graph.arrows if not arrow.alternative)
     title = shortened(graph.title)
-    counted = f"{_count(len(graph.all_frames()), 'frame')} · {_count(edges.total(), 'edge')}"
+    totals = f"{counted(len(graph.all_frames()), 'frame')} · {counted(edges.total(), 'edge')}"
     title_width = width_of(title, STYLES["title"].size, bold=True)
-    counted_width = width_of(counted, STYLES["label"].size)
+    totals_width = width_of(totals, STYLES["label"].size)
     base = margin + 14.0
     shapes: list[Shape] = [
         Text(margin, base, title, "title", title_width),
-        Text(margin + title_width + 12.0, base, counted, "label", counted_width),
+        Text(margin + title_width + 12.0, base, totals, "label", totals_width),
     ]
-    width = max(width, MIN_WIDTH, title_width + 12.0 + counted_width)
+    width = max(width, MIN_WIDTH, title_width + 12.0 + totals_width)
     y = base + LEGEND_LINE
     for row in (_owner_items(owners, edges), _line_items(graph)):
         more, y, width = _wrapped(row, margin, y, width)
@@ -235,13 +236,9 @@ class _Item:
     owner: int = 0
 
 
-def _count(number: int, thing: str) -> str:
-    return f"{number} {thing}{'' if number == 1 else 's'}"
-
-
 def _owner_items(owners: dict[str, int], edges: Counter[str]) -> list[_Item]:
     return [
-        _Item(f"{shortened(name)} ({_count(edges[name], 'edge')})", owner=index)
+        _Item(f"{shortened(name)} ({counted(edges[name], 'edge')})", owner=index)
         for name, index in owners.items()
         if edges[name]
     ]

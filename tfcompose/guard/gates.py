@@ -19,6 +19,7 @@ from tfcompose.guard.judge import FINDING_S
 from tfcompose.ipc import Found, Gate, GateOpen, GateShut
 from tfcompose.process import say
 from tfcompose.ros.graph import is_offered, services, writers
+from tfcompose.text import listed
 from tfcompose.verdict.drivers import not_taken
 
 if TYPE_CHECKING:
@@ -142,8 +143,7 @@ def _some(what: str, names: list[str], wanted: str) -> str:
     """Return the first names: those with another namespace, then those of the same, then the others."""
     above, _, last = wanted.rpartition("/")
     names = sorted(names, key=lambda name: (name.rpartition("/")[2] != last, name.rpartition("/")[0] != above, name))
-    more = f" and {len(names) - NAMED_AT_MOST} more" if len(names) > NAMED_AT_MOST else ""
-    return f"{what} {', '.join(names[:NAMED_AT_MOST])}{more}" if names else f"no {what}"
+    return f"{what} {listed(names, NAMED_AT_MOST)}" if names else f"no {what}"
 
 
 def _lifecycle(node: Node, name: str, state: str, *, drive: bool) -> Lifecycle:

@@ -6,6 +6,7 @@ import signal
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, Note, finding
+from tfcompose.text import listed
 
 if TYPE_CHECKING:
     from tfcompose.launcher.events import Exited
@@ -72,14 +73,13 @@ def never_clear(name: str, seconds: float) -> Finding:
 
 def never_published(owner: Tracked, edges: tuple[PlanEdge, ...]) -> Finding:
     """Return the finding for the edges of one owner that were not published in time."""
-    names = ", ".join(edge.name for edge in edges[:NAMED_AT_MOST])
-    more = f" and {len(edges) - NAMED_AT_MOST} more" if len(edges) > NAMED_AT_MOST else ""
+    names = listed((edge.name for edge in edges), NAMED_AT_MOST)
     name = owner.process.name
     if owner.state == "STOPPED" and owner.order == 0:
         waits = " and ".join(f"{other} to be {what}" for other, what in owner.process.after.items())
         why = f"was not started: it waits for {waits}" if waits else "was not started"
-        return finding("TF811", f"nobody published {names}{more}: {name} {why}", None)
+        return finding("TF811", f"nobody published {names}: {name} {why}", None)
     if owner.state in ("STOPPED", "EXITED", "FATAL", "BACKOFF"):
         why = f"{owner.state.lower()}: {owner.detail}" if owner.detail else owner.state.lower()
-        return finding("TF811", f"nobody publishes {names}{more}: {name} is {why}", None)
-    return finding("TF811", f"{name} never published {names}{more}", None)
+        return finding("TF811", f"nobody publishes {names}: {name} is {why}", None)
+    return finding("TF811", f"{name} never published {names}", None)

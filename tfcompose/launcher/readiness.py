@@ -13,6 +13,7 @@ from tfcompose.findings import Note, finding
 from tfcompose.ipc import AllReady, AllStarted, Gate, ProcessReady, StartRow
 from tfcompose.launcher.events import NotifyLate, Order
 from tfcompose.launcher.failures import waits_in_vain
+from tfcompose.text import listed
 
 if TYPE_CHECKING:
     from tfcompose.findings import Finding
@@ -148,7 +149,6 @@ def waits_for(state: State, one: Tracked) -> str:
     ready = one.process.ready
     text = ready.text if ready else ""
     missing = [edge.name for edge in state.plan.edges_of(one.process.name) if edge.child not in state.live]
-    more = f" and {len(missing) - _NAMED_AT_MOST} more" if len(missing) > _NAMED_AT_MOST else ""
     return {
         "topic": f"nobody publishes {text}",
         "service": f"there is no service {text}",
@@ -156,7 +156,7 @@ def waits_for(state: State, one: Tracked) -> str:
         "log": f"no line of its output holds {text}",
         "exit": "it still runs",
         "time": f"{ready.number if ready else 0:g} s have not passed",
-        "edges": f"nobody published {', '.join(missing[:_NAMED_AT_MOST])}{more}",
+        "edges": f"nobody published {listed(missing, _NAMED_AT_MOST)}",
     }.get(gate_of(one.process), "")
 
 

@@ -15,6 +15,7 @@ from tfcompose.ipc import Absent, DownRequest, Replanned
 from tfcompose.launcher.events import Kill, Order, OutputLost, Signalled, TimeUp
 from tfcompose.launcher.failures import ended_by_itself, guard_lost, how_ended, never_published, signal_name
 from tfcompose.launcher.state import MAX_RESTARTS, UNREAD, Stop, Tracked, by_owner
+from tfcompose.text import counted
 
 if TYPE_CHECKING:
     from tfcompose.findings import Finding
@@ -107,7 +108,7 @@ def _schedule_restart(step: Transition, one: Tracked, event: Exited) -> None:
     how = how_ended(event.returncode)
     if failures > most:
         step.enter(name, "FATAL", how)
-        when = f", after {most} restart{'' if most == 1 else 's'}"
+        when = f", after {counted(most, 'restart')}"
         step.fail_process(name, ended_by_itself(name, event.returncode, when, event.last_lines))
         return
     delay = backoff_s(times, failures)

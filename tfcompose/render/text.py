@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tfcompose.text import counted
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
@@ -71,8 +73,8 @@ def summary(found: Sequence[Finding], files: int) -> str:
     """Return the last line: the number of findings and of files."""
     errors = sum(one.severity == "error" for one in found)
     warnings = len(found) - errors
-    where = f"in {files} file{'s' if files != 1 else ''}"
+    where = f"in {counted(files, 'file')}"
     if not found:
         return f"no findings {where}\n"
-    parts = [f"{n} {word}{'s' if n != 1 else ''}" for n, word in ((errors, "error"), (warnings, "warning")) if n]
+    parts = [counted(n, word) for n, word in ((errors, "error"), (warnings, "warning")) if n]
     return f"{' and '.join(parts)} {where}\n"

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, Span, did_you_mean, finding, nearest
 from tfcompose.model import Component, Hardware, Interface
+from tfcompose.text import listed
 from tfcompose.urdf.read import read_xml
 
 if TYPE_CHECKING:
@@ -102,8 +103,7 @@ def unknown_references(element: Element, frames: Collection[str], joints: Collec
 
 def unknown_joint(name: str, at: Span, joints: Collection[str]) -> Finding:
     """Return the finding that none of the ``joints``, the moving ones, has this name."""
-    more = f" and {len(joints) - _MOST_NAMED} more" if len(joints) > _MOST_NAMED else ""
-    there = f"the robot has {', '.join(list(joints)[:_MOST_NAMED])}{more}"
+    there = f"the robot has {listed(joints, _MOST_NAMED)}"
     advice = did_you_mean(name, joints, there if joints else "no joint of the robot moves")
     return finding("TF703", f"no moving joint {name}", at, help=advice)
 

@@ -13,7 +13,8 @@ import sys
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_for, add_format, add_variant, namespace
-from tfcompose.cli.terminal import UNREADABLE, counted, fail, print_findings, printable
+from tfcompose.cli.terminal import UNREADABLE, fail, print_findings, printable
+from tfcompose.text import counted
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace

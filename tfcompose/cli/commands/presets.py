@@ -13,6 +13,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.terminal import complain, print_findings, table_width
+from tfcompose.text import counted
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -87,8 +88,7 @@ def _list(only: str | None, known: Library, form: str) -> int:
         lines = [f"  {row['name']:<{width}}  {row['kind']:<10}  {_about(row)}" for row in group]
         lines = [shortened(line, columns - 1, at_end=True) for line in lines] if columns else lines
         blocks.append("\n".join([vendor, *lines]))
-    count = f"{len(rows)} preset{'s' if len(rows) != 1 else ''}"
-    sys.stdout.write("\n\n".join(blocks) + f"\n\n{count}; tfcompose presets NAME shows one\n")
+    sys.stdout.write("\n\n".join(blocks) + f"\n\n{counted(len(rows), 'preset')}; tfcompose presets NAME shows one\n")
     return 0
 
 

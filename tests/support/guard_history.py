@@ -7,11 +7,12 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.geometry import Pose
-from tfcompose.guard.judge import Judge
+from tfcompose.guard.judge import Judge, JudgeMemory
 from tfcompose.ipc import Clear, Found, GuardEvent, Recovered, Taken
 from tfcompose.live.publishers import Message
 from tfcompose.live.publishers import Publisher as TFPublisher
 from tfcompose.plan import Claim, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
+from tfcompose.plan.codec import decode, encode
 
 if TYPE_CHECKING:
     from tfcompose.findings import Finding
@@ -173,7 +174,7 @@ class History:
 
     def dies(self, down_s: float = 1.5) -> History:
         """Let another judge follow with this one's memory, after a time in which nobody looked, and forget events."""
-        memory = json.loads(json.dumps(self.judge.memory()))
+        memory = decode(JudgeMemory, json.loads(json.dumps(encode(self.judge.memory()))))
         self.now += down_s
         self.judge = Judge(self.judge.plan, 0.0, self.now, 0)
         self.events = self.judge.recall(memory, self.now)

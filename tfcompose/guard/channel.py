@@ -35,6 +35,7 @@ from tfcompose.ipc import (
     Remember,
     Silent,
 )
+from tfcompose.plan.codec import encode
 from tfcompose.process import say
 
 if TYPE_CHECKING:
@@ -180,7 +181,7 @@ class Memory:
         if mark == self._mark:
             return
         self._mark = mark
-        known = self._judge.memory() | (self._relay.memory() if self._relay else {})
+        known = encode(self._judge.memory()) | (self._relay.memory() if self._relay else {})
         gone = dict.fromkeys(self._left.keys() - known.keys())
         for part, value in (known | gone).items():
             if self._left.get(part) != value and len(json.dumps(value)) < LONGEST:

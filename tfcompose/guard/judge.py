@@ -10,13 +10,13 @@ can be replayed. Times are monotonic seconds, but for those of messages, which a
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tfcompose.guard.diagnostics import EdgeHealth
-from tfcompose.guard.liveness import Liveness
-from tfcompose.guard.reports import Cases, PublisherReports
+from tfcompose.guard.liveness import Liveness, LivenessMemory
+from tfcompose.guard.reports import CaseMemory, Cases, PublisherReports
 from tfcompose.ipc import Clear, Found, GuardEvent
-from tfcompose.live.publishers import NAMELESS_S, Senders
+from tfcompose.live.publishers import NAMELESS_S, SenderMemory, Senders
 from tfcompose.verdict.drivers import SentPoses
 from tfcompose.verdict.ownership import OwnershipRules, SentEdge, Start, Violation, violation_finding
 from tfcompose.verdict.stamps import Clocks, StampHistory
@@ -39,6 +39,21 @@ NAMELESS_OWNER_S = 5.0
 MOST_VERDICTS = 4096
 #: What was judged of a message with edges that the plan does not have holds for so long.
 STRANGE_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class JudgeMemory:
+    """What the guard that follows this one must know of one pair of topics; the launcher keeps it, part by part.
+
+    ``owners`` holds by frame who sent it last and before, ``senders`` are by publishers' ids, ``reported`` publishers.
+    """
+
+    start: Start
+    owners: dict[str, tuple[str, str]]
+    senders: dict[str, SenderMemory]
+    cases: tuple[CaseMemory, ...]
+    reported: tuple[tuple[str, str], ...]
+    live: LivenessMemory
 
 
 @dataclass(slots=True)
@@ -169,28 +184,28 @@ class Judge:
         changes = (one.changes for one in (self._rules, self.cases, self.live, self._publishers))
         return (*changes, *self._senders.mark)
 
-    def memory(self) -> dict[str, Any]:
-        """Return what the guard that follows this one must know, part by part, as values of JSON."""
-        start = self._start
-        return {
-            "start": [start.begun, start.begun_ns, start.cleared, start.cleared_ns],
-            "owners": self._rules.owners.memory(),
-            "senders": self._senders.memory(),
-            "cases": self.cases.memory(),
-            "reported": self._publishers.memory(),
-            "live": self.live.memory(),
-        }
+    def memory(self) -> JudgeMemory:
+        """Return what the guard that follows this one must know."""
+        return JudgeMemory(
+            self._start,
+            self._rules.owners.memory(),
+            self._senders.memory(),
+            self.cases.memory(),
+            self._publishers.memory(),
+            self.live.memory(),
+        )
 
-    def recall(self, memory: dict[str, Any], now: float) -> list[GuardEvent]:
+    def recall(self, memory: JudgeMemory, now: float) -> list[GuardEvent]:
         """Restore the state of the guard before this one, and return that the observation before the start is over."""
         self._finds_until = now + FINDING_S
-        start = self._start
-        start.begun, start.begun_ns, start.cleared, start.cleared_ns = memory["start"]
-        self._rules.owners.recall(memory["owners"])
-        self._senders.recall(memory["senders"])
-        self.cases.recall(memory["cases"], self._finds_until)
-        self._publishers.recall(memory["reported"])
-        self.live.recall(memory["live"], now, self._finds_until)
+        begun = memory.start
+        self._start.begun, self._start.begun_ns = begun.begun, begun.begun_ns
+        self._start.cleared, self._start.cleared_ns = begun.cleared, begun.cleared_ns
+        self._rules.owners.recall(memory.owners)
+        self._senders.recall(memory.senders)
+        self.cases.recall(memory.cases, self._finds_until)
+        self._publishers.recall(memory.reported)
+        self.live.recall(memory.live, now, self._finds_until)
         return [Clear()]
 
     # What is seen.

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tfcompose.ipc import Complete, Found, GuardEvent, Live, OwnerReady, Recovered
 from tfcompose.live.arrivals import Arrivals
@@ -123,6 +123,24 @@ class Track:
         return self.arrivals.steady_rate(self._window_ns // 2)
 
 
+@dataclass(frozen=True, slots=True)
+class SilentMemory:
+    """Edges, by their children, that are silent since a monotonic time in seconds."""
+
+    since: float
+    children: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class LivenessMemory:
+    """What the next guard must know: the edges, by their children, that are live, slow and silent, and gone owners."""
+
+    live: tuple[str, ...]
+    slow: tuple[str, ...]
+    silent: tuple[SilentMemory, ...]
+    gone: tuple[str, ...]
+
+
 class Liveness:
     """The planned edges and their owners; ``changes`` counts what was reported, and what became of owners."""
 
@@ -157,27 +175,27 @@ class Liveness:
         """Note that the owner was started: its edges must be observed anew."""
         self._absent.discard(owner)
 
-    def memory(self) -> dict[str, Any]:
-        """Return what the next guard must know, as values of JSON: who is live, slow, silent (since when)."""
-        silent = [[track.silent_since, _children([track])] for track in self.tracks if track.silent]
+    def memory(self) -> LivenessMemory:
+        """Return what the next guard must know."""
+        silent = tuple(SilentMemory(track.silent_since, _children([track])) for track in self.tracks if track.silent)
         live, slow = ([t for t in self.tracks if t.live], [t for t in self.tracks if t.slow])
-        return {"live": _children(live), "slow": _children(slow), "silent": silent, "gone": sorted(self._gone)}
+        return LivenessMemory(_children(live), _children(slow), silent, tuple(sorted(self._gone)))
 
-    def recall(self, memory: dict[str, Any], now: float, until: float) -> None:
+    def recall(self, memory: LivenessMemory, now: float, until: float) -> None:
         """Restore the previous guard's state, and report no silence before ``until``: discovery starts anew."""
         self._watched.begins_late(until)
-        self._gone = set(memory["gone"])
-        for track in self._parted(self._planned(memory["live"])):
+        self._gone = set(memory.gone)
+        for track in self._parted(self._planned(memory.live)):
             track.live, track.last = True, now
             self._waiting[track.edge.owner].difference_update(edge.child for edge in track.edges)
-        for track in self._parted(self._planned(memory["slow"])):
+        for track in self._parted(self._planned(memory.slow)):
             track.slow = True
-        for since, children in memory["silent"]:
-            for track in self._parted(self._planned(children)):
-                track.silent, track.silent_since, track.last = True, since, since
+        for one in memory.silent:
+            for track in self._parted(self._planned(one.children)):
+                track.silent, track.silent_since, track.last = True, one.since, one.since
         self._complete = not any(self._waiting.values())
 
-    def _planned(self, children: list[str]) -> tuple[str, ...]:
+    def _planned(self, children: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(child for child in children if child in self._track_of)
 
     def arrived(self, children: tuple[str, ...], now: float, delay_s: float | None = None) -> list[GuardEvent]:
@@ -233,7 +251,7 @@ class Liveness:
         """Return the age of the track's last arrival, and its rate in hertz, None while there is too little to say."""
         return now - track.last, track.rate() if track.silent_after is not None else None
 
-    def silent(self) -> list[str]:
+    def silent(self) -> tuple[str, ...]:
         """Return the children of the edges that were live and come no more."""
         return _children([track for track in self.tracks if track.live and (track.silent or self._is_gone(track))])
 
@@ -317,8 +335,8 @@ def change_event(change: str, tracks: list[Track], now: float) -> GuardEvent:
             return Recovered(f"{named} {are} sent at {min(track.rate() or 0.0 for track in tracks):.3g} Hz again")
 
 
-def _children(tracks: list[Track]) -> list[str]:
-    return [edge.child for track in tracks for edge in track.edges]
+def _children(tracks: list[Track]) -> tuple[str, ...]:
+    return tuple(edge.child for track in tracks for edge in track.edges)
 
 
 def _change(track: Track, watched: float, speed: float) -> str | None:

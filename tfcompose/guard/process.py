@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING
 from tfcompose.guard.channel import EventWriter, Memory, OrderReader, SilentEdges, SwitchMemory, recalled
 from tfcompose.guard.diagnostics import DiagnosticsPage
 from tfcompose.guard.gates import Gates, LifecycleDriver, Switches
-from tfcompose.guard.judge import FINDING_S, Judge
+from tfcompose.guard.judge import FINDING_S, Judge, JudgeMemory
 from tfcompose.guard.relay import Feedback, Relay
 from tfcompose.ipc import JOINS, ORDERS_FD, PROCESS, REMAPPED, RUN_ID, SETTLE, Clear, Complete
 from tfcompose.live.publishers import MessageReader
 from tfcompose.live.topics import RunMarks, TFGraph, TFTopics
+from tfcompose.plan.codec import decode
 from tfcompose.plan.topics import GLOBAL, parts_of, private_topics
 from tfcompose.process import ready, say
 from tfcompose.ros.clock import ClockWatch, SimClock
@@ -86,7 +87,7 @@ class TopicWatch:
 
     def begin(self, now: float, memory: dict[str, Any] | None) -> None:
         """Skip the observation before the start: the start was long ago."""
-        self._pass_on(self.judge.tick(now) if memory is None else self.judge.recall(memory, now))
+        self._pass_on(self.judge.tick(now) if memory is None else self.judge.recall(decode(JudgeMemory, memory), now))
         if self.relay and memory:
             self.relay.recall(memory, lambda message: self.judge.admits(message, now), now + FINDING_S)
 

@@ -6,7 +6,7 @@ A violation is reported together with others of its kind and node, and said to b
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tfcompose.findings import Note
 from tfcompose.ipc import Found, GuardEvent, Recovered, Taken
@@ -189,15 +189,15 @@ class Cases:
             return False
         return bool(sender.began_before(self._start.cleared_ns - FIRST_BY_NS, FEWEST_GAPS))
 
-    def memory(self) -> list[list[Any]]:
-        """Return what was reported and is not over, as values of JSON."""
-        return [_to_json(case) for case in self.open.values() if case.reported]
+    def memory(self) -> tuple[CaseMemory, ...]:
+        """Return what was reported and is not over."""
+        return tuple(CaseMemory.of(case) for case in self.open.values() if case.reported)
 
-    def recall(self, memory: list[list[Any]], until: float) -> None:
+    def recall(self, memory: tuple[CaseMemory, ...], until: float) -> None:
         """Take these as reported by the guard before, and as going on ``until`` then at least."""
         planned = {edge.child: edge for edge in self._plan.edges}
         for one in memory:
-            case = _from_json(one, planned, until)
+            case = one.case(planned, until)
             self.open[self._key(case.violation, case.gid)] = case
 
     def over(self, now: float) -> list[GuardEvent]:
@@ -223,18 +223,34 @@ def _over(ended: list[Violation]) -> list[str]:
     return [ended[0].over(len(ended) - 1)]
 
 
-def _to_json(case: Case) -> list[Any]:
-    one = case.violation
-    gid = None if case.gid is None else case.gid.hex()
-    what = (one.code, one.parent, one.child, list(one.nodes), one.static, one.edge is not None)
-    return [*what, one.namesake, list(one.loop), one.detail, gid]
+@dataclass(frozen=True, slots=True)
+class CaseMemory:
+    """What the next guard must know of a case that was reported; ``gid`` is the publisher's id in hexadecimal."""
 
+    code: str
+    parent: str
+    child: str
+    nodes: tuple[str, ...]
+    static: bool
+    is_planned: bool
+    namesake: bool
+    loop: tuple[str, ...]
+    detail: str
+    gid: str | None
 
-def _from_json(data: list[Any], planned: dict[str, PlanEdge], last: float) -> Case:
-    code, parent, child, nodes, static, is_planned, namesake, loop, detail, gid = data
-    edge = planned.get(child) if is_planned else None
-    violation = Violation(code, parent, child, tuple(nodes), static, edge, namesake, tuple(loop), detail)
-    return Case(violation, None if gid is None else bytes.fromhex(gid), last, last, reported=True)
+    @classmethod
+    def of(cls, case: Case) -> CaseMemory:
+        """Return what must be known of the case."""
+        one = case.violation
+        what = (one.code, one.parent, one.child, one.nodes, one.static, one.edge is not None)
+        return cls(*what, one.namesake, one.loop, one.detail, None if case.gid is None else case.gid.hex())
+
+    def case(self, planned: dict[str, PlanEdge], last: float) -> Case:
+        """Return the case, as going on until then at least."""
+        edge = planned.get(self.child) if self.is_planned else None
+        what = (self.code, self.parent, self.child, self.nodes, self.static)
+        violation = Violation(*what, edge, self.namesake, self.loop, self.detail)
+        return Case(violation, None if self.gid is None else bytes.fromhex(self.gid), last, last, reported=True)
 
 
 class PublisherReports:
@@ -301,11 +317,11 @@ class PublisherReports:
                 found += self._once(one, replaced_latched(one.node, first - 1, edges))
         return found
 
-    def memory(self) -> list[list[str]]:
-        """Return what was reported, as values of JSON."""
-        return sorted([code, gid.hex()] for code, gid in self._reported)
+    def memory(self) -> tuple[tuple[str, str], ...]:
+        """Return what was reported: codes, with publishers' ids in hexadecimal."""
+        return tuple(sorted((code, gid.hex()) for code, gid in self._reported))
 
-    def recall(self, memory: list[list[str]]) -> None:
+    def recall(self, memory: tuple[tuple[str, str], ...]) -> None:
         """Take this as reported by the guard before."""
         self._reported = {(code, bytes.fromhex(gid)) for code, gid in memory}
 

@@ -5,8 +5,8 @@ What messages say is read fast where a publisher sends the same edges again and 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from tfcompose.geometry import Pose
 from tfcompose.ros.tf_codec import Decoder, decode
@@ -184,13 +184,13 @@ class Sender:
     first_sequence: int
     last_ns: int
     last_sequence: int
-    gaps_ns: list[float] = field(default_factory=list)
+    gaps_ns: tuple[float, ...] = ()
 
     def heard(self, message: Message) -> None:
         """Note a further message."""
         counted = message.sequence - self.last_sequence
         if counted > 0 and len(self.gaps_ns) < GAPS:
-            self.gaps_ns.append((message.source_ns - self.last_ns) / counted)
+            self.gaps_ns += ((message.source_ns - self.last_ns) / counted,)
         self.last_ns, self.last_sequence = message.source_ns, message.sequence
 
     def began_before(self, time_ns: float, gaps: int = GAPS) -> bool | None:
@@ -210,6 +210,14 @@ def _median(values: Sequence[float]) -> float:
     """Return the middle one; the library's median costs two megabytes in a process that needs it only here."""
     ordered, half = sorted(values), len(values) // 2
     return ordered[half] if len(ordered) % 2 else (ordered[half - 1] + ordered[half]) / 2
+
+
+@dataclass(frozen=True, slots=True)
+class SenderMemory:
+    """What the next guard must know of a sender; ``nodes`` are those that it can be of."""
+
+    nodes: tuple[str, ...]
+    sender: Sender
 
 
 class Senders(Publishers):
@@ -256,20 +264,15 @@ class Senders(Publishers):
         """What changes when there is more to remember."""
         return len(self._heard), sum(one.node is not None for one in self.known.values())
 
-    def memory(self) -> dict[str, list[Any]]:
-        """Return what the next guard must know of those that are there, as values of JSON."""
+    def memory(self) -> dict[str, SenderMemory]:
+        """Return what the next guard must know of those that are there, by their ids in hexadecimal."""
         there = {gid: sender for gid, sender in self._heard.items() if gid in self.present}
-        return {gid.hex(): [self.known[gid].nodes, *_to_json(one)] for gid, one in there.items()}
+        return {gid.hex(): SenderMemory(self.known[gid].nodes, one) for gid, one in there.items()}
 
-    def recall(self, memory: dict[str, list[Any]]) -> None:
+    def recall(self, memory: dict[str, SenderMemory]) -> None:
         """Know what the guard before knew."""
-        for hexed, (names, *numbers) in memory.items():
+        for hexed, one in memory.items():
             gid = bytes.fromhex(hexed)
-            self._heard[gid] = Sender(*numbers)
-            if names:
-                self.known[gid] = Publisher(gid, names[0], static=False, others=tuple(names[1:]))
-
-
-def _to_json(one: Sender) -> list[Any]:
-    first = (one.first_received, one.first_ns, one.first_sequence)
-    return [*first, one.last_ns, one.last_sequence, list(one.gaps_ns)]
+            self._heard[gid] = one.sender
+            if one.nodes:
+                self.known[gid] = Publisher(gid, one.nodes[0], static=False, others=one.nodes[1:])

@@ -318,11 +318,11 @@ class LastSenders:
         """Return who sent it last."""
         return self._gids[child][0] if child in self._gids else None
 
-    def memory(self) -> dict[str, list[str]]:
-        """Return what the next guard must know, as values of JSON."""
-        return {child: [gid.hex(), before.hex() if before else ""] for child, (gid, before) in self._gids.items()}
+    def memory(self) -> dict[str, tuple[str, str]]:
+        """Return what the next guard must know: by frame who sent it last, and who before, in hexadecimal."""
+        return {child: (gid.hex(), before.hex() if before else "") for child, (gid, before) in self._gids.items()}
 
-    def recall(self, memory: dict[str, list[str]]) -> None:
+    def recall(self, memory: dict[str, tuple[str, str]]) -> None:
         """Know what the guard before knew."""
         for child, (gid, before) in memory.items():
             self._gids[child] = (bytes.fromhex(gid), bytes.fromhex(before) or None)

@@ -80,7 +80,8 @@ def test_a_late_joiner_gets_all_fixed_edges_in_one_message(
 ) -> None:
     edges = [edge(f"base_link frame_{n}", "static", Pose((n, 0.0, 0.0))) for n in range(150)]
     other = [edge("odom base_link", "wheels")]
-    process = start("tfcompose.publishers.static", write(edges + other, PlanProcess("static", "static")), "static")
+    both = PlanProcess("static", "static"), PlanProcess("wheels", "external")
+    process = start("tfcompose.publishers.static", write(edges + other, *both), "static")
     process.until_says("150 edges on /tf_static")
     ((received, transforms),) = listeners.tf(1, static=True)
     assert [(t.parent, t.child, t.xyz[0]) for t in transforms] == [("base_link", f"frame_{n}", n) for n in range(150)]

@@ -14,13 +14,13 @@ from tfcompose.files import AS_IN_SOURCE, Target
 from tfcompose.model import JOINTS, STATIC
 from tfcompose.numbers import clean
 from tfcompose.plan import DESCRIPTION, Claim, Driven, Joint, Plan, PlanEdge, SourceLine, switch_text
+from tfcompose.plan.codec import narrowed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tfcompose.model import Edge, MountedSensor, Process, Robot
     from tfcompose.plan import PlanProcess, PoseKnowledge
-
 
 _FILE = re.compile(r"\$\{file:([^{}]*)\}")
 
@@ -97,7 +97,7 @@ def _edge(edge: Edge, node: str, file: str, prefix: str) -> PlanEdge:
     joint = None
     if moving:
         name, mimic = moving.name.removeprefix(prefix), moving.mimic and moving.mimic.removeprefix(prefix)
-        joint = Joint(name, moving.type, moving.axis, mimic, moving.multiplier, moving.offset)
+        joint = narrowed(Joint, moving, name=name, mimic=mimic)
     return PlanEdge(
         parent=edge.parent,
         child=edge.child,

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, dataclass
+from dataclasses import MISSING, dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
+from tfcompose.plan import Joint as PlanJoint
 from tfcompose.plan.codec import documented
 from tfcompose.units import JointDamping, JointEffort, JointPosition, JointVelocity, Number  # noqa: TC001 (read by them)
 
 if TYPE_CHECKING:
     from tfcompose.findings import Span
-    from tfcompose.geometry import Vector
     from tfcompose.plan import JointType
 
 #: Joints that joint states move; those of them that have ends; and those that have more than one position, of which
@@ -65,18 +65,15 @@ class ReferencePositions:
 
 
 @dataclass(frozen=True, slots=True)
-class Joint:
-    """A joint that can move; ``axis`` is a unit vector in the child's frame, for planar the plane's normal."""
+class Joint(PlanJoint):
+    """A joint of the plan, with what only the compiler knows of it; the axis of a planar one is the plane's normal.
 
-    name: str
-    type: JointType
-    at: Span
-    axis: Vector = (1.0, 0.0, 0.0)
-    limit: Limit | None = None
-    mimic: str | None = None
-    multiplier: float = 1.0
-    offset: float = 0.0
-    axis_length: float = 1.0  # as it was written
-    dynamics: Dynamics | None = None
-    safety: SafetyController | None = None
-    reference: ReferencePositions | None = None
+    ``axis_length`` is that of the axis as it was written.
+    """
+
+    at: Span = field(kw_only=True)
+    limit: Limit | None = field(default=None, kw_only=True)
+    axis_length: float = field(default=1.0, kw_only=True)
+    dynamics: Dynamics | None = field(default=None, kw_only=True)
+    safety: SafetyController | None = field(default=None, kw_only=True)
+    reference: ReferencePositions | None = field(default=None, kw_only=True)

@@ -170,7 +170,7 @@ def _joint(name: str, kind: Any, element: Element, values: Values) -> Joint:
         x, y, z, length = 1.0, 0.0, 0.0, 1.0
     axis: Vector = (x / length, y / length, z / length)
     mimic = element.first("mimic")
-    joint = Joint(name, kind, element.at_value("name"), axis, axis_length=length)
+    joint = Joint(name, kind, axis, at=element.at_value("name"), axis_length=length)
     if mimic is not None:
         master = values.text(mimic, "joint", '<mimic joint="…"/>')
         multiplier, offset = values.number(mimic, "multiplier", 1.0), values.number(mimic, "offset", 0.0)

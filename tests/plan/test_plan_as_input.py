@@ -65,6 +65,13 @@ def test_a_program_may_be_given_several_lines() -> None:
     assert plan.processes[0].argv[2] == "a\n\tb"
 
 
+@pytest.mark.parametrize("name", ["ur-driver", "3d_lidar", "cam.left", "arm/ur-driver", "arm/_x"])
+def test_every_name_that_a_robot_file_may_give_to_a_process_is_taken(name: str) -> None:
+    """As rule TF501 has it."""
+    text = plan_with(lambda plan: plan["processes"][-1].update(name=name))
+    assert read_plan(text, "plan.json").processes[-1].name == name
+
+
 @pytest.mark.parametrize("kind", ["pipe", "link", "terminal"])
 def test_a_review_neither_waits_nor_reads_elsewhere_nor_moves_the_cursor(
     kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 #: A robot's name, which becomes part of topics, units and programs; and a process's, in a part with the part's name.
 _ROBOT = re.compile(r"[a-z][a-z0-9_]*")
-_PROCESS = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?:/[A-Za-z][A-Za-z0-9_]*)*")
+_PROCESS = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(?:/[A-Za-z0-9_][A-Za-z0-9_.-]*)*")
 #: Keys below which text may hold lines and tabs: what programs are given.
 _FOR_PROGRAMS = frozenset({"argv", "env", "switches"})
 
@@ -80,7 +80,7 @@ def _wrong_names(plan: Plan) -> Iterator[str]:
     known = Counter(process.name for process in plan.processes)
     for name, times in known.items():
         if not _PROCESS.fullmatch(name):
-            yield f"a process is named {shown(name)}, not with letters, digits and _"
+            yield f"a process is named {shown(name)}, not with letters, digits, _, - and ."
         if times > 1:
             yield f"{times} processes are named {name}"
     yield from (

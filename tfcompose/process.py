@@ -15,10 +15,10 @@ from select import select
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import RejectedError, Span, finding
-from tfcompose.ipc import GO, HOLD_FD
 from tfcompose.plan.file import read_plan
 from tfcompose.ros.environment import RosError, child_environment, missing_ros
 from tfcompose.signals import Stop
+from tfcompose.variables import GO, HOLD_FD
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -13,8 +13,9 @@ from tests.support.findings import expect
 from tfcompose.guard import gates
 from tfcompose.guard.channel import SwitchMemory, recalled
 from tfcompose.guard.gates import Switches
-from tfcompose.ipc import MEMORY_FD, Found, GuardEvent, Remember
+from tfcompose.ipc import Found, GuardEvent, Remember
 from tfcompose.plan import Driven, Plan, PlanProcess, RosSettings
+from tfcompose.variables import MEMORY_FD
 from tfcompose.verdict.drivers import not_taken
 
 if TYPE_CHECKING:

@@ -16,11 +16,11 @@ from hypothesis import strategies as st
 from tests.support.findings import expect
 from tfcompose.findings import Finding
 from tfcompose.geometry import Pose
-from tfcompose.ipc import REMAPPED
 from tfcompose.launcher.preflight import LAUNCH, Command, commands_of
 from tfcompose.plan import FenceWay, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.plan.topics import private_topics
 from tfcompose.ros.environment import child_environment
+from tfcompose.variables import REMAPPED
 
 GUARD = PlanProcess("guard", "guard", argv=("true",))
 SLAM = PlanProcess("slam", "run", argv=("true",), nodes=("/slam",), owns=(("map", "odom"),))

@@ -11,11 +11,18 @@ import pytest
 
 from tests.support.launcher import LISTEN, SLEEPER, Launcher, plan_of, program
 from tests.support.waiting import TIMEOUT_S, gone, until
-from tfcompose.ipc import GO, GUARD_EVENTS, HOLD_FD, Clear, LogLine, Notice, ProcessState
+from tfcompose.ipc import (
+    GUARD_EVENTS,
+    Clear,
+    LogLine,
+    Notice,
+    ProcessState,
+)
 from tfcompose.launcher.supervisor import supervise
 from tfcompose.plan import PlanProcess
 from tfcompose.process import wait_for_go
 from tfcompose.signals import Stop
+from tfcompose.variables import GO, HOLD_FD
 
 #: Says what it has loaded before it is let go, as an own process would.
 HELD = f"""

@@ -10,7 +10,6 @@ from tests.support.findings import expect
 from tests.support.machine_history import GUARD, SLAM, STATIC, begin, plan_of, run_process
 from tfcompose.findings import finding
 from tfcompose.ipc import (
-    SETTLE,
     Clear,
     Complete,
     Ended,
@@ -42,6 +41,7 @@ from tfcompose.launcher.events import (
 from tfcompose.launcher.machine import step, wake_time
 from tfcompose.launcher.state import initial
 from tfcompose.plan import GuardPolicy, PlanProcess
+from tfcompose.variables import SETTLE
 
 DRIVE = PlanProcess("drive", "external", owns=(("odom", "base_link"),))
 ERROR = finding("TF801", "rogue publishes base_link → laser, which is static's", None)

@@ -13,10 +13,10 @@ from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import UNREADABLE, fail, reject
 from tfcompose.files import with_absolute_addresses
 from tfcompose.findings import RejectedError
-from tfcompose.ipc import SETTLE
 from tfcompose.plan import Plan
 from tfcompose.plan.file import read_plan, write_plan
 from tfcompose.plan.hosts import share_of
+from tfcompose.variables import SETTLE
 
 if TYPE_CHECKING:
     from argparse import Namespace

@@ -16,11 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.guard.liveness import MOST_NAMED
 from tfcompose.ipc import (
-    EVENTS_FD,
     GUARD_EVENTS,
     GUARD_ORDERS,
-    MEMORY_FD,
-    ORDERS_FD,
     Absent,
     Alive,
     Clear,
@@ -37,6 +34,7 @@ from tfcompose.ipc import (
 )
 from tfcompose.plan.codec import encode
 from tfcompose.process import say
+from tfcompose.variables import EVENTS_FD, MEMORY_FD, ORDERS_FD
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

@@ -18,7 +18,7 @@ from tfcompose.guard.diagnostics import DiagnosticsPage
 from tfcompose.guard.gates import Gates, LifecycleDriver, Switches
 from tfcompose.guard.judge import FINDING_S, Judge, JudgeMemory
 from tfcompose.guard.relay import Feedback, Relay
-from tfcompose.ipc import JOINS, ORDERS_FD, PROCESS, REMAPPED, RUN_ID, SETTLE, Clear, Complete
+from tfcompose.ipc import Clear, Complete
 from tfcompose.live.publishers import MessageReader
 from tfcompose.live.topics import RunMarks, TFGraph, TFTopics
 from tfcompose.plan.codec import decode
@@ -29,6 +29,14 @@ from tfcompose.ros.environment import PROFILE_VARIABLES
 from tfcompose.ros.graph import ids_say_who
 from tfcompose.ros.node import open_node, wait
 from tfcompose.text import counted
+from tfcompose.variables import (
+    JOINS,
+    ORDERS_FD,
+    PROCESS,
+    REMAPPED,
+    RUN_ID,
+    SETTLE,
+)
 from tfcompose.verdict.drivers import expected_of
 
 if TYPE_CHECKING:

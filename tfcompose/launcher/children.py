@@ -14,11 +14,14 @@ from typing import TYPE_CHECKING, Any
 
 import regex
 
-from tfcompose.ipc import (
+from tfcompose.ipc import GUARD_EVENTS, GUARD_ORDERS, LogLine
+from tfcompose.launcher.child import LAST_LINE_LENGTH, Child, Pipe, has_ended, kill_group, reap_adopted, spawn
+from tfcompose.launcher.events import Exited, LogMatched, Started, StartFailed
+from tfcompose.launcher.processes import descendants, end, launcher_mark, leftovers, leftovers_of, signal_leftovers
+from tfcompose.signals import SIGNALS
+from tfcompose.variables import (
     EVENTS_FD,
     GO,
-    GUARD_EVENTS,
-    GUARD_ORDERS,
     HOLD_FD,
     JOINS,
     LAUNCHER,
@@ -26,12 +29,7 @@ from tfcompose.ipc import (
     ORDERS_FD,
     PROCESS,
     RUN_ID,
-    LogLine,
 )
-from tfcompose.launcher.child import LAST_LINE_LENGTH, Child, Pipe, has_ended, kill_group, reap_adopted, spawn
-from tfcompose.launcher.events import Exited, LogMatched, Started, StartFailed
-from tfcompose.launcher.processes import descendants, end, launcher_mark, leftovers, leftovers_of, signal_leftovers
-from tfcompose.signals import SIGNALS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import RejectedError
-from tfcompose.ipc import JOINS
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.plan.file import read_plan
 from tfcompose.ros.environment import child_environment
+from tfcompose.variables import JOINS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from tfcompose.findings import Finding, Note, did_you_mean, finding
-from tfcompose.ipc import REMAPPED
 from tfcompose.launcher.fence import by_partition, not_remapped, remapped, way_of
+from tfcompose.variables import REMAPPED
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

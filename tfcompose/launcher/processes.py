@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.ipc import LAUNCHER, PROCESS, RUN_ID
+from tfcompose.variables import LAUNCHER, PROCESS, RUN_ID
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator

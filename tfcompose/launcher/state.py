@@ -8,8 +8,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
-from tfcompose.ipc import SETTLE, Ended, FindingShown, Notice, Present, ProcessState, StateName, Stopping
+from tfcompose.ipc import (
+    Ended,
+    FindingShown,
+    Notice,
+    Present,
+    ProcessState,
+    StateName,
+    Stopping,
+)
 from tfcompose.launcher.events import Action, Finish, Notify, Order, Start
+from tfcompose.variables import SETTLE
 
 if TYPE_CHECKING:
     from tfcompose.findings import Finding

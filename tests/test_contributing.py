@@ -8,6 +8,7 @@ import re
 import yaml
 
 from tests.support.house import GUIDE, ROOT, mermaid, with_drawing
+from tests.support.skips import ACCEPTED
 
 TEXT = GUIDE.read_text("utf-8")
 #: What the examples would add.
@@ -44,3 +45,9 @@ def test_the_fast_tests_are_folders_that_are_there() -> None:
     folders = [word for word in hooks["fast-tests"]["entry"].split() if word.startswith("tests/")]
     assert len(folders) > 10
     assert all((ROOT / folder).exists() for folder in folders)
+
+
+def test_tests_that_may_be_skipped_are_there() -> None:
+    for name in ACCEPTED:
+        file, _, test = name.partition("::")
+        assert f"def {test}" in (ROOT / file).read_text("utf-8"), name

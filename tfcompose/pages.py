@@ -422,6 +422,13 @@ guard receives. The process was started with another file, or without one: a she
 FASTRTPS_DEFAULT_PROFILES_FILE, or clears the environment. What it sends reaches every listener, so tfcompose stops it,
 whatever on_violation says. Name that file under env: of the process, and tfcompose adds the fence to it; or let the
 guard fence off by remapping: guard: {fence: remap}.""",
+    "TF853": """A node publishes more TF than the guard can judge.
+
+The guard judges edges that nobody declared up to a bound, so that a flood of them neither stops it nor delays a strict
+robot: beyond it they are not reported one by one, and strict holds them back. Declared edges are always judged, unless
+a publisher sends other edges in each message, and so many that reading them takes a tenth of the guard's time: then
+some of its messages are skipped. Such a node usually invents a frame for each object or each message: let it reuse
+names, or end it.""",
     "TF901": """ROS 2 is missing, or cannot be used.
 
 pip install 'tfcompose[ros]' brings it on x86-64 Linux; elsewhere source your distribution's setup file.""",

@@ -1,12 +1,13 @@
 """Switched edges, loops, frames in themselves, edges that are allowed to anybody, and how they are published."""
 
+import time
 from dataclasses import replace
 
 import pytest
 
 from tests.support.findings import expect, words_of
 from tests.support.guard_history import EDGES, PROCESSES, SETTLE_S, TOOL, History
-from tfcompose.guard.judge import Judge
+from tfcompose.guard.judge import MOST_UNDECLARED, MOST_VERDICT_EDGES, Judge
 from tfcompose.ipc import Found, Taken
 from tfcompose.live.publishers import Publisher
 from tfcompose.plan import EdgePattern, GuardPolicy, Plan, RosSettings
@@ -155,3 +156,49 @@ def test_a_program_of_the_robots_own_is_not_to_be_ended_but_to_leave_the_edge_ou
     own, stranger = history.found()
     expect(own, own.code, advice)
     expect(stranger, own.code, "end /rogue")
+
+
+# Floods: what nobody declared is judged up to a bound, what is declared always.
+
+
+def flood_of(count: int, begin: int = 0) -> str:
+    return ", ".join(f"f{number} f{number + 1}" for number in range(begin, begin + count))
+
+
+def test_a_flood_of_undeclared_edges_is_reported_once_and_declared_edges_are_judged() -> None:
+    running = History(GuardPolicy(mode="strict")).clear()
+    rogue, slam = running.joins("/rogue"), running.joins("/slam")
+    running.check().send(rogue, flood_of(3000)).wait(0.2)
+    running.send(rogue, f"{flood_of(3000)}, map odom").wait(0.2)
+    assert running.judge.admitted == frozenset()
+    running.send(slam, "map odom")
+    assert running.judge.admitted is None
+    running.wait(1)
+    codes = [one.code for one in running.found()]
+    assert codes.count("TF853") == 1
+    assert "TF801" in codes, "the declared edge in the flood"
+    expect(next(one for one in running.found() if one.code == "TF853"), "TF853", "/rogue", "3,000")
+
+
+def test_edges_with_ever_new_names_are_remembered_up_to_a_bound() -> None:
+    running = History().clear()
+    rogue = running.joins("/rogue")
+    running.check()
+    for number in range(60):
+        running.send(rogue, flood_of(500, number * 500)).wait(0.1)
+    assert len(running.judge.cases.open) <= MOST_UNDECLARED + len(EDGES) + 500
+    assert sum(len(edges) for _, _, edges in running.judge._verdicts._verdicts) <= MOST_VERDICT_EDGES
+    assert [one.code for one in running.found()].count("TF853") == 1
+
+
+def test_the_cost_of_a_chain_grows_with_its_edges_and_not_faster() -> None:
+    def seconds(edges: int) -> float:
+        running = History().clear()
+        rogue = running.joins("/rogue")
+        message = flood_of(edges)
+        begun = time.process_time()
+        running.check().send(rogue, message).send(rogue, message)
+        return time.process_time() - begun
+
+    seconds(100)
+    assert min(seconds(8000) for _ in range(3)) < 16 * min(seconds(1000) for _ in range(3))

@@ -8,6 +8,7 @@ import signal
 import sys
 from typing import TYPE_CHECKING
 
+import psutil
 import pytest
 
 from tests.support import processes
@@ -169,3 +170,42 @@ def test_a_child_that_leaves_the_fence_is_named_and_stopped(
     assert until(lambda: gone(robot.pid_of("rogue")))
     assert robot.popen.poll() is None
     assert robot.text.count("error[TF852]") == 1
+
+
+#: A node that sends new frames in each message: so many transforms, ten times a second.
+FLOOD = """
+import signal, sys, time
+from tfcompose.ros.tf_codec import Transform, encode
+from tfcompose.ros.node import TFPublisher, open_node
+signal.signal(signal.SIGTERM, lambda *_: sys.exit())
+with open_node("flood", "/") as node:
+    publisher, n = TFPublisher(node, static=False), 0
+    print("ready", flush=True)
+    while True:
+        n, now = n + 1, time.time_ns()
+        rest = ((0, 0, 0), (0, 0, 0, 1))
+        publisher.publish(encode([Transform(now, f"f{n}_{i}", f"f{n}_{i + 1}", *rest) for i in range(3000)]))
+        time.sleep(0.1)
+"""
+#: What a guard may grow by, however much is sent.
+MOST_GROWTH = 60_000_000
+
+
+@pytest.mark.parametrize("guard", ["mode: watch", "mode: strict"])
+def test_a_flood_of_ever_new_frames_is_named_and_takes_neither_the_tree_nor_the_memory(
+    run: Callable[..., Liars], guard: str
+) -> None:
+    robot = run(guard)
+    robot.says("tree complete")
+    process = psutil.Process(robot.pid_of("guard"))
+    before = process.memory_info().rss
+    (robot.folder / "flood.py").write_text(FLOOD, encoding="utf-8")
+    flood = processes.start([sys.executable, "flood.py"], cwd=robot.folder)
+    try:
+        robot.says("error[TF853]", "/flood")
+        heard_until("odom", OWNER_X, 60)
+        assert process.memory_info().rss - before < MOST_GROWTH
+    finally:
+        processes.end(flood)
+    assert robot.pid_of("guard") == process.pid, "it was not killed as one that hangs"
+    assert process.is_running()

@@ -17,6 +17,7 @@ ELSEWHERE = {
     "TF829": "presets/test_driver_ros.py",
     "TF850": "guard/test_guard_faults_ros.py",
     "TF852": "guard/test_liars_ros.py",
+    "TF853": "guard/test_liars_ros.py",
 }
 
 

@@ -37,6 +37,10 @@ FINDING_S = 5.0
 NAMELESS_OWNER_S = 5.0
 #: For so many kinds of messages what was judged of them is remembered.
 MOST_VERDICTS = 4096
+#: These messages have so many edges at most, together.
+MOST_VERDICT_EDGES = 200_000
+#: While so many undeclared edges are known to be wrong, or wait for their sender's name, no further ones are judged.
+MOST_UNDECLARED = 1000
 #: What was judged of a message with edges that the plan does not have holds for so long.
 STRANGE_S = 1.0
 
@@ -133,9 +137,14 @@ class Judge:
         """Take who publishes on the global topics while the plan's own (moving, static) are ``topics``."""
         return list(self._publishers.leaks(publishers, topics))
 
+    def skipped(self, gid: bytes | None) -> None:
+        """Note that a publisher sends more than can be judged."""
+        self._verdicts.unjudged.setdefault(gid, 0)
+
     def tick(self, now: float) -> list[GuardEvent]:
         """Return what the passing of time means."""
         events = [*self._see_again(now), *self.cases.report(now), *map(Found, self._sent.judge())]
+        events += self._publishers.floods(self._senders, self._verdicts.unjudged)
         if self._start.cleared is not None:
             over = self.cases.over(now)
             self._rules.changes += bool(over)
@@ -255,7 +264,10 @@ class Verdicts:
         self._cases = cases
         self._start = start
         self._verdicts: dict[tuple[bytes | None, bool, Edges], Verdict] = {}
+        self._verdict_edges = 0
         self._pending: dict[SentEdge, float] = {}
+        #: Publishers of undeclared edges that were not judged: there are too many. How many a message had at most.
+        self.unjudged: dict[bytes | None, int] = {}
 
     @property
     def waits(self) -> bool:
@@ -267,8 +279,10 @@ class Verdicts:
         key = (message.gid, message.static, message.edges)
         verdict = self._verdicts.get(key)
         if verdict is None:
-            if len(self._verdicts) >= MOST_VERDICTS:
+            self._verdict_edges += len(message.edges)
+            if len(self._verdicts) >= MOST_VERDICTS or self._verdict_edges > MOST_VERDICT_EDGES:
                 self._verdicts.clear()
+                self._verdict_edges = len(message.edges)
             verdict = self._verdicts[key] = Verdict()
         if verdict.epoch != self._rules.changes or now > verdict.until:
             self.judge(verdict, message, now)
@@ -287,7 +301,12 @@ class Verdicts:
         sure = self._senders.is_sure(message.gid)
         epoch, certain = self._rules.changes, sure
         cases, children, admitted = [], [], []
+        strange = 0
         for parent, child in dict.fromkeys(message.edges):
+            if child not in self._rules.planned:
+                strange += 1
+                if self._is_full:
+                    continue
             sent = SentEdge(message.gid, parent, child, message.static)
             violation = self._rules.violation(sent, nodes, now) if nodes else None
             # Where ids do not say whose they are, the sender may be one that the graph does not show yet.
@@ -305,9 +324,15 @@ class Verdicts:
                 children.append(child)
         verdict.admitted = None if {*admitted} == {*message.edges} else frozenset(admitted)
         verdict.cases, verdict.children = tuple(cases), tuple(children)
+        if strange and self._is_full:
+            self.unjudged[message.gid] = max(strange, self.unjudged.get(message.gid, 0))
+            epoch = self._rules.changes
         verdict.epoch = epoch if certain and epoch == self._rules.changes else -1
-        strange = any(child not in self._rules.planned for _, child in message.edges)
         verdict.until = now + STRANGE_S if strange else float("inf")
+
+    @property
+    def _is_full(self) -> bool:
+        return self._cases.undeclared + len(self._pending) >= MOST_UNDECLARED
 
     def see_again(self, now: float) -> list[tuple[str, ...]]:
         """Judge what waited for a name, and return the planned edges that have come with it, by their senders."""

@@ -15,7 +15,14 @@ from tfcompose.live.state import NAMELESS
 from tfcompose.plan.topics import GLOBAL
 from tfcompose.verdict.drivers import drives_of, sensor_of
 from tfcompose.verdict.ownership import Violation, misnamed_help, taken_finding, violation_finding
-from tfcompose.verdict.publishers import best_effort_publisher, leak, replaced_latched, unfenced, volatile_publisher
+from tfcompose.verdict.publishers import (
+    best_effort_publisher,
+    flood,
+    leak,
+    replaced_latched,
+    unfenced,
+    volatile_publisher,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -97,6 +104,11 @@ class Cases:
         """Return what the case is known by; where ids do not say whose, who may have done it changes all the time."""
         who = violation.who if self._senders.is_sure(gid) else ""
         return (violation.code, violation.parent, violation.child, who)
+
+    @property
+    def undeclared(self) -> int:
+        """How many cases there are at least about edges that nobody declared."""
+        return max(0, len(self.open) - len(self._plan.edges))
 
     @property
     def unreported(self) -> bool:
@@ -291,6 +303,15 @@ class PublisherReports:
             if one.node and one.ours and one.process and one.fenced is False
             for found in self._once(one, unfenced(one.node, one.process, one.topic or GLOBAL[one.static]))
         ]
+
+    def floods(self, senders: Senders, unjudged: dict[bytes | None, int]) -> list[Found]:
+        """Return the findings for publishers of more undeclared edges than are judged, by how many a message has."""
+        found = []
+        for gid, edges in unjudged.items():
+            one = senders.known.get(gid) if gid is not None else None
+            if one and one.node:
+                found += self._once(one, flood(one.node, edges, one.where))
+        return found
 
     def leaks(self, publishers: Sequence[Publisher], topics: tuple[str, str]) -> list[Found]:
         """Return the findings for the plan's nodes on the global topics, while its own (moving, static) are others."""

@@ -46,7 +46,7 @@ class MessageReader:
 
     def __init__(self, frames: frozenset[str] = frozenset()) -> None:
         self._frames = frames
-        self._decoder = Decoder()
+        self.decoder = Decoder()
         self._posed: set[tuple[bytes | None, Layout]] = set()
 
     def read(self, received: Received, *, static: bool) -> Message:
@@ -55,7 +55,7 @@ class MessageReader:
         Raises:
             ValueError: with one sentence, if it is no TFMessage.
         """
-        layout, stamps = self._decoder.stamps(received.data)
+        layout, stamps = self.decoder.stamps(received.data)
         edges = layout.plain_edges
         poses: tuple[Pose, ...] = ()
         if self._frames and (received.gid, layout) not in self._posed:
@@ -67,9 +67,9 @@ class MessageReader:
     def _poses(self, received: Received, layout: Layout) -> tuple[Pose, ...]:
         if len(self._posed) >= _MOST:
             self._posed.clear()
-        self._posed.add((received.gid, layout))
         if not any(child in self._frames for _, child in layout.plain_edges):
             return ()
+        self._posed.add((received.gid, layout))
         return tuple(Pose(one.xyz, one.quat_xyzw) for one in decode(received.data))
 
 

@@ -37,6 +37,8 @@ _OWN = ("static", "joints")
 KEPT_S = 10.0
 #: Of frames that nobody planned so many are remembered.
 MOST_FRAMES = 10_000
+#: A loop is looked for so many edges up, so that a chain of thousands costs a bounded time; no robot is that deep.
+DEEPEST_LOOP = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -346,7 +348,10 @@ class KnownTree:
 
     def loop(self, parent: str, child: str, now: float) -> tuple[str, ...]:
         """Return the frames of the loop that the edge closes, from ``child`` down to it again; () if it closes none."""
-        return loop_closed_by((parent, child), lambda frame: self._parent(frame, now))
+        left = iter(range(DEEPEST_LOOP))
+        return loop_closed_by(
+            (parent, child), lambda frame: None if next(left, None) is None else self._parent(frame, now)
+        )
 
     def is_planned(self, parent: str, child: str) -> bool:
         """Return whether the plan has this edge."""

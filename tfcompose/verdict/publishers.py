@@ -49,6 +49,14 @@ def topics_message(edges: str, topics: Sequence[tuple[str, str]], declared: str 
     return f"{edges} {'are' if several else 'is'} published {on}{', declared for ' if declared else ''}{declared}"
 
 
+def flood(node: str, edges: int, where: str) -> Finding:
+    """Return the finding for a publisher of more undeclared edges than the guard judges: so many in a message."""
+    what = f"{edges:,} undeclared edges in a message, more than" if edges else "more TF than"
+    message = f"{node} publishes {what} the guard judges: only declared edges are judged"
+    notes = [Note(f"{node} runs {where}")] if where else []
+    return finding("TF853", message, None, notes=notes, help=f"end {node}, or let it publish fewer edges")
+
+
 def unfenced(node: str, process: str, topic: str) -> Finding:
     """Return the finding for a process of a strict plan that was started without its profile of the fence."""
     message = f"{node} of {process} publishes {topic} past the fence of guard: strict: every listener receives it"

@@ -14,8 +14,8 @@ from tfcompose.files import AS_IN_SOURCE, File, Target
 from tfcompose.plan import DESCRIPTION
 from tfcompose.plan.file import write_plan
 from tfcompose.render.tree import graph_of, tree
+from tfcompose.urdf.macro import MACRO, caller, macro
 from tfcompose.urdf.write import urdf
-from tfcompose.urdf.xacro import MACRO, caller, macro
 
 if TYPE_CHECKING:
     from tfcompose.model import Process, Robot

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import unicodedata
 from collections import Counter
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
@@ -19,6 +18,8 @@ if TYPE_CHECKING:
 #: A robot's name, which becomes part of topics, units and programs; and a process's, in a part with the part's name.
 _ROBOT = re.compile(r"[a-z][a-z0-9_]*")
 _PROCESS = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(?:/[A-Za-z0-9_][A-Za-z0-9_.-]*)*")
+#: Control characters, and halves of characters.
+_CONTROL = re.compile("[\\x00-\\x1f\\x7f-\\x9f\\ud800-\\udfff]")
 #: Keys below which text may hold lines and tabs: what programs are given.
 _FOR_PROGRAMS = frozenset({"argv", "env", "switches"})
 
@@ -61,8 +62,8 @@ def read_plan(text: str, file: str) -> Plan:
 def _wrong_text(data: Any, path: tuple[str, ...]) -> Iterator[str]:
     """Yield what is wrong with each text: control characters would move a terminal's cursor, or begin a new line."""
     if isinstance(data, str):
-        allowed = "\n\t" if _FOR_PROGRAMS & set(path) else ""
-        if any(unicodedata.category(one) in {"Cc", "Cs"} and one not in allowed for one in data):
+        found = _CONTROL.findall(data)
+        if found and not (_FOR_PROGRAMS & set(path) and {"\n", "\t"}.issuperset(found)):
             yield f"{'.'.join(path)} holds a control character: {json.dumps(data)[:60]}"
     elif isinstance(data, dict):
         for key, value in data.items():

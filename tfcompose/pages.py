@@ -424,11 +424,11 @@ whatever on_violation says. Name that file under env: of the process, and tfcomp
 guard fence off by remapping: guard: {fence: remap}.""",
     "TF853": """A node publishes more TF than the guard can judge.
 
-The guard judges edges that nobody declared up to a bound, so that a flood of them neither stops it nor delays a strict
-robot: beyond it they are not reported one by one, and strict holds them back. Declared edges are always judged, unless
-a publisher sends other edges in each message, and so many that reading them takes a tenth of the guard's time: then
-some of its messages are skipped. Such a node usually invents a frame for each object or each message: let it reuse
-names, or end it.""",
+Of each publisher the guard judges a thousand edges that nobody declared, so that a flood of them neither stops it nor
+delays a strict robot: further ones are not reported one by one, and strict holds them back. Its declared edges are
+judged all the same, unless it sends other edges in each message, and so many that reading them takes a tenth of the
+guard's time: then some of its messages are skipped. Such a node usually invents a frame for each object or each
+message: let it use the same frames again, or end it.""",
     "TF901": """ROS 2 is missing, or cannot be used.
 
 pip install 'tfcompose[ros]' brings it on x86-64 Linux; elsewhere source your distribution's setup file.""",

@@ -7,10 +7,11 @@ import pytest
 
 from tests.support.findings import expect, words_of
 from tests.support.guard_history import EDGES, PROCESSES, SETTLE_S, TOOL, History
-from tfcompose.guard.judge import MOST_UNDECLARED, MOST_VERDICT_EDGES, Judge
+from tfcompose.guard.judge import MOST_VERDICT_EDGES, Judge
 from tfcompose.ipc import Found, Taken
 from tfcompose.live.publishers import Publisher
 from tfcompose.plan import EdgePattern, GuardPolicy, Plan, RosSettings
+from tfcompose.verdict.ownership import MOST_UNDECLARED
 
 
 def test_the_owner_may_hang_a_switched_edge_on_each_of_its_parents_and_on_no_other() -> None:
@@ -177,7 +178,19 @@ def test_a_flood_of_undeclared_edges_is_reported_once_and_declared_edges_are_jud
     codes = [one.code for one in running.found()]
     assert codes.count("TF853") == 1
     assert "TF801" in codes, "the declared edge in the flood"
-    expect(next(one for one in running.found() if one.code == "TF853"), "TF853", "/rogue", "3,000")
+    expect(next(one for one in running.found() if one.code == "TF853"), "TF853", "/rogue")
+
+
+def test_others_are_judged_during_a_flood_and_what_is_allowed_passes() -> None:
+    allow = (EdgePattern(parent="map", child="person_*"),)
+    running = History(GuardPolicy(mode="strict", allow=allow)).clear()
+    rogue, tracker = running.joins("/rogue"), running.joins("/tracker")
+    running.check().send(rogue, f"{flood_of(3000)}, map person_7").wait(0.2)
+    assert running.judge.admitted == frozenset({("map", "person_7")})
+    running.send(tracker, "map person_1").send(tracker, "map person_2, map cup").wait(1)
+    assert running.judge.admitted == frozenset({("map", "person_2")})
+    found = [(one.code, word) for one in running.found() for word in ("/rogue", "/tracker") if word in one.message]
+    assert sorted(set(found)) == [("TF803", "/rogue"), ("TF803", "/tracker"), ("TF853", "/rogue")]
 
 
 def test_edges_with_ever_new_names_are_remembered_up_to_a_bound() -> None:

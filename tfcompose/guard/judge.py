@@ -18,7 +18,7 @@ from tfcompose.guard.reports import CaseMemory, Cases, PublisherReports
 from tfcompose.ipc import Clear, Found, GuardEvent
 from tfcompose.live.publishers import NAMELESS_S, SenderMemory, Senders
 from tfcompose.verdict.drivers import SentPoses
-from tfcompose.verdict.ownership import OwnershipRules, SentEdge, Start, Violation, violation_finding
+from tfcompose.verdict.ownership import MOST_UNDECLARED, OwnershipRules, SentEdge, Start, Violation, violation_finding
 from tfcompose.verdict.stamps import Clocks, StampHistory
 
 if TYPE_CHECKING:
@@ -39,8 +39,6 @@ NAMELESS_OWNER_S = 5.0
 MOST_VERDICTS = 4096
 #: These messages have so many edges at most, together.
 MOST_VERDICT_EDGES = 200_000
-#: While so many undeclared edges are known to be wrong, or wait for their sender's name, no further ones are judged.
-MOST_UNDECLARED = 1000
 #: What was judged of a message with edges that the plan does not have holds for so long.
 STRANGE_S = 1.0
 
@@ -137,14 +135,14 @@ class Judge:
         """Take who publishes on the global topics while the plan's own (moving, static) are ``topics``."""
         return list(self._publishers.leaks(publishers, topics))
 
-    def skipped(self, gid: bytes | None) -> None:
-        """Note that a publisher sends more than can be judged."""
-        self._verdicts.unjudged.setdefault(gid, 0)
+    def is_flooded_by(self, gid: bytes | None) -> bool:
+        """Return whether the publisher has published more undeclared edges than are judged."""
+        return gid in self._verdicts.flooders
 
     def tick(self, now: float) -> list[GuardEvent]:
         """Return what the passing of time means."""
         events = [*self._see_again(now), *self.cases.report(now), *map(Found, self._sent.judge())]
-        events += self._publishers.floods(self._senders, self._verdicts.unjudged)
+        events += self._publishers.floods(self._senders, self._verdicts.flooders)
         if self._start.cleared is not None:
             over = self.cases.over(now)
             self._rules.changes += bool(over)
@@ -266,8 +264,8 @@ class Verdicts:
         self._verdicts: dict[tuple[bytes | None, bool, Edges], Verdict] = {}
         self._verdict_edges = 0
         self._pending: dict[SentEdge, float] = {}
-        #: Publishers of undeclared edges that were not judged: there are too many. How many a message had at most.
-        self.unjudged: dict[bytes | None, int] = {}
+        #: Publishers of more undeclared edges than are judged.
+        self.flooders: set[bytes | None] = set()
 
     @property
     def waits(self) -> bool:
@@ -301,11 +299,12 @@ class Verdicts:
         sure = self._senders.is_sure(message.gid)
         epoch, certain = self._rules.changes, sure
         cases, children, admitted = [], [], []
-        strange = 0
+        strange = {child for _, child in message.edges} - self._rules.planned.keys()
+        left = MOST_UNDECLARED - self._undeclared(message.gid) if strange else 0
         for parent, child in dict.fromkeys(message.edges):
-            if child not in self._rules.planned:
-                strange += 1
-                if self._is_full:
+            if child in strange and not self._rules.may_be_undeclared(parent, child):
+                left -= 1
+                if left < 0:
                     continue
             sent = SentEdge(message.gid, parent, child, message.static)
             violation = self._rules.violation(sent, nodes, now) if nodes else None
@@ -324,15 +323,15 @@ class Verdicts:
                 children.append(child)
         verdict.admitted = None if {*admitted} == {*message.edges} else frozenset(admitted)
         verdict.cases, verdict.children = tuple(cases), tuple(children)
-        if strange and self._is_full:
-            self.unjudged[message.gid] = max(strange, self.unjudged.get(message.gid, 0))
+        if left < 0:
+            self.flooders.add(message.gid)
             epoch = self._rules.changes
         verdict.epoch = epoch if certain and epoch == self._rules.changes else -1
         verdict.until = now + STRANGE_S if strange else float("inf")
 
-    @property
-    def _is_full(self) -> bool:
-        return self._cases.undeclared + len(self._pending) >= MOST_UNDECLARED
+    def _undeclared(self, gid: bytes | None) -> int:
+        """Return how many undeclared edges of the publisher are known to be wrong, or wait for its name."""
+        return self._cases.undeclared(gid) + sum(sent.gid == gid for sent in self._pending)
 
     def see_again(self, now: float) -> list[tuple[str, ...]]:
         """Judge what waited for a name, and return the planned edges that have come with it, by their senders."""

@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 
 
 CHECK_EVERY_S = 0.1
-#: One publisher's messages with ever new edges take so much of each second at most; further ones are skipped.
+#: Messages with ever new edges of one who floods the tree take so much of each second at most, in seconds.
 BUSY_S = 0.1
 #: How often a strict guard says what it held back, in seconds.
 REPORT_EVERY_S = 10.0
@@ -139,16 +139,15 @@ class TopicWatch:
             yield data if received.gid else replace(data, received=replace(received, gid=received.raw_gid))
 
     def _take(self, data: TFData, now: float) -> None:
-        """Take a message; one with other edges than before only while its publisher's took little time."""
+        """Take a message; of who floods the tree one with other edges than before only while that took little time."""
         gid, decoder = data.received.gid, self._reader.decoder
         if now - self._busy_since >= 1.0:
             self._busy, self._busy_since = {}, now
         if self._busy.get(gid, 0.0) > BUSY_S and not decoder.knows(data.received.data):
-            self.judge.skipped(gid)
             return
         before, begun = decoder.read_anew, time.thread_time()
         self._read(data, now)
-        if decoder.read_anew != before:
+        if decoder.read_anew != before and self.judge.is_flooded_by(gid):
             self._busy[gid] = self._busy.get(gid, 0.0) + time.thread_time() - begun
 
     def _read(self, data: TFData, now: float) -> None:

@@ -105,10 +105,9 @@ class Cases:
         who = violation.who if self._senders.is_sure(gid) else ""
         return (violation.code, violation.parent, violation.child, who)
 
-    @property
-    def undeclared(self) -> int:
-        """How many cases there are at least about edges that nobody declared."""
-        return max(0, len(self.open) - len(self._plan.edges))
+    def undeclared(self, gid: bytes | None) -> int:
+        """Return how many cases there are about edges of a publisher that nobody declared."""
+        return sum(case.gid == gid and case.violation.edge is None for case in self.open.values())
 
     @property
     def unreported(self) -> bool:
@@ -304,13 +303,15 @@ class PublisherReports:
             for found in self._once(one, unfenced(one.node, one.process, one.topic or GLOBAL[one.static]))
         ]
 
-    def floods(self, senders: Senders, unjudged: dict[bytes | None, int]) -> list[Found]:
-        """Return the findings for publishers of more undeclared edges than are judged, by how many a message has."""
+    def floods(self, senders: Senders, flooders: set[bytes | None]) -> list[Found]:
+        """Return the findings for publishers of more undeclared edges than are judged; forget those that have left."""
         found = []
-        for gid, edges in unjudged.items():
-            one = senders.known.get(gid) if gid is not None else None
+        for gid in [gid for gid in flooders if gid is not None]:
+            one = senders.known.get(gid)
             if one and one.node:
-                found += self._once(one, flood(one.node, edges, one.where))
+                found += self._once(one, flood(one.node, one.where))
+                if not senders.is_present(gid):
+                    flooders.discard(gid)
         return found
 
     def leaks(self, publishers: Sequence[Publisher], topics: tuple[str, str]) -> list[Found]:

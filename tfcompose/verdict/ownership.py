@@ -37,6 +37,8 @@ _OWN = ("static", "joints")
 KEPT_S = 10.0
 #: Of frames that nobody planned so many are remembered.
 MOST_FRAMES = 10_000
+#: Of one publisher's undeclared edges so many are judged; further ones are neither reported nor admitted.
+MOST_UNDECLARED = 1000
 #: A loop is looked for so many edges up, so that a chain of thousands costs a bounded time; no robot is that deep.
 DEEPEST_LOOP = 100
 
@@ -417,12 +419,16 @@ class OwnershipRules:
         code = LOOP if loop else "TF801" if namesake else code
         return Violation(code, parent, child, nodes, static, edge, namesake, loop) if code else None
 
+    def may_be_undeclared(self, parent: str, child: str) -> bool:
+        """Return whether the plan lets somebody publish the edge though nobody declared it."""
+        return self._plan.may_be_undeclared(parent, child)
+
     def _unplanned(self, sent: SentEdge, nodes: tuple[str, ...], now: float) -> Violation | None:
         """Judge an edge that the plan does not have."""
         parent, child, static = sent.parent, sent.child, sent.static
         if self._tree.add(parent, child, now, static=static):
             self.changes += 1
-        undeclared = not self._plan.may_be_undeclared(parent, child)
+        undeclared = not self.may_be_undeclared(parent, child)
         loop = self._tree.loop(parent, child, now)
         ours = any(self._tree.is_planned(*edge) for edge in pairwise(loop))
         if loop and (ours or undeclared):

@@ -49,12 +49,11 @@ def topics_message(edges: str, topics: Sequence[tuple[str, str]], declared: str 
     return f"{edges} {'are' if several else 'is'} published {on}{', declared for ' if declared else ''}{declared}"
 
 
-def flood(node: str, edges: int, where: str) -> Finding:
-    """Return the finding for a publisher of more undeclared edges than the guard judges: so many in a message."""
-    what = f"{edges:,} undeclared edges in a message, more than" if edges else "more TF than"
-    message = f"{node} publishes {what} the guard judges: only declared edges are judged"
+def flood(node: str, where: str) -> Finding:
+    """Return the finding for a publisher of more undeclared edges than the guard judges."""
+    message = f"{node} publishes more undeclared edges than the guard judges: only its declared ones are judged now"
     notes = [Note(f"{node} runs {where}")] if where else []
-    return finding("TF853", message, None, notes=notes, help=f"end {node}, or let it publish fewer edges")
+    return finding("TF853", message, None, notes=notes, help=f"end {node}, or let it use the same frames again")
 
 
 def unfenced(node: str, process: str, topic: str) -> Finding:

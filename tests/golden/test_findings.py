@@ -5,10 +5,8 @@ A golden holds one row per finding: ``case: code line:col-line:col``, with the f
 After an intended change: ``python -m tests.golden.test_findings --write``, and read the difference.
 """
 
-import difflib
 import json
 import os
-import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -20,6 +18,7 @@ from typing import Any
 import pytest
 
 from tests.support.bad_input import BAD
+from tests.support.goldens import compare, write
 from tests.support.mutations import mutated
 from tfcompose.check import unused_allows
 from tfcompose.cli.compiling import PRESETS, disk, library
@@ -286,14 +285,8 @@ def in_the_repository() -> Iterator[None]:
 
 @pytest.mark.parametrize("name", CORPORA)
 def test_the_findings_are_the_golden_ones(name: str) -> None:
-    golden = (GOLDEN / f"{name}.txt").read_text("utf-8").splitlines(keepends=True)
-    difference = list(difflib.unified_diff(golden, rows(name), "golden", "now", n=0))
-    if difference:
-        pytest.fail(f"{len(difference)} lines of difference\n{''.join(difference)}", pytrace=False)
+    compare(GOLDEN, {name: "".join(rows(name))})
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] != ["--write"]:
-        sys.exit("python -m tests.golden.test_findings --write")
-    for corpus in CORPORA:
-        (GOLDEN / f"{corpus}.txt").write_text("".join(rows(corpus)), "utf-8")
+    write(GOLDEN, {corpus: "".join(rows(corpus)) for corpus in CORPORA})

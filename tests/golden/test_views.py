@@ -4,18 +4,15 @@ No process runs: commands that look at recordings stand for those that look at a
 given as a launcher would. After an intended change: ``python -m tests.golden.test_views --write``.
 """
 
-import difflib
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from unittest import mock
 
-import pytest
-
 from tests.golden.test_findings import ROOT
 from tests.support.bags import UP, Sent, drive, write_bag
 from tests.support.cli import tfcompose_in
+from tests.support.goldens import compare, write
 from tests.support.robots import ROVER
 from tests.support.tree_history import SECOND_NS
 from tfcompose.cli.commands import ps
@@ -186,17 +183,8 @@ def printed(folder: Path, command: str) -> str:
 
 
 def test_commands_print_what_the_golden_views_say() -> None:
-    difference: list[str] = []
-    for view, text in views().items():
-        golden = (GOLDEN / f"{view}.txt").read_text("utf-8").splitlines(keepends=True)
-        difference += difflib.unified_diff(golden, text.splitlines(keepends=True), f"golden {view}", "now", n=0)
-    if difference:
-        pytest.fail(f"{len(difference)} lines of difference\n{''.join(difference)}", pytrace=False)
+    compare(GOLDEN, views())
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] != ["--write"]:
-        sys.exit("python -m tests.golden.test_views --write")
-    GOLDEN.mkdir(exist_ok=True)
-    for view, text in views().items():
-        (GOLDEN / f"{view}.txt").write_text(text, "utf-8")
+    write(GOLDEN, views())

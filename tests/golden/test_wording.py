@@ -5,18 +5,15 @@ presets, URDFs of others, and histories of live trees and processes (``scenes``)
 ``python -m tests.golden.test_wording --write``.
 """
 
-import difflib
 import os
 import re
-import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-import pytest
-
 from tests.golden.scenes import SCENES
 from tests.golden.test_findings import CORPORA, ROOT, in_the_repository, refusals, within
+from tests.support.goldens import compare, write
 from tfcompose.catalogue import CATALOGUE
 from tfcompose.cli.compiling import disk
 from tfcompose.findings import Finding
@@ -49,10 +46,10 @@ def findings() -> Iterator[Finding]:
 
 @cache
 def texts() -> dict[str, str]:
-    """Return what is said, each text once, by the first three letters of its code."""
+    """Return what is said, each text once, by its family: TF1xx."""
     output = {text_of(one) for one in findings()}
     return {
-        family: "\n".join(sorted(text for text in output if f"[{family}" in text.partition(" ")[0]))
+        f"{family}xx": "\n".join(sorted(text for text in output if f"[{family}" in text.partition(" ")[0]))
         for family in FAMILIES
     }
 
@@ -65,17 +62,9 @@ def text_of(found: Finding) -> str:
 
 def test_findings_say_what_the_golden_files_say_and_every_code_is_there() -> None:
     """All in one test, since all families come from one look at everything."""
-    difference: list[str] = []
-    for family, text in texts().items():
-        golden = (GOLDEN / f"{family}xx.txt").read_text("utf-8").splitlines(keepends=True)
-        difference += difflib.unified_diff(golden, text.splitlines(keepends=True), f"golden {family}xx", "now", n=0)
-    if difference:
-        pytest.fail(f"{len(difference)} lines of difference\n{''.join(difference)}", pytrace=False)
+    compare(GOLDEN, texts())
     assert {code for text in texts().values() for code in re.findall(r"\[(TF\d+)\]", text)} == set(CATALOGUE)
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] != ["--write"]:
-        sys.exit("python -m tests.golden.test_wording --write")
-    for name, text in texts().items():
-        (GOLDEN / f"{name}xx.txt").write_text(text, "utf-8")
+    write(GOLDEN, texts())

@@ -36,3 +36,8 @@ def duration(seconds: float) -> str:
     if size < 600:  # noqa: PLR2004 (ten minutes)
         return f"{size:.3g} s"
     return f"{size / 3600:.3g} h" if size < 48 * 3600 else f"{size / 86400:,.0f} days"
+
+
+def visible(text: str) -> str:
+    """Return the text with what cannot be seen, such as control characters, as Python's escapes."""
+    return text if text.isprintable() else "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)

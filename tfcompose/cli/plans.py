@@ -124,9 +124,9 @@ def copy_plan(plan: Plan, file: Path, place: RuntimeDir, *, alone: bool) -> Path
         for name in descriptions & parts.keys():
             parts[name] = _with_absolute_addresses(parts[name], (file.parent / name).parent)
         digest = hashlib.sha256(repr(sorted(parts.items())).encode()).hexdigest()[:16]
-        folder = place.folder / f"plan-{digest}"
+        folder = place.plan_folder(digest)
         if alone:
-            for old in set(place.folder.glob("plan-*")) - {folder}:
+            for old in set(place.plan_folders()) - {folder}:
                 shutil.rmtree(old, ignore_errors=True)
         try:
             _write_copy(parts, folder)

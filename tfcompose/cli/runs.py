@@ -223,10 +223,10 @@ def _robot_of(place: RuntimeDir) -> str:
 
 def _share_topics(other: RuntimeDir, plan: Plan) -> bool:
     """Return whether the plan that runs there, as far as it can be read, has TF topics of this one."""
-    copies = sorted(other.folder.glob("plan-*/plan.json"), key=lambda file: file.stat().st_mtime)
     try:
-        running_plan = read_plan(copies[-1].read_text("utf-8"), "plan.json")
-    except (OSError, ValueError, IndexError, RejectedError):
+        newest = max(other.plan_folders(), key=lambda folder: folder.stat().st_mtime)
+        running_plan = read_plan((newest / "plan.json").read_text("utf-8"), "plan.json")
+    except (OSError, ValueError, RejectedError):
         return False
     return not judged_topics(plan).isdisjoint(judged_topics(running_plan))
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from tfcompose.draw.style import STYLES, colour_of, visible
+from tfcompose.draw.style import STYLES, colour_of
+from tfcompose.text import visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -10,6 +10,8 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 
+from tfcompose.text import visible
+
 SANS = "Arial, Helvetica, 'Liberation Sans', sans-serif"
 
 
@@ -109,11 +111,6 @@ def width_of(text: str, size: float, *, bold: bool = False) -> float:
     """
     thousandths = sum([_WIDTHS.get(character, _OTHER_WIDTH) for character in text])
     return math.ceil(thousandths * size * (_BOLD if bold else 1.0) / 100) / 10
-
-
-def visible(text: str) -> str:
-    """Return the text with invisible characters, such as control characters, as escapes."""
-    return text if text.isprintable() else "".join(one if one.isprintable() else ascii(one)[1:-1] for one in text)
 
 
 def shortened(text: str) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.draw.picture import Box, Curve
-from tfcompose.draw.style import SANS, STYLES, visible
+from tfcompose.draw.style import SANS, STYLES
+from tfcompose.text import visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

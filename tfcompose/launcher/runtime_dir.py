@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 #: Where systemd makes a folder for each user who is logged in, also for services and cron, which are not told of it.
 USERS = Path("/run/user")
+#: How the folder of a plan's copy begins.
+_PLAN = "plan-"
 
 
 class RuntimeDirError(Exception):
@@ -55,10 +57,13 @@ class RuntimeDir:
         """The control socket."""
         return self.folder / "control"
 
-    @property
-    def plan(self) -> Path:
-        """The plan that runs, with its files: a copy, so that a build does not affect a run."""
-        return self.folder / "plan" / "plan.json"
+    def plan_folder(self, digest: str) -> Path:
+        """Return where a plan with its files is copied to, so that a build does not affect a run."""
+        return self.folder / f"{_PLAN}{digest}"
+
+    def plan_folders(self) -> list[Path]:
+        """Return the folders of the copies that are there."""
+        return list(self.folder.glob(f"{_PLAN}*"))
 
     def holder(self) -> Holder | None:
         """Return who runs the robot now, or None."""

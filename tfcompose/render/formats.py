@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from tfcompose.catalogue import CATALOGUE
+from tfcompose.text import visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -54,7 +55,7 @@ def _annotation(found: Finding) -> str:
             properties["endColumn"] = at.end_column
     notes = [f"{note.span}: {note.message}" if note.span else note.message for note in found.notes]
     lines = [found.message, *notes, *([f"help: {found.help}"] if found.help else [])]
-    message = "\n".join("".join(c if c.isprintable() else repr(c)[1:-1] for c in line) for line in lines)
+    message = "\n".join(map(visible, lines))
     listed = ",".join(f"{name}={_escaped_property(str(value))}" for name, value in properties.items())
     return f"::{found.severity} {listed}::{_escaped(message)}\n"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tfcompose.text import counted
+from tfcompose.text import counted, visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -49,7 +49,7 @@ def _one(found: Finding, line_of: Callable[[str, int], str | None], paint: _Pain
 def _printable(text: str) -> str:
     """Return the text on one line of bounded length, without control characters."""
     shown = text if len(text) <= _LONGEST_MESSAGE else f"{text[:_LONGEST_MESSAGE]}…"
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in shown)
+    return visible(shown)
 
 
 def _excerpt(span: Span, line_of: Callable[[str, int], str | None], paint: _Paint, shade: str) -> list[str]:

@@ -4,9 +4,11 @@ import os
 import signal
 import sys
 import weakref
+from pathlib import Path
 
 import pytest
 
+from tests.support import processes
 from tfcompose.cli import main
 from tfcompose.cli.parser import COMMANDS
 from tfcompose.launcher.supervisor import Signals
@@ -89,3 +91,27 @@ def test_elsewhere_an_interrupt_ends_the_command_as_ever() -> None:
         send_an_interrupt()
     assert signal.getsignal(signal.SIGINT) is before
     assert take_interrupt()
+
+
+INTERRUPTED_DATACLASSES = """
+import builtins, dataclasses, os, signal
+
+def interrupt():
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:  # a command loads
+        os.kill(os.getpid(), signal.SIGINT)
+
+def execute(text, *spaces):
+    builtins.exec("interrupt()", {"interrupt": interrupt})
+    builtins.exec(text, *spaces)
+
+dataclasses.exec = execute
+"""
+
+
+def test_an_interrupt_in_an_exec_gives_the_exit_code_of_any_other(tmp_path: Path) -> None:
+    """Python then ends a module run with -m by the signal; dataclasses are made by exec."""
+    (tmp_path / "sitecustomize.py").write_text(INTERRUPTED_DATACLASSES, "utf-8")
+    path = os.pathsep.join([str(tmp_path), *sys.path])
+    command = [sys.executable, "-m", "tfcompose", "schema", "robot"]
+    ended = processes.run(command, env={**os.environ, "PYTHONPATH": path})
+    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "")

@@ -109,6 +109,26 @@ def test_a_profile_may_hold_a_part_of_what_a_robot_does(profile: str, *, fine: b
     assert validator("robot").is_valid(load(text, "r.yaml").data) is fine
 
 
+@pytest.mark.parametrize(
+    ("overlay", "fine"),
+    [
+        ("sensors: {laser: {driver: none, xyz: null}}\nros: {clock: sim}\n", True),
+        ("tfcompose: 1\nprofiles: {demo: {links: {mast: null}}}\nx-mine: 1\n", True),
+        ("sensors: {laser: {drivr: none}}\n", False),
+        ("processes: {player: {restart: sometimes}}\n", False),
+        ("profiles: {demo: {links: {mast: {parnet: base_link}}}}\n", False),
+        ("tfcompose: 2\n", False),
+    ],
+)
+def test_an_overlay_may_hold_a_part_of_what_a_robot_does_and_profiles(overlay: str, *, fine: bool) -> None:
+    laser = "sensors: {laser: {preset: generic/lidar2d, parent: base_link, xyz: [0, 0, 1]}}\n"
+    text = f"{HEAD}links: {{base_link: {{}}, mast: {{parent: base_link}}}}\n{laser}"
+    source = load(overlay, "o.yaml")
+    profiles = list(source.data.get("profiles", ()))
+    assert bool(compile_robot(text, "r.yaml", library(), profiles, overlays=[source]).errors) is not fine
+    assert validator("overlay").is_valid(source.data) is fine
+
+
 def test_a_robot_without_its_name_or_version_is_refused() -> None:
     assert not validator("robot").is_valid({"tfcompose": 1})
     assert not validator("robot").is_valid({"robot": "r"})

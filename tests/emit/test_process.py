@@ -2,6 +2,7 @@
 
 import json
 import os
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,9 @@ from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
 from tfcompose.files import Target
 from tfcompose.findings import Finding, RejectedError
+from tfcompose.language.process import keys_of
 from tfcompose.launcher.preflight import filled_in, folder_of, own_env
+from tfcompose.model import Process
 from tfcompose.plan import PlanProcess, Ready, StopRule
 from tfcompose.plan.file import read_plan, write_plan
 
@@ -41,6 +44,11 @@ REACH: dict[str, dict[str, Any]] = {
     "required: true": {"required": True},
     "required: false": {"required": False},
     "host: jetson": {"host": "jetson"},
+    "env: {B: c}": {"env": {"B": "c"}},
+    "cwd: maps": {"cwd": "${build_dir}/maps"},
+    "remap: {/scan: /front}": {"remap": {"/scan": "/front"}},
+    "log_level: debug": {"log_level": "debug"},
+    "after: {static: started}": {"after": {"static": "started"}},
     "restart: always, max_restarts: 3": {"restart": "always", "max_restarts": 3},
     "stop: {signal: SIGTERM, timeout: 200 ms}": {"stop": StopRule("SIGTERM", 0.2)},
     "stop: {}": {"stop": StopRule("SIGINT", None)},
@@ -68,6 +76,11 @@ def test_a_key_of_a_process_reaches_the_plan(keys: str) -> None:
     head = HEAD.replace("map: {}", "map: {}, odom: {parent: map, owner: a}") if "edges" in keys else HEAD
     process = process_of(f"{EXE}, {keys}".rstrip(", "), head)
     assert {name: getattr(process, name) for name in REACH[keys]} == REACH[keys]
+
+
+def test_no_key_that_a_process_of_the_plan_has_as_well_is_left_out() -> None:
+    shared = {one.name for one in fields(Process) if one.init} & keys_of("run")
+    assert shared <= {name for words in REACH.values() for name in words}
 
 
 COMMANDS: dict[str, tuple[str, ...]] = {

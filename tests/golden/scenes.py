@@ -52,11 +52,11 @@ from tfcompose.live.state import NO_NODE, MovingJoint, RosProcess, StampedData, 
 from tfcompose.model import Robot
 from tfcompose.model.body import Asset
 from tfcompose.plan import (
-    Claim,
     Driven,
     EdgePattern,
     GuardPolicy,
     Plan,
+    PlanClaim,
     PlanEdge,
     PlanProcess,
     Ready,
@@ -265,7 +265,7 @@ def _strangers() -> Iterator[guarded.History]:
     stops = GuardPolicy(on_violation="stop-offender")
     yield _sent("/slam", "odom base", guard=stops, processes=(PlanProcess("slam", "run", nodes=("/slam",)),))
     for switch in ("enable_odom_tf: false", ""):
-        yield _sent("/diff", "odom base", claims=(Claim("/diff", "odom", "base", switch),))
+        yield _sent("/diff", "odom base", claims=(PlanClaim("/diff", "odom", "base", switch),))
     nodes = tuple(replace(one, nodes=(f"/{one.name}er",)) for one in guarded.PROCESSES)
     yield _sent("/slamer", "odom base", processes=nodes)
     yield _sent("/slamer", "map base", processes=nodes)

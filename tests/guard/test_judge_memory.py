@@ -12,7 +12,7 @@ from tfcompose.geometry import Pose
 from tfcompose.guard.diagnostics import statuses
 from tfcompose.ipc import Clear, Found, Live, Recovered
 from tfcompose.live.publishers import Publisher
-from tfcompose.plan import Claim, EdgePattern, GuardPolicy, PlanEdge, PlanProcess, SourceLine
+from tfcompose.plan import EdgePattern, GuardPolicy, PlanClaim, PlanEdge, PlanProcess, SourceLine
 
 
 @settings(max_examples=60, deadline=None)
@@ -90,14 +90,14 @@ def test_what_is_wrong_now_is_on_the_page_and_gone_when_it_is_over(running: Hist
 
 @pytest.mark.parametrize("switch", ["enable_odom_tf: false", ""])
 def test_the_guard_names_the_switch_of_a_node_that_publishes_by_default(switch: str) -> None:
-    history = History(claims=(Claim("/diff", "odom", "base", switch),)).clear()
+    history = History(claims=(PlanClaim("/diff", "odom", "base", switch),)).clear()
     history.repeat(history.joins("/drive"), "odom base", 5)
     history.repeat(history.joins("/diff"), "odom base", 10)
     expect(history.only(), "TF801", "/diff", "by default", switch)
 
 
 def test_the_guard_names_no_switch_for_another_node_or_edge() -> None:
-    history = History(claims=(Claim("/diff", "odom", "base", "x: false"),)).clear()
+    history = History(claims=(PlanClaim("/diff", "odom", "base", "x: false"),)).clear()
     history.repeat(history.joins("/other"), "odom base", 10)
     history.repeat(history.joins("/diff"), "map odom", 10)
     assert [("set" in found.help) for found in history.found()] == [False, False]

@@ -11,7 +11,7 @@ from tfcompose.guard.judge import Judge, JudgeMemory
 from tfcompose.ipc import Clear, Found, GuardEvent, Recovered, Taken
 from tfcompose.live.publishers import Message
 from tfcompose.live.publishers import Publisher as TFPublisher
-from tfcompose.plan import Claim, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
+from tfcompose.plan import GuardPolicy, Plan, PlanClaim, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.plan.codec import decode, encode
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ class History:
     gids: bool = True
     says_who: bool = True
     edges: tuple[PlanEdge, ...] = EDGES
-    claims: tuple[Claim, ...] = ()
+    claims: tuple[PlanClaim, ...] = ()
     now: float = 1000.0
     events: list[GuardEvent] = field(default_factory=list)
     graph: list[Publisher] = field(default_factory=list)

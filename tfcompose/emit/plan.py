@@ -13,14 +13,14 @@ from tfcompose.emit.argv import argv_of, file_params
 from tfcompose.files import AS_IN_SOURCE, Target
 from tfcompose.model import JOINTS, STATIC
 from tfcompose.numbers import clean
-from tfcompose.plan import DESCRIPTION, Claim, Driven, Joint, Plan, PlanEdge, SourceLine, switch_text
+from tfcompose.plan import DESCRIPTION, Driven, Joint, Plan, SourceLine
 from tfcompose.plan.codec import narrowed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tfcompose.model import Edge, MountedSensor, Process, Robot
-    from tfcompose.plan import PlanProcess, PoseKnowledge
+    from tfcompose.plan import PlanEdge, PlanProcess, PoseKnowledge
 
 _FILE = re.compile(r"\$\{file:([^{}]*)\}")
 
@@ -57,7 +57,7 @@ def plan_of(robot: Robot, target: Target = AS_IN_SOURCE) -> Plan:
             _on(main, _at(target, _process(process, robot, owned.get(process.name, []), names))) for process in needed
         ),
         guard=robot.guard,
-        claims=tuple(_claims(robot)),
+        claims=tuple(claim.planned() for claim in robot.claims),
     )
 
 
@@ -85,12 +85,6 @@ def _digest(robot: Robot) -> str:
     return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
 
 
-def _claims(robot: Robot) -> Iterator[Claim]:
-    """Yield what nodes would publish by default and somebody else owns."""
-    for claim in robot.claims:
-        yield Claim(claim.node, claim.parent, claim.child, switch_text(claim.switch))
-
-
 def _edge(edge: Edge, node: str, file: str, prefix: str) -> PlanEdge:
     """Return the edge; its joint without the ``prefix`` that joint states do not have."""
     moving = edge.joint
@@ -98,18 +92,7 @@ def _edge(edge: Edge, node: str, file: str, prefix: str) -> PlanEdge:
     if moving:
         name, mimic = moving.name.removeprefix(prefix), moving.mimic and moving.mimic.removeprefix(prefix)
         joint = narrowed(Joint, moving, name=name, mimic=mimic)
-    return PlanEdge(
-        parent=edge.parent,
-        child=edge.child,
-        kind=edge.kind,
-        owner=edge.owner,
-        node=node,
-        pose=clean(edge.pose),
-        rate=edge.rate,
-        source=SourceLine(file, edge.at.line),
-        joint=joint,
-        switched=edge.switched,
-    )
+    return edge.planned(node=node, pose=clean(edge.pose), source=SourceLine(file, edge.at.line), joint=joint)
 
 
 def _relative(file: str, to: str) -> str:
@@ -162,7 +145,7 @@ def switches_of(process: Process, robot: Robot) -> dict[str, dict[str, Any]]:
     keys = {key for sensor in _sensors(process, robot) for key in _switch(sensor)}
     found = {}
     for node in process.ros_nodes if process.kind in {"run", "external"} else ():
-        wanted = keys | {key for claim in robot.claims if claim.node == node.name for key in claim.switch}
+        wanted = keys | {key for claim in robot.claims if claim.node == node.name for key in claim.off}
         switches = {key: value for key, value in node.params.items() if key in wanted}
         if switches:
             found[node.name] = switches

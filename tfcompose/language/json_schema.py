@@ -27,30 +27,34 @@ LANGUAGES: dict[str, type[Spec]] = {"robot": RobotSpec, "preset": PresetSpec, "n
 
 
 def json_schema(language: str, presets: Mapping[str, PresetSpec], nodes: Iterable[str]) -> dict[str, Any]:
-    """Return the schema of ``robot``, ``preset`` or ``node``, which is a preset of a node that publishes TF.
+    """Return the schema of ``robot``, of an ``overlay`` of one, of ``preset``, or of ``node``, a node's preset.
 
-    The schema of ``robot`` knows the names and options of ``presets``, and the names of ``nodes``, their presets.
+    The schemas of robots know the names and options of ``presets``, and the names of ``nodes``, their presets.
     """
-    root = LANGUAGES[language]
+    root = RobotSpec if language == "overlay" else LANGUAGES[language]
     own = root.model_json_schema(schema_generator=_Generator)
     definitions = own.pop("$defs", {})
     for _, kind in walk(root):
         schema = own if kind is root else definitions[kind.__name__]
         for name, field in fields_of(kind).items():
             form = schema["properties"][name]
+            form.pop("to", None)  # which processes a key applies to: JSON Schema would not warn, it would refuse
             form |= {"description": described(field), "examples": _examples(field, form)}
         if kind is not root:
             schema["title"] = kind.__name__.removesuffix("Spec")
         _exclude(schema, getattr(kind, "EXCLUSIVE", ()), definitions)
     if language == "preset":
         _overlaid(own, definitions)
-    if language == "robot":
+    if root is RobotSpec:
         own["patternProperties"] = {"^x-": {"description": "your own anchors, which tfcompose does not read"}}
         _add_codes(own["properties"]["rules"])
         _add_presets(own, definitions, presets)
         for kind in ("NamedNode", "NodeSpec"):
             definitions[kind]["properties"]["preset"] |= {"enum": sorted(nodes)}
-        _add_profiles(own, definitions)
+        _add_profiles(own, definitions, at="#/$defs/Robot" if language == "overlay" else "#")
+    if language == "overlay":
+        definitions["Robot"], profile = own, definitions["Profile"]
+        own = profile | {"properties": profile["properties"] | {"profiles": own["properties"]["profiles"]}}
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": f"tfcompose {language}, version 1"}
     return head | own | {"$defs": dict(sorted(definitions.items()))}
 
@@ -154,17 +158,18 @@ def _add_codes(rules: dict[str, Any]) -> None:
     rules["additionalProperties"] = False
 
 
-def _add_profiles(own: dict[str, Any], definitions: dict[str, Any]) -> None:
+def _add_profiles(own: dict[str, Any], definitions: dict[str, Any], at: str) -> None:
     """Let a profile hold whatever a robot file does but profiles, with nothing required and null for what it removes.
 
-    That goes for each mapping in it too, but not for those in lists, which a profile replaces as a whole.
+    That goes for each mapping in it too, but not for those in lists, which a profile replaces as a whole. ``at`` points
+    to the schema of the robot, ``own``.
     """
     mappings = {f"#/$defs/{name}": schema for name, schema in definitions.items() if "properties" in schema}
-    for at, schema in mappings.items():
-        definitions[f"{at.rpartition('/')[2]}Overlay"] = _overlay(at, schema, mappings)
+    for pointer, schema in mappings.items():
+        definitions[f"{pointer.rpartition('/')[2]}Overlay"] = _overlay(pointer, schema, mappings)
     robot = {key: own[key] for key in ("type", "properties", "additionalProperties", "patternProperties")}
     robot["properties"] = {name: schema for name, schema in own["properties"].items() if name != "profiles"}
-    definitions["Profile"] = {"description": "What is merged over the robot."} | _overlay("#", robot, mappings)
+    definitions["Profile"] = {"description": "What is merged over the robot."} | _overlay(at, robot, mappings)
     own["properties"]["profiles"]["additionalProperties"] = {"$ref": "#/$defs/Profile"}
 
 

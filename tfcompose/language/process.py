@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag
@@ -10,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Stri
 from tfcompose.language.expressions import inserted
 from tfcompose.language.node_preset import ClaimSpec
 from tfcompose.language.pose import Posed
-from tfcompose.language.spec import Checked, Spec, key, several
+from tfcompose.language.spec import Checked, Spec, fields_of, key, more_of, several
 from tfcompose.language.values import (
     Boolean,
     Integral,
@@ -234,6 +235,15 @@ def _names_a_variable(name: str) -> str:
 
 
 RUNNING = frozenset({"run", "simulate", "external"})
+Way = Literal["run", "simulate", "external", "built-in"]
+"""How a process runs, by the key that says so; built-in: one of tfcompose's own."""
+#: To which processes a key applies, if not only to those that ``run``.
+ALL: tuple[Way, ...] = ("run", "simulate", "external", "built-in")
+NOT_OWN: tuple[Way, ...] = ("run", "simulate", "external")
+NOT_EXTERNAL: tuple[Way, ...] = ("run", "simulate", "built-in")
+NOT_SIMULATED: tuple[Way, ...] = ("run", "external")
+KEPT_ALIVE: tuple[Way, ...] = ("run", "simulate")
+OWN: tuple[Way, ...] = ("built-in",)
 
 
 class Started(Checked):
@@ -254,34 +264,44 @@ class Started(Checked):
         "its node's name, or {preset, name}; below its namespace unless it begins with /",
         "slam_toolbox",
         {"preset": "slam_toolbox"},
+        to=NOT_OWN,
     )
     namespace: Namespace | None = key(
-        None, "the namespace of its nodes; below ros.namespace unless it begins with /", "front"
+        None, "the namespace of its nodes; below ros.namespace unless it begins with /", "front", to=NOT_OWN
     )
-    publishes: tuple[ClaimSpec, ...] = key((), _PUBLISHES, [{"parent": "map", "child": "odom", "off": "none"}])
-    params: Parameters = key({}, _PARAMS, {"use_sim_time": False})
-    lifecycle: LifecycleState | None = key(None, "the state that its lifecycle node is brought into after the start")
+    publishes: tuple[ClaimSpec, ...] = key(
+        (), _PUBLISHES, [{"parent": "map", "child": "odom", "off": "none"}], to=NOT_SIMULATED
+    )
+    params: Parameters = key({}, _PARAMS, {"use_sim_time": False}, to=NOT_SIMULATED)
+    lifecycle: LifecycleState | None = key(
+        None, "the state that its lifecycle node is brought into after the start", to=NOT_SIMULATED
+    )
     log_level: LogLevel | None = key(None, "the level of its nodes' loggers")
-    remap: dict[str, Text] = key({}, "topics, services and actions under other names", {"scan": "front/scan"})
+    remap: dict[str, Text] = key(
+        {}, "topics, services and actions under other names", {"scan": "front/scan"}, to=NOT_EXTERNAL
+    )
     env: dict[Annotated[Text, AfterValidator(_names_a_variable)], Word] = key(
-        {}, "environment variables", {"RCUTILS_COLORIZED_OUTPUT": "1"}
+        {}, "environment variables", {"RCUTILS_COLORIZED_OUTPUT": "1"}, to=NOT_EXTERNAL
     )
     cwd: Text | None = key(
         None, "the folder that it runs in, relative to this file; default: where up is called", "maps"
     )
-    rate: Rate | None = key(None, "of joints alone: how often joint states come", "50 Hz")
-    host: Text | None = key(None, "the computer that it runs on", "jetson")
+    rate: Rate | None = key(None, "of joints alone: how often joint states come", "50 Hz", to=OWN)
+    host: Text | None = key(None, "the computer that it runs on", "jetson", to=ALL)
     required: Boolean | None = key(
         None,
         "true: its end stops everything; false: the rest goes on when it fails; default: its failure stops everything",
+        to=KEPT_ALIVE,
     )
-    restart: RestartPolicy = key(DEFAULTS.restart, "when it is started again after it has ended")
+    restart: RestartPolicy = key(DEFAULTS.restart, "when it is started again after it has ended", to=KEPT_ALIVE)
     max_restarts: Annotated[int, Strict(), Field(ge=0, le=1_000_000), Integral] | None = key(
-        None, "how often in a row it is started again before it is given up", 5
+        None, "how often in a row it is started again before it is given up", 5, to=KEPT_ALIVE
     )
-    stop: StopSpec | None = key(None, "how it is stopped", {"signal": "SIGTERM", "timeout": "5 s"})
-    ready: Ready | None = key(None, "when it counts as ready", {"topic": "scan"})
-    after: dict[str, StartCondition] = key({}, "what must have happened before it is started", {"base_drive": "ready"})
+    stop: StopSpec | None = key(None, "how it is stopped", {"signal": "SIGTERM", "timeout": "5 s"}, to=KEPT_ALIVE)
+    ready: Ready | None = key(None, "when it counts as ready", {"topic": "scan"}, to=NOT_SIMULATED)
+    after: dict[str, StartCondition] = key(
+        {}, "what must have happened before it is started", {"base_drive": "ready"}, to=ALL
+    )
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
@@ -308,7 +328,15 @@ class ProcessSpec(Started):
         {},
         "the nodes of a process that holds several, by name; node, params and lifecycle are the short form for one",
         {"planner_server": {"lifecycle": "active"}, "controller_server": {"lifecycle": "active"}},
+        to=NOT_OWN,
     )
+
+
+@cache
+def keys_of(way: Way) -> frozenset[str]:
+    """Return the keys that apply to processes that run so, but for those that say how it runs."""
+    known = fields_of(ProcessSpec).items()
+    return frozenset(name for name, field in known if way in more_of(field, "to", ("run",))) - RUNNING
 
 
 class DriverSpec(Started):

@@ -80,9 +80,15 @@ def several(*errors: tuple[Path, PydanticCustomError], also: ValidationError | N
     return ValidationError.from_exception_data("", lines)
 
 
-def key(default: Any = ..., about: str = "", *examples: Any) -> Any:
-    """Describe a key of a ``Spec``; without a default it is required."""
-    return Field(default, description=about or None, examples=list(examples) or None)
+def key(default: Any = ..., about: str = "", *examples: Any, **more: Any) -> Any:
+    """Describe a key of a ``Spec``; without a default it is required. ``more`` is for ``more_of``."""
+    return Field(default, description=about or None, examples=list(examples) or None, json_schema_extra=more or None)
+
+
+def more_of(field: FieldInfo, name: str, default: Any) -> Any:
+    """Return what else is known of a key under a name, or the default."""
+    more = field.json_schema_extra
+    return more.get(name, default) if isinstance(more, dict) else default
 
 
 def inherited(of: type, name: str) -> Any:

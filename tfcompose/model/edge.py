@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.geometry import angle_between
+from tfcompose.plan import PlanEdge, SourceLine
+from tfcompose.plan.codec import narrowed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -14,7 +16,6 @@ if TYPE_CHECKING:
     from tfcompose.findings import Edit, Span
     from tfcompose.geometry import Pose
     from tfcompose.model.joint import Joint
-    from tfcompose.plan import EdgeKind
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,41 +55,37 @@ class Calibration:
 
 
 @dataclass(frozen=True, slots=True)
-class Edge:
-    """A frame and its parent, and who publishes where the one is in the other.
+class Edge(PlanEdge):
+    """An edge of the plan, with what only the compiler knows of it.
 
-    ``switched`` holds the further parents between which the owner may change it, as a tool changer does; ``parent`` is
-    the nominal one.
+    ``at`` is where it was written, and ``source`` the line of that. ``node`` is empty where the owner has one node.
     ``joint`` moves by joint states. ``free`` is a planar or floating joint, of which joint states say nothing.
-    ``other_axes``: the vendor's name for the frame does not say whether it is optical, or says it wrongly. ``node`` is
-    the full name of the node that publishes the edge, where the owner has several. ``optical_edits`` returns the edits
-    of the file that give the edge the optical rotation of REP-103; none where that is not safe.
+    ``other_axes``: the vendor's name for the frame does not say whether it is optical, or says it wrongly.
+    ``optical_edits`` returns the edits of the file that give the edge the optical rotation of REP-103; none where that
+    is not safe.
     """
 
-    parent: str
-    child: str
-    kind: EdgeKind
-    pose: Pose
-    owner: str
-    at: Span
-    rate: float | None = None
-    joint: Joint | None = None
-    joint_name: str = ""
-    given: bool = True
-    owner_at: Span | None = None
-    child_at: Span | None = None
-    joint_at: Span | None = None
-    sensor: str | None = None
-    nominal: bool = False
-    rate_at: Span | None = None
-    calibration: Calibration | None = None
-    switched: tuple[str, ...] = ()
-    free: Joint | None = None
-    other_axes: bool = False
-    node: str = ""
-    optical_edits: Callable[[], tuple[Edit, ...]] = field(default=tuple, compare=False, repr=False)
+    node: str = field(default="", kw_only=True)
+    rate: float | None = field(default=None, kw_only=True)
+    source: SourceLine = field(init=False, compare=False, repr=False)
+    joint: Joint | None = field(default=None, kw_only=True)
+    at: Span = field(kw_only=True)
+    joint_name: str = field(default="", kw_only=True)
+    given: bool = field(default=True, kw_only=True)
+    owner_at: Span | None = field(default=None, kw_only=True)
+    child_at: Span | None = field(default=None, kw_only=True)
+    joint_at: Span | None = field(default=None, kw_only=True)
+    sensor: str | None = field(default=None, kw_only=True)
+    nominal: bool = field(default=False, kw_only=True)
+    rate_at: Span | None = field(default=None, kw_only=True)
+    calibration: Calibration | None = field(default=None, kw_only=True)
+    free: Joint | None = field(default=None, kw_only=True)
+    other_axes: bool = field(default=False, kw_only=True)
+    optical_edits: Callable[[], tuple[Edit, ...]] = field(default=tuple, compare=False, repr=False, kw_only=True)
 
-    @property
-    def name(self) -> str:
-        """The edge as people read it."""
-        return f"{self.parent} → {self.child}"
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "source", SourceLine(self.at.file, self.at.line))
+
+    def planned(self, **made: Any) -> PlanEdge:
+        """Return the edge as the plan has it, with fields that follow from the whole robot."""
+        return narrowed(PlanEdge, self, **made)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.plan import PlanProcess
+from tfcompose.plan import PlanClaim, PlanProcess, switch_text
 from tfcompose.plan.codec import narrowed
 
 STATIC, JOINTS, GUARD = "static", "joints", "guard"
@@ -80,10 +80,15 @@ class Process(PlanProcess):
 
 
 @dataclass(frozen=True, slots=True)
-class Claim:
-    """An edge that a node publishes by default and somebody else owns; ``switch`` are the parameters that stop it."""
+class Claim(PlanClaim):
+    """A claim of the plan, with the parameters that stop it, which ``switch`` is the text of."""
 
-    node: str
-    parent: str
-    child: str
-    switch: dict[str, Any]
+    switch: str = field(init=False)
+    off: dict[str, Any] = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "switch", switch_text(self.off))
+
+    def planned(self) -> PlanClaim:
+        """Return the claim as the plan has it."""
+        return PlanClaim(self.node, self.parent, self.child, self.switch)

@@ -286,7 +286,7 @@ class GuardPolicy:
 
 
 @dataclass(frozen=True, slots=True)
-class Claim:
+class PlanClaim:
     """An edge that a node publishes by default and somebody else owns; ``switch`` stops it, empty: nothing does."""
 
     node: str
@@ -325,7 +325,7 @@ class Plan:
     ros: RosSettings
     edges: tuple[PlanEdge, ...]
     processes: tuple[PlanProcess, ...]
-    claims: tuple[Claim, ...] = field(default=(), kw_only=True)
+    claims: tuple[PlanClaim, ...] = field(default=(), kw_only=True)
     guard: GuardPolicy = field(default_factory=GuardPolicy)
 
     def process(self, name: str) -> PlanProcess:
@@ -345,7 +345,7 @@ class Plan:
         # No two nodes have one name.
         return tuple(node.removesuffix(_name_end(self.host)) + _name_end(host) for node in own)
 
-    def claim_on(self, nodes: tuple[str, ...], parent: str, child: str) -> Claim | None:
+    def claim_on(self, nodes: tuple[str, ...], parent: str, child: str) -> PlanClaim | None:
         """Return what is known of one of the nodes publishing the edge by default, or None."""
         ends = (parent, child)
         return next((one for one in self.claims if one.node in nodes and (one.parent, one.child) == ends), None)

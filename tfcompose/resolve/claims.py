@@ -158,7 +158,7 @@ class _Work:
             self._own(claimant, claim, edge)
             return
         if claimant.is_published(claim) or claim.by_default:
-            self.claims.append(Claim(claimant.node.name, parent, child, claim.off))
+            self.claims.append(Claim(claimant.node.name, parent, child, off=claim.off))
         if not claimant.is_published(claim):
             return
         other = edge or self.robot.parent_edge(child)
@@ -218,7 +218,7 @@ class _Work:
         self.found.append(finding("TF331", message, claimant.node.at, help=advice))
 
     def _settle_pattern(self, claimant: Claimant, claim: ClaimSpec, parent: str, child: str) -> None:
-        self.claims.append(Claim(claimant.node.name, parent, child, claim.off))
+        self.claims.append(Claim(claimant.node.name, parent, child, off=claim.off))
         guard = self.robot.guard
         owns = any(edge.owner == claimant.process.name for edge in self.robot.edges)
         allowed = any(fnmatchcase(one.child, child) or fnmatchcase(child, one.child) for one in guard.allow)

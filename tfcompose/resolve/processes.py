@@ -6,11 +6,11 @@ tfcompose's own processes are here as well: ``static``, ``joints`` and ``guard``
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, did_you_mean, finding
-from tfcompose.language.process import RUNNING, SIMULATIONS, SWEEP
+from tfcompose.language.process import RUNNING, SIMULATIONS, SWEEP, keys_of
 from tfcompose.model import BUILT_IN, GUARD, JOINTS, MOVING, SHELL, STATIC, Node, Process
 from tfcompose.plan import Ready, Simulation, StopRule, Sweep
 from tfcompose.resolve.poses import pose_of
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tfcompose.language import Validated
-    from tfcompose.language.process import ProcessSpec, ReadySpec, Run, Simulate, Started
+    from tfcompose.language.process import ProcessSpec, ReadySpec, Run, Simulate, Started, Way
     from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Path, Source
     from tfcompose.model import Joint, Robot
@@ -37,12 +37,12 @@ def user_process(name: str, declared: ProcessSpec, validated: Validated) -> tupl
     namespace = namespace_of(declared, spec.ros.namespace)
     nodes, found = nodes_of(name, declared, namespace, source)
     if declared.external:
-        keys = how(declared, namespace, EXTERNAL_KEYS)
+        keys = how(declared, namespace, "external")
         return replace(Process(name, "external", at=place, ros_nodes=nodes), **keys), found
     if declared.simulate:
         one = (Node(nodes[0].name, nodes[0].at),)
         process, refused = _simulated(Process(name, "simulate", at=place, ros_nodes=one), declared.simulate, validated)
-        keys = how(declared, namespace, SIMULATED_KEYS)
+        keys = how(declared, namespace, "simulate")
         return process and replace(process, **keys), [*found, *refused]
     if declared.run and declared.run.is_startable:
         process = Process(name, "run", at=place, ros_nodes=nodes)
@@ -130,25 +130,20 @@ def unknown_names(
     return found
 
 
-#: Keys of a process that have the same name in the model.
-_COPIED = ("after", "cwd", "env", "host", "log_level", "max_restarts", "remap", "required", "restart")
-#: All that ``how`` reads, of a process that tfcompose starts.
-KEYS = (*_COPIED, "stop", "ready")
-#: Those of a process that somebody else starts, and of one that is simulated.
-EXTERNAL_KEYS = ("after", "host", "ready")
-SIMULATED_KEYS = ("after", "env", "host", "max_restarts", "remap", "required", "restart", "stop")
+_FIELDS = frozenset(one.name for one in fields(Process) if one.init)
 
 
-def how(declared: Started, namespace: str, keys: tuple[str, ...] = KEYS) -> dict[str, Any]:
-    """Return a process's fields from what was written, those of ``keys``; ``namespace`` is that of its nodes."""
-    fields = {key: getattr(declared, key) for key in keys if key in _COPIED}
+def how(declared: Started, namespace: str, way: Way = "run") -> dict[str, Any]:
+    """Return the fields of a process that runs in this way, by the keys that have their names."""
+    found = {key: getattr(declared, key) for key in _FIELDS & keys_of(way)}
+    stop, ready = found.pop("stop", None), found.pop("ready", None)
     if declared.namespace is not None:
-        fields["namespace"] = namespace
-    if "stop" in keys and declared.stop:
-        fields["stop"] = StopRule(declared.stop.signal, declared.stop.timeout)
-    if "ready" in keys and declared.ready:
-        fields["ready"] = _ready(declared.ready, namespace)
-    return fields
+        found["namespace"] = namespace
+    if stop:
+        found["stop"] = StopRule(stop.signal, stop.timeout)
+    if ready:
+        found["ready"] = _ready(ready, namespace)
+    return found
 
 
 def program(run: Run, *, shell: bool) -> dict[str, Any]:
@@ -174,7 +169,6 @@ def _ready(declared: ReadySpec, namespace: str) -> Ready | None:
     return Ready("edges", timeout_s=timeout_s) if declared.edges else None  # what else was said was refused
 
 
-_BUILT_IN_KEYS = frozenset({"rate", "remap", "env", "host", "after"})
 #: The parameters of ``joints``: robot_state_publisher's, where it has them, each with an example.
 _JOINTS_PARAMS: dict[str, Any] = {"publish_frequency": 30.0, "ignore_timestamp": True}
 _KINDS: dict[str, ProcessKind] = {STATIC: "static", JOINTS: "joints", GUARD: "guard"}
@@ -191,8 +185,7 @@ def built_in(spec: RobotSpec, source: Source) -> list[Process]:
         node = Node(full_name(spec.ros.namespace, f"tfcompose_{name}"), at, path, params)
         process = Process(name, _KINDS[name], at=at, ros_nodes=(node,))
         if declared:
-            given = {key: getattr(declared, key) for key in _BUILT_IN_KEYS}
-            process = replace(process, **given)
+            process = replace(process, **how(declared, spec.ros.namespace, "built-in"))
         own.append(process)
     return own
 
@@ -200,7 +193,7 @@ def built_in(spec: RobotSpec, source: Source) -> list[Process]:
 def built_in_keys(name: str, declared: ProcessSpec, source: Source) -> list[Finding]:
     """Return findings about what stands under the name of one of tfcompose's own processes."""
     at: Path = ("processes", name)
-    known = _BUILT_IN_KEYS | ({"params"} if name == JOINTS else set())
+    known = keys_of("built-in") | ({"params"} if name == JOINTS else set())
     wrong = declared.model_fields_set - known
     advice = f"its keys can be: {', '.join(sorted(known))}"
     found = [
@@ -227,19 +220,6 @@ def _joints_params(params: dict[str, Any], source: Source) -> list[Finding]:
             advice = "leave it out, and every joint state is published"
             found.append(finding("TF106", f"{name} has to be above 0", source.at(at), help=advice))
     return found
-
-
-#: What is read of every process; of two ways of running one is refused elsewhere, as is a rate.
-_ALWAYS = frozenset({*RUNNING, "node", "nodes", "namespace", "rate"})
-#: For each way of running: the keys that are read, how it is called, and whom the other keys are for.
-_READ = {
-    "external": (
-        _ALWAYS | {*EXTERNAL_KEYS, "publishes", "params", "lifecycle"},
-        "started by others",
-        "whoever starts the process",
-    ),
-    "simulate": (_ALWAYS | {*SIMULATED_KEYS}, "simulated", "the real process"),
-}
 
 
 def idle_keys(spec: RobotSpec, source: Source) -> list[Finding]:
@@ -273,12 +253,14 @@ def _idle(path: Path, name: str, process: Started, source: Source) -> Iterator[F
 
     Where an overlay puts that in the place of something else, the keys below it are meant for what they stood beside.
     """
-    way = "external" if process.external else "simulate" if process.simulate else None
-    if way is None or (*path, way) in source.replaced or (way == "simulate" and path[0] == "sensors"):
+    way: Way = "external" if process.external else "simulate" if process.simulate else "run"
+    if way == "run" or (*path, way) in source.replaced or (way == "simulate" and path[0] == "sensors"):
         return  # no driver is simulated: that is refused
-    read, how, whom = _READ[way]
-    for key in process.model_fields_set - read:
-        message, advice = f"{name} is {how}: {key} does nothing there", f"remove it: it is for {whom}"
+    what, whom = "simulated", "the real process"
+    if way == "external":
+        what, whom = "started by others", "whoever starts the process"
+    for key in process.model_fields_set - keys_of(way) - RUNNING - {"rate"}:  # which are refused elsewhere
+        message, advice = f"{name} is {what}: {key} does nothing there", f"remove it: it is for {whom}"
         yield finding("TF851", message, source.at_key((*path, key)), help=advice)
 
 

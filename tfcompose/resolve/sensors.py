@@ -13,7 +13,7 @@ from tfcompose.plan import switch_text
 from tfcompose.resolve.isolation import settings_of
 from tfcompose.resolve.poses import Draft, rotation_of
 from tfcompose.resolve.presets import DRIVER, TFCOMPOSE
-from tfcompose.resolve.processes import EXTERNAL_KEYS, KEYS, full_name, how, namespace_of, program
+from tfcompose.resolve.processes import full_name, how, namespace_of, program
 from tfcompose.urdf.inertia import of_primitives
 
 if TYPE_CHECKING:
@@ -71,8 +71,9 @@ class _Mounting:
         self.drafts.frames.setdefault(final, self.place())
         nominal = frame.nominal and not measured
         edge = Edge(
-            self.renamed(parent), final, "dynamic" if kind == "dynamic" else "static", pose, owner, self.place(),
-            given=False, sensor=self.sensor.name, nominal=nominal, other_axes=frame.other_axes,
+            parent=self.renamed(parent), child=final, kind="dynamic" if kind == "dynamic" else "static", owner=owner,
+            pose=pose, at=self.place(), given=False, sensor=self.sensor.name, nominal=nominal,
+            other_axes=frame.other_axes,
         )  # fmt: skip
         self.drafts.edges.append(Draft(edge))
 
@@ -220,8 +221,8 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
     node = Node(driver_node(sensor, spec), place, at, params, (declared.lifecycle if declared else None) or state)
     process = Process(sensor.name, "external" if external else "run", at=place, ros_nodes=(node,))
     if declared:
-        keys = how(declared, namespace_of(declared, spec.ros.namespace), EXTERNAL_KEYS if external else KEYS)
-        process = replace(process, **keys)
+        namespace = namespace_of(declared, spec.ros.namespace)
+        process = replace(process, **how(declared, namespace, "external" if external else "run"))
     if run:
         process = replace(process, **program(run, shell=bool(declared and declared.shell)))
     elif driver and launched:

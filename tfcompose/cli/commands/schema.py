@@ -1,7 +1,7 @@
 """Print the language as JSON Schema, or as a reference.
 
-Print the JSON Schema that editors and CI use: of robot files, of presets of sensors and nodes, or of plan.json. With
---reference print every key of the language as Markdown instead.
+Print the JSON Schema that editors and CI use: of robot files, of overlays, of presets of sensors and nodes, or of
+plan.json. With --reference print every key of the language as Markdown instead.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from tfcompose.cli.terminal import UNREADABLE, fail
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-LANGUAGES = ("robot", "preset", "node", "plan")
+LANGUAGES = ("robot", "overlay", "preset", "node", "plan")
+_WITHOUT_REFERENCE = {"overlay": "an overlay has the keys of a robot file", "plan": "plan.json is written by build"}
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -29,8 +30,8 @@ def run(arguments: Namespace) -> int:
     if not arguments.reference:
         sys.stdout.write(schema_text(arguments.language))
         return 0
-    if arguments.language == "plan":
-        fail("plan.json has a schema only; build writes it", UNREADABLE)
+    if arguments.language in _WITHOUT_REFERENCE:
+        fail(f"there is no reference: {_WITHOUT_REFERENCE[arguments.language]}", UNREADABLE)
     from tfcompose.language.reference import reference
 
     sys.stdout.write(reference(arguments.language))

@@ -1,22 +1,16 @@
 """Bodies as users write them: shapes, colours, masses and links."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Discriminator, Tag
+from pydantic_core import PydanticCustomError
 
 from tfcompose.language.pose import MountKeys, Posed, Rotated
 from tfcompose.language.spec import Spec, key
 from tfcompose.language.values import Name, Rgba, Scale, Sizes, Text, Xyz, listed, short
+from tfcompose.load import Path
 from tfcompose.units import Density, Inertia, Mass, Size, refused
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from pydantic_core import PydanticCustomError
-
-    from tfcompose.load import Path
 
 
 class Cylinder(Spec):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, finding
 from tfcompose.language.robot import RobotSpec
-from tfcompose.language.spec import Spec, choices
+from tfcompose.language.spec import Spec, mappings_at
 from tfcompose.load import Path, Place, Source
 
 if TYPE_CHECKING:
@@ -124,10 +124,9 @@ class _Merger:
         """Return the choices that a mapping at the path makes: of each, it holds a key with a value."""
         return [
             keys
-            for pattern, keys in choices(self.of)
-            if len(pattern) == len(path)
-            and all(want in {"*", step} for want, step in zip(pattern, path, strict=True))
-            and any(data.get(key) is not None for key in keys)
+            for kind in mappings_at(self.of, path)
+            for keys in getattr(kind, "EXCLUSIVE", ())
+            if any(data.get(key) is not None for key in keys)
         ]
 
     def note_removal(self, was_there: bool, key: Place, path: Path) -> None:  # noqa: FBT001 (the fact itself)

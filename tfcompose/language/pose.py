@@ -3,8 +3,6 @@
 What is written stays as it is: ``rotation`` and ``Posed.xyz`` are what it means.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, ClassVar, Literal
 

@@ -4,10 +4,9 @@ In names ``{name}`` stands for the sensor's name, and a word of ``words`` for wh
 parameters and arguments there is also ``{prefix}``, the robot's frame prefix.
 """
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Discriminator, Tag
 
@@ -18,13 +17,9 @@ from tfcompose.language.pose import Rotated
 from tfcompose.language.reading import Refusal
 from tfcompose.language.spec import Spec, key
 from tfcompose.language.values import Anything, Boolean, Matches, NoMapping, Parameters, Text, Xyz
+from tfcompose.load import Path
 from tfcompose.plan import SensorPublisher
 from tfcompose.units import Mass, Rate
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from tfcompose.load import Path
 
 UNKNOWN = "unknown"
 

@@ -1,12 +1,12 @@
 """Processes as users describe them: what is started, or expected to run, and how."""
 
-from __future__ import annotations
-
 import re
+from collections.abc import Iterator
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag
+from pydantic_core import PydanticCustomError
 
 from tfcompose.language.expressions import inserted
 from tfcompose.language.node_preset import ClaimSpec
@@ -23,6 +23,7 @@ from tfcompose.language.values import (
     Text,
     short,
 )
+from tfcompose.load import Path
 from tfcompose.plan import (
     LifecycleState,
     LogLevel,
@@ -34,14 +35,6 @@ from tfcompose.plan import (
     StopSignal,
 )
 from tfcompose.units import AngularVelocity, Duration, JointPosition, Quantity, Rate, Size, refused, shown
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from pydantic_core import PydanticCustomError
-
-    from tfcompose.load import Path
-
 
 #: What a process of the plan is where nothing is said.
 DEFAULTS = PlanProcess("", "run")

@@ -3,12 +3,12 @@
 The descriptions and examples here are what an editor shows and what ``tfcompose schema --reference`` prints.
 """
 
-from __future__ import annotations
-
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
+from pydantic_core import PydanticCustomError
 
 from tfcompose.language.bodies import LinkSpec
 from tfcompose.language.pose import EdgeKeys, MountKeys, Parents, Posed, Rotated
@@ -27,6 +27,7 @@ from tfcompose.language.values import (
     Texts,
     Xyz,
 )
+from tfcompose.load import Path
 from tfcompose.model import Dynamics, Limit, ReferencePositions, SafetyController
 from tfcompose.plan import GuardPolicy, Isolation, JointType, RosSettings, SensorPublisher, StatePublisher
 from tfcompose.plan.codec import documented
@@ -43,13 +44,6 @@ from tfcompose.units import (
     shown,
     with_article,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from pydantic_core import PydanticCustomError
-
-    from tfcompose.load import Path
 
 
 class FrameSpec(MountKeys):

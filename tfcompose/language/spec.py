@@ -162,11 +162,16 @@ def at(model: Any, path: tuple[str | int, ...]) -> Any:
     return model
 
 
-def mapping_at(model: Any, path: tuple[str | int, ...]) -> Any:
-    """Return the mapping with known keys, or the one in a list, that stands at a path, or None."""
+def mappings_at(model: Any, path: tuple[str | int, ...]) -> list[Any]:
+    """Return the mappings with known keys that may stand at a path, or in a list there."""
     kinds = list(kinds_of(at(model, path)))
     kinds += [item for kind in kinds if get_origin(kind) is tuple for item in kinds_of(get_args(kind)[0])]
-    return next((kind for kind in kinds if is_mapping(kind)), None)
+    return [kind for kind in kinds if is_mapping(kind)]
+
+
+def mapping_at(model: Any, path: tuple[str | int, ...]) -> Any:
+    """Return the mapping with known keys, or the one in a list, that stands at a path, or None."""
+    return next(iter(mappings_at(model, path)), None)
 
 
 def walk(annotation: Any, pattern: Pattern = ()) -> Iterator[tuple[Pattern, Any]]:
@@ -180,13 +185,6 @@ def walk(annotation: Any, pattern: Pattern = ()) -> Iterator[tuple[Pattern, Any]
             yield from walk(get_args(kind)[1], (*pattern, "*"))
         elif get_origin(kind) is tuple:
             yield from walk(get_args(kind)[0], pattern)
-
-
-@cache
-def choices(model: type[Spec]) -> tuple[tuple[Pattern, frozenset[str]], ...]:
-    """Return where in a file of the model a mapping stands that holds one of several keys, and these keys."""
-    found = [(pattern, keys) for pattern, kind in walk(model) for keys in getattr(kind, "EXCLUSIVE", ())]
-    return tuple(dict.fromkeys(found))
 
 
 def described(field: FieldInfo) -> str:

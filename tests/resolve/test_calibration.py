@@ -1,6 +1,7 @@
 """Each format gives the pose that scipy computes, in the direction that its tool means."""
 
 import math
+from functools import partial
 from typing import Any
 
 import pytest
@@ -347,11 +348,12 @@ def test_the_robots_bodies_are_found_above_and_below_the_measured_frame() -> Non
 
 
 def test_comments_in_launch_files_are_no_entries_and_each_publisher_is_one() -> None:
-    assert [one.name for one in read_calibration(moveit_launch(), "c.launch").entries] == ["base_link → lens"]
+    read = partial(read_calibration, file="c.launch", form="auto", at=Span("r.yaml"))
+    assert [one.name for one in read(moveit_launch()).entries] == ["base_link → lens"]
     two = moveit_launch().replace("</launch>", moveit_launch().partition("-->")[2].replace("lens", "other"))
-    assert [one.child for one in read_calibration(two, "c.launch").entries] == ["lens", "other"]
+    assert [one.child for one in read(two).entries] == ["lens", "other"]
     angles = '<launch><node type="static_transform_publisher" args="1 2 3 0 0 0.5 a b"/></launch>'
-    assert [one.code for one in read_calibration(angles, "c.launch").found] == ["TF610"]
+    assert [one.code for one in read(angles).found] == ["TF610"]
 
 
 def test_a_profile_takes_another_file_and_a_missing_one_has_no_place() -> None:

@@ -39,7 +39,7 @@ def lint_urdf(file: str) -> list[Finding]:
 
 def lint_text(text: str) -> tuple[Finding, ...]:
     try:
-        return robot_of(read_xml(text, "r.urdf"), "r.urdf", Packages().asset)[1]
+        return robot_of(read_xml(text, "r.urdf"), "r.urdf", Packages().asset).found
     except RejectedError as error:
         return error.findings
 
@@ -323,10 +323,11 @@ def test_a_rotation_as_a_quaternion_is_read_and_is_one_finding(
     version: str, origin: str, severity: str, word: str
 ) -> None:
     text = QUAT.format(version, origin)
-    robot, (found,) = robot_of(read_xml(text, "r.urdf"), "r.urdf", Packages().asset)
+    converted = robot_of(read_xml(text, "r.urdf"), "r.urdf", Packages().asset)
+    (found,) = converted.found
     assert (found.code, found.severity, word in found.message) == ("TF721", severity, True)
     if ROTATION in origin:
-        assert robot.edges[0].pose.quat_xyzw == pytest.approx((0, 0, 0.5**0.5, 0.5**0.5))
+        assert converted.robot.edges[0].pose.quat_xyzw == pytest.approx((0, 0, 0.5**0.5, 0.5**0.5))
 
 
 def test_xacro_in_a_file_that_is_named_as_a_urdf_is_expanded_too(tmp_path: Path) -> None:

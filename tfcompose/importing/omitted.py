@@ -32,8 +32,6 @@ _NOT_HELD = {
     "limit": ("acceleration", "jerk", "deceleration"),
     "calibration": ("reference_position",),
 }
-#: Of files, for which nothing is left out; and of blocks, which say it themselves.
-_NOTED_ELSEWHERE = frozenset({"TF203", "TF703", "TF723", "TF724"})
 #: What has no effect in a joint that does not move.
 _OF_MOTION = ("axis", "limit", "mimic", "dynamics", "calibration", "safety_controller")
 #: Blocks that are ignored if they refer to nothing; ros2_control does not start with an unknown joint.
@@ -56,8 +54,8 @@ def omitted(document: Document) -> Notes:
             notes.setdefault(at, []).append(f"left out: {', '.join(several)}")
         if _has_no_ends(element):
             notes.setdefault(at, []).append("the source gives no lower and upper limit, and parsers take 0")
-    for one in document.found:
-        if one.span and one.code not in _NOTED_ELSEWHERE:
+    for one in document.converted.of_elements:  # of blocks and files nothing is left out for it
+        if one.span:
             notes.setdefault(_entry_at(one.span, entries), []).append(f"{one.code} in the source: {one.message}")
     of_robot = list(_in_robot(document.root, document.robot))
     if of_robot:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, model_validator
 
-from tfcompose.findings import Finding, Span, finding
+from tfcompose.findings import Finding, Note, RejectedError, Span, finding
 from tfcompose.geometry import Pose, Quaternion, normalised, quat_from_matrix, quat_from_rpy
 from tfcompose.language.pose import CalibrationFormat, has_unit_length, is_rotation
 from tfcompose.language.reading import Refusal, read
@@ -31,7 +31,7 @@ from tfcompose.load.calibration import load_calibration
 from tfcompose.units import Number, refused, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from tfcompose.load import Path, Source
     from tfcompose.load.calibration import Form
@@ -254,7 +254,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationFile:
-    """What a calibration file says; ``found`` holds what is wrong with it, at its places."""
+    """What a calibration file says; ``found`` holds what is wrong with it, at the place that names it."""
 
     file: str
     format: str
@@ -262,35 +262,47 @@ class CalibrationFile:
     found: tuple[Finding, ...]
 
 
-def read_calibration(text: str, file: str, form: str = "auto") -> CalibrationFile:
-    """Return what the text says, read in the format; ``auto`` recognises it.
+def unreadable(file: str, form: str, at: Span, found: Iterable[Finding]) -> CalibrationFile:
+    """Return what a file says that cannot be read: nothing, and why."""
+    exact = (replace(one, span=None) if one.span == Span(file) else one for one in found)
+    return CalibrationFile(file, form, (), tuple(_inside("TF610", one, file, at) for one in exact))
 
-    Raises:
-        RejectedError: if the text is not one that can be read at all.
-    """
-    kind, documents = load_calibration(text, file)
+
+def _inside(code: str, found: Finding, file: str, at: Span) -> Finding:
+    """Return a finding inside a calibration file as one at the place that names the file."""
+    notes = [Note("here", found.span), *found.notes] if found.span else found.notes
+    return finding(code, f"{file}: {found.message}", at, help=found.help, notes=notes)
+
+
+def read_calibration(text: str, file: str, form: str, at: Span) -> CalibrationFile:
+    """Return what the text says, read in the format, which ``auto`` recognises; ``at`` is where the file is named."""
+    try:
+        kind, documents = load_calibration(text, file)
+    except RejectedError as error:
+        return unreadable(file, form, at, error.findings)
     wrong = [one for document in documents for one in document.found]
     if wrong:
-        rejected = (finding("TF610", one.message, one.span, help=one.help, notes=one.notes) for one in wrong)
-        return CalibrationFile(file, form, (), tuple(rejected))
+        return CalibrationFile(file, form, (), tuple(_inside("TF610", one, file, at) for one in wrong))
     known = _recognised(kind, documents)
     chosen = known if form == "auto" else form
     if chosen is None or not documents:
         what = "is empty" if not documents else "is in no known format"
         advice = f"formats: {', '.join(FORMATS)}; format: names one"
-        return CalibrationFile(file, form, (), (finding("TF611", what, Span(file), help=advice),))
+        return CalibrationFile(file, form, (), (_of_no_format(file, what, at, advice),))
     if chosen != known and (kind != "yaml" or chosen == "moveit"):
         advice = f"leave format out; it reads like {known}" if known else f"formats: {', '.join(FORMATS)}"
-        return CalibrationFile(
-            file, chosen, (), (finding("TF611", f"is not a {chosen} file", Span(file), help=advice),)
-        )
-    reader = _Reader()
+        return CalibrationFile(file, chosen, (), (_of_no_format(file, f"is not a {chosen} file", at, advice),))
+    reader = _Reader(at)
     for document in documents:
         reader.source = document
         reader.entries += _READERS[chosen](reader, document.data)
     if not reader.entries and not reader.found:
-        reader.found.append(finding("TF611", f"holds no pose, read as {chosen}", Span(file)))
+        reader.found.append(_of_no_format(file, f"holds no pose, read as {chosen}", at))
     return CalibrationFile(file, chosen, tuple(reader.entries), tuple(reader.found))
+
+
+def _of_no_format(file: str, what: str, at: Span, advice: str = "") -> Finding:
+    return finding("TF611", f"{file} {what}", at, help=advice, notes=[Note("here", Span(file))])
 
 
 _AUTOWARE_KEYS = frozenset(PoseXyzRpy.model_fields)
@@ -324,6 +336,7 @@ M = TypeVar("M", bound=FileEntry)
 class _Reader:
     """Reads documents in each of the formats; an entry that is wrong is a finding, and the others are taken."""
 
+    named_at: Span
     source: Source = field(init=False)
     entries: list[Entry] = field(default_factory=list)
     found: list[Finding] = field(default_factory=list)
@@ -337,13 +350,16 @@ class _Reader:
                 continue  # one of several keys tells what the mapping should have been
             missing.add(one.path)
             at = (*path, *one.path[1:]) if model is MatrixFile else (*path, *one.path)
-            code = "TF614" if one.code in _NO_ROTATION else "TF610"
-            self.found.append(replace(one, path=at, on_key=False).finding(self.source, code))
+            self._refused(replace(one, path=at, on_key=False))
         return None if refusals else made
 
     def refuse(self, path: Path, message: str, advice: str = "") -> None:
         """Note what is wrong at a path."""
-        self.found.append(Refusal("TF610", path, message, advice).finding(self.source))
+        self._refused(Refusal("TF610", path, message, advice))
+
+    def _refused(self, one: Refusal) -> None:
+        code = "TF614" if one.code in _NO_ROTATION else "TF610"
+        self.found.append(_inside(code, one.finding(self.source), self.source.file, self.named_at))
 
     def entry(
         self, path: Path, pose: Pose, parent: str | None = None, child: str | None = None, what: str = ""
@@ -467,8 +483,7 @@ class _Reader:
         made, refusals = read(model, _DEFAULTS[model] | given)
         for one in refusals:
             path = (index, where[str(one.path[0])]) if one.path and str(one.path[0]) in where else (index,)
-            code = "TF614" if one.code in _NO_ROTATION else "TF610"
-            self.found.append(replace(one, path=path, on_key=False).finding(self.source, code))
+            self._refused(replace(one, path=path, on_key=False))
         return made.pose if made and not refusals else None
 
 

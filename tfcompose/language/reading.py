@@ -47,12 +47,12 @@ class Refusal:
     other: Path | None = None
     instead: str | None = None
 
-    def finding(self, source: Source, code: str = "") -> Finding:
-        """Return the finding at its place in the source; ``code`` replaces its own."""
+    def finding(self, source: Source) -> Finding:
+        """Return the finding at its place in the source."""
         span = source.at_key(self.path) if self.on_key else source.at(self.path)
         notes = [Note("the other one", source.at_key(self.other))] if self.other else []
         edits = [Edit(span, self.instead)] if self.instead is not None else []
-        return finding(code or self.code, self.message, span, help=self.help, notes=notes, edits=edits)
+        return finding(self.code, self.message, span, help=self.help, notes=notes, edits=edits)
 
 
 def read(model: type[M], data: Any, already: Iterable[Path] = ()) -> tuple[M | None, list[Refusal]]:

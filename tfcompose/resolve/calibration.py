@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, RejectedError, Span, did_you_mean, finding, nearest
-from tfcompose.language.calibration import CalibrationFile, read_calibration
+from tfcompose.language.calibration import CalibrationFile, read_calibration, unreadable
 from tfcompose.language.pose import ROTATIONS, CalibrationLimit, CalibrationSpec, MountKeys
 from tfcompose.load import path_named
 from tfcompose.model import Calibration
@@ -62,20 +62,13 @@ class _Files:
 
     def _load(self, path: str, at: Span, form: str) -> CalibrationFile:
         if self.read is None:
-            self.found.append(finding("TF610", f"{path}: files cannot be read here", at))
-            return CalibrationFile(path, form, (), tuple(self.found[-1:]))
-        try:
-            loaded = read_calibration(self.read(path), path, form)
-            wrong = loaded.found
-        except RejectedError as error:
-            file_span = Span(path)  # no place in it
-            found = error.findings
-            wrong = tuple(replace(one, code="TF610", span=None if one.span == file_span else one.span) for one in found)
-            loaded = CalibrationFile(path, form, (), wrong)
-        for one in wrong:
-            notes = [Note("here", one.span), *one.notes] if one.span else one.notes
-            message = f"{path} {one.message}" if one.code == "TF611" else f"{path}: {one.message}"
-            self.found.append(finding(one.code, message, at, help=one.help, notes=notes))
+            loaded = unreadable(path, form, at, [finding("TF001", "files cannot be read here", None)])
+        else:
+            try:
+                loaded = read_calibration(self.read(path), path, form, at)
+            except RejectedError as error:
+                loaded = unreadable(path, form, at, error.findings)
+        self.found += loaded.found
         return loaded
 
 

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeGuard
 
-from tfcompose.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
+from tfcompose.findings import Finding, RejectedError, Span, finding
 from tfcompose.geometry import rpy_from_quat
 from tfcompose.language.robot import Origin
 from tfcompose.load import path_named
@@ -19,7 +19,7 @@ from tfcompose.resolve.stock import with_stock
 from tfcompose.urdf.blocks import read_block, with_hardware
 from tfcompose.urdf.convert import robot_of
 from tfcompose.urdf.read import read_xml
-from tfcompose.urdf.xacro import Call, macros_in
+from tfcompose.urdf.xacro import Use, macros_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -28,13 +28,15 @@ if TYPE_CHECKING:
     from tfcompose.resolve.parts import PartEntry
     from tfcompose.urdf.packages import Packages
 
-_WORD = re.compile(r"""["']?(\w+)["']?""")
 _PACKAGE = re.compile(r"(?:package://|\$\(find(?:-pkg-share)?\s+)([A-Za-z][A-Za-z0-9_.-]*)\)?/(.+)")
 
 
 @dataclass(frozen=True, slots=True)
 class Foreign:
-    """The robot of a URDF or xacro file. ``file`` is its name in places; ``found`` is what is wrong with it.
+    """The robot of a URDF or xacro file. ``file`` is its name in places.
+
+    ``found`` is what is wrong with it: errors, and the files that it names and that are not found. Other warnings are
+    for those who wrote it.
 
     ``implied`` are the frames that its joints hang on and that it does not have: the holder's, where a macro makes it.
     """
@@ -59,7 +61,8 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
         name, text = file, read(file)
     else:
         name, text = f"{file} (expanded)", _expanded(part, file, at, packages)
-    robot, found = robot_of(read_xml(text, name), name, packages.asset)
+    converted = robot_of(read_xml(text, name), name, packages.asset)
+    robot = converted.robot
     if not robot.frames:
         macros = macros_in(read(file))
         advice = f"it defines macros; call one with xacro: and macro: {', '.join(macros)}" if macros else ""
@@ -68,11 +71,13 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
     parents = {edge.parent for edge in robot.edges}
     implied = frozenset(parents - robot.frames.keys()) if spec.macro is not None else frozenset[str]()
     digest = hashlib.sha256(text.encode()).hexdigest()
+    found = [one for one in (*converted.of_elements, *converted.of_blocks) if one.severity == "error"]
+    found += converted.of_files
     own = _with_base(replace(robot, ros=part.settings, processes=_own(part), source_data={"urdf": digest}))
     if part.alone and part.spec.ros.state_publisher == "stock":
         own, refused = with_stock(own)
-        found = (*found, *refused)
-    return Foreign(own, name, found, implied)
+        found += refused
+    return Foreign(own, name, tuple(found), implied)
 
 
 def _with_base(robot: Robot) -> Robot:
@@ -95,58 +100,27 @@ def _expanded(part: PartEntry, file: str, at: Span, packages: Packages) -> str:
     disk, spec = packages.disk, part.declared
     if disk is None:
         raise RejectedError([finding("TF001", f"{file}: files cannot be read here", at)])
-    call = _call(part, file, packages)
-    try:
-        return disk.expand(file, packages, spec.args, call)
-    except RejectedError as error:
-        if spec.macro is None:
-            place = part.source.at((*part.at, "xacro"))
-            raise RejectedError([_at(place, one) for one in error.findings]) from None
-        raise RejectedError([_in_call(part, file, one, disk.read) for one in error.findings]) from None
+    return disk.expand(file, packages, spec.args, _use(part, file, packages))
 
 
-def _in_call(part: PartEntry, file: str, found: Finding, read: Callable[[str], str]) -> Finding:
-    """Return the finding about a call of a macro, at the parameter that it names, with what the macro takes."""
-    macro = part.declared.macro or ""
-    place = part.source.at((*part.at, "macro"))
-    if found.code != "TF018":
-        return _at(place, found)
-    named = [word for word in _WORD.findall(found.message) if word in part.declared.params]
-    macros = macros_in(read(file))
-    if macro in macros:
-        advice = f"{macro} takes {macros[macro] or 'nothing'}"
-        advice += "; parameters with * take {xyz, rpy} or XML" if "*" in macros[macro] else ""
-        place = part.source.at_key((*part.at, "params", named[-1])) if named else place
-    else:
-        advice = did_you_mean(macro, macros, f"{file} defines {', '.join(macros)}" if macros else "")
-    return replace(_at(place, found), help=advice)
-
-
-def _at(place: Span, found: Finding) -> Finding:
-    """Return the finding about a file that has no better place in it, at the place that names the file."""
-    if found.span is None or found.code == "TF001":
-        return found
-    exact = () if found.span == Span(found.span.file) else (Note("reported here", found.span),)
-    return replace(found, span=place, message=f"{found.span.file}: {found.message}", notes=(*exact, *found.notes))
-
-
-def _call(part: PartEntry, file: str, packages: Packages) -> Call | None:
-    """Return the call of the part's macro; None where the file itself is the robot."""
-    spec = part.declared
+def _use(part: PartEntry, file: str, packages: Packages) -> Use:
+    """Return how the part uses the file: as a whole, or a call of its macro."""
+    spec, at = part.declared, part.at
     if spec.macro is None:
-        return None
-    places = (part.source.at((*part.at, "include", index)) for index in range(len(spec.include)))
+        return Use(part.source.at((*at, "xacro")))
+    places = (part.source.at((*at, "include", index)) for index in range(len(spec.include)))
     files = (*(_address(one, place, packages) for one, place in zip(spec.include, places, strict=True)), file)
     words, blocks = {}, []
     for name, value in spec.params.items():
         if _is_markup(value):
-            _refuse_broken(name, value, part.source.at((*part.at, "params", name)))
+            _refuse_broken(name, value, part.source.at((*at, "params", name)))
         block = _block(value)
         if block is None:
             words[name] = _word(value)
         else:
             blocks.append(block)
-    return Call(spec.macro, words, tuple(blocks), files)
+    named = {name: part.source.at_key((*at, "params", name)) for name in spec.params}
+    return Use(part.source.at((*at, "macro")), spec.macro, words, tuple(blocks), files, named)
 
 
 def _is_markup(value: Any) -> TypeGuard[str]:

@@ -38,8 +38,6 @@ if TYPE_CHECKING:
 
 #: How many parts a robot may have, those of its parts counted.
 MOST_PARTS = 100
-#: Warnings about somebody else's file that its holder is told: what is not found here may be elsewhere.
-_TELLING = frozenset({"TF723", "TF724"})
 
 
 @dataclass(slots=True)
@@ -99,7 +97,7 @@ class Parts:
         except RejectedError as error:
             raise RejectedError([_noted(one, part) for one in error.findings]) from None
         self.collected.notes.setdefault(made.file, []).append(_note(part))
-        self.found += [_noted(one, part) for one in made.found if one.severity == "error" or one.code in _TELLING]
+        self.found += [_noted(one, part) for one in made.found]
         return made.robot, made.implied
 
     def _resolved(self, part: PartEntry, named: str, read: Reader) -> Robot:

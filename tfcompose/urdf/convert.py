@@ -53,8 +53,27 @@ T = TypeVar("T", Dynamics, Limit, ReferencePositions, SafetyController)
 _BOUNDS = (Limit, SafetyController)
 
 
-def robot_of(root: Element, file: str, find: Finder) -> tuple[Robot, tuple[Finding, ...]]:
-    """Return the robot that the URDF describes, right or wrong, and what was found while reading it.
+@dataclass(frozen=True, slots=True)
+class Converted:
+    """The robot that a URDF describes, right or wrong, and what was found while reading it.
+
+    ``of_elements`` is about links and joints, ``of_blocks`` about elements that are kept as they are, and ``of_files``
+    about meshes and textures, of which those that are not here may be elsewhere.
+    """
+
+    robot: Robot
+    of_elements: tuple[Finding, ...]
+    of_blocks: tuple[Finding, ...]
+    of_files: tuple[Finding, ...]
+
+    @property
+    def found(self) -> tuple[Finding, ...]:
+        """All that was found."""
+        return (*self.of_elements, *self.of_blocks, *self.of_files)
+
+
+def robot_of(root: Element, file: str, find: Finder) -> Converted:
+    """Return the robot that the URDF describes.
 
     ``find`` looks for the files of meshes and textures.
 
@@ -75,9 +94,8 @@ def robot_of(root: Element, file: str, find: Finder) -> tuple[Robot, tuple[Findi
     edges = [edge for element in joints if (edge := _edge(element, values))]
     frames = {link: element.at_value("name") for link, element in links.items()}
     names = {edge.joint_name: None for edge in edges}
-    for element in root.children:
-        if element.tag in REFERRING:
-            values.found += [replace(one, severity="warning") for one in unknown_references(element, frames, names)]
+    referring = (element for element in root.children if element.tag in REFERRING)
+    unknown = (one for element in referring for one in unknown_references(element, frames, names))
     robot = Robot(
         name=name,
         file=file,
@@ -89,7 +107,8 @@ def robot_of(root: Element, file: str, find: Finder) -> tuple[Robot, tuple[Findi
         blocks=tuple(_blocks(root)),
         foreign=frozenset({file}),
     )
-    return robot, (*values.found, *bodies.found, *unknown_words(root))
+    of_blocks = tuple(replace(one, severity="warning") for one in unknown)
+    return Converted(robot, (*values.found, *unknown_words(root)), of_blocks, tuple(bodies.found))
 
 
 def _by_name(elements: list[Element], values: Values, severity: Severity = "error") -> dict[str, Element]:

@@ -17,13 +17,13 @@ import xacro
 from xacro import substitution_args
 
 from tfcompose.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
-from tfcompose.urdf.xacro import NAMESPACE
+from tfcompose.urdf.xacro import NAMESPACE, macros_in
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
 
     from tfcompose.urdf.packages import Packages
-    from tfcompose.urdf.xacro import Call
+    from tfcompose.urdf.xacro import Use
 
 #: How a file declares an argument, and how it asks for one.
 _ARGUMENT = re.compile(r"""<xacro:arg\b[^>]*?\bname\s*=\s*["']([^"']+)["']|\$\(arg\s+(\w+)\s*\)""")
@@ -32,47 +32,48 @@ _NAMED = (
     (re.compile(r"when evaluating expression '(.+)'"), r"\$\{{\s*{}\s*\}}"),
     (re.compile(r"unknown macro name: (xacro:\S+)"), r"<{}(?=[\s/>])"),
 )
+_WORD = re.compile(r"""["']?(\w+)["']?""")
 #: At most so many of the macros around an error are named.
 _MOST_MACROS = 5
 
 
-def expand(file: str, packages: Packages, arguments: Mapping[str, Any], call: Call | None = None) -> str:
+def expand(file: str, packages: Packages, arguments: Mapping[str, Any], use: Use | None = None) -> str:
     """Return the URDF that xacro makes of a file, or of a call of one of its macros; ``packages`` answer $(find …).
 
     Raises:
-        RejectedError: if xacro refuses the file.
+        RejectedError: if xacro refuses the file; with the findings where a robot file names it, if one does.
     """
     given = {name: str(value) for name, value in arguments.items()}
     try:
         xacro.all_includes.clear()
         with _finding_in(packages, file):
-            document = _processed(file, call, given)
-        _refuse_unknown(given, [file, *xacro.all_includes], file)
+            document = _processed(file, use, given)
+        _refuse_unknown(given, [file, *xacro.all_includes], file, use)
         _raise_comments(document)
         result: str = document.toprettyxml(indent="  ")
     except RejectedError:
         raise
     except Exception as error:  # noqa: BLE001 (xacro evaluates Python: anything can come out of it)
-        raise RejectedError([_refused(error, file)]) from None
+        raise RejectedError([_refused(error, file, use)]) from None
     return result
 
 
-def _processed(file: str, call: Call | None, arguments: dict[str, str]) -> Any:
+def _processed(file: str, use: Use | None, arguments: dict[str, str]) -> Any:
     """Return the DOM document that xacro makes."""
-    if call is None:
+    if use is None or not use.macro:
         return xacro.process_file(file, mappings=arguments)
-    document = xacro.parse(_document(call), file)
+    document = xacro.parse(_document(use), file)
     xacro.init_stacks(file)  # relative includes begin in the file's folder
     xacro.process_doc(document, mappings=arguments)
     return document
 
 
-def _document(call: Call) -> str:
-    words = "".join(f" {name}={quoteattr(value)}" for name, value in call.words.items())
+def _document(use: Use) -> str:
+    words = "".join(f" {name}={quoteattr(value)}" for name, value in use.words.items())
     includes = "".join(
-        f"<xacro:include filename={quoteattr(os.path.normpath(Path(file).absolute()))}/>" for file in call.files
+        f"<xacro:include filename={quoteattr(os.path.normpath(Path(file).absolute()))}/>" for file in use.files
     )
-    macro = f"<xacro:{call.macro}{words}>{''.join(call.blocks)}</xacro:{call.macro}>"
+    macro = f"<xacro:{use.macro}{words}>{''.join(use.blocks)}</xacro:{use.macro}>"
     return f'<robot name="part" {NAMESPACE}>{includes}{macro}</robot>'
 
 
@@ -102,7 +103,7 @@ def _finding_in(packages: Packages, file: str) -> Iterator[None]:
         substitution_args._eval_find = before  # noqa: SLF001 (as above)
 
 
-def _refuse_unknown(given: Mapping[str, str], files: list[str], file: str) -> None:
+def _refuse_unknown(given: Mapping[str, str], files: list[str], file: str, use: Use | None) -> None:
     """Refuse arguments that none of the files declares or asks for; xacro itself ignores them."""
     texts = [Path(name).read_text("utf-8", "replace") for name in files]
     known = dict.fromkeys(
@@ -110,7 +111,7 @@ def _refuse_unknown(given: Mapping[str, str], files: list[str], file: str) -> No
     )
     wrong = [name for name in given if name not in known]
     if wrong:
-        raise RejectedError([_no_argument(name, known, file) for name in wrong])
+        raise RejectedError([_where_used(_no_argument(name, known, file), use) for name in wrong])
 
 
 def _no_argument(name: str, known: Collection[str], file: str) -> Finding:
@@ -133,25 +134,47 @@ def _raise_comments(node: Any) -> None:
         over.parentNode.insertBefore(child, over)
 
 
-def _refused(error: Exception, file: str) -> Finding:
+def _where_used(found: Finding, use: Use | None) -> Finding:
+    """Return a finding in a xacro file as one at the place in the robot file that names it, if one does."""
+    if use is None or found.span is None:
+        return found
+    exact = () if found.span == Span(found.span.file) else (Note("reported here", found.span),)
+    return replace(found, span=use.at, message=f"{found.span.file}: {found.message}", notes=(*exact, *found.notes))
+
+
+def _in_call(found: Finding, file: str, use: Use) -> Finding:
+    """Return what xacro says about the call of a macro, at the parameter that it names, with what the macro takes."""
+    named = [word for word in _WORD.findall(found.message) if word in use.places]
+    macros, at = macros_in(Path(file).read_text("utf-8", "replace")), use.at
+    if use.macro in macros:
+        advice = f"{use.macro} takes {macros[use.macro] or 'nothing'}"
+        advice += "; parameters with * take {xyz, rpy} or XML" if "*" in macros[use.macro] else ""
+        at = use.places[named[-1]] if named else at
+    else:
+        advice = did_you_mean(use.macro, macros, f"{file} defines {', '.join(macros)}" if macros else "")
+    return replace(_where_used(found, replace(use, at=at)), help=advice)
+
+
+def _refused(error: Exception, file: str, use: Use | None) -> Finding:
     """Return what xacro, or something that it called, did not like, and where, or in which other file."""
     chain: list[Any] = [error]
     while getattr(chain[-1], "exc", None) is not None:  # xacro wraps what it calls, again and again
         chain.append(chain[-1].exc)
     root = chain[-1]
     if isinstance(root, _MissingError):
-        return replace(root.found, severity="error", span=Span(file))
+        return _where_used(replace(root.found, severity="error", span=Span(file)), use)
     if type(root).__name__ == "ArgException":
         message = f"the argument {root} has no value and no default"
-        return finding("TF106", message, Span(file), help=f"give it: {root}:=…, or in a part args: {{{root}: …}}")
+        advice = f"give it: {root}:=…, or in a part args: {{{root}: …}}"
+        return _where_used(finding("TF106", message, Span(file), help=advice), use)
     reason = _reason(chain) or type(error).__name__
     found = finding("TF018", f"xacro: {reason}", Span(file))
     files, macros = list(xacro.filestack or ()), list(xacro.macrostack or ())
     placed = _relative_to(file, _placed(found, root, files, macros))
     others = [name for name in files[-1:] if name and Path(name).absolute() != Path(file).absolute()]
     if others and placed.span == found.span:
-        return replace(placed, message=f"{placed.message} (in {os.path.relpath(others[0])})")
-    return placed
+        placed = replace(placed, message=f"{placed.message} (in {os.path.relpath(others[0])})")
+    return _in_call(placed, file, use) if use and use.macro else _where_used(placed, use)
 
 
 def _reason(chain: list[Any]) -> str:

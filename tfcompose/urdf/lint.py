@@ -9,7 +9,7 @@ from tfcompose.check import RULES, apply, check, unused_allows
 from tfcompose.findings import Finding, RejectedError, Span, finding
 from tfcompose.load import allows_in_xml
 from tfcompose.urdf.blocks import with_hardware
-from tfcompose.urdf.convert import robot_of
+from tfcompose.urdf.convert import Converted, robot_of
 from tfcompose.urdf.read import read_xml
 from tfcompose.urdf.xacro import macros_in
 
@@ -34,18 +34,22 @@ def lint_urdf(file: str, packages: Packages) -> list[Finding]:
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A URDF that was read: its elements, the robot that it describes, and what was found by reading it."""
+    """A URDF that was read: its elements, and what they describe."""
 
     name: str
     text: str
     root: Element
-    robot: Robot
-    found: tuple[Finding, ...]
+    converted: Converted
+
+    @property
+    def robot(self) -> Robot:
+        """The robot that it describes."""
+        return self.converted.robot
 
     def findings(self) -> list[Finding]:
         """Return what is wrong with it, by place, but for what its comments allow."""
         allows = allows_in_xml(self.text, self.name)
-        found = dict.fromkeys([*self.found, *check(with_hardware(self.robot), _RULES)])
+        found = dict.fromkeys([*self.converted.found, *check(with_hardware(self.robot), _RULES)])
         kept, used = apply(found, allows)
         return sorted([*kept, *unused_allows(allows, used)], key=lambda one: one.sort_key)
 
@@ -67,10 +71,10 @@ def read_urdf(file: str, packages: Packages, arguments: Mapping[str, str] | None
         raise RejectedError([finding("TF106", f"unknown argument {next(iter(arguments))}", Span(file), help=advice)])
     name, text = (f"{file} (expanded)", disk.expand(file, packages, arguments or {}, None)) if is_xacro else (file, raw)
     root = read_xml(text, name)
-    robot, found = robot_of(root, name, packages.asset)
-    macros = list(macros_in(raw)) if is_xacro and not robot.frames else []
+    converted = robot_of(root, name, packages.asset)
+    macros = list(macros_in(raw)) if is_xacro and not converted.robot.frames else []
     if macros:
         advice = f"a part can call one: parts: {{NAME: {{xacro: {file}, macro: {macros[0]}, …}}}}"
         message = f"{file} defines macros but no links: {', '.join(macros)}"
         raise RejectedError([finding("TF206", message, Span(file), help=advice)])
-    return Document(name, text, root, robot, found)
+    return Document(name, text, root, converted)

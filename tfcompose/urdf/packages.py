@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from tfcompose.geometry import Vector
     from tfcompose.urdf.inertia import Moments
-    from tfcompose.urdf.xacro import Call
+    from tfcompose.urdf.xacro import Use
 
 _PACKAGE_NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://")
@@ -39,7 +39,7 @@ def _not_expanded(file: str, *_: object) -> str:
 class Disk:
     """What a compiler may ask about files. ``prefixes`` are those of AMENT_PREFIX_PATH, in order.
 
-    ``expand`` gives the URDF that xacro makes of a file, with arguments, or of a call of one of its macros.
+    ``expand`` gives the URDF that xacro makes of a file, with arguments, or of what a robot file uses of it.
     ``moments`` gives those of a mesh file at a scale, and raises ``UnmeasurableError`` with the finding's parts.
     ``is_pointer`` tells whether a file is a pointer that Git LFS has yet to replace by the file itself.
     """
@@ -49,7 +49,7 @@ class Disk:
     is_folder: Callable[[str], bool]
     prefixes: tuple[str, ...] = ()
     moments: Callable[[str, Vector], Moments] | None = None
-    expand: Callable[[str, Packages, Mapping[str, Any], Call | None], str] = _not_expanded
+    expand: Callable[[str, Packages, Mapping[str, Any], Use | None], str] = _not_expanded
     is_pointer: Callable[[str], bool] = lambda _: False
 
 

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tfcompose.findings import Span
 
 NAMESPACE = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
 #: How a file defines a macro, up to its name, and the macro's parameters in that tag.
@@ -12,13 +16,19 @@ _PARAMS = re.compile(r"""\bparams\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 
 
 @dataclass(frozen=True, slots=True)
-class Call:
-    """A call of a macro that one of the files defines: its parameters are words and blocks of XML."""
+class Use:
+    """How a robot file uses a xacro file, ``at`` a place: as a whole, or a call of a ``macro`` that is defined there.
 
-    macro: str
+    The macro's parameters are words, of which ``places`` holds where they are given, and blocks of XML; ``files`` are
+    what is included for it.
+    """
+
+    at: Span
+    macro: str = ""
     words: dict[str, str] = field(default_factory=dict)
     blocks: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
+    places: dict[str, Span] = field(default_factory=dict)
 
 
 def macros_in(text: str) -> dict[str, str]:

@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tfcompose.launcher.child import BURST, LINE_LIMIT, Bucket, Lines, Pipe, spawn
+from tfcompose.launcher.child import BURST, LINE_LIMIT, Bucket, Command, Lines, Pipe, spawn
 from tfcompose.launcher.children import Reaper
-from tfcompose.launcher.preflight import Command
 from tfcompose.launcher.supervisor import Signals
 
 

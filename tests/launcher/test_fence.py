@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 from tests.support.findings import expect
 from tfcompose.findings import Finding
 from tfcompose.geometry import Pose
-from tfcompose.launcher.preflight import LAUNCH, Command, commands_of
+from tfcompose.launcher.child import Command
+from tfcompose.launcher.preflight import LAUNCH, commands_of
 from tfcompose.plan import FenceWay, GuardPolicy, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.plan.topics import private_topics
 from tfcompose.ros.environment import child_environment

@@ -11,7 +11,8 @@ import pytest
 from tests.support.findings import expect
 from tfcompose.findings import Finding
 from tfcompose.ipc import LogLine, Notice
-from tfcompose.launcher.preflight import Command, commands_of
+from tfcompose.launcher.child import Command
+from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.supervisor import supervise
 from tfcompose.plan import Plan, PlanProcess, RosSettings
 from tfcompose.ros.environment import child_environment

@@ -9,7 +9,8 @@ import pytest
 
 from tests.support.findings import expect
 from tfcompose.findings import Finding
-from tfcompose.launcher.preflight import Command, commands_of
+from tfcompose.launcher.child import Command
+from tfcompose.launcher.preflight import commands_of
 from tfcompose.plan import Plan, PlanProcess, RosSettings
 from tfcompose.ros.environment import child_environment
 

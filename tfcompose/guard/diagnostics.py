@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from tfcompose.findings import Finding
     from tfcompose.guard.judge import Judge
-    from tfcompose.plan import PlanEdge
+    from tfcompose.guard.liveness import EdgeHealth
 
 
 _TOPIC = "/diagnostics"
@@ -74,38 +74,10 @@ EVERY_S = 1.0
 _NAMES = {OK: "ok", WARN: "warning", ERROR: "error", STALE: "not seen"}
 
 
-@dataclass(frozen=True, slots=True)
-class EdgeHealth:
-    """One planned edge: which node publishes it (full name, empty while none has), and how.
-
-    ``rate`` is in hertz, ``age_s`` counts since it came last, ``delay_s`` is how old its stamp was then; None: not
-    known. ``silent`` and ``slow`` are against what the plan says.
-    """
-
-    edge: PlanEdge
-    publisher: str = ""
-    rate: float | None = None
-    age_s: float | None = None
-    delay_s: float | None = None
-    silent: bool = False
-    slow: bool = False
-
-    @property
-    def level(self) -> int:
-        """How bad it is, as on a diagnostics page."""
-        if self.age_s is None:
-            return STALE
-        return ERROR if self.silent else WARN if self.slow else OK
-
-    @property
-    def text(self) -> str:
-        """What is known, in words."""
-        if self.age_s is None:
-            return "not seen yet"
-        numbers = [f"age {self.age_s:.3f} s"] if self.edge.kind != "static" else ["latched"]
-        numbers += [f"{self.rate:.3g} Hz"] if self.rate is not None else []
-        numbers += [f"delay {self.delay_s:.3f} s"] if self.delay_s is not None else []
-        return ", ".join([*numbers, f"from {self.publisher}"])
+def _level(edge: EdgeHealth) -> int:
+    if edge.age_s is None:
+        return STALE
+    return ERROR if edge.silent else WARN if edge.slow else OK
 
 
 def held_status(robot: str, held: Mapping[tuple[str, str, str], int]) -> Status:
@@ -124,8 +96,8 @@ def statuses(robot: str, edges: Sequence[EdgeHealth], found: Sequence[Finding]) 
     for owner in dict.fromkeys(one.edge.owner for one in edges):
         owned = [one for one in edges if one.edge.owner == owner]
         # Not seen yet is worse than fine, and better than silent.
-        worst = max((one.level for one in owned), key=[OK, WARN, STALE, ERROR].index)
-        number = sum(one.level == worst for one in owned)
+        worst = max((_level(one) for one in owned), key=[OK, WARN, STALE, ERROR].index)
+        number = sum(_level(one) == worst for one in owned)
         summary = f"{number} of {len(owned)} edges: {_NAMES[worst]}"
         lines.append(
             Status(f"tfcompose {robot}: {owner}", worst, summary, [(one.edge.name, one.text) for one in owned])

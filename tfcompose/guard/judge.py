@@ -12,8 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from tfcompose.guard.diagnostics import EdgeHealth
-from tfcompose.guard.liveness import Liveness, LivenessMemory
+from tfcompose.guard.liveness import EdgeHealth, Liveness, LivenessMemory
 from tfcompose.guard.reports import CaseMemory, Cases, PublisherReports
 from tfcompose.ipc import Clear, Found, GuardEvent
 from tfcompose.live.publishers import NAMELESS_S, SenderMemory, Senders

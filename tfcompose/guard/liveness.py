@@ -42,6 +42,33 @@ STALLED_S = 1.0
 CATCH_UP_S = 3.5
 
 
+@dataclass(frozen=True, slots=True)
+class EdgeHealth:
+    """One planned edge: which node publishes it (full name, empty while none has), and how.
+
+    ``rate`` is in hertz, ``age_s`` counts since it came last, ``delay_s`` is how old its stamp was then; None: not
+    known. ``silent`` and ``slow`` are against what the plan says.
+    """
+
+    edge: PlanEdge
+    publisher: str = ""
+    rate: float | None = None
+    age_s: float | None = None
+    delay_s: float | None = None
+    silent: bool = False
+    slow: bool = False
+
+    @property
+    def text(self) -> str:
+        """What is known, in words."""
+        if self.age_s is None:
+            return "not seen yet"
+        numbers = [f"age {self.age_s:.3f} s"] if self.edge.kind != "static" else ["latched"]
+        numbers += [f"{self.rate:.3g} Hz"] if self.rate is not None else []
+        numbers += [f"delay {self.delay_s:.3f} s"] if self.delay_s is not None else []
+        return ", ".join([*numbers, f"from {self.publisher}"])
+
+
 @dataclass(slots=True)
 class WatchedTime:
     """The seconds in which the guard ran: a clock that stops while the guard is kept from running."""

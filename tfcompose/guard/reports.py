@@ -13,8 +13,8 @@ from tfcompose.ipc import Found, GuardEvent, Recovered, Taken
 from tfcompose.live.publishers import FEWEST_GAPS, NAMELESS_S, UNCOUNTED
 from tfcompose.live.state import NAMELESS
 from tfcompose.plan.topics import GLOBAL
-from tfcompose.verdict.drivers import drives_of, sensor_of
-from tfcompose.verdict.ownership import Violation, misnamed_help, taken_finding, violation_finding
+from tfcompose.verdict.drivers import drives_of
+from tfcompose.verdict.ownership import Violation, misnamed_help, sensor_of, taken_finding, violation_finding
 from tfcompose.verdict.publishers import (
     best_effort_publisher,
     flood,

@@ -31,8 +31,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from tfcompose.ipc import Request
+    from tfcompose.launcher.child import Command
     from tfcompose.launcher.events import Event
-    from tfcompose.launcher.preflight import Command, Environment
+    from tfcompose.launcher.preflight import Environment
     from tfcompose.launcher.state import State, Tracked
     from tfcompose.plan import Plan, PlanProcess
 

@@ -21,9 +21,8 @@ from tfcompose.signals import SIGNALS
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator
     from io import FileIO
+    from pathlib import Path
     from typing import IO
-
-    from tfcompose.launcher.preflight import Command
 
 #: A line longer than this comes in pieces; bytes.
 LINE_LIMIT = 64 * 1024
@@ -44,6 +43,22 @@ LAST_LINE_LENGTH = 300
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
 _LIBC = ctypes.CDLL(None, use_errno=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """Program and arguments, environment, and folder.
+
+    ``own`` says that it is one of tfcompose's. ``fence`` is a file that must be there first, and what it holds.
+    ``missing`` says, of a process that the run goes on without, why it cannot be started.
+    """
+
+    argv: tuple[str, ...]
+    env: dict[str, str]
+    folder: Path
+    own: bool = False
+    fence: tuple[Path, str] | None = None
+    missing: str = ""
 
 
 class Lines:

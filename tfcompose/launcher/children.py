@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from selectors import BaseSelector
 
     from tfcompose.ipc import GuardOrder, Notice, Stream
+    from tfcompose.launcher.child import Command
     from tfcompose.launcher.events import Event
-    from tfcompose.launcher.preflight import Command
     from tfcompose.plan import PlanProcess
 
 #: So much of a line is compared with what a gate waits for, in characters.

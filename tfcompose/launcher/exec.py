@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from tfcompose.findings import Finding
-    from tfcompose.launcher.preflight import Command
+    from tfcompose.launcher.child import Command
 
 _ARGUMENTS = 2
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from typing import Literal
 
-    from tfcompose.launcher.preflight import Command
+    from tfcompose.launcher.child import Command
     from tfcompose.plan import Plan, PlanProcess
 
     Way = Literal["", "partition", "remap"]

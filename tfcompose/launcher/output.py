@@ -27,9 +27,9 @@ from tfcompose.launcher.control import Control
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
+    from socket import socket
 
     from tfcompose.ipc import Notice, Request
-    from tfcompose.launcher.supervisor import Session
 
 
 #: So much is kept for a slow reader; what the launcher itself says may take as much again; bytes.
@@ -124,28 +124,28 @@ def _not_waiting(fd: int) -> tuple[int, bool]:
 class Notifier:
     """Passes notices on to the person at the output, and to whoever listens at the control socket.
 
-    ``lost`` is called once, when the reader of the output has gone.
+    ``lost`` is called once, when the reader of the ``output`` has gone, ``refresh`` now and then.
     """
 
     def __init__(
         self,
         selector: selectors.BaseSelector,
-        session: Session,
         report: Callable[[Notice], None],
         lost: Callable[[], None],
+        output: NonBlockingOutput | None,
+        refresh: Callable[[], None] | None,
     ) -> None:
         self._selector = selector
-        self._output = session.output
-        self._refresh = session.refresh
+        self._output = output
+        self._refresh = refresh
         self._report: Callable[[Notice], None] | None = report
         self._lost = lost
         self._owing: int | None = None
         self._control: Control | None = None
 
-    def listen(self, session: Session, answer: Callable[[Request], object]) -> None:
-        """Hear other commands at the session's socket, if it has one."""
-        if session.listener:
-            self._control = Control(session.listener, self._selector, answer)
+    def listen(self, listener: socket, answer: Callable[[Request], object]) -> None:
+        """Take requests of other commands at the control socket."""
+        self._control = Control(listener, self._selector, answer)
 
     def close(self) -> None:
         """Let all go who listen."""

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from tfcompose.findings import Finding, Note, did_you_mean, finding
+from tfcompose.launcher.child import Command
 from tfcompose.launcher.fence import by_partition, not_remapped, remapped, way_of
 from tfcompose.variables import REMAPPED
 
@@ -34,22 +35,6 @@ _WRAPPER = Path(__file__).absolute().with_name("launch_wrapper.py")
 #: The variable in which the wrapper is given the launch file, and what the plan says of it.
 LAUNCH = "TFCOMPOSE_LAUNCH"
 _KINDS = ("*launch.py", "*launch.xml", "*launch.yaml", "*launch.yml")
-
-
-@dataclass(frozen=True, slots=True)
-class Command:
-    """Program and arguments, environment, and folder.
-
-    ``own`` says that it is one of tfcompose's. ``fence`` is a file that must be there first, and what it holds.
-    ``missing`` says, of a process that the run goes on without, why it cannot be started.
-    """
-
-    argv: tuple[str, ...]
-    env: dict[str, str]
-    folder: Path
-    own: bool = False
-    fence: tuple[Path, str] | None = None
-    missing: str = ""
 
 
 class Environment(Protocol):

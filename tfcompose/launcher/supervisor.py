@@ -53,9 +53,10 @@ if TYPE_CHECKING:
     from tfcompose.findings import Finding
     from tfcompose.ipc import Notice, Request
     from tfcompose.launcher.answers import Answer, Outcome
+    from tfcompose.launcher.child import Command
     from tfcompose.launcher.events import Action, Event
     from tfcompose.launcher.output import NonBlockingOutput
-    from tfcompose.launcher.preflight import Command, Environment
+    from tfcompose.launcher.preflight import Environment
     from tfcompose.launcher.state import State, Times
     from tfcompose.plan import Plan
 
@@ -140,8 +141,10 @@ class _Supervisor:
         selector.register(self._signals.fd, selectors.EVENT_READ, self._signals.woken)
         self._session = session
         self._decide = decide
-        self._notifier = Notifier(selector, session, report, lambda: self._events.append(OutputLost()))
-        self._notifier.listen(session, self._answer)
+        lost = partial(self._events.append, OutputLost())
+        self._notifier = Notifier(selector, report, lost, session.output, session.refresh)
+        if session.listener:
+            self._notifier.listen(session.listener, self._answer)
         self._notify = self._notifier.notify
         stack.callback(self._notifier.close)
         if session.run_id:

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from tfcompose.load import Path, Source
     from tfcompose.plan import EdgeKind
     from tfcompose.resolve.bodies import Bodies
-    from tfcompose.resolve.parts import Joined
+    from tfcompose.resolve.part import Joined
     from tfcompose.resolve.presets import Sensor
 
 

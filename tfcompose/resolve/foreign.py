@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from tfcompose.plan import RosSettings
-    from tfcompose.resolve.parts import PartEntry
+    from tfcompose.resolve.part import PartEntry
     from tfcompose.urdf.packages import Packages
 
 _PACKAGE = re.compile(r"(?:package://|\$\(find(?:-pkg-share)?\s+)([A-Za-z][A-Za-z0-9_.-]*)\)?/(.+)")

@@ -15,7 +15,7 @@ from tfcompose.resolve.completed import completed
 from tfcompose.resolve.edges import Drafts, source_numbers
 from tfcompose.resolve.isolation import settings_of
 from tfcompose.resolve.param_files import with_param_files
-from tfcompose.resolve.parts import Collected, Parts
+from tfcompose.resolve.parts import Collected, Parts, Resolved
 from tfcompose.resolve.poses import Solver
 from tfcompose.resolve.presets import sensor_of
 from tfcompose.resolve.processes import (
@@ -38,19 +38,10 @@ if TYPE_CHECKING:
     from tfcompose.load import Source
     from tfcompose.model import Block
     from tfcompose.plan import GuardPolicy
-    from tfcompose.resolve.parts import Joined
+    from tfcompose.resolve.part import Joined
     from tfcompose.resolve.poses import Draft
     from tfcompose.resolve.presets import Library
     from tfcompose.urdf.packages import Disk
-
-
-@dataclass(frozen=True, slots=True)
-class Resolved:
-    """The robot, right or wrong, and what was found while resolving it."""
-
-    robot: Robot
-    found: tuple[Finding, ...]
-    collected: Collected = field(default_factory=Collected)
 
 
 def resolve(

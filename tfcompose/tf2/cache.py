@@ -13,7 +13,13 @@ from bisect import bisect_right
 from typing import TYPE_CHECKING, Literal
 
 from tfcompose.tf2 import exceptions
-from tfcompose.tf2.exceptions import ConnectivityException, ExtrapolationException, LookupException
+from tfcompose.tf2.exceptions import (
+    ConnectivityException,
+    ExtrapolationException,
+    LookupException,
+    milliseconds,
+    seconds,
+)
 from tfcompose.tf2.poses import IDENTITY, PoseTuple, between, inverse, inverse_product, product, unit
 
 if TYPE_CHECKING:
@@ -263,7 +269,7 @@ def chain_at(caches: Mapping[str, TimeCache], target: str, source: str, stamp_ns
     up, down, tops = _meet(caches, target, source, lambda cache: cache.parent_at(stamp_ns))
     for top in tops:
         if top in caches:
-            raise ExtrapolationException(exceptions.outside(caches[top], stamp_ns))
+            raise ExtrapolationException(outside(caches[top], stamp_ns))
     if tops:
         raise ConnectivityException(exceptions.two_trees(caches, target, source, *tops))
     return Chain(up, down)
@@ -303,3 +309,39 @@ def _climb(
             raise LookupException(exceptions.loop(frame, [each.child for each in way]))
         visited.add(frame)
     return way, frame
+
+
+# What the exceptions say of times.
+
+
+def outside(cache: TimeCache, stamp_ns: int) -> str:
+    """Return how far the time is from the edge's samples."""
+    if not len(cache):
+        return f"{cache.child} has had no parent since the buffer was cleared"
+    edge = f"{cache.parent} → {cache.child}"
+    if len(cache) == 1:
+        only = cache.newest_ns
+        away = f"{milliseconds(abs(only - stamp_ns))} {'later' if only > stamp_ns else 'earlier'}"
+        return f"{edge} at {seconds(stamp_ns)} would be extrapolation: its one sample is {away}, of {seconds(only)}"
+    if stamp_ns > cache.newest_ns:
+        late = milliseconds(stamp_ns - cache.newest_ns)
+        return (
+            f"{edge} at {seconds(stamp_ns)} would be extrapolation into the future: "
+            f"its newest sample is {late} earlier, of {seconds(cache.newest_ns)}"
+        )
+    early = milliseconds(cache.oldest_ns - stamp_ns)
+    return (
+        f"{edge} at {seconds(stamp_ns)} would be extrapolation into the past: "
+        f"its oldest sample is {early} later, of {seconds(cache.oldest_ns)}"
+    )
+
+
+def no_common_time(moving: Sequence[TimeCache]) -> str:
+    """Return which edge has nothing at the newest time of the edge that is behind."""
+    behind = min(moving, key=lambda cache: cache.newest_ns)
+    ahead = max(moving, key=lambda cache: cache.oldest_ns)
+    gap = milliseconds(ahead.oldest_ns - behind.newest_ns)
+    return (
+        f"{ahead.parent} → {ahead.child} begins {gap} after the last of {behind.parent} → {behind.child}: "
+        "they have no time in common (extrapolation into the past)"
+    )

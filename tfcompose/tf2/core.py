@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.geometry import Pose
 from tfcompose.tf2 import exceptions
-from tfcompose.tf2.cache import Chain, TimeCache, chain_at, newest_chain, pack_pose
+from tfcompose.tf2.cache import Chain, TimeCache, chain_at, newest_chain, no_common_time, pack_pose
 from tfcompose.tf2.exceptions import (
     ConnectivityException,
     ExtrapolationException,
@@ -238,7 +238,7 @@ class BufferCore:
                 except ExtrapolationException as error:
                     if stamp_ns:
                         raise
-                    raise ExtrapolationException(exceptions.no_common_time(chain.moving)) from error
+                    raise ExtrapolationException(no_common_time(chain.moving)) from error
             return pose, at_ns
 
     def _pose_at(self, target: str, source: str, stamp_ns: int) -> PoseTuple:

@@ -14,9 +14,8 @@ from math import isfinite
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
+    from collections.abc import Collection, Sequence
 
-    from tfcompose.tf2.cache import TimeCache
     from tfcompose.tf2.poses import PoseTuple
 
 #: A quaternion whose squared length is off by this much is rejected.
@@ -132,9 +131,9 @@ def unusable_name(frame: str) -> str:
     return f"no frame's name starts with a slash in tf2: {frame} is known as {frame[1:]}"
 
 
-def two_trees(caches: Mapping[str, TimeCache], a: str, b: str, top_a: str, top_b: str) -> str:
+def two_trees(known: Collection[str], a: str, b: str, top_a: str, top_b: str) -> str:
     """Return which trees the two frames are in."""
-    cleared = [top for top in (top_a, top_b) if top in caches]
+    cleared = [top for top in (top_a, top_b) if top in known]
     if cleared:
         return f"{a} and {b} are not connected: {cleared[0]} has had no parent since the buffer was cleared"
     return (
@@ -149,39 +148,6 @@ def loop(frame: str, children: Sequence[str]) -> str:
     return f"the live tree has a loop: {' → '.join([frame, *reversed(around)])}"
 
 
-def outside(cache: TimeCache, stamp_ns: int) -> str:
-    """Return how far the time is from the edge's samples."""
-    if not len(cache):
-        return f"{cache.child} has had no parent since the buffer was cleared"
-    edge = f"{cache.parent} → {cache.child}"
-    if len(cache) == 1:
-        only = cache.newest_ns
-        away = f"{_ms(abs(only - stamp_ns))} {'later' if only > stamp_ns else 'earlier'}"
-        return f"{edge} at {seconds(stamp_ns)} would be extrapolation: its one sample is {away}, of {seconds(only)}"
-    if stamp_ns > cache.newest_ns:
-        late = _ms(stamp_ns - cache.newest_ns)
-        return (
-            f"{edge} at {seconds(stamp_ns)} would be extrapolation into the future: "
-            f"its newest sample is {late} earlier, of {seconds(cache.newest_ns)}"
-        )
-    early = _ms(cache.oldest_ns - stamp_ns)
-    return (
-        f"{edge} at {seconds(stamp_ns)} would be extrapolation into the past: "
-        f"its oldest sample is {early} later, of {seconds(cache.oldest_ns)}"
-    )
-
-
-def no_common_time(moving: Sequence[TimeCache]) -> str:
-    """Return which edge has nothing at the newest time of the edge that is behind."""
-    behind = min(moving, key=lambda cache: cache.newest_ns)
-    ahead = max(moving, key=lambda cache: cache.oldest_ns)
-    gap = _ms(ahead.oldest_ns - behind.newest_ns)
-    return (
-        f"{ahead.parent} → {ahead.child} begins {gap} after the last of {behind.parent} → {behind.child}: "
-        "they have no time in common (extrapolation into the past)"
-    )
-
-
 def seconds(stamp_ns: int) -> str:
     """Return a time in seconds with all nine decimals."""
     sign = "-" if stamp_ns < 0 else ""
@@ -189,5 +155,6 @@ def seconds(stamp_ns: int) -> str:
     return f"{sign}{seconds}.{rest:09d} s"
 
 
-def _ms(nanoseconds: int) -> str:
+def milliseconds(nanoseconds: int) -> str:
+    """Return a duration in milliseconds."""
     return f"{nanoseconds / 1e6:.6g} ms" if nanoseconds < 10**9 else f"{nanoseconds / 1e6:.0f} ms"

@@ -17,17 +17,14 @@ from tfcompose.text import counted
 from tfcompose.verdict.publishers import compared
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
 
     from tfcompose.findings import Span
     from tfcompose.live.publishers import Message, Publishers
     from tfcompose.plan import Driven, Plan, PlanEdge
-    from tfcompose.verdict.ownership import Violation
 
     Value = bool | int | float | str
 
-#: Frames that were sent otherwise than expected, or were not expected.
-_OTHERWISE = frozenset({"TF802", "TF803"})
 #: How far a frame may be from its value: a nominal one, and one that is exact.
 NOMINAL, EXACT = Offset(0.02, radians(5.0)), Offset(0.001, radians(0.2))
 #: A quaternion's length may be so far from 1.
@@ -36,46 +33,9 @@ UNIT_WITHIN = 0.005
 _MOST = 1000
 
 
-# Frames.
-
-
 def drives_of(plan: Plan) -> dict[str, tuple[Driven, ...]]:
     """Return the sensors that each node drives, by its full name."""
     return {node: process.drives for process in plan.processes for node in process.nodes if process.drives}
-
-
-def sensor_of(found: Violation, drives: Mapping[str, Sequence[Driven]]) -> Driven | None:
-    """Return the sensor that the publisher drives; of several the one whose name the frame has."""
-    driven = drives.get(found.nodes[0], ()) if len(found.nodes) == 1 and not found.namesake else ()
-    named = [one for one in driven if one.sensor in found.child]
-    return next(iter(named or driven), None)
-
-
-def unexpected_frames(found: Violation, more: str, driven: Driven | None) -> str:
-    """Return the message for frames that a driver sends otherwise than its preset has them, or nothing."""
-    if driven is None or not driven.publishes or found.code not in _OTHERWISE or not _is_own(found):
-        return ""
-    expected = found.edge.name if found.edge else f"no frame {found.child}"
-    return f"preset {driven.preset} expects {expected}, the driver {found.who} sent {found.name}{more}"
-
-
-def switch_help(found: Violation, driven: Driven | None) -> str:
-    """Return what to do about a driver, or nothing."""
-    if driven is None or found.code not in {*_OTHERWISE, "TF801"}:
-        return ""
-    if driven.publishes and found.code in _OTHERWISE and _is_own(found):
-        frames = f"frames: {{{found.child}: {{parent: {found.parent}}}}}"
-        return f"let sensors.{driven.sensor} say what its driver does: " + (
-            frames if found.edge else "options with that frame"
-        )
-    switch = ", ".join(f"{name}: {json.dumps(value)}" for name, value in driven.switch.items())
-    ignores = f"{found.whom} drives {driven.sensor} ({driven.preset}) and ignores its switch: start it with {switch}"
-    return ignores if switch else ""
-
-
-def _is_own(found: Violation) -> bool:
-    """Return whether the plan gives the edge to the publisher, or to no process."""
-    return found.edge is None or found.edge.node in found.nodes
 
 
 # Poses.

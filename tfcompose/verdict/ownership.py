@@ -7,6 +7,7 @@ say them with ``violation_finding``.
 
 from __future__ import annotations
 
+import json
 from collections import OrderedDict
 from dataclasses import dataclass
 from itertools import pairwise
@@ -16,10 +17,10 @@ from tfcompose.findings import Finding, Note, finding
 from tfcompose.live.state import NAMELESS, NO_NODE
 from tfcompose.text import counted
 from tfcompose.tree import loop_closed_by
-from tfcompose.verdict import drivers, publishers, stamps, tree
+from tfcompose.verdict import publishers, stamps, tree
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from tfcompose.catalogue import Severity
     from tfcompose.findings import Span
@@ -30,6 +31,8 @@ LOOP, SELF, TWO_PUBLISHERS = "TF820", "TF821", "TF822"
 #: Codes about stamps: over as soon as these are right.
 _OF_STAMPS = frozenset({stamps.REPEATED, stamps.BACK, stamps.WRONG_CLOCK})
 _WARNINGS = frozenset({SELF, TWO_PUBLISHERS, stamps.REPEATED, stamps.BACK})
+#: Frames that were sent otherwise than expected, or were not expected.
+_OTHERWISE = frozenset({"TF802", "TF803"})
 LISTED_AT_MOST = 12
 #: The publishers that a plan starts once and never again.
 _OWN = ("static", "joints")
@@ -147,8 +150,8 @@ def violation_finding(
     mild = first.code in _WARNINGS or (first.code == "TF803" and plan.guard.unknown_edges == "warn")
     severity: Severity = "warning" if mild else "error"
     notes = [*_others(found), *([] if place else _declared(first)), *_runs(first, where)]
-    message = drivers.unexpected_frames(first, _more(found), driven) or _message(found, plan)
-    advice = drivers.switch_help(first, driven) or _switch_help(first, plan) or _help(first, plan, _pattern(found))
+    message = _unexpected_frames(first, _more(found), driven) or _message(found, plan)
+    advice = _driver_help(first, driven) or _switch_help(first, plan) or _help(first, plan, _pattern(found))
     return finding(first.code, message, place, help=advice, notes=notes, severity=severity)
 
 
@@ -231,6 +234,40 @@ _HELP = {
     TWO_PUBLISHERS: "end one of them, or let each send a frame of its own: tf2 takes whatever came last",
     "TF809": "static: true says that the owner sends it on /tf_static",
 }
+
+
+def sensor_of(found: Violation, drives: Mapping[str, Sequence[Driven]]) -> Driven | None:
+    """Return the sensor that the publisher drives; of several the one whose name the frame has."""
+    driven = drives.get(found.nodes[0], ()) if len(found.nodes) == 1 and not found.namesake else ()
+    named = [one for one in driven if one.sensor in found.child]
+    return next(iter(named or driven), None)
+
+
+def _unexpected_frames(found: Violation, more: str, driven: Driven | None) -> str:
+    """Return the message for frames that a driver sends otherwise than its preset has them, or nothing."""
+    if driven is None or not driven.publishes or found.code not in _OTHERWISE or not _is_own(found):
+        return ""
+    expected = found.edge.name if found.edge else f"no frame {found.child}"
+    return f"preset {driven.preset} expects {expected}, the driver {found.who} sent {found.name}{more}"
+
+
+def _driver_help(found: Violation, driven: Driven | None) -> str:
+    """Return what to do about a driver, or nothing."""
+    if driven is None or found.code not in {*_OTHERWISE, "TF801"}:
+        return ""
+    if driven.publishes and found.code in _OTHERWISE and _is_own(found):
+        frames = f"frames: {{{found.child}: {{parent: {found.parent}}}}}"
+        return f"let sensors.{driven.sensor} say what its driver does: " + (
+            frames if found.edge else "options with that frame"
+        )
+    switch = ", ".join(f"{name}: {json.dumps(value)}" for name, value in driven.switch.items())
+    ignores = f"{found.whom} drives {driven.sensor} ({driven.preset}) and ignores its switch: start it with {switch}"
+    return ignores if switch else ""
+
+
+def _is_own(found: Violation) -> bool:
+    """Return whether the plan gives the edge to the publisher, or to no process."""
+    return found.edge is None or found.edge.node in found.nodes
 
 
 def _help_about(first: Violation, plan: Plan) -> str:

@@ -19,8 +19,8 @@ from tfcompose.geometry import Offset, Pose, offset_of
 from tfcompose.live.state import TreeState
 from tfcompose.plan import SLOW_BELOW
 from tfcompose.plan.topics import parts_of
-from tfcompose.verdict.drivers import Expected, driver_pose_differs, drives_of, expected_of, is_off, sensor_of
-from tfcompose.verdict.ownership import SELF, Violation, code_of, may_be_owners, relays_of, violation_finding
+from tfcompose.verdict.drivers import Expected, driver_pose_differs, drives_of, expected_of, is_off
+from tfcompose.verdict.ownership import SELF, Violation, code_of, may_be_owners, relays_of, sensor_of, violation_finding
 from tfcompose.verdict.publishers import pose_differs
 from tfcompose.verdict.rates import left, never_received, silent, slow
 from tfcompose.verdict.tree import rejected_transforms

@@ -352,3 +352,16 @@ def test_a_launcher_that_was_stopped_is_named_at_once_and_hides_no_other_robot(
     finally:
         os.kill(launcher, signal.SIGCONT)
     assert until(lambda: tfc("ps", "--robot", "rover").returncode == 0)
+
+
+def test_verify_and_doctor_take_the_plan_of_the_robot_that_runs_here(tfc: Callable[..., Any], tmp_path: Path) -> None:
+    assert tfc("up", "--wait").returncode == 0
+    (tmp_path / "robot.yaml").unlink()
+    verified = tfc("verify", "--for", "2")
+    assert (verified.returncode, verified.stdout.count("2 of 2")) == (0, 1), verified.stdout + verified.stderr
+    assert "rover@" in verified.stderr
+    drive = next(name for name, process in ps(tfc).items() if process["edges"] and name != "static")
+    assert tfc("stop", drive).returncode == 0
+    examined = tfc("doctor", "--for", "3")
+    assert "rover@" in examined.stderr
+    assert (examined.returncode, drive in examined.stdout) == (1, True), examined.stdout

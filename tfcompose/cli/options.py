@@ -39,9 +39,9 @@ def add_frames(parser: ArgumentParser) -> None:
     parser.add_argument("b", metavar="B", help="the frame whose pose it is")
 
 
-def add_robot(parser: ArgumentParser) -> None:
+def add_robot(parser: ArgumentParser, default: str = "the one in this ROS domain, or of ./robot.yaml") -> None:
     """Add --robot."""
-    parser.add_argument("--robot", metavar="NAME", help="the robot, as NAME or NAME@DOMAIN; default: the only one")
+    parser.add_argument("--robot", metavar="NAME", help=f"the robot, as NAME or NAME@DOMAIN; default: {default}")
 
 
 def add_processes(parser: ArgumentParser) -> None:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shlex
 import time
 from typing import TYPE_CHECKING, TypeVar
 
+from tfcompose.cli.options import DEFAULT_FILE
+from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import FAILED, UNREADABLE, complain, fail, wait_for_data
 from tfcompose.findings import RejectedError
 from tfcompose.ipc import (
@@ -20,7 +23,7 @@ from tfcompose.ipc import (
 )
 from tfcompose.launcher.control import RefusedError, ask, connect
 from tfcompose.launcher.processes import environment_of, leftovers
-from tfcompose.launcher.runtime_dir import RuntimeDirError, runtime_dirs
+from tfcompose.launcher.runtime_dir import RuntimeDirError, domain_of, runtime_dirs
 from tfcompose.plan.file import read_plan
 from tfcompose.plan.topics import judged_topics
 from tfcompose.text import listed
@@ -50,14 +53,16 @@ def running() -> list[tuple[RuntimeDir, Holder]]:
     return [(place, holder) for place, holder in found if holder]
 
 
-def is_meant(place: RuntimeDir, name: str | None) -> bool:
+def is_meant(place: RuntimeDir, name: str) -> bool:
     """Return whether this name means the robot: its own, one without the domain, or without a host's name too."""
-    share = place.name.rpartition("@")[0]
-    return name is None or name in {place.name, share, share.partition(".")[0]}
+    return name in {place.name, place.share, place.robot}
 
 
-def chosen_run(name: str | None, *, among: Callable[[], list[RuntimeDir]] | None = None) -> RuntimeDir:
+def chosen_run(name: str | None, command: str, *, among: Callable[[], list[RuntimeDir]] | None = None) -> RuntimeDir:
     """Return the place of the robot that is meant: of those that run, or ``among`` others.
+
+    Without a name that is the one in this shell's ROS domain, else the one of the ``robot.yaml`` here; ``command`` is
+    what the user typed, to be shown with the name of another.
 
     Raises:
         SystemExit: after saying that there is none, or which there are.
@@ -66,16 +71,37 @@ def chosen_run(name: str | None, *, among: Callable[[], list[RuntimeDir]] | None
         known = among() if among else [place for place, _ in running()]
     except RuntimeDirError as error:
         fail(str(error), UNREADABLE)
-    what = "robot has run here" if among else "robot is running"
-    found = [place for place in known if is_meant(place, name)]
+    verb = "has run" if among else "runs"
+    found = [place for place in known if is_meant(place, name)] if name else in_scope(known)
+    names = listed([place.name for place in known], NAMED_AT_MOST)
     if not known:
-        fail(f"no {what}")
+        fail(f"no robot {verb} here")
+    if not found and name:
+        fail(f"no robot {name} {verb} here; there is {names}")
     if not found:
-        fail(f"no {what} by the name {name}; there are {', '.join(place.name for place in known)}")
+        example = f"tfcompose {command} --robot {known[0].name}"
+        fail(f"no robot {verb} in ROS domain {domain_of(os.environ)}; elsewhere there is {names}: {example}")
     if len(found) > 1:
-        names = ", ".join(place.name for place in found)
-        fail(f"several robots: {names}; choose one with --robot", UNREADABLE)
+        fail(f"several robots: {', '.join(place.name for place in found)}; choose one with --robot", UNREADABLE)
     return found[0]
+
+
+def in_scope(places: list[RuntimeDir]) -> list[RuntimeDir]:
+    """Return the robots in this shell's ROS domain; where there is none, those that the ``robot.yaml`` here names."""
+    found = [place for place in places if place.domain == domain_of(os.environ)]
+    robot = _robot_here() if places and not found else None
+    return found or [place for place in places if place.robot == robot]
+
+
+def _robot_here() -> str | None:
+    """Return the name that the robot file of this folder gives, if it can be read."""
+    from tfcompose.load import load
+
+    try:
+        name = load(read_text(DEFAULT_FILE), DEFAULT_FILE).data.get("robot")
+    except RejectedError:
+        return None
+    return name if isinstance(name, str) else None
 
 
 def request(place: RuntimeDir, question: Request, answer: type[A]) -> A | None:
@@ -91,7 +117,7 @@ def request(place: RuntimeDir, question: Request, answer: type[A]) -> A | None:
 
 def control_processes(arguments: Namespace, verb: Verb, doing: str) -> int:
     """Have the launcher do it with each of the named processes; return the exit code."""
-    place = chosen_run(arguments.robot)
+    place = chosen_run(arguments.robot, shlex.join([verb, *arguments.name]))
     code = 0
     for name in arguments.name:
         answer = request(place, ProcessRequest(verb, name), Done)
@@ -202,14 +228,14 @@ def hidden_run(place: RuntimeDir) -> str | None:
 
 def complain_of_neighbours(place: RuntimeDir, plan: Plan) -> None:
     """Complain about other robots that run in the domain on the same TF topics: each guard would report the other's."""
-    own, domain = _robot_of(place), place.name.rpartition("@")[2]
     found = [
-        (_robot_of(other), holder)
+        (other.robot, holder)
         for other, holder in running()
-        if other.name.rpartition("@")[2] == domain and _robot_of(other) != own and _share_topics(other, plan)
+        if other.domain == place.domain and other.robot != place.robot and _share_topics(other, plan)
     ]
     for robot, holder in found:
-        complain(f"{robot} (pid {holder.pid}, since {since(holder)}) runs in domain {domain} on the same TF topics")
+        where = f"runs in domain {place.domain} on the same TF topics"
+        complain(f"{robot} (pid {holder.pid}, since {since(holder)}) {where}")
     if found:
         complain(
             "each guard will report the other's edges: give one ros: {domain_id: N}, "
@@ -217,18 +243,39 @@ def complain_of_neighbours(place: RuntimeDir, plan: Plan) -> None:
         )
 
 
-def _robot_of(place: RuntimeDir) -> str:
-    return place.name.rpartition("@")[0].partition(".")[0]
-
-
 def _share_topics(other: RuntimeDir, plan: Plan) -> bool:
     """Return whether the plan that runs there, as far as it can be read, has TF topics of this one."""
+    running_plan = plan_of_run(other)
+    return running_plan is not None and not judged_topics(plan).isdisjoint(judged_topics(running_plan))
+
+
+def complain_of_other_domains(place: RuntimeDir) -> None:
+    """Complain about runs of the same robot in other domains, such as that of a domain_id that has changed."""
+    for other, holder in running():
+        if other.share == place.share and other.domain != place.domain:
+            complain(
+                f"{other.name} still runs (pid {holder.pid}, since {since(holder)}); "
+                f"tfcompose down --robot {other.name} stops it"
+            )
+
+
+def plan_of_run(place: RuntimeDir) -> Plan | None:
+    """Return the plan that a robot runs, or None if it cannot be read any more."""
     try:
-        newest = max(other.plan_folders(), key=lambda folder: folder.stat().st_mtime)
-        running_plan = read_plan((newest / "plan.json").read_text("utf-8"), "plan.json")
+        newest = max(place.plan_folders(), key=lambda folder: folder.stat().st_mtime)
+        return read_plan((newest / "plan.json").read_text("utf-8"), "plan.json")
     except (OSError, ValueError, RejectedError):
-        return False
-    return not judged_topics(plan).isdisjoint(judged_topics(running_plan))
+        return None
+
+
+def run_of_domain() -> tuple[RuntimeDir, Plan] | None:
+    """Return the one robot that runs in this shell's ROS domain, and its plan; None for none, or for several."""
+    try:
+        found = [place for place, _ in running() if place.domain == domain_of(os.environ)]
+    except RuntimeDirError:
+        return None
+    plan = plan_of_run(found[0]) if len(found) == 1 else None
+    return (found[0], plan) if plan else None
 
 
 def complain_of_leftovers(place: RuntimeDir, run_id: str) -> None:

@@ -20,6 +20,7 @@ from tfcompose.cli.reading import read_text
 from tfcompose.cli.runs import (
     complain_of_leftovers,
     complain_of_neighbours,
+    complain_of_other_domains,
     hidden_run,
     notices,
     print_missing,
@@ -77,6 +78,7 @@ def start(file: Path, arguments: Namespace) -> int:
         stack.callback(lock.close)
         if hidden := hidden_run(place):
             fail(hidden)
+        complain_of_other_domains(place)
         copy = copy_plan(plan, file, place, alone=True)
         session = Session(copy, lock.run, file.absolute().parent, listen(place))
         if arguments.detach or arguments.wait:

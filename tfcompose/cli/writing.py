@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import compiled_robot
-from tfcompose.cli.terminal import UNREADABLE, fail, reject
+from tfcompose.cli.terminal import UNREADABLE, complain, fail, reject
 from tfcompose.emit import described, emit
 from tfcompose.files import Target, unaddressed
 from tfcompose.findings import Finding, finding
@@ -28,6 +28,10 @@ if TYPE_CHECKING:
 
     from tfcompose.files import File, Form
     from tfcompose.model import Asset, Robot
+
+
+#: In a folder that a build chose by itself: the path of the robot file. Two files may name one robot.
+SOURCE = ".source"
 
 
 def replace_file(path: Path, data: bytes) -> None:
@@ -182,16 +186,30 @@ def build(arguments: Namespace) -> tuple[Path, list[str]]:
     lost = [_without_address(asset, target.form) for asset in unaddressed(robot, target.form)]
     if lost:
         reject(lost)
+    shared = None if arguments.output else _other_source(folder, arguments.file)
     files = emit(robot, target)
     different = _differences(robot, files, target) if reads_back else []
     if different:
         reject(different)
     try:
         write_all(folder, files)
+        if not arguments.output and Path(arguments.file).is_file():
+            replace_file(folder / SOURCE, f"{Path(arguments.file).absolute()}\n".encode())
     except OSError as error:
         where = f": {error.filename}" if error.filename else ""
         fail(f"nothing was written to {folder}: {error.strerror}{where}", UNREADABLE)
+    if shared:
+        complain(f"{folder} held the build of {shared}, which names its robot {robot.name} too: -o keeps them apart")
     return folder, [file.path for file in files]
+
+
+def _other_source(folder: Path, file: str) -> Path | None:
+    """Return the other robot file that the folder was built from, if that is still there."""
+    with contextlib.suppress(OSError, ValueError):
+        before = Path((folder / SOURCE).read_text("utf-8").removesuffix("\n"))
+        if not before.samefile(file):
+            return before
+    return None
 
 
 def destination(arguments: Namespace, robot: Robot) -> tuple[Path, Target]:

@@ -53,6 +53,21 @@ class RuntimeDir:
     logs: Path
 
     @property
+    def robot(self) -> str:
+        """The robot's name, without host and domain."""
+        return self.share.partition(".")[0]
+
+    @property
+    def share(self) -> str:
+        """The robot's name with the host whose share it is, without the domain."""
+        return self.name.rpartition("@")[0]
+
+    @property
+    def domain(self) -> str:
+        """The ROS domain."""
+        return self.name.rpartition("@")[2]
+
+    @property
     def socket(self) -> Path:
         """The control socket."""
         return self.folder / "control"
@@ -141,9 +156,14 @@ def runtime_dir_of(plan: Plan, env: Mapping[str, str]) -> RuntimeDir:
     Raises:
         RuntimeDirError: if there is no folder that only this user can open.
     """
-    domain = str(plan.ros.domain_id) if plan.ros.domain_id is not None else env.get("ROS_DOMAIN_ID") or "0"
+    domain = str(plan.ros.domain_id) if plan.ros.domain_id is not None else domain_of(env)
     share = f"{plan.robot}.{plan.host}" if plan.host else plan.robot
-    return _dir(f"{share}@{domain.strip()}".replace("/", "_"), _runtime_folder(env), env)
+    return _dir(f"{share}@{domain}".replace("/", "_"), _runtime_folder(env), env)
+
+
+def domain_of(env: Mapping[str, str]) -> str:
+    """Return the ROS domain that the environment says."""
+    return (env.get("ROS_DOMAIN_ID") or "0").strip()
 
 
 def runtime_dirs(env: Mapping[str, str]) -> list[RuntimeDir]:

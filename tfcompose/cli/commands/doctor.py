@@ -2,8 +2,9 @@
 
 Listen to the running system for a few seconds and report what is wrong: disconnected trees, loops, two publishers of
 one edge, stamps that no lookup can match, low rates, frames that no listener receives, a silent /clock, missing joint
-states, settings that prevent discovery. Each finding names the node and the numbers. No robot file is needed; given
-one, or a built plan, it also checks what to expect. Ctrl-C ends it early and prints what was found.
+states, settings that prevent discovery. Each finding names the node and the numbers. It also checks what to expect, if
+a robot file or a built plan is given, or a robot of tfcompose runs in this ROS domain. Ctrl-C ends it early and prints
+what was found.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_for, add_format, add_variant, namespace
-from tfcompose.cli.terminal import UNREADABLE, fail, print_findings, printable
+from tfcompose.cli.terminal import UNREADABLE, complain, fail, print_findings, printable
 from tfcompose.text import counted
 
 if TYPE_CHECKING:
@@ -28,7 +29,9 @@ MOST_ROOTS = 6
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("file", nargs="?", metavar="FILE|PLAN", help="expected tree; default: none")
+    parser.add_argument(
+        "file", nargs="?", metavar="FILE|PLAN", help="expected tree; default: of the robot that runs in this ROS domain"
+    )
     add_variant(parser)
     add_for(parser, "listen for S seconds; default: 5", 5.0)
     parser.add_argument("--namespace", type=namespace, metavar="NS", help="use /NS/tf and /NS/tf_static")
@@ -91,18 +94,24 @@ def _summary(found: list[Finding]) -> str:
 
 
 def _plan(arguments: Namespace) -> Plan | None:
-    """Return the plan of the robot or the plan's file that was given, if one was.
+    """Return the plan of the robot or the plan's file that was given, else of the robot that runs here, if one does.
 
     Raises:
         SystemExit: after saying what is wrong.
     """
     from tfcompose.cli.plans import expected_plan
+    from tfcompose.cli.runs import run_of_domain
 
     if arguments.file is not None:
         return expected_plan(arguments.file, arguments)[0]
     if arguments.profiles or arguments.overlays or arguments.settings:
         fail("--profile, --overlay and --set need a robot file", UNREADABLE)
-    return None
+    running = run_of_domain()
+    if running is None:
+        return None
+    place, plan = running
+    complain(f"{place.name} runs here, so its edges are expected")
+    return plan
 
 
 def _expected(plan: Plan | None, below: str | None) -> dict[tuple[str, str], Plan | None]:

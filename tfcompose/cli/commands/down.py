@@ -32,7 +32,7 @@ def run(arguments: Namespace) -> int:
 
     if arguments.leftovers:
         return _stop_leftovers(arguments.robot)
-    place = chosen_run(arguments.robot)
+    place = chosen_run(arguments.robot, "down")
     if request(place, DownRequest(), Done) is None:
         return FAILED
     try:
@@ -52,7 +52,7 @@ def _stop_leftovers(robot: str | None) -> int:
     from tfcompose.launcher.processes import end, leftovers
     from tfcompose.launcher.runtime_dir import runtime_dirs
 
-    place = chosen_run(robot, among=lambda: runtime_dirs(os.environ))
+    place = chosen_run(robot, "down --leftovers", among=lambda: runtime_dirs(os.environ))
     found = [one for one in leftovers(f"{place.name}:") if one.launcher is None]
     for one in found:
         print(f"stopping {one.pid}: {one.command}")

@@ -31,7 +31,7 @@ def run(arguments: Namespace) -> int:
     from tfcompose.ipc import Ended, notice_line
     from tfcompose.plan import Plan, RosSettings
 
-    place = chosen_run(arguments.robot)
+    place = chosen_run(arguments.robot, "events")
     lines = _TimedLines()
     ended = False
     console = Console(Plan(place.name, "", None, RosSettings(), (), ()), lines, colour=coloured(sys.stdout))

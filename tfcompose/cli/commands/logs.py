@@ -7,6 +7,7 @@ itself are those of tfcompose.
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 import time
 from collections import deque
@@ -42,7 +43,7 @@ def run(arguments: Namespace) -> int:
     from tfcompose.findings import did_you_mean
     from tfcompose.launcher.output import Follower, logged, read_logs
 
-    place = _place(arguments.robot)
+    place = _place(arguments.robot, shlex.join(["logs", *arguments.name]))
     known = logged(place.logs)
     for name in arguments.name:
         if name not in known:
@@ -64,18 +65,18 @@ def run(arguments: Namespace) -> int:
     return 0
 
 
-def _place(robot: str | None) -> RuntimeDir:
-    """Return the robot that runs, or the one that has run last."""
-    from tfcompose.cli.runs import chosen_run, running
+def _place(robot: str | None, command: str) -> RuntimeDir:
+    """Return the robot that runs, or the one that has run last: of those that the name, or else this shell, means."""
+    from tfcompose.cli.runs import chosen_run, in_scope, is_meant
     from tfcompose.launcher.output import last_modified
     from tfcompose.launcher.runtime_dir import runtime_dirs
 
-    if robot is None and len(alive := running()) == 1:
-        return alive[0][0]
     there = [place for place in runtime_dirs(os.environ) if place.logs.is_dir()]
-    if robot is None and there and not alive:
-        return max(there, key=lambda place: last_modified(place.logs))
-    return chosen_run(robot, among=lambda: there)
+    meant = [place for place in there if is_meant(place, robot)] if robot else in_scope(there)
+    running = [place for place in meant if place.holder()]
+    if meant and len(running) <= 1:
+        return running[0] if running else max(meant, key=lambda place: last_modified(place.logs))
+    return chosen_run(robot, command, among=lambda: running or there)
 
 
 class _Printer:

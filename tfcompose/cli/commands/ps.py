@@ -29,7 +29,7 @@ HEAD = ("PROCESS", "STATE", "PID", "UPTIME", "RESTARTS", "CPU", "MEMORY", "EDGES
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    add_robot(parser)
+    add_robot(parser, "all of this user")
     add_format(parser)
 
 
@@ -63,7 +63,7 @@ def _robots(name: str | None) -> tuple[dict[str, RobotStatus], int]:
     from tfcompose.launcher.runtime_dir import RuntimeDirError
 
     try:
-        places = [place for place, _ in running() if is_meant(place, name)]
+        places = [place for place, _ in running() if name is None or is_meant(place, name)]
     except RuntimeDirError as error:
         fail(str(error), UNREADABLE)
     answers = {place.name: request(place, StatusRequest(), RobotStatus) for place in places}

@@ -15,12 +15,13 @@ import time
 from argparse import ArgumentTypeError
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import add_bag, add_file, add_for, add_format, add_variant
-from tfcompose.cli.terminal import print_findings
+from tfcompose.cli.options import DEFAULT_FILE, add_bag, add_for, add_format, add_variant
+from tfcompose.cli.terminal import complain, print_findings
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
+    from tfcompose.findings import Span
     from tfcompose.geometry import Offset
     from tfcompose.plan import Plan
     from tfcompose.verdict.verify import Verdict
@@ -32,7 +33,9 @@ _QUANTITY = re.compile(r"(\d+\.?\d*|\.\d+)\s*([a-z]+)")
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    add_file(parser)
+    parser.add_argument(
+        "file", nargs="?", metavar="FILE|PLAN", help="default: the robot that runs in this ROS domain, or robot.yaml"
+    )
     add_variant(parser)
     parser.add_argument("--live", action="store_true", help="use the running tree (default unless --bag is given)")
     add_bag(parser)
@@ -56,7 +59,7 @@ def run(arguments: Namespace) -> int:
     from tfcompose.verdict.verify import verify
 
     refuse_live_bag(arguments)
-    plan, places = expected_plan(arguments.file, arguments)
+    plan, places = _running_plan(arguments) or expected_plan(arguments.file or DEFAULT_FILE, arguments)
     observers = {topics: TreeObserver(settle_s=0.0 if arguments.bag else SETTLE_S) for topics in parts_of(plan)}
     # Programs are told of each edge that it is missing; a robot without edges misses none.
     may_be_silent = arguments.format != "text" or not plan.edges
@@ -68,6 +71,20 @@ def run(arguments: Namespace) -> int:
     seconds = time.monotonic() - begun
     now_ns = max(observer.end_ns for observer in observers.values()) if arguments.bag else time.time_ns()
     return _report(arguments, plan, verify(plan, observers, now_ns, arguments.tolerance, places), seconds)
+
+
+def _running_plan(arguments: Namespace) -> tuple[Plan, dict[str, Span]] | None:
+    """Return the plan of the robot that runs in this ROS domain, without places; None if a file or a bag is given."""
+    from tfcompose.cli.runs import run_of_domain
+
+    if arguments.file or arguments.bag or arguments.profiles or arguments.overlays or arguments.settings:
+        return None
+    running = run_of_domain()
+    if running is None:
+        return None
+    place, plan = running
+    complain(f"{place.name} runs here, so its edges are expected")
+    return plan, {}
 
 
 def _report(arguments: Namespace, plan: Plan, verdicts: list[Verdict], seconds: float) -> int:

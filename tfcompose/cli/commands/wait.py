@@ -27,7 +27,7 @@ def run(arguments: Namespace) -> int:
     from tfcompose.cli.runs import chosen_run, notices, wait_until_ready
     from tfcompose.ipc import Ended
 
-    place = chosen_run(arguments.robot)
+    place = chosen_run(arguments.robot, "wait")
     if arguments.ready:
         return wait_until_ready(place, arguments.timeout)
     try:

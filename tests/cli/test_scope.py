@@ -1,0 +1,129 @@
+"""Which robot a command means that names none: the one of this ROS domain, else of the file here, else nobody's."""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tests.support.robots import ROVER
+from tfcompose.cli import main
+from tfcompose.cli.runs import chosen_run, complain_of_other_domains, run_of_domain
+from tfcompose.launcher.runtime_dir import Lock, RuntimeDir, runtime_dir_of
+from tfcompose.plan import Plan, RosSettings
+from tfcompose.plan.file import write_plan
+
+PLAN = Plan("rover", "sha256:0", None, RosSettings(), (), ())
+Run = Callable[..., RuntimeDir]
+
+
+@pytest.fixture
+def runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Run]:
+    """Let a robot run, as far as others see it: its lock is held, and its plan is there."""
+    (tmp_path / "runtime").mkdir(mode=0o700)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "runtime"))
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
+    monkeypatch.setenv("ROS_DOMAIN_ID", "67")
+    with ExitStack() as stack:
+
+        def run(robot: str, domain: int) -> RuntimeDir:
+            plan = replace(PLAN, robot=robot, ros=RosSettings(domain_id=domain))
+            place = runtime_dir_of(plan, os.environ)
+            stack.callback(Lock(place).close)
+            folder = place.plan_folder("0")
+            folder.mkdir()
+            (folder / "plan.json").write_text(write_plan(plan), "utf-8")
+            return place
+
+        yield run
+
+
+def test_a_robot_of_another_domain_is_refused_with_the_command_for_it(
+    runs: Run, capsys: pytest.CaptureFixture[str]
+) -> None:
+    runs("rover", 71)
+    assert main(["down"]) == 1
+    assert "tfcompose down --robot rover@71" in capsys.readouterr().err
+    assert main(["stop", "base drive"]) == 1
+    assert "tfcompose stop 'base drive' --robot rover@71" in capsys.readouterr().err
+    assert main(["logs"]) == 1
+
+
+def test_the_domain_decides_between_robots(runs: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    here, there = runs("rover", 67), runs("crawler", 72)
+    assert chosen_run(None, "down").name == here.name
+    monkeypatch.setenv("ROS_DOMAIN_ID", " 72 ")
+    assert chosen_run(None, "down").name == there.name
+
+
+def test_two_robots_in_the_domain_need_a_name(runs: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    runs("rover", 67)
+    runs("crawler", 67)
+    assert main(["wait"]) == 2
+    errors = capsys.readouterr().err
+    assert "rover@67" in errors
+    assert "crawler@67" in errors
+
+
+def test_the_robot_file_of_the_folder_names_one_that_has_a_domain_of_its_own(runs: Run, tmp_path: Path) -> None:
+    runs("crawler", 71)
+    rover = runs("rover", 72)
+    (tmp_path / "robot.yaml").write_text(ROVER, "utf-8")
+    assert chosen_run(None, "down").name == rover.name
+    (tmp_path / "robot.yaml").write_text("robot: [", "utf-8")
+    with pytest.raises(SystemExit):
+        chosen_run(None, "down")
+
+
+def test_logs_are_those_of_the_newest_run_in_the_domain(
+    runs: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    elsewhere = runs("crawler", 71)
+    for place, line in ((elsewhere, "far"), (replace_name(elsewhere, "rover@67", tmp_path), "near")):
+        place.folder.mkdir(exist_ok=True)
+        (place.folder / "lock").touch()
+        place.logs.mkdir(parents=True)
+        (place.logs / "drive.log").write_text(f"2026-01-01T00:00:00.000 {line}\n", "utf-8")
+    assert main(["logs"]) == 0
+    out = capsys.readouterr().out
+    assert "near" in out
+    assert "far" not in out
+
+
+def replace_name(place: RuntimeDir, name: str, tmp_path: Path) -> RuntimeDir:
+    return RuntimeDir(name, place.folder.with_name(name), tmp_path / "log" / "tfcompose" / name)
+
+
+def test_the_plan_of_the_domains_robot_is_known(runs: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert run_of_domain() is None
+    rover = runs("rover", 67)
+    found = run_of_domain()
+    assert found is not None
+    assert (found[0].name, found[1].robot) == (rover.name, "rover")
+    monkeypatch.setenv("ROS_DOMAIN_ID", "1")
+    assert run_of_domain() is None
+
+
+def test_a_run_of_the_same_robot_in_another_domain_is_named(runs: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    runs("rover", 71)
+    runs("crawler", 71)
+    complain_of_other_domains(runs("rover", 67))
+    assert "--robot rover@71" in capsys.readouterr().err
+
+
+def test_two_files_with_one_robots_name_do_not_share_a_folder_silently(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.yaml", "b.yaml"):
+        (tmp_path / name).write_text(ROVER, "utf-8")
+    assert main(["build", "a.yaml"]) == main(["build", "a.yaml"]) == main(["build", "b.yaml", "-o", "b"]) == 0
+    assert capsys.readouterr().err == ""
+    assert main(["build", "b.yaml"]) == 0
+    assert str(tmp_path / "a.yaml") in capsys.readouterr().err
+    (tmp_path / "b.yaml").unlink()
+    assert main(["build", "a.yaml"]) == 0
+    assert capsys.readouterr().err == ""

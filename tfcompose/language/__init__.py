@@ -1,11 +1,10 @@
 """The language of robot files, presets and calibration sections: pydantic models, and what merges files.
 
-The models are the one description of validation, JSON Schema and reference. ``overlay`` and ``include`` merge sources,
+The models are the one description of validation, JSON Schema and reference. ``overlay`` merges sources,
 ``validate`` makes a ``RobotSpec`` of one. Must not import ``resolve``, ``check``, ``urdf``, ``yaml``.
 """
 
-from tfcompose.language.include import set_value, with_includes
-from tfcompose.language.overlay import as_part, composed, lay_over, profiles_in
+from tfcompose.language.overlay import as_part, composed, lay_over, profiles_in, set_value, with_includes
 from tfcompose.language.validate import Validated, validate, validate_node_preset, validate_preset
 
 __all__ = [

@@ -6,12 +6,21 @@ angles radians, rates hertz; an edge's pose is the pose of its child in its pare
 """
 
 from tfcompose.model.body import Asset, Inertial, Link, Material, Shape, colour_name, materials
-from tfcompose.model.edge import Calibration, Edge
+from tfcompose.model.edge import (
+    BOUNDED,
+    FREE,
+    MOVING,
+    Calibration,
+    Dynamics,
+    Edge,
+    Joint,
+    Limit,
+    ReferencePositions,
+    SafetyController,
+)
 from tfcompose.model.hardware import Block, Component, Hardware, Interface
-from tfcompose.model.joint import BOUNDED, FREE, MOVING, Dynamics, Joint, Limit, ReferencePositions, SafetyController
 from tfcompose.model.process import BUILT_IN, GUARD, JOINTS, SHELL, STATIC, AsInFile, Claim, Node, Process
-from tfcompose.model.robot import Part, Robot, SourceNumbers, may_be_refused
-from tfcompose.model.sensor import OPTICAL_ENDINGS, MountedSensor, is_optical
+from tfcompose.model.robot import OPTICAL_ENDINGS, MountedSensor, Part, Robot, SourceNumbers, is_optical, may_be_refused
 
 __all__ = [
     "BOUNDED",

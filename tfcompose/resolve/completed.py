@@ -6,19 +6,19 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from tfcompose.findings import Finding, did_you_mean, finding
-from tfcompose.resolve.blocks import blocks_of, hardware_of
+from tfcompose.findings import Finding, RejectedError, Span, did_you_mean, finding
+from tfcompose.model import Block, Component, Hardware, Interface
 from tfcompose.resolve.claims import settled
 from tfcompose.resolve.isolation import Filler, isolate
 from tfcompose.resolve.processes import has_claims
 from tfcompose.resolve.stock import with_stock
-from tfcompose.urdf.blocks import unknown_joints
+from tfcompose.urdf.blocks import faults_of, read_block, unexpanded, unknown_joints
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from tfcompose.language.robot import RobotSpec
-    from tfcompose.load import Source
+    from tfcompose.language.robot import ComponentSpec, HardwareSpec, RobotSpec
+    from tfcompose.load import Path, Source
     from tfcompose.model import Robot
     from tfcompose.urdf.packages import Disk
 
@@ -87,3 +87,63 @@ def _base(robot: Robot, spec: RobotSpec, source: Source, found: list[Finding]) -
         return "base_link"
     roots = robot.roots()
     return roots[0] if len(roots) == 1 else None
+
+
+# ``ros2_control`` and ``xml``: what a URDF holds next to links and joints. Places in a raw block are those of the robot
+# file.
+
+
+def hardware_of(specs: dict[str, HardwareSpec], source: Source) -> tuple[Hardware, ...]:
+    """Return the hardware components with the places of their joints."""
+    return tuple(_hardware(name, spec, source) for name, spec in specs.items())
+
+
+def _hardware(name: str, spec: HardwareSpec, source: Source) -> Hardware:
+    at: Path = ("ros2_control", name)
+    kinds = (("joint", spec.joints), ("sensor", spec.sensors), ("gpio", spec.gpios))
+    components = tuple(
+        _component(kind, inner, one, source.at_key((*at, f"{kind}s", inner)))
+        for kind, several in kinds
+        for inner, one in several.items()
+    )
+    return Hardware(
+        name, spec.plugin, spec.type, source.at_key(at), spec.params, components, spec.rw_rate, spec.is_async
+    )
+
+
+def _component(kind: str, name: str, spec: ComponentSpec, at: Span) -> Component:
+    command, state = ([Interface(i, params) for i, params in one.items()] for one in (spec.command, spec.state))
+    return Component(kind, name, at, tuple(command), tuple(state), spec.params)
+
+
+def blocks_of(
+    texts: dict[str, str], source: Source, frames: Collection[str], joints: Collection[str]
+) -> tuple[tuple[Block, ...], list[Finding]]:
+    """Return the raw blocks, and what is wrong with them. ``joints`` are the names of all joints of the robot."""
+    found: list[Finding] = []
+    blocks = []
+    for name, text in texts.items():
+        at: Path = ("xml", name)
+        try:
+            root = read_block(text, source.file)
+        except RejectedError as error:
+            found += [replace(one, span=_in_file(one.span, text, source, at)) for one in error.findings]
+            continue
+        blocks.append(Block(name, source.at(at), text))
+        for one in (*faults_of(root, frames, joints), *unexpanded(text, source.file)):
+            found.append(replace(one, span=_in_file(one.span, text, source, at)))
+    return tuple(blocks), found
+
+
+def _in_file(span: Span | None, text: str, source: Source, at: Path) -> Span:
+    """Return the place in the robot file of a place in the block, in which its text begins at line 2.
+
+    Only in a literal block (``|``) are the lines those of the file; elsewhere it is the whole value.
+    """
+    value, key = source.at(at), source.at_key(at)
+    lines = text.rstrip("\n").count("\n") + 1
+    if span is None or value.end_line - value.line < lines:
+        return value
+    line = value.line + min(max(span.line - 1, 1), lines)
+    indent = key.column + 1  # as most people write it: two more than the key
+    return Span(value.file, line, span.column + indent, line, max(span.end_column, span.column + 1) + indent)

@@ -14,7 +14,7 @@ from tfcompose.live.pose_query import NoPose
 from tfcompose.plan.topics import namespace_options
 from tfcompose.ros.tf_codec import TF_MESSAGE, TF_MESSAGE_HASH, Decoder
 from tfcompose.tf2 import Buffer, TransformException
-from tfcompose.tf2.core import CACHE_NS
+from tfcompose.tf2.pose_buffer import CACHE_NS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence

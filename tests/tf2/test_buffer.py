@@ -15,7 +15,7 @@ from tfcompose.tf2 import (
     InvalidArgumentException,
     LookupException,
 )
-from tfcompose.tf2.core import CACHE_NS
+from tfcompose.tf2.pose_buffer import CACHE_NS
 from tfcompose.tf2.poses import IDENTITY, between, unit
 
 S = 1_000_000_000

@@ -31,6 +31,9 @@ PROGRAMS = Path(__file__).parent / "programs"
 #: What is changed of a program for tf2, and nothing else.
 IMPORTS = {
     "from tf2_ros import": "from tfcompose.tf2 import",
+    "from tf2_ros.static_transform_broadcaster import": "from tfcompose.tf2 import",
+    "from tf2_sensor_msgs import": "from tfcompose.tf2.messages import",
+    "import tf_transformations$": "from tfcompose.tf2 import transformations as tf_transformations",
     "import tf2_ros$": "from tfcompose import tf2 as tf2_ros",
     "import tf2_py as tf2$": "from tfcompose import tf2",
     "import tf2_geometry_msgs$": "from tfcompose.tf2 import messages as tf2_geometry_msgs",
@@ -50,19 +53,39 @@ def rover(write: Callable[..., Path], start: Callable[..., Any], edge: Callable[
 
 
 @pytest.fixture
-def program(tmp_path: Path) -> Callable[..., str]:
-    """Run a program with nothing but its imports of tf2_ros changed; return its output."""
+def changed(tmp_path: Path) -> Callable[[str], Path]:
+    """Return a program with nothing but its imports of tf2_ros changed."""
 
-    def run(name: str, *arguments: str) -> str:
+    def change(name: str) -> Path:
         text = (PROGRAMS / f"{name}.py").read_text("utf-8")
         for tf2s, ours in IMPORTS.items():
             text = re.sub(f"^{tf2s}", ours, text, flags=re.MULTILINE)
-        assert not re.search(r"^(import|from) tf2", text, re.MULTILINE)
+        assert not re.search(r"^(import|from) tf(2|_)", text, re.MULTILINE)
         file = tmp_path / f"{name}.py"
         file.write_text(text, "utf-8")
-        done = processes.run([sys.executable, file, *arguments])
+        return file
+
+    return change
+
+
+@pytest.fixture
+def program(changed: Callable[[str], Path]) -> Callable[..., str]:
+    """Run a changed program to its end; return its output."""
+
+    def run(name: str, *arguments: str) -> str:
+        done = processes.run([sys.executable, changed(name), *arguments])
         assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
         return done.stdout
+
+    return run
+
+
+@pytest.fixture
+def running(changed: Callable[[str], Path]) -> Callable[..., None]:
+    """Start a changed program that spins until the test's end."""
+
+    def run(name: str, *arguments: str) -> None:
+        processes.start([sys.executable, changed(name), *arguments], stderr=subprocess.DEVNULL)
 
     return run
 
@@ -90,6 +113,25 @@ def test_a_program_awaits_transforms_in_its_callbacks(program: Callable[..., str
 def test_a_program_moves_clouds_at_their_own_time(program: Callable[..., str], arguments: tuple[str, ...]) -> None:
     output = [line for line in program("cloud", *arguments).splitlines() if not line.startswith("not yet: ")]
     assert output == ["cloud in odom: 2.000 keep", "same time: True", "end"]
+
+
+def test_programs_that_send_transforms_serve_those_that_use_them(
+    running: Callable[..., None], program: Callable[..., str]
+) -> None:
+    running("mounts")
+    running("circle")
+    assert program("camera_in_base").splitlines() == ["at (0.100, 0.000, 0.200) turned (0.131, 0.991)", "end"]
+    with TransformListener(buffer := Buffer()):
+        assert until(lambda: bool(buffer.can_transform("odom", "laser_link", Time())))
+        found = buffer.lookup_transform("odom", "laser_link", Time()).transform.translation
+    assert (found.x**2 + found.y**2, found.z) == pytest.approx((1.0, 0.3))
+
+
+def test_a_program_that_sends_a_cameras_frames_serves_one_that_moves_its_clouds(
+    running: Callable[..., None], program: Callable[..., str]
+) -> None:
+    running("camera", "--ros-args", "-p", "camera_pitch:=1.5707963267948966")
+    assert program("points").splitlines() == ["[0.1, 0.0, -1.8] True", "end"], "2 m ahead of a camera that looks down"
 
 
 @pytest.fixture

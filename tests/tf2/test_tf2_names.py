@@ -69,10 +69,36 @@ METHODS = {
     "all_frames_as_yaml": "",
     "all_frames_as_string": "",
     "clear": "",
+    "_chain": "target_frame target_time source_frame source_time fixed_frame",
     "_frameExists": "frame_id",
     "_getFrameStrings": "",
     "_allFramesAsDot": "time",
 }
+
+
+#: What tf2_py's BufferCore has.
+OF_THE_CORE = [
+    "set_transform", "set_transform_static", "lookup_transform_core", "lookup_transform_full_core",
+    "can_transform_core", "can_transform_full_core", "lookupVelocityCore", "lookupVelocityFullCore",
+    "get_latest_common_time", "all_frames_as_yaml", "all_frames_as_string", "clear",
+    "_chain", "_frameExists", "_getFrameStrings", "_allFramesAsDot",
+]  # fmt: skip
+
+
+@for_each(OF_THE_CORE)
+def test_the_core_has_tf2_pys_methods(name: str) -> None:
+    assert list(inspect.signature(getattr(tf2.BufferCore(), name)).parameters) == METHODS[name].split()
+
+
+#: What a client of a buffer server has.
+OF_THE_CLIENT = ["transform", "transform_full", "lookup_transform", "lookup_transform_full"]
+OF_THE_CLIENT += ["can_transform", "can_transform_full"]
+
+
+@for_each(OF_THE_CLIENT)
+def test_the_client_has_the_buffers_lookups(name: str) -> None:
+    named = list(inspect.signature(getattr(tf2.BufferClient, name)).parameters)[1:]
+    assert named == [word for word in METHODS[name].split() if word != "return_debug_tuple"]
 
 
 @for_each(METHODS)
@@ -90,7 +116,8 @@ def test_the_buffer_and_the_listener_are_made_as_tf2s_are() -> None:
 
 def test_what_is_exported_has_the_names_of_tf2_ros() -> None:
     wanted = (
-        "Buffer BufferCore BufferInterface TransformListener TransformRegistration ConvertRegistration Stamped convert"
+        "Buffer BufferClient BufferCore BufferInterface StaticTransformBroadcaster TransformBroadcaster"
+        " TransformListener TransformRegistration ConvertRegistration Stamped convert"
     )
     wanted += " TypeException NotImplementedException TransformException ConnectivityException LookupException"
     wanted += " ExtrapolationException InvalidArgumentException TimeoutException"

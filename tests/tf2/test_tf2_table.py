@@ -227,6 +227,23 @@ def test_between_two_times_rotations_count_in_the_order_of_the_frames() -> None:
     assert angle_between(rotated, other.quat_xyzw) > 0.5, "in the other order it would be another rotation"
 
 
+def test_a_sample_that_comes_again_is_not_the_last_of_its_time() -> None:
+    """tf2 keeps all samples of a time, and takes none twice."""
+    buffer = moving(*(("odom", "base", x, 5.0) for x in (1.0, 2.0, 3.0, 2.0)))
+    assert x_of(buffer, "odom", "base") == 3.0
+    buffer.set("odom", "base", at(4.0), 7 * S, static=False)
+    assert x_of(buffer, "odom", "base", 5.0) == 1.0, "at the oldest time of all the first counts"
+    assert x_of(buffer, "odom", "base", 6.0) == 3.5
+    buffer.set("map", "base", at(2.0), 7 * S, static=False)
+    buffer.set("odom", "base", at(4.0), 7 * S, static=False)
+    assert x_of(buffer, "map", "base") == 2.0
+
+
+def test_samples_that_came_at_an_expired_time_are_forgotten() -> None:
+    buffer = moving(*(("odom", "base", x, 5.0) for x in (1.0, 2.0, 3.0)), *(("odom", "base", 0.0, s) for s in (20, 21)))
+    assert not buffer._caches["base"].repeated
+
+
 def test_clear_forgets_what_moves_and_keeps_what_is_fixed_and_the_names() -> None:
     buffer = moving(("odom", "base", 1.0, 5.0))
     buffer.set("base", "laser", at(0.1), 0, static=True)
@@ -268,9 +285,12 @@ def test_messages_and_times_are_taken_by_what_they_have() -> None:
         stamped = TransformStamped(
             Header(Time(sec, 500 * MS), "/odom"), "base", Transform(Vector3(float(sec)), Quaternion())
         )
-        assert buffer.set_transform(stamped, "driver")
-    assert not buffer.set_transform(TransformStamped(Header(Time(1), "odom"), "base"), "driver")
-    assert buffer.set_transform_static(TransformStamped(Header(Time(), "base"), "laser"), "urdf")
+        buffer.set_transform(stamped, "driver")
+    buffer.set_transform(TransformStamped(Header(Time(1), "odom"), "base"), "driver")
+    assert [each.samples for each in buffer.all_frames() if each.name == "base"] == [3], (
+        "2 s are kept, no older one taken"
+    )
+    buffer.set_transform_static(TransformStamped(Header(Time(), "base"), "laser"), "urdf")
     found = buffer.lookup_transform("odom", "laser", Time(5, 0), timeout=Duration())
     assert (found.header.stamp.sec, found.header.stamp.nanosec, found.header.frame_id) == (5, 0, "odom")
     assert (found.transform.translation.x, found.child_frame_id) == (4.5, "laser")

@@ -56,6 +56,14 @@ def qos(depth: int, durability: DurabilityPolicy, reliability: ReliabilityPolicy
     )
 
 
+def profile_of(qos_or_depth: QoSProfile | int | None, default: QoSProfile) -> QoSProfile:
+    """Return what is given, or the default; a depth alone leaves all else of the default, so that latched stays so."""
+    if isinstance(qos_or_depth, int):
+        given: Any = default
+        return qos(qos_or_depth, given.durability, given.reliability)
+    return qos_or_depth or default
+
+
 #: tf2_ros ``qos.hpp`` (Jazzy): what every listener and broadcaster of TF expects of the other.
 TF_PUBLISHER = TF_READER = qos(100, DurabilityPolicy.VOLATILE, ReliabilityPolicy.RELIABLE)
 TF_STATIC_PUBLISHER = qos(1, DurabilityPolicy.TRANSIENT_LOCAL, ReliabilityPolicy.RELIABLE)
@@ -200,11 +208,16 @@ class Received:
 
 
 class TFPublisher:
-    """A publisher of TFMessage bytes on /tf or, latched, on /tf_static, or on another ``topic`` with the same QoS."""
+    """A publisher of TFMessage bytes on /tf or, latched, on /tf_static, or on another ``topic``.
 
-    def __init__(self, node: Node, *, static: bool, topic: str | None = None) -> None:
-        qos = TF_STATIC_PUBLISHER if static else TF_PUBLISHER
-        self.publisher: Any = node.create_publisher(tf_message_type(), topic or _topic(static=static), qos)
+    ``qos`` is rclpy's profile, a depth, or None for tf2's.
+    """
+
+    def __init__(
+        self, node: Node, *, static: bool, topic: str | None = None, qos: QoSProfile | int | None = None
+    ) -> None:
+        profile = profile_of(qos, TF_STATIC_PUBLISHER if static else TF_PUBLISHER)
+        self.publisher: Any = node.create_publisher(tf_message_type(), topic or _topic(static=static), profile)
 
     @property
     def raw_gid(self) -> bytes:

@@ -17,7 +17,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.time import Time
 
 from tfcompose.ros.clock import SimClock
-from tfcompose.ros.node import TF_READER, TF_STATIC_READER, Subscription, open_node, qos, wait
+from tfcompose.ros.node import TF_READER, TF_STATIC_READER, Subscription, open_node, profile_of, wait
 from tfcompose.ros.typesupport import tf_message_type
 from tfcompose.signals import Stop
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rclpy.node import Node
+    from rclpy.qos import QoSProfile
 
     #: Is called with the bytes of each message, and whether it came on the static topic.
     OnMessage = Callable[[bytes, bool], None]
@@ -40,12 +41,9 @@ class Topic(NamedTuple):
     qos: Any
 
     @property
-    def profile(self) -> Any:
-        """The profile to subscribe with; a depth alone leaves fixed edges latched, which else would not come."""
-        default: Any = TF_STATIC_READER if self.static else TF_READER
-        if isinstance(self.qos, int):
-            return qos(self.qos, default.durability, default.reliability)
-        return self.qos or default
+    def profile(self) -> QoSProfile:
+        """The profile to subscribe with."""
+        return profile_of(self.qos, TF_STATIC_READER if self.static else TF_READER)
 
 
 class NodeListener:

@@ -13,18 +13,22 @@ nothing else. The buffer needs only Python; arrays of poses and points need nump
     except TransformException as error:
         print(error)  # which edge is missing, or how many milliseconds too early or too late
 
-- ``buffer``: ``Buffer``, which takes and gives messages and waits; ``core``: ``BufferCore``, numbers in and out
-- ``cache``, ``poses``: what is kept of an edge, the way between two frames, and the arithmetic
+- ``buffer``: ``Buffer``, which waits; ``core``: ``BufferCore``, which takes and gives messages and does not; both are
+  ``pose_buffer``'s ``PoseBuffer``, numbers in and out
+- ``cache``, ``poses``, ``velocity``: what is kept of an edge, the way between two frames, and the arithmetic
 - ``messages``: times, TransformStamped, what tf2_geometry_msgs and tf2_sensor_msgs offer, and types of your own
-- ``arrays``: trajectories, points and clouds; needs numpy
-- ``listener``: ``TransformListener``; needs rclpy
+- ``arrays``: trajectories, points and clouds; ``transformations``: the functions of tf_transformations; need numpy
+- ``listener``, ``broadcasters``, ``buffer_client``: ``TransformListener``, ``TransformBroadcaster``,
+  ``StaticTransformBroadcaster``, ``BufferClient``; need rclpy
 - ``exceptions``: why there is no transform, and why one was not taken
 
 This package imports ``tfcompose.geometry`` and, for a listener or a node, ``tfcompose.ros``; nothing else of tfcompose.
 Must not import ``plan``, ``live``, ``findings``, ``rclpy``: people use it without the rest.
 """
 
+from tfcompose.tf2.broadcasters import StaticTransformBroadcaster, TransformBroadcaster
 from tfcompose.tf2.buffer import Buffer, BufferInterface
+from tfcompose.tf2.buffer_client import BufferClient
 from tfcompose.tf2.core import BufferCore
 from tfcompose.tf2.exceptions import (
     ConnectivityException,
@@ -39,7 +43,8 @@ from tfcompose.tf2.exceptions import (
 from tfcompose.tf2.listener import TransformListener
 from tfcompose.tf2.messages import ConvertRegistration, Stamped, TransformRegistration, convert
 
-__all__ = ["Buffer", "BufferCore", "BufferInterface", "TransformListener"]
+__all__ = ["Buffer", "BufferClient", "BufferCore", "BufferInterface"]
+__all__ += ["StaticTransformBroadcaster", "TransformBroadcaster", "TransformListener"]
 __all__ += ["ConnectivityException", "ExtrapolationException", "InvalidArgumentException", "LookupException"]
 __all__ += ["NotImplementedException", "TimeoutException", "TransformException", "TypeException"]
 __all__ += ["ConvertRegistration", "Stamped", "TransformRegistration", "convert"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from copy import copy, deepcopy
+from copy import copy
 from math import factorial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from tfcompose.tf2.cache import Chain, TimeCache
-    from tfcompose.tf2.core import BufferCore
+    from tfcompose.tf2.pose_buffer import PoseBuffer
 
     Floats = NDArray[np.float64]
     Stamps = NDArray[np.int64]
@@ -64,7 +64,7 @@ def stamps_of(stamps: ArrayLike) -> Stamps:
     return given.astype(np.int64)
 
 
-def lookup_many(buffer: BufferCore, target: str, source: str, stamps: ArrayLike, outside: str) -> Trajectory:
+def lookup_many(buffer: PoseBuffer, target: str, source: str, stamps: ArrayLike, outside: str) -> Trajectory:
     """Return what ``Buffer.lookup_many`` does."""
     times = stamps_of(stamps)
     with buffer.locked():
@@ -80,7 +80,7 @@ def lookup_many(buffer: BufferCore, target: str, source: str, stamps: ArrayLike,
     return found
 
 
-def _one_by_one(buffer: BufferCore, target: str, source: str, stamps: Stamps) -> tuple[Trajectory, NDArray[np.bool_]]:
+def _one_by_one(buffer: PoseBuffer, target: str, source: str, stamps: Stamps) -> tuple[Trajectory, NDArray[np.bool_]]:
     """Return the poses where frames change their parents, so that each time may have a chain of its own."""
     known = np.ones(len(stamps), bool)
     found = Trajectory(np.zeros((len(stamps), 3)), np.zeros((len(stamps), 4)))
@@ -235,7 +235,7 @@ def rotation_and_translation(pose: PoseTuple) -> tuple[NDArray[np.float64], NDAr
 
 
 def moved_cloud(cloud: Any, pose: PoseTuple) -> Any:
-    """Return a copy of the cloud with x, y and z moved; its header is a copy of the cloud's.
+    """Return a copy of the cloud with x, y and z moved; its header is the cloud's own.
 
     Raises:
         InvalidArgumentException: if there is no x, y or z of type float32 or float64, or too little data.
@@ -252,7 +252,6 @@ def moved_cloud(cloud: Any, pose: PoseTuple) -> Any:
             for index, column in enumerate(columns):
                 column[row, block] = points[:, index]
     moved = copy(cloud)
-    moved.header = deepcopy(cloud.header)
     moved.data = array("B")
     moved.data.frombytes(data.data)
     return moved

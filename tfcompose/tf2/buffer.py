@@ -17,31 +17,21 @@ Times are integer nanoseconds throughout.
 from __future__ import annotations
 
 import sys
-from math import atan2, sqrt
 from time import monotonic_ns
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
-from tfcompose.tf2.core import CACHE_NS, BufferCore, Row, as_dot, as_string, as_yaml
+from tfcompose.tf2.core import BufferCore
 from tfcompose.tf2.exceptions import InvalidArgumentException, NotImplementedException, TransformException
-from tfcompose.tf2.messages import (
-    TransformRegistration,
-    convert,
-    nanoseconds,
-    require_numpy,
-    time_of,
-    transform_stamped,
-)
-from tfcompose.tf2.poses import PoseTuple, product, unit
+from tfcompose.tf2.messages import TransformRegistration, convert, nanoseconds, require_numpy, transform_stamped
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from numpy.typing import ArrayLike, NDArray
 
     from tfcompose.tf2.arrays import Trajectory
 
 _Answer = TypeVar("_Answer")
-Three = tuple[float, float, float]
 
 # How often a waiting buffer takes messages itself, in seconds.
 _POLL_S = 0.005
@@ -109,13 +99,6 @@ class BufferInterface:
         raise NotImplementedException
 
 
-class Velocity(NamedTuple):
-    """``linear`` in m/s and ``angular`` in rad/s, each x y z."""
-
-    linear: Three
-    angular: Three
-
-
 class Buffer(BufferCore, BufferInterface):
     """tf2_ros's ``Buffer``: takes and gives messages, and waits.
 
@@ -124,19 +107,14 @@ class Buffer(BufferCore, BufferInterface):
         node: an rclpy node; when its clock goes back, all moving edges are forgotten. (A listener sees to that, too.)
             Where tf2_msgs is installed it offers the service ``tf2_frames``, which view_frames asks.
 
-    Frames, times and durations are given as to tf2; see ``messages`` for what a time may be. All lookups raise
-
-    - ``InvalidArgumentException`` if a name is empty or starts with a slash,
-    - ``LookupException`` if a frame is not known, or the frames above it lead back to it,
-    - ``ConnectivityException`` if two frames are in two trees,
-    - ``ExtrapolationException`` if an edge between them has no samples around that time.
+    Lookups take and raise what ``BufferCore``'s do (module ``core``), and can wait for what is not there yet.
 
     A program that has loaded rclpy gets its ``Future``, for ``spin_until_future_complete`` and coroutines that an
     executor runs; any other that of ``concurrent.futures``, and coroutines for asyncio.
     """
 
     def __init__(self, cache_time: Any = None, node: Any = None) -> None:
-        BufferCore.__init__(self, CACHE_NS if cache_time is None else nanoseconds(cache_time))
+        BufferCore.__init__(self, cache_time)
         BufferInterface.__init__(self)
         #: Called while a lookup waits, to take messages that nobody else takes meanwhile.
         self.pollers: list[Callable[[], object]] = []
@@ -156,14 +134,6 @@ class Buffer(BufferCore, BufferInterface):
         clock = node.get_clock()
         if id(clock) not in self._jumps:
             self._jumps[id(clock)] = (clock, on_clock_jump(node, self.time_jump_callback))
-
-    def set_transform(self, transform: Any, authority: str = "default_authority") -> bool:
-        """Take a TransformStamped of a moving edge; return False if it was rejected."""
-        return not self.insert([_row(transform)], static=False, authority=authority)
-
-    def set_transform_static(self, transform: Any, authority: str = "default_authority") -> bool:
-        """Take a TransformStamped of a fixed edge; return False if it was rejected."""
-        return not self.insert([_row(transform)], static=True, authority=authority)
 
     def time_jump_callback(self, time_jump: object = None) -> None:  # noqa: ARG002 (what rclpy's clock gives)
         """Forget all samples of moving edges, since the clock went back."""
@@ -216,36 +186,6 @@ class Buffer(BufferCore, BufferInterface):
             lambda: self._full_pose(target_frame, times[0], source_frame, times[1], fixed_frame), timeout
         )
         return (error is None, str(error or "")) if return_debug_tuple else error is None
-
-    def lookup_transform_core(self, target_frame: str, source_frame: str, time: Any) -> Any:
-        """Return what ``lookup_transform`` does, without waiting."""
-        return self.lookup_transform(target_frame, source_frame, time)
-
-    def lookup_transform_full_core(
-        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str
-    ) -> Any:
-        """Return what ``lookup_transform_full`` does, without waiting."""
-        return self.lookup_transform_full(target_frame, target_time, source_frame, source_time, fixed_frame)
-
-    def can_transform_core(self, target_frame: str, source_frame: str, time: Any) -> tuple[bool, str]:
-        """Return whether ``lookup_transform`` would answer, and why not."""
-        found: tuple[bool, str] = self.can_transform(target_frame, source_frame, time, 0, return_debug_tuple=True)
-        return found
-
-    def can_transform_full_core(
-        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str
-    ) -> tuple[bool, str]:
-        """Return whether ``lookup_transform_full`` would answer, and why not."""
-        query = target_frame, target_time, source_frame, source_time, fixed_frame
-        found: tuple[bool, str] = self.can_transform_full(*query, 0, return_debug_tuple=True)
-        return found
-
-    def get_latest_common_time(self, target_frame: str, source_frame: str) -> Any:
-        """Return the newest time that all moving edges between the two have reached; 0 where none moves."""
-        if target_frame == source_frame:
-            return time_of(self._newest_ns(target_frame))
-        with self._lock:
-            return time_of(self._chain(target_frame, source_frame).common_ns())
 
     # Futures and coroutines.
 
@@ -305,91 +245,7 @@ class Buffer(BufferCore, BufferInterface):
 
         return lookup_many(self, target, source, stamps, outside)
 
-    # Velocities.
-
-    def lookup_velocity(  # noqa: PLR0913, PLR0917 (tf2's arguments)
-        self, tracking_frame: str, observation_frame: str, time: Any, averaging_interval: Any,
-        reference_frame: str = "", reference_point: Sequence[float] = (0.0, 0.0, 0.0), reference_point_frame: str = "",
-    ) -> Velocity:  # fmt: skip
-        """Return how fast one frame moves as seen from another: (``linear`` m/s, ``angular`` rad/s).
-
-        It is the mean over ``averaging_interval`` around a time (0: up to the newest), as far as samples go, with the
-        axes of ``reference_frame``, default the observation frame. Linear is the velocity of the tracking frame's
-        origin, or of another point that moves along with it. (tf2's ``lookupVelocity`` returns the same where nothing
-        rotates and the axes agree; where something rotates, it mixes up the axes.)
-
-        Raises:
-            ValueError: if the interval is not positive.
-        """
-        time_ns, interval_ns = nanoseconds(time), nanoseconds(averaging_interval)
-        if interval_ns <= 0:
-            raise ValueError(f"a velocity is a mean over some time, not over {interval_ns} ns")
-        x, y, z = reference_point
-        with self._lock:
-            _, newest_ns = self._pose(observation_frame, tracking_frame, 0)
-            if not newest_ns and not time_ns:
-                return Velocity((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))  # only fixed edges
-            end_ns = min(time_ns + interval_ns // 2, newest_ns) if time_ns and newest_ns else time_ns or newest_ns
-            first, _ = self._pose(observation_frame, tracking_frame, end_ns - interval_ns)
-            last, _ = self._pose(observation_frame, tracking_frame, end_ns)
-            at_ns = time_ns or end_ns
-            axes, _ = self._pose(reference_frame or observation_frame, observation_frame, at_ns)
-            point, _ = self._pose(observation_frame, reference_point_frame or tracking_frame, at_ns)
-            origin, _ = self._pose(observation_frame, tracking_frame, at_ns)
-        seconds = interval_ns / 1e9
-        angular = _angular_velocity(first, last, seconds)
-        arm = [a - b for a, b in zip(product(point, (x, y, z, 0.0, 0.0, 0.0, 1.0)), origin, strict=False)][:3]
-        carried = _cross(angular, (arm[0], arm[1], arm[2]))
-        linear = [(b - a) / seconds + c for a, b, c in zip(first, last, carried, strict=False)]
-        return Velocity(_rotated(axes, (linear[0], linear[1], linear[2])), _rotated(axes, angular))
-
-    def lookupVelocityCore(  # noqa: N802 (tf2_py's name)
-        self, tracking_frame: str, observation_frame: str, time: Any, averaging_interval: Any
-    ) -> Velocity:
-        """Return what ``lookup_velocity`` does."""
-        return self.lookup_velocity(tracking_frame, observation_frame, time, averaging_interval)
-
-    def lookupVelocityFullCore(  # noqa: N802, PLR0913, PLR0917 (tf2_py's name and arguments)
-        self, tracking_frame: str, observation_frame: str, reference_frame: str, reference_point: Sequence[float],
-        reference_point_frame: str, time: Any, averaging_interval: Any,
-    ) -> Velocity:  # fmt: skip
-        """Return what ``lookup_velocity`` does."""
-        return self.lookup_velocity(
-            tracking_frame, observation_frame, time, averaging_interval,
-            reference_frame, reference_point, reference_point_frame,
-        )  # fmt: skip
-
-    # What the buffer holds, as tf2's tools print it.
-
-    def all_frames_as_string(self) -> str:
-        """Return a line for each edge, in tf2's words."""
-        return as_string(self.all_frames())
-
-    def all_frames_as_yaml(self) -> str:
-        """Return each edge with its rate and times, as tf2's ``tf2_frames`` service does."""
-        return as_yaml(self.all_frames())
-
-    def _allFramesAsDot(self, time: Any = 0) -> str:  # noqa: ARG002, N802 (tf2_py's name)
-        """Return the edges as a graph for graphviz."""
-        return as_dot(self.all_frames())
-
-    def _frameExists(self, frame_id: str) -> bool:  # noqa: N802 (tf2_py's name)
-        """Return whether the frame was heard of."""
-        return frame_id in self.frames
-
-    def _getFrameStrings(self) -> list[str]:  # noqa: N802 (tf2_py's name)
-        """Return every frame that was heard of, in the order in which they were."""
-        return [frame.name for frame in self.all_frames()]
-
     # Waiting.
-
-    def _full_pose(self, target: str, target_ns: int, source: str, source_ns: int, fixed: str) -> tuple[PoseTuple, int]:
-        with self._lock:
-            for frame in (target, source, fixed):
-                self._require(frame)
-            first, _ = self._pose(fixed, source, source_ns)
-            second, stamp_ns = self._pose(target, fixed, target_ns)
-        return unit(product(second, first)), stamp_ns
 
     def _error(self, attempt: Callable[[], object], timeout: Any) -> TransformException | None:
         try:
@@ -467,31 +323,3 @@ def _awaitable(future: Any) -> Any:
     import asyncio  # noqa: PLC0415 (with rclpy nobody needs it)
 
     return asyncio.wrap_future(future)
-
-
-def _row(transform: Any) -> Row:
-    header, to, rotation = transform.header, transform.transform.translation, transform.transform.rotation
-    stamp = header.stamp
-    return (
-        header.frame_id, transform.child_frame_id, stamp.sec, stamp.nanosec, to.x, to.y, to.z,
-        rotation.x, rotation.y, rotation.z, rotation.w,
-    )  # fmt: skip
-
-
-def _angular_velocity(first: PoseTuple, last: PoseTuple, seconds: float) -> Three:
-    """Return the angular velocity that rotates the first into the last the short way, in their parent's axes."""
-    ax, ay, az, aw = first[3:]
-    *_, x, y, z, w = product((0.0, 0.0, 0.0, *last[3:]), (0.0, 0.0, 0.0, -ax, -ay, -az, aw))
-    length = sqrt(x * x + y * y + z * z)
-    if not length:
-        return 0.0, 0.0, 0.0
-    rate = 2 * atan2(length, abs(w)) / (length * seconds) * (1 if w >= 0 else -1)
-    return x * rate, y * rate, z * rate
-
-
-def _rotated(pose: PoseTuple, vector: Three) -> Three:
-    return product((0.0, 0.0, 0.0, *pose[3:]), (*vector, 0.0, 0.0, 0.0, 1.0))[:3]
-
-
-def _cross(a: Three, b: Three) -> Three:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

@@ -39,12 +39,13 @@ class TimeCache:
     """The samples of one child frame, oldest first. A static frame has a single one, valid at any time.
 
     ``parent`` is that of the newest sample, and empty where all samples were cleared; ``mixed`` says that samples have
-    different parents. Of samples with the same stamp only the first and the last that came are kept: no answer depends
-    on more. Times and poses are kept as plain numbers, seven for a pose, which takes a quarter of the memory of
-    objects; those before the index ``start`` have expired.
+    different parents. Of samples with the same stamp only the first and the last that came are kept, since no answer
+    depends on more; ``repeated`` has them all, by their stamp, so that one that comes again is no other last one. Times
+    and poses are kept as plain numbers, seven for a pose, which takes a quarter of the memory of objects; those before
+    the index ``start`` have expired.
     """
 
-    __slots__ = ("authority", "child", "mixed", "parent", "parents", "poses", "stamps", "start", "static")
+    __slots__ = ("authority", "child", "mixed", "parent", "parents", "poses", "repeated", "stamps", "start", "static")
 
     def __init__(self, child: str, *, static: bool) -> None:
         self.child = child
@@ -63,6 +64,7 @@ class TimeCache:
         self.stamps = array("q")
         self.poses = array("d")
         self.parents: list[str] = []
+        self.repeated: dict[int, set[tuple[str, PoseTuple]]] = {}
 
     @property
     def oldest_ns(self) -> int:
@@ -162,14 +164,14 @@ class TimeCache:
 
     def _sort_in(self, stamp_ns: int, parent: str, pose: PoseTuple) -> None:
         end = bisect_right(self.stamps, stamp_ns, self.start)
-        begin = end
-        while begin > self.start and self.stamps[begin - 1] == stamp_ns:
-            begin -= 1
-            if self.pose(begin) == pose and self.parents[begin] == parent:
+        if end > self.start and self.stamps[end - 1] == stamp_ns:
+            known = self.repeated.setdefault(stamp_ns, {(self.parents[end - 1], self.pose(end - 1))})
+            if (parent, pose) in known:
                 return
-        if end - begin > 1:
-            self.poses[7 * end - 7 : 7 * end], self.parents[end - 1] = array("d", pose), parent
-            return
+            known.add((parent, pose))
+            if len(known) > 2:  # noqa: PLR2004 (the first and the last so far)
+                self.poses[7 * end - 7 : 7 * end], self.parents[end - 1] = array("d", pose), parent
+                return
         self.stamps.insert(end, stamp_ns)
         self.poses[7 * end : 7 * end] = array("d", pose)
         self.parents.insert(end, parent)
@@ -186,6 +188,8 @@ class TimeCache:
         while self.stamps[start] < limit_ns:
             start += 1
         self.start = start
+        if self.repeated:
+            self.repeated = {stamp_ns: known for stamp_ns, known in self.repeated.items() if stamp_ns >= limit_ns}
         if start > _COMPACT:
             del self.stamps[:start], self.poses[: 7 * start], self.parents[:start]
             self.start = 0
@@ -198,12 +202,14 @@ Link = tuple[None, PoseTuple, bool] | tuple["TimeCache", None, bool]
 class Chain:
     """The pose of the source in the target as a product of links, from the source on.
 
-    ``moving`` are the edges with samples over time. Where there are none, ``fixed`` is the pose, else None.
+    ``children`` are those of all edges. ``moving`` are the edges with samples over time. Where there are none,
+    ``fixed`` is the pose, else None.
     """
 
-    __slots__ = ("fixed", "links", "moving")
+    __slots__ = ("children", "fixed", "links", "moving")
 
     def __init__(self, up: Sequence[TimeCache], down: Sequence[TimeCache]) -> None:
+        self.children = [cache.child for cache in (*down, *reversed(up))]
         self.moving = [cache for cache in (*down, *up) if not cache.static]
         self.links = _links([*((each, False) for each in down), *((each, True) for each in reversed(up))])
         self.fixed = None if self.moving else unit(self.links[0][1] or IDENTITY) if self.links else IDENTITY

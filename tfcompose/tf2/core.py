@@ -1,314 +1,197 @@
-"""The buffer without messages: takes transforms as plain numbers, and answers where one frame is in another.
+"""tf2_py's ``BufferCore``: a buffer that takes and gives messages, and waits for nothing.
 
-Frames are names, times are integer nanoseconds since the epoch, poses are ``tfcompose.geometry.Pose``.
+Frames, times and durations are given as to tf2; see ``messages`` for what a time may be. All lookups raise
+
+- ``InvalidArgumentException`` if a name is empty or starts with a slash,
+- ``LookupException`` if a frame is not known, or the frames above it lead back to it,
+- ``ConnectivityException`` if two frames are in two trees,
+- ``ExtrapolationException`` if an edge between them has no samples around that time.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import isfinite, sqrt
-from threading import Condition, RLock
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from tfcompose.geometry import Pose
-from tfcompose.tf2 import exceptions
-from tfcompose.tf2.cache import Chain, TimeCache, chain_at, newest_chain, no_common_time, pack_pose
-from tfcompose.tf2.exceptions import (
-    ConnectivityException,
-    ExtrapolationException,
-    InvalidArgumentException,
-    LookupException,
-    Rejection,
-    TransformException,
-    rejection_of,
-)
-from tfcompose.tf2.poses import IDENTITY, PoseTuple
+from tfcompose.tf2.exceptions import TransformException
+from tfcompose.tf2.messages import nanoseconds, time_of, transform_stamped
+from tfcompose.tf2.pose_buffer import CACHE_NS, FrameInfo, PoseBuffer, Row
+from tfcompose.tf2.velocity import Moving, Velocity, mean_velocity
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
 
-#: How long samples are kept before the newest of their edge, as in tf2.
-CACHE_NS = 10_000_000_000
-# Closer to 1 than this a sum of four squares cannot be told from 1.
-_ROUNDING = 1e-15
-# So many chains are remembered at most.
-_MOST_CHAINS = 4096
+    from tfcompose.tf2.poses import PoseTuple
+
 _SECOND_NS = 1_000_000_000
 # tf2 divides by no less, so that a frame with one sample has a rate of 10,000.
 _SHORTEST_S = 100e-6
 
-#: One transform: parent, child, seconds, nanoseconds, x y z in metres, quaternion x y z w.
-Row = tuple[str, str, int, int, float, float, float, float, float, float, float]
 
-
-@dataclass(frozen=True, slots=True)
-class FrameInfo:
-    """A frame's edge to its parent; ``parent`` is empty for a root, and for a moving frame after ``clear``.
-
-    Times are in nanoseconds since the epoch, and 0 for a fixed edge, which is good at any time; ``samples`` counts what
-    is kept.
-    """
-
-    name: str
-    parent: str
-    static: bool
-    authority: str
-    oldest_ns: int
-    newest_ns: int
-    samples: int
-
-
-class BufferCore:
-    """Takes transforms and answers where one frame is in another; safe to use from several threads.
+class BufferCore(PoseBuffer):
+    """tf2_py's ``BufferCore``.
 
     Args:
-        cache_ns: how long samples are kept, in nanoseconds before the newest of their edge.
-
-    Raises:
-        ValueError: if the time is negative.
+        cache_time: how long samples are kept before the newest of their edge, a duration; default 10 s.
     """
 
-    def __init__(self, cache_ns: int = CACHE_NS) -> None:
-        if cache_ns < 0:
-            raise ValueError(f"samples cannot be kept for {cache_ns} ns")
-        self.cache_ns = cache_ns
-        self._lock = RLock()
-        self._inserted = Condition(self._lock)
-        self._waiting = 0
-        #: Called after something was taken, by whoever gave it.
-        self.on_insert: list[Callable[[], object]] = []
-        self._caches: dict[str, TimeCache] = {}
-        self._names: dict[str, None] = {}
-        self._chains: dict[tuple[str, str], Chain] = {}
-        self._mixed: set[str] = set()
+    def __init__(self, cache_time: Any = None) -> None:
+        super().__init__(CACHE_NS if cache_time is None else nanoseconds(cache_time))
 
-    @property
-    def frames(self) -> frozenset[str]:
-        """Every frame that was heard of."""
-        with self._lock:
-            return frozenset(self._names)
+    # Transforms in.
 
-    def set(  # noqa: PLR0913 (a transform has that many parts)
-        self, parent: str, child: str, pose: Pose, stamp_ns: int, *, static: bool, authority: str = ""
-    ) -> bool:
-        """Take the pose of ``child`` in ``parent``; return False if tf2 would refuse it."""
-        row = (parent, child, 0, stamp_ns, *pose.xyz, *pose.quat_xyzw)
-        return not self.insert([row], static=static, authority=authority)
+    def set_transform(self, transform: Any, authority: str = "default_authority") -> None:
+        """Take a TransformStamped of a moving edge; what tf2 would reject is dropped. ``set`` says whether it was."""
+        self.insert([_row(transform)], static=False, authority=authority)
 
-    def insert(self, rows: Iterable[Row], *, static: bool, authority: str = "") -> list[tuple[str, Rejection]]:
-        """Take transforms in order; return the child and the reason of each that was rejected.
+    def set_transform_static(self, transform: Any, authority: str = "default_authority") -> None:
+        """Take a TransformStamped of a fixed edge; what tf2 would reject is dropped."""
+        self.insert([_row(transform)], static=True, authority=authority)
 
-        A leading slash is dropped from names, and quaternions are normalised. What is rejected ``Rejection`` lists, in
-        the words of tf2's log; infinite values count as not a number.
+    # Lookups.
+
+    def lookup_transform_core(self, target_frame: str, source_frame: str, time: Any) -> Any:
+        """Return the pose of ``source_frame`` in ``target_frame`` at a time as a TransformStamped.
+
+        It takes coordinates in the source frame to the target frame. The stamp is the given time, or what time 0
+        stands for.
         """
-        rejected: list[tuple[str, Rejection]] = []
+        pose, stamp_ns = self._pose(target_frame, source_frame, nanoseconds(time))
+        return transform_stamped(target_frame, source_frame, stamp_ns, pose)
+
+    def lookup_transform_full_core(
+        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str
+    ) -> Any:
+        """Return the pose of the source frame at one time in the target frame at another.
+
+        Between the times ``fixed_frame`` is taken to stand still. The stamp is that of the target.
+        """
+        target_ns, source_ns = nanoseconds(target_time), nanoseconds(source_time)
+        pose, stamp_ns = self._full_pose(target_frame, target_ns, source_frame, source_ns, fixed_frame)
+        return transform_stamped(target_frame, source_frame, stamp_ns, pose)
+
+    def can_transform_core(self, target_frame: str, source_frame: str, time: Any) -> tuple[bool, str]:
+        """Return whether ``lookup_transform_core`` would answer, and why not."""
+        return _possible(lambda: self.lookup_transform_core(target_frame, source_frame, time))
+
+    def can_transform_full_core(
+        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str
+    ) -> tuple[bool, str]:
+        """Return whether ``lookup_transform_full_core`` would answer, and why not."""
+        query = target_frame, target_time, source_frame, source_time, fixed_frame
+        return _possible(lambda: self.lookup_transform_full_core(*query))
+
+    def get_latest_common_time(self, target_frame: str, source_frame: str) -> Any:
+        """Return the newest time that all moving edges between the two have reached; 0 where none moves."""
         with self._lock:
-            caches, cache_ns = self._caches, self.cache_ns
-            for row in rows:
-                # What comes fifty thousand times a second: the next sample of an edge that stays as it is.
-                parent, child, sec, nsec, x, y, z, qx, qy, qz, qw = row
-                cache = caches.get(child)
-                if cache is not None and cache.parent == parent and cache.static is static:
-                    squared = qx * qx + qy * qy + qz * qz + qw * qw
-                    if -_ROUNDING < squared - 1.0 < _ROUNDING and isfinite(x + y + z):
-                        pose = pack_pose(x, y, z, qx, qy, qz, qw)
-                        if cache.append(sec * _SECOND_NS + nsec, pose, cache_ns):
-                            cache.authority = authority
-                            continue
-                reason = self._take(row, static=static, authority=authority)
-                if reason:
-                    rejected.append((child.removeprefix("/"), reason))
-            if self._waiting:
-                self._inserted.notify_all()
-        if self.on_insert:
-            for callback in tuple(self.on_insert):
-                callback()
-        return rejected
+            if target_frame == source_frame:
+                self._require(target_frame)
+                return time_of(self._newest_ns(target_frame))
+            return time_of(self._chain_between(target_frame, source_frame).common_ns())
 
-    def _take(self, row: Row, *, static: bool, authority: str) -> Rejection | None:
-        """Take any transform; return why it was rejected."""
-        # tf2 strips one slash.
-        parent, child = row[0].removeprefix("/"), row[1].removeprefix("/")
-        x, y, z, qx, qy, qz, qw = row[4:]
-        reason = rejection_of(parent, child, (x, y, z, qx, qy, qz, qw))
-        if reason:
-            return reason
-        squared = qx * qx + qy * qy + qz * qz + qw * qw
-        scale = 1.0 if -_ROUNDING < squared - 1.0 < _ROUNDING else 1 / sqrt(squared)
-        cache = self._caches.get(child)
-        if cache is None or cache.static is not static:
-            cache = self._new_cache(child, static=static)
-        pose = (x, y, z, qx * scale, qy * scale, qz * scale, qw * scale)
-        outcome = cache.insert(row[2] * _SECOND_NS + row[3], parent, pose, self.cache_ns)
-        if outcome != "taken" or cache.mixed:
-            self._names.setdefault(child)
-            self._names.setdefault(parent)
-        if outcome == "old":
-            return Rejection.OLD
-        if outcome == "changed":
-            self._changed(cache)
-        cache.authority = authority
-        return None
+    # Velocities.
 
-    def lookup(self, target: str, source: str, stamp_ns: int = 0) -> tuple[Pose, int]:
-        """Return the pose of ``source`` in ``target`` at a time, and that time, both in nanoseconds since the epoch.
+    def lookup_velocity(  # noqa: PLR0913, PLR0917 (tf2's arguments)
+        self, tracking_frame: str, observation_frame: str, time: Any, averaging_interval: Any,
+        reference_frame: str = "", reference_point: Sequence[float] = (0.0, 0.0, 0.0), reference_point_frame: str = "",
+    ) -> Velocity:  # fmt: skip
+        """Return how fast one frame moves as seen from another: (``linear`` m/s, ``angular`` rad/s).
 
-        Time 0 is the newest that all moving edges between them have reached; where none moves it stays 0. The
-        quaternion's w is not negative. A frame in itself is the identity, whether it is known or not.
+        It is the mean over ``averaging_interval`` around a time (0: up to the newest), as far as samples go, with the
+        axes of ``reference_frame``, default the observation frame. Linear is the velocity of the tracking frame's
+        origin, or of another point that moves along with it. (tf2's ``lookupVelocity`` returns the same where nothing
+        rotates and the axes agree; where something rotates, it mixes up the axes.) What would begin before the epoch
+        begins 10 µs after it, as in tf2.
 
         Raises:
-            InvalidArgumentException: if a name is empty or starts with a slash.
-            LookupException: if a frame is not known.
-            ConnectivityException: if they are in two trees.
-            ExtrapolationException: if an edge between them has no samples around that time.
+            ValueError: if the interval is not positive.
         """
-        (x, y, z, *quat), stamp_ns = self._pose(target, source, stamp_ns)
-        return Pose((x, y, z), (quat[0], quat[1], quat[2], quat[3])), stamp_ns
+        moving = Moving(tracking_frame, observation_frame, reference_frame, reference_point, reference_point_frame)
+        return self._velocity(moving, nanoseconds(time), averaging_interval, up_to_newest=not nanoseconds(time))
 
-    def latest(self, target: str, source: str) -> tuple[Pose, int | None]:
-        """Return what ``lookup`` does for time 0; the time is None where only fixed edges are between the two."""
-        pose, stamp_ns = self.lookup(target, source)
-        return pose, stamp_ns or None
+    def lookupVelocityCore(  # noqa: N802 (tf2_py's name)
+        self, tracking_frame: str, observation_frame: str, time: Any, averaging_interval: Any
+    ) -> Velocity:
+        """Return what ``lookup_velocity`` does; but time 0 is the epoch here, as in tf2, and not the newest."""
+        return self._velocity(Moving(tracking_frame, observation_frame), nanoseconds(time), averaging_interval)
 
-    def behind(self, target: str, source: str) -> str | None:
-        """Return the moving edge between the two whose newest sample is the oldest, as "parent → child", or None.
+    def lookupVelocityFullCore(  # noqa: N802, PLR0913, PLR0917 (tf2_py's name and arguments)
+        self, tracking_frame: str, observation_frame: str, reference_frame: str, reference_point: Sequence[float],
+        reference_point_frame: str, time: Any, averaging_interval: Any,
+    ) -> Velocity:  # fmt: skip
+        """Return what ``lookup_velocity`` does; but time 0 is the epoch here, as in tf2, and not the newest."""
+        moving = Moving(tracking_frame, observation_frame, reference_frame, reference_point, reference_point_frame)
+        return self._velocity(moving, nanoseconds(time), averaging_interval)
 
-        Raises:
-            LookupException: if a frame is not known.
-            ConnectivityException: if they are in two trees.
+    def _velocity(self, moving: Moving, time_ns: int, interval: Any, *, up_to_newest: bool = False) -> Velocity:
+        interval_ns = nanoseconds(interval)
+        if interval_ns <= 0:
+            raise ValueError(f"a velocity is a mean over some time, not over {interval_ns} ns")
+
+        def pose_of(target: str, source: str, stamp_ns: int) -> PoseTuple:
+            return self._pose(target, source, stamp_ns)[0]
+
+        with self._lock:
+            _, newest_ns = self._pose(moving.observation_frame, moving.tracking_frame, 0)
+            end_ns = newest_ns if up_to_newest else time_ns + interval_ns // 2
+            end_ns = min(end_ns, newest_ns) if newest_ns else end_ns
+            return mean_velocity(pose_of, moving, end_ns - interval_ns, end_ns, time_ns)
+
+    # What the buffer holds, as tf2's tools print it.
+
+    def all_frames_as_string(self) -> str:
+        """Return a line for each edge, in tf2's words."""
+        return "".join(
+            f"Frame {frame.name} exists with parent {frame.parent}.\n" for frame in _edges(self.all_frames())
+        )
+
+    def all_frames_as_yaml(self) -> str:
+        """Return each edge with its rate and times, as tf2's ``tf2_frames`` service gives view_frames."""
+        return "".join(map(_yaml, _edges(self.all_frames()))) or "[]"
+
+    def _allFramesAsDot(self, time: Any = 0) -> str:  # noqa: ARG002, N802 (tf2_py's name)
+        """Return the edges as a graph for graphviz, each with who sent it, its rate and its times."""
+        return f"digraph G {{\n{''.join(map(_dot, _edges(self.all_frames())))}}}"
+
+    def _frameExists(self, frame_id: str) -> bool:  # noqa: N802 (tf2_py's name)
+        """Return whether the frame was heard of."""
+        return frame_id in self.frames
+
+    def _getFrameStrings(self) -> list[str]:  # noqa: N802 (tf2_py's name)
+        """Return every frame that was heard of, in the order in which they were."""
+        return [frame.name for frame in self.all_frames()]
+
+    def _chain(
+        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str
+    ) -> list[str]:
+        """Return the children of the edges from the source to the fixed frame, then of those on to the target.
+
+        Where both times are the same, tf2 gives the way to the fixed frame alone, and so does this.
         """
+        times = nanoseconds(source_time), nanoseconds(target_time)
         with self._lock:
-            moving = self._chain(target, source).moving if target != source else []
-            if not moving:
-                return None
-            last = min(moving, key=lambda cache: cache.newest_ns)
-            return f"{last.parent} → {last.child}"
-
-    def all_frames(self) -> list[FrameInfo]:
-        """Return what is known of each frame, in the order in which they were first heard of."""
-        with self._lock:
-            return [_frame_info(name, self._caches.get(name)) for name in self._names]
-
-    def clear(self) -> None:
-        """Forget all samples of moving edges; fixed ones and the names stay, as in tf2."""
-        with self._lock:
-            for cache in self._caches.values():
-                if not cache.static:
-                    cache.clear()
-            self._chains.clear()
-            self._mixed.clear()
-
-    def can_lookup(self, target: str, source: str, stamp_ns: int = 0) -> str:
-        """Return nothing if ``lookup`` would answer, else why it would not."""
-        try:
-            self._pose(target, source, stamp_ns)
-        except TransformException as error:
-            return str(error)
-        return ""
-
-    def locked(self) -> RLock:
-        """Return a context in which nothing is taken, by any thread."""
-        return self._lock
-
-    def chain_for_all_times(self, target: str, source: str) -> Chain | None:
-        """Return the chain between two frames, or None where a frame has had several parents within the cache.
-
-        Raises:
-            LookupException, ConnectivityException, InvalidArgumentException: as ``lookup`` for time 0.
-        """
-        if self._mixed:
-            return None
-        return self._chain(target, source) if target != source else Chain((), ())
-
-    def _pose(self, target: str, source: str, stamp_ns: int) -> tuple[PoseTuple, int]:
-        """Return what ``lookup`` does, as numbers."""
-        with self._lock:
-            if target == source:
-                return IDENTITY, stamp_ns or self._newest_ns(target)
-            chain = self._chains.get((target, source)) or self._chain(target, source, stamp_ns)
-            at_ns = stamp_ns or chain.common_ns()
-            if self._mixed and at_ns:
-                return self._pose_at(target, source, at_ns), at_ns
-            if chain.fixed is not None:
-                return chain.fixed, stamp_ns
-            pose = chain.at(at_ns)
-            if pose is None:
-                try:
-                    pose = self._pose_at(target, source, at_ns)
-                except ExtrapolationException as error:
-                    if stamp_ns:
-                        raise
-                    raise ExtrapolationException(no_common_time(chain.moving)) from error
-            return pose, at_ns
-
-    def _pose_at(self, target: str, source: str, stamp_ns: int) -> PoseTuple:
-        """Return the pose by the parents of that time; in a loop of frames the other way round may be the one."""
-        pose = chain_at(self._caches, target, source, stamp_ns).at(stamp_ns)
-        if pose is None:
-            raise ExtrapolationException(f"{source} has no pose in {target} at {exceptions.seconds(stamp_ns)}")
-        return pose
-
-    def _chain(self, target: str, source: str, stamp_ns: int = 0) -> Chain:
-        """Return the chain between the two; the one by newest parents, if there is any, is remembered."""
-        self._require(target)
-        self._require(source)
-        try:
-            chain = newest_chain(self._caches, target, source)
-        except (ConnectivityException, LookupException):
-            if not stamp_ns:
-                raise
-            return chain_at(self._caches, target, source, stamp_ns)
-        if len(self._chains) >= _MOST_CHAINS:
-            self._chains.clear()
-        self._chains[target, source] = chain
-        return chain
-
-    def _require(self, frame: str) -> None:
-        if not frame or frame[0] == "/":
-            raise InvalidArgumentException(exceptions.unusable_name(frame))
-        if frame not in self._names:
-            raise LookupException(exceptions.UnknownFrame(frame, self._names))
-
-    def _new_cache(self, child: str, *, static: bool) -> TimeCache:
-        """Return the samples of a frame that is new, or fixed from now on, or moving from now on."""
-        cache = self._caches[child] = TimeCache(child, static=static)
-        self._mixed.discard(child)
-        return cache
-
-    def _changed(self, cache: TimeCache) -> None:
-        """Forget the chains, since an edge is new, or has another fixed pose or parent."""
-        self._chains.clear()
-        (self._mixed.add if cache.mixed else self._mixed.discard)(cache.child)
-
-    def _newest_ns(self, frame: str) -> int:
-        cache = self._caches.get(frame)
-        return cache.newest_ns if cache and not cache.static and len(cache) else 0
+            found = self._chain_between(fixed_frame, source_frame, times[0]).children
+            if times[0] == times[1]:
+                return list(found)
+            return [*found, *self._chain_between(target_frame, fixed_frame, times[1]).children]
 
 
-def _frame_info(name: str, cache: TimeCache | None) -> FrameInfo:
-    if cache is None or not len(cache):
-        return FrameInfo(name, "", static=False, authority="", oldest_ns=0, newest_ns=0, samples=0)
-    oldest, newest = (0, 0) if cache.static else (cache.oldest_ns, cache.newest_ns)
-    return FrameInfo(name, cache.parent, cache.static, cache.authority, oldest, newest, len(cache))
+def _row(transform: Any) -> Row:
+    sec, nanosec = divmod(nanoseconds(transform.header.stamp), _SECOND_NS)
+    to, rotation = transform.transform.translation, transform.transform.rotation
+    names = transform.header.frame_id, transform.child_frame_id
+    return (*names, sec, nanosec, to.x, to.y, to.z, rotation.x, rotation.y, rotation.z, rotation.w)
 
 
-# What tf2's tools print of the frames.
+def _possible(lookup: Callable[[], object]) -> tuple[bool, str]:
+    try:
+        lookup()
+    except TransformException as error:
+        return False, str(error)
+    return True, ""
 
 
-def as_string(frames: Iterable[FrameInfo]) -> str:
-    """Return a line for each frame that has a parent, in tf2's words."""
-    return "".join(f"Frame {frame.name} exists with parent {frame.parent}.\n" for frame in frames if frame.parent)
-
-
-def as_yaml(frames: Iterable[FrameInfo]) -> str:
-    """Return the frames as the YAML that tf2's ``tf2_frames`` service gives view_frames."""
-    return "".join(map(_yaml, (frame for frame in frames if frame.parent))) or "[]"
-
-
-def as_dot(frames: Iterable[FrameInfo]) -> str:
-    """Return the edges as a graph for graphviz, each with who sent it, its rate and its times."""
-    edges = "".join(map(_dot, (frame for frame in frames if frame.parent)))
-    return f"digraph G {{\n{edges}}}"
+def _edges(frames: Iterable[FrameInfo]) -> Iterable[FrameInfo]:
+    return (frame for frame in frames if frame.parent)
 
 
 def _dot(frame: FrameInfo) -> str:

@@ -21,10 +21,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from tfcompose.geometry import matrix_from_quat
 from tfcompose.tf2.exceptions import TypeException
-from tfcompose.tf2.poses import PoseTuple, product, unit
+from tfcompose.tf2.poses import IDENTITY, PoseTuple, product, unit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+
+    from numpy.typing import ArrayLike, NDArray
 
     Maker = Callable[[str, str, int, PoseTuple], Any]
     #: Moves an object by a TransformStamped.
@@ -255,6 +257,19 @@ def transform_covariance(covariance: Sequence[float], transform: Any) -> list[fl
     return moved
 
 
+def transform_points(point_cloud: ArrayLike, transform: Any) -> NDArray[Any]:
+    """Return points, N×3 in metres, moved by a Transform or a TransformStamped, as tf2_sensor_msgs does. Needs numpy.
+
+    Raises:
+        InvalidArgumentException: if the last dimension is not 3.
+        ImportError: if there is no numpy.
+    """
+    require_numpy()
+    from tfcompose.tf2.arrays import moved_points  # noqa: PLC0415 (numpy is optional)
+
+    return moved_points(point_cloud, pose_of(transform))
+
+
 def do_transform_polygon_stamped(polygon: Any, transform: Any) -> Any:
     """Return a PolygonStamped in the transform's frame."""
     moved, pose = _headed(polygon, transform), pose_of(transform)
@@ -276,6 +291,7 @@ def do_transform_cloud(cloud: Any, transform: Any) -> Any:
     from tfcompose.tf2.arrays import moved_cloud  # noqa: PLC0415 (numpy is optional)
 
     moved = moved_cloud(cloud, pose_of(transform))
+    moved.header = _copied_with_header(cloud.header, cloud.header.stamp)
     moved.header.frame_id = getattr(transform, "header", cloud.header).frame_id
     return moved
 
@@ -298,17 +314,29 @@ def require_numpy() -> None:
 
 
 def pose_of(transform: Any) -> PoseTuple:
-    """Return the pose of a TransformStamped, or of a Transform, as numbers; its quaternion is brought to length 1."""
+    """Return the pose of a TransformStamped, or of a Transform, as numbers.
+
+    Its quaternion is brought to length 1; one of zeros counts as no rotation, as in tf2.
+    """
     inner = getattr(transform, "transform", transform)
     to, rotation = inner.translation, inner.rotation
-    return unit((to.x, to.y, to.z, rotation.x, rotation.y, rotation.z, rotation.w))
+    quat = (rotation.x, rotation.y, rotation.z, rotation.w)
+    return unit((to.x, to.y, to.z, *(quat if any(quat) else IDENTITY[3:])))
+
+
+def _copied_with_header(headed: Any, stamp: Any) -> Any:
+    """Return a copy of a message or header whose stamp is given; rclpy's ``Time`` cannot be copied, nor changed."""
+    return deepcopy(headed, {} if hasattr(stamp, "sec") else {id(stamp): stamp})
 
 
 def _headed(message: Any, transform: Any) -> Any:
     """Return a copy of the message with the frame and the time of the transform."""
-    copied = deepcopy(message)
-    copied.header.frame_id = transform.header.frame_id
-    copied.header.stamp.sec, copied.header.stamp.nanosec = transform.header.stamp.sec, transform.header.stamp.nanosec
+    copied = _copied_with_header(message, message.header.stamp)
+    copied.header.frame_id, stamp_ns = transform.header.frame_id, nanoseconds(transform.header.stamp)
+    if hasattr(copied.header.stamp, "sec"):
+        copied.header.stamp.sec, copied.header.stamp.nanosec = divmod(stamp_ns, _SECOND_NS)
+    else:
+        copied.header.stamp = time_of(stamp_ns)
     return copied
 
 

@@ -210,13 +210,12 @@ XACRO = """<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">
 """
 
 
-def test_a_xacro_file_is_expanded_and_places_are_those_of_the_expanded_text(tmp_path: Path) -> None:
+def test_a_xacro_file_is_expanded_and_places_are_those_in_it(tmp_path: Path) -> None:
     file = tmp_path / "r.urdf.xacro"
     file.write_text(XACRO)
     found = lint_urdf(str(file))
     assert [one.code for one in found] == ["TF203"]
-    assert found[0].span
-    assert found[0].span.file == f"{file} (expanded)"
+    assert found[0].span == Span(str(file), 3, 53, 3, 61)
     file.write_text(XACRO.replace("${n}", "${m}", 1))
     (refused,) = lint_urdf(str(file))
     assert refused.code == "TF018"
@@ -250,7 +249,9 @@ ALLOWED = """<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">
 def test_a_comment_in_a_xacro_file_counts_for_its_line_in_every_expansion(tmp_path: Path) -> None:
     file = tmp_path / "r.urdf.xacro"
     file.write_text(ALLOWED)
-    assert [(one.code, "TF205" in one.message) for one in lint_urdf(str(file))] == [("TF012", True)] * 2
+    assert [(one.code, "TF205" in one.message, str(one.span)) for one in lint_urdf(str(file))] == [
+        ("TF012", True, f"{file}:4:40")
+    ]
 
 
 RATES = 'effort="1" velocity="1"'

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from tfcompose.model import Edge, Robot
     from tfcompose.urdf.inertia import Moments
     from tfcompose.urdf.packages import Packages
-    from tfcompose.urdf.xacro import Use
+    from tfcompose.urdf.xacro import Expansion, Use
 
 
 PRESETS = Path(__file__).parents[1] / "presets"
@@ -184,8 +184,8 @@ def moments(path: str, scale: Vector) -> Moments:
     return mesh.moments(path, scale)
 
 
-def _expanded(file: str, packages: Packages, arguments: Mapping[str, Any], use: Use | None) -> str:
-    """Return the URDF that xacro makes of a file, or of a call of one of its macros; xacro is loaded only here."""
+def _expanded(file: str, packages: Packages, arguments: Mapping[str, Any], use: Use | None) -> Expansion:
+    """Return what xacro makes of a file, or of a call of one of its macros; xacro is loaded only here."""
     if use is None or not use.macro:
         read_text(file)  # a file that cannot be read is refused as everywhere
     from tfcompose.urdf.expand import expand

@@ -55,11 +55,12 @@ _HELD = re.compile(r"""(=\s*")([^<"]*)(?=")|(=\s*')([^<']*)(?=')|(>)([^<>]*)(?=<
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Elements that stand in the URDF as the user wrote them."""
+    """Elements that stand in the URDF as the user wrote them; ``places`` are theirs, in order, if known."""
 
     name: str
     at: Span
     text: str
+    places: tuple[Span, ...] = field(default=(), compare=False)
 
     def own_names(self) -> list[str]:
         """Return the names of the elements in it that have one for themselves in the whole robot."""

@@ -18,7 +18,7 @@ from tfcompose.resolve.processes import full_name
 from tfcompose.resolve.stock import with_stock
 from tfcompose.urdf.blocks import read_block, with_hardware
 from tfcompose.urdf.convert import robot_of
-from tfcompose.urdf.read import read_xml
+from tfcompose.urdf.read import read_expansion, read_xml
 from tfcompose.urdf.xacro import Use, macros_in
 
 if TYPE_CHECKING:
@@ -27,13 +27,14 @@ if TYPE_CHECKING:
     from tfcompose.plan import RosSettings
     from tfcompose.resolve.part import PartEntry
     from tfcompose.urdf.packages import Packages
+    from tfcompose.urdf.xacro import Expansion
 
 _PACKAGE = re.compile(r"(?:package://|\$\(find(?:-pkg-share)?\s+)([A-Za-z][A-Za-z0-9_.-]*)\)?/(.+)")
 
 
 @dataclass(frozen=True, slots=True)
 class Foreign:
-    """The robot of a URDF or xacro file. ``file`` is its name in places.
+    """The robot of a URDF or xacro file. ``files`` are what it is written in.
 
     ``found`` is what is wrong with it: errors, and the files that it names and that are not found. Other warnings are
     for those who wrote it.
@@ -42,7 +43,7 @@ class Foreign:
     """
 
     robot: Robot
-    file: str
+    files: tuple[str, ...]
     found: tuple[Finding, ...]
     implied: frozenset[str] = frozenset()
 
@@ -57,11 +58,15 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
     key = "urdf" if spec.urdf is not None else "xacro"
     at = part.source.at((*part.at, key))
     file = _address(spec.urdf or spec.xacro or "", at, packages)
+    files: tuple[str, ...] = (file,)
     if spec.urdf is not None:
-        name, text = file, read(file)
+        text = read(file)
+        root = read_xml(text, file)
     else:
-        name, text = f"{file} (expanded)", _expanded(part, file, at, packages)
-    converted = robot_of(read_xml(text, name), name, packages.asset)
+        expansion = _expanded(part, file, at, packages)
+        text, files = expansion.text, tuple(dict.fromkeys((file, *expansion.files)))
+        root = read_expansion(expansion, file, read)
+    converted = robot_of(root, file, packages.asset, files)
     robot = converted.robot
     if not robot.frames:
         macros = macros_in(read(file))
@@ -77,7 +82,7 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
     if part.alone and part.spec.ros.state_publisher == "stock":
         own, refused = with_stock(own)
         found += refused
-    return Foreign(own, name, tuple(found), implied)
+    return Foreign(own, files, tuple(found), implied)
 
 
 def _with_base(robot: Robot) -> Robot:
@@ -96,7 +101,7 @@ def _address(named: str, at: Span, packages: Packages) -> str:
     return f"{folder}/{found[2]}"
 
 
-def _expanded(part: PartEntry, file: str, at: Span, packages: Packages) -> str:
+def _expanded(part: PartEntry, file: str, at: Span, packages: Packages) -> Expansion:
     disk, spec = packages.disk, part.declared
     if disk is None:
         raise RejectedError([finding("TF001", f"{file}: files cannot be read here", at)])

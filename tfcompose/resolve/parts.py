@@ -98,7 +98,8 @@ class Parts:
             made = foreign(part, packages, self.read)
         except RejectedError as error:
             raise RejectedError([_noted(one, part) for one in error.findings]) from None
-        self.collected.notes.setdefault(made.file, []).append(_note(part))
+        for file in made.files:
+            self.collected.notes.setdefault(file, []).append(_note(part))
         self.found += [_noted(one, part) for one in made.found]
         return made.robot, made.implied
 

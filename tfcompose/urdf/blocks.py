@@ -156,12 +156,12 @@ def with_hardware(robot: Robot) -> Robot:
 def _hardware_of(element: Element, block: Block) -> Hardware | None:
     """Return the hardware component that the element describes, or None where it cannot say all of it."""
     try:
-        return _hardware(element, block.at)
+        return _hardware(element, block)
     except (_UnsupportedError, ValueError):
         return None
 
 
-def _hardware(element: Element, at: Span) -> Hardware:
+def _hardware(element: Element, block: Block) -> Hardware:
     attributes = _only(element, "name", "type", "rw_rate", "is_async", tags=("hardware", *_KINDS))
     inner = element.first("hardware")
     if inner is None or len(element.all("hardware")) != 1 or attributes.get("type") not in _TYPES:
@@ -170,9 +170,8 @@ def _hardware(element: Element, at: Span) -> Hardware:
     if len(inner.all("plugin")) != 1 or attributes.get("is_async") not in {None, "true", "false"}:
         raise _UnsupportedError
     plugin = inner.all("plugin")[0]
-    components = [
-        replace(_component(one), at=_in_document(one.at, at)) for one in element.children if one.tag in _KINDS
-    ]
+    places = dict(zip(map(id, element.walk()), block.places, strict=True))
+    components = [replace(_component(one), at=places[id(one)]) for one in element.children if one.tag in _KINDS]
     if len({(one.kind, one.name) for one in components}) != len(components):
         raise _UnsupportedError
     _only(plugin)
@@ -180,19 +179,12 @@ def _hardware(element: Element, at: Span) -> Hardware:
         attributes.get("name", ""),
         plugin.text.strip(),
         attributes["type"],
-        at,
+        block.at,
         _params(inner),
         tuple(components),
         int(attributes["rw_rate"]) if "rw_rate" in attributes else None,
         attributes["is_async"] == "true" if "is_async" in attributes else None,
     )
-
-
-def _in_document(inside: Span, block: Span) -> Span:
-    """Return the place in the document of one in the block that begins there."""
-    lines, columns = block.line - 2, block.column - 1 if inside.line == 2 else 0  # noqa: PLR2004 (the block's first)
-    begin, end = (inside.line + lines, inside.column + columns), (inside.end_line + lines, inside.end_column + columns)
-    return Span(block.file, *begin, *end)
 
 
 def _component(element: Element) -> Component:

@@ -35,15 +35,16 @@ from tfcompose.urdf.inertia import traces
 from tfcompose.urdf.schema import HUGE, JOINT_TYPES, MOMENTS, SIZES, Values, unknown_words, version_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Collection, Iterator
 
     from tfcompose.catalogue import Severity
     from tfcompose.findings import Span
     from tfcompose.geometry import Vector
     from tfcompose.urdf.read import Element
 
-    #: Takes the address of a file and its place; returns the file, and what is wrong with the address, if anything is.
-    Finder = Callable[[str, Span], tuple[Asset, Finding | None]]
+    #: Takes the address of a file, its place, and the document's file; returns the file, and what is wrong with the
+    #: address, if anything is.
+    Finder = Callable[[str, Span, str], tuple[Asset, Finding | None]]
 
 #: The elements that become links and joints; all others below <robot> are kept verbatim.
 _CONVERTED = frozenset({"link", "joint", "material"})
@@ -72,10 +73,10 @@ class Converted:
         return (*self.of_elements, *self.of_blocks, *self.of_files)
 
 
-def robot_of(root: Element, file: str, find: Finder) -> Converted:
+def robot_of(root: Element, file: str, find: Finder, included: Collection[str] = ()) -> Converted:
     """Return the robot that the URDF describes.
 
-    ``find`` looks for the files of meshes and textures.
+    ``find`` looks for the files of meshes and textures. ``included`` are further files that its elements come from.
 
     Raises:
         RejectedError: if it is no URDF.
@@ -85,7 +86,7 @@ def robot_of(root: Element, file: str, find: Finder) -> Converted:
         raise RejectedError([finding("TF018", message, root.at, help="a URDF begins with <robot name=…>")])
     values = Values()
     values.has_quaternions = version_of(root, values) >= (1, 1)
-    bodies = _Bodies(values, find, root)
+    bodies = _Bodies(values, lambda address, at: find(address, at, file), root)
     name = values.text(root, "name", '<robot name="rover">')
     links = _by_name(root.all("link"), values)
     joints = root.all("joint")
@@ -105,7 +106,7 @@ def robot_of(root: Element, file: str, find: Finder) -> Converted:
         processes=(),
         base=None,
         blocks=tuple(_blocks(root)),
-        foreign=frozenset({file}),
+        foreign=frozenset({file, *included}),
     )
     of_blocks = tuple(replace(one, severity="warning") for one in unknown)
     return Converted(robot, (*values.found, *unknown_words(root)), of_blocks, tuple(bodies.found))
@@ -135,7 +136,8 @@ def _blocks(root: Element) -> Iterator[Block]:
         if element.tag not in _CONVERTED:
             counts[element.tag] = counts.get(element.tag, 0) + 1
             name = f"{element.tag.replace(':', '_')}_{counts[element.tag]}"
-            yield Block(name, element.at, _with_namespaces(element, root))
+            places = tuple(one.at for one in element.walk()) if element.tag == "ros2_control" else ()
+            yield Block(name, element.at, _with_namespaces(element, root), places)
 
 
 def _with_namespaces(element: Element, root: Element) -> str:
@@ -231,7 +233,7 @@ class _Bodies:
     """Reads the links of a document; ``found`` holds what is wrong with their files."""
 
     values: Values
-    find: Finder
+    find: Callable[[str, Span], tuple[Asset, Finding | None]]
     root: Element
     found: list[Finding] = field(default_factory=list)
     _materials: dict[str, Material | None] = field(default_factory=dict)

@@ -1,25 +1,30 @@
 """Xacro files, expanded by xacro itself; what xacro refuses is a finding at its place in the xacro file.
 
-xacro names the expression and the macros that it stopped at, and neither line nor column: they are looked for here.
+xacro runs in a process of its own, with bounds of time and memory. It names the expression and the macros that it
+stopped at, and neither line nor column: they are looked for here.
 """
 
 from __future__ import annotations
 
-import contextlib
+import json
 import os
 import re
-from dataclasses import replace
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
-import xacro
-from xacro import substitution_args
-
 from tfcompose.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
-from tfcompose.urdf.xacro import NAMESPACE, macros_in
+from tfcompose.urdf.xacro import NAMESPACE, Expansion, macros_in
 
 if TYPE_CHECKING:
+    import io
     from collections.abc import Collection, Iterator, Mapping
 
     from tfcompose.urdf.packages import Packages
@@ -35,37 +40,77 @@ _NAMED = (
 _WORD = re.compile(r"""["']?(\w+)["']?""")
 #: At most so many of the macros around an error are named.
 _MOST_MACROS = 5
+#: Files may be on a disk that does not answer; the process bounds its processor time itself.
+_MOST_WALL_S = 600.0
+#: Bytes of an expression that the process keeps for when it ends.
+_NOTED = 4000
+_ALONE = "simplify it; or expand it outside of tfcompose, xacro {file} > robot.urdf, and use that file"
 
 
-def expand(file: str, packages: Packages, arguments: Mapping[str, Any], use: Use | None = None) -> str:
-    """Return the URDF that xacro makes of a file, or of a call of one of its macros; ``packages`` answer $(find …).
+def expand(file: str, packages: Packages, arguments: Mapping[str, Any], use: Use | None = None) -> Expansion:
+    """Return what xacro makes of a file, or of a call of one of its macros; ``packages`` answer $(find …).
 
     Raises:
-        RejectedError: if xacro refuses the file; with the findings where a robot file names it, if one does.
+        RejectedError: if xacro refuses the file, or needs too much for it; with the findings where a robot file names
+            it, if one does.
     """
     given = {name: str(value) for name, value in arguments.items()}
-    try:
-        xacro.all_includes.clear()
-        with _finding_in(packages, file):
-            document = _processed(file, use, given)
-        _refuse_unknown(given, [file, *xacro.all_includes], file, use)
-        _raise_comments(document)
-        result: str = document.toprettyxml(indent="  ")
-    except RejectedError:
-        raise
-    except Exception as error:  # noqa: BLE001 (xacro evaluates Python: anything can come out of it)
-        raise RejectedError([_refused(error, file, use)]) from None
-    return result
+    request = {"file": file, "arguments": given, "call": _document(use) if use and use.macro else None}
+    with tempfile.TemporaryFile() as noted:
+        noted.truncate(_NOTED)
+        answer, code = _answered(request, file, packages, noted)
+        if answer is None:
+            raise RejectedError([_where_used(_ended(code, _text_in(noted), file), use)])
+    if "text" not in answer:
+        raise RejectedError([_refused(_Stop(**answer), file, packages, use)])
+    _refuse_unknown(given, answer["read"], file, use)
+    names = tuple(_shown(name, file) for name in answer["files"])
+    places = tuple(tuple(place) if place else None for place in answer["places"])
+    return Expansion(answer["text"], names, places, tuple(map(tuple, answer["comments"])))
 
 
-def _processed(file: str, use: Use | None, arguments: dict[str, str]) -> Any:
-    """Return the DOM document that xacro makes."""
-    if use is None or not use.macro:
-        return xacro.process_file(file, mappings=arguments)
-    document = xacro.parse(_document(use), file)
-    xacro.init_stacks(file)  # relative includes begin in the file's folder
-    xacro.process_doc(document, mappings=arguments)
-    return document
+def _answered(
+    request: Mapping[str, Any], file: str, packages: Packages, noted: IO[bytes]
+) -> tuple[dict[str, Any] | None, int]:
+    """Return the process's answer to a request, None where it was ended, and its exit code."""
+    ours, theirs = socket.socketpair()
+    inherited = [theirs.fileno(), noted.fileno()]
+    program = f"import sys; sys.path[:] = {sys.path!r}; from tfcompose.urdf.xacro_process import main; main"
+    command = [sys.executable, "-c", f"{program}(*{inherited})"]
+    answer: dict[str, Any] | None = None
+    with (
+        ours,
+        ours.makefile("rwb") as channel,
+        subprocess.Popen(command, stdout=2, pass_fds=inherited) as process,  # what xacro prints is for people
+    ):
+        theirs.close()
+        watchdog = threading.Timer(_MOST_WALL_S, process.kill)
+        watchdog.daemon = True
+        watchdog.start()
+        try:
+            message = _exchanged(channel, request)
+            while "find" in message:
+                folder = packages.folder(message["find"], file)
+                message = _exchanged(
+                    channel, folder and str(Path(folder).absolute())
+                )  # it is relative to including files
+            answer = message
+        except (OSError, json.JSONDecodeError):
+            pass  # the process's end says why
+        except BaseException:
+            process.kill()
+            raise
+        finally:
+            watchdog.cancel()
+    return answer, process.returncode
+
+
+def _exchanged(channel: io.BufferedRWPair, message: Any) -> dict[str, Any]:
+    """Send a message, and return the next one."""
+    channel.write(json.dumps(message).encode() + b"\n")
+    channel.flush()
+    answer: dict[str, Any] = json.loads(channel.readline())
+    return answer
 
 
 def _document(use: Use) -> str:
@@ -77,33 +122,7 @@ def _document(use: Use) -> str:
     return f'<robot name="part" {NAMESPACE}>{includes}{macro}</robot>'
 
 
-class _MissingError(LookupError):
-    """A package is not found; ``found`` is the finding about it."""
-
-    def __init__(self, found: Finding) -> None:
-        super().__init__(found.message)
-        self.found = found
-
-
-@contextlib.contextmanager
-def _finding_in(packages: Packages, file: str) -> Iterator[None]:
-    """Let $(find NAME) be answered by the robot's packages too, for as long as ``file`` is expanded."""
-    before = substitution_args._eval_find  # noqa: SLF001 (xacro offers no other way)
-
-    def find(name: str) -> str:
-        folder = packages.folder(name, file)
-        if folder is None:
-            raise _MissingError(packages.not_found(name, None))
-        return str(Path(folder).absolute())  # relative paths in xacro begin at the file that includes
-
-    substitution_args._eval_find = find  # noqa: SLF001 (as above)
-    try:
-        yield
-    finally:
-        substitution_args._eval_find = before  # noqa: SLF001 (as above)
-
-
-def _refuse_unknown(given: Mapping[str, str], files: list[str], file: str, use: Use | None) -> None:
+def _refuse_unknown(given: Mapping[str, str], files: Collection[str], file: str, use: Use | None) -> None:
     """Refuse arguments that none of the files declares or asks for; xacro itself ignores them."""
     texts = [Path(name).read_text("utf-8", "replace") for name in files]
     known = dict.fromkeys(
@@ -117,21 +136,6 @@ def _refuse_unknown(given: Mapping[str, str], files: list[str], file: str, use: 
 def _no_argument(name: str, known: Collection[str], file: str) -> Finding:
     there = f"known: {', '.join(known)}" if known else "the file takes no arguments"
     return finding("TF106", f"unknown argument {name}", Span(file), help=did_you_mean(name, known, there))
-
-
-def _raise_comments(node: Any) -> None:
-    """Move comments that allow findings above the tag on their line: printing gives each a line of its own."""
-    for child in list(node.childNodes):
-        _raise_comments(child)
-        before = child.previousSibling
-        if child.nodeType != child.COMMENT_NODE or "tfcompose:" not in child.data or before is None:
-            continue
-        if before.nodeType == child.TEXT_NODE and ("\n" in before.data or before.data.strip()):
-            continue
-        while before is not None and before.nodeType != child.ELEMENT_NODE:
-            before = before.previousSibling
-        over = before or node
-        over.parentNode.insertBefore(child, over)
 
 
 def _where_used(found: Finding, use: Use | None) -> Finding:
@@ -155,58 +159,89 @@ def _in_call(found: Finding, file: str, use: Use) -> Finding:
     return replace(_where_used(found, replace(use, at=at)), help=advice)
 
 
-def _refused(error: Exception, file: str, use: Use | None) -> Finding:
+@dataclass(frozen=True, slots=True)
+class _Stop:
+    """Why xacro stopped.
+
+    ``files`` are those that were being read, the innermost last, and so are ``macros``, each with its file. ``error``
+    is where XML is broken, ``at`` the element that xacro was busy with: file, line, and column, which counts from 0.
+    """
+
+    kind: str
+    reason: str
+    files: list[str]
+    macros: list[tuple[str, str]]
+    error: tuple[str, int, int] | None
+    at: tuple[str, int, int] | None
+
+
+def _refused(stop: _Stop, file: str, packages: Packages, use: Use | None) -> Finding:
     """Return what xacro, or something that it called, did not like, and where, or in which other file."""
-    chain: list[Any] = [error]
-    while getattr(chain[-1], "exc", None) is not None:  # xacro wraps what it calls, again and again
-        chain.append(chain[-1].exc)
-    root = chain[-1]
-    if isinstance(root, _MissingError):
-        return _where_used(replace(root.found, severity="error", span=Span(file)), use)
-    if type(root).__name__ == "ArgException":
-        message = f"the argument {root} has no value and no default"
-        advice = f"give it: {root}:=…, or in a part args: {{{root}: …}}"
-        return _where_used(finding("TF106", message, Span(file), help=advice), use)
-    reason = _reason(chain) or type(error).__name__
-    found = finding("TF018", f"xacro: {reason}", Span(file))
-    files, macros = list(xacro.filestack or ()), list(xacro.macrostack or ())
-    placed = _relative_to(file, _placed(found, root, files, macros))
-    others = [name for name in files[-1:] if name and Path(name).absolute() != Path(file).absolute()]
-    if others and placed.span == found.span:
-        placed = replace(placed, message=f"{placed.message} (in {os.path.relpath(others[0])})")
-    return _in_call(placed, file, use) if use and use.macro else _where_used(placed, use)
-
-
-def _reason(chain: list[Any]) -> str:
-    """Return the message of a chain of exceptions in one line; the last one is the cause of the others."""
-    root = chain[-1]
-    if isinstance(root, OSError):
-        words = [f"{root.strerror}: {root.filename}"]
+    begins = [(stop.at[0], stop.at[1])] if stop.at else []
+    if stop.kind == "package":
+        missing = replace(packages.not_found(stop.reason, None), severity="error", span=Span(file))
+        found = _at_words(missing, rf"\$\(find\s+{re.escape(stop.reason)}\s*\)", begins)
+    elif stop.kind == "argument":
+        message = f"the argument {stop.reason} has no value and no default"
+        advice = f"give it: {stop.reason}:=…, or in a part args: {{{stop.reason}: …}}"
+        missing = finding("TF106", message, Span(file), help=advice)
+        found = _at_words(missing, rf"\$\(arg\s+{re.escape(stop.reason)}\s*\)", begins)
+    elif stop.kind == "limit":
+        found = _placed(finding("TF008", stop.reason, Span(file), help=_ALONE.format(file=file)), stop, begins)
     else:
-        heads = [str(one.args[0]) for one in chain[:-1] if one.args and one.args[0]]
-        own = str(root) if hasattr(root, "suffix") or "line" in str(root) else f"{type(root).__name__}: {root}"
-        words = [*(head for head in heads if str(root) not in head), own]
-        words += [str(one.suffix) for one in reversed(chain[:-1]) if getattr(one, "suffix", None)]
-    return " ".join(" ".join(words).split())
+        found = _placed(finding("TF018", f"xacro: {stop.reason}", Span(file)), stop, begins)
+    found = _relative_to(file, found)
+    others = [name for name in stop.files[-1:] if Path(name).absolute() != Path(file).absolute()]
+    if others and found.span == Span(file) and stop.kind not in {"package", "argument"}:
+        found = replace(found, message=f"{found.message} (in {os.path.relpath(others[0])})")
+    return _in_call(found, file, use) if use and use.macro and stop.kind == "refused" else _where_used(found, use)
 
 
-def _placed(found: Finding, error: Any, files: list[str], macros: list[Any]) -> Finding:
+def _at_words(found: Finding, pattern: str, begins: list[tuple[str, int]]) -> Finding:
+    """Return the finding at the first words of the pattern from one of these lines on."""
+    at = next((at for file, line in begins if (at := _first(file, pattern, line))), found.span)
+    return replace(found, span=at)
+
+
+def _placed(found: Finding, stop: _Stop, begins: list[tuple[str, int]]) -> Finding:
     """Return the finding at the words that it is about, with notes about the macros that were expanded then.
 
-    ``files`` are those that were being read, the innermost last, and so are ``macros``. The finding stays where it is
-    if the words are not to be found. Places are in the files as xacro names them.
+    Where the words are not to be found it is at the element that xacro was busy with. Places are in the files as xacro
+    names them.
     """
-    files = [file for file in files if file]
-    around = dict.fromkeys((macro.body.getAttribute("name"), macro.history[-1][-1]) for macro in reversed(macros))
+    around = dict.fromkeys((name, file) for name, file in reversed(stop.macros))
     inner = [(name, begin) for name, file in around if (begin := _definition(file, name))]
     notes = [Note(f"in the macro {name}", at) for name, at in inner[:_MOST_MACROS]]
-    if getattr(error, "lineno", None) is not None and files:  # an ExpatError; its columns count from 0
-        line, column = error.lineno, error.offset + 1
-        at: Span | None = Span(files[-1], line, column, line, column + 1)
+    if stop.error:
+        at: Span | None = _mark(*stop.error)
     else:
-        begins = [(macro.file, macro.line) for _, macro in inner] + [(file, 0) for file in reversed(files)]
-        at = next((word for file, line in begins for word in _named_at(found.message, file, line)), found.span)
+        begins = [*begins, *((macro.file, macro.line) for _, macro in inner), *((one, 0) for one in stop.files[::-1])]
+        busy = _mark(*stop.at) if stop.at else found.span
+        at = next((word for file, line in begins for word in _named_at(found.message, file, line)), busy)
     return replace(found, span=at, notes=(*found.notes, *notes))
+
+
+def _mark(file: str, line: int, column: int) -> Span:
+    return Span(file, line, column + 1, line, column + 2)
+
+
+def _ended(code: int, noted: str, file: str) -> Finding:
+    """Return the finding that the process was ended, and what it was evaluating then."""
+    if code == -signal.SIGVTALRM:
+        message = "xacro was ended: an expression takes too long"
+    elif code == -signal.SIGKILL:
+        message = "xacro was ended: it took too long, or too much memory"
+    else:
+        message = f"xacro was ended by {signal.Signals(-code).name}" if code < 0 else f"xacro gave up with code {code}"
+    found = finding("TF008", f"{message}: {noted}" if noted else message, Span(file), help=_ALONE.format(file=file))
+    words = r"\s+".join(map(re.escape, noted.split()))
+    return _at_words(found, words, [(file, 0)]) if words else found
+
+
+def _text_in(noted: IO[bytes]) -> str:
+    """Return what the process was evaluating."""
+    noted.seek(0)
+    return noted.read().partition(b"\0")[0].decode("utf-8", "replace")
 
 
 def _definition(file: str | None, macro: str) -> Span | None:
@@ -244,10 +279,12 @@ def _relative_to(file: str, found: Finding) -> Finding:
     """Return the finding with its places in files as seen from the working folder, and ``file`` as it is named."""
 
     def shown(span: Span | None) -> Span | None:
-        if span is None or span.file == file:
-            return span
-        same = Path(span.file).absolute() == Path(file).absolute()
-        return span._replace(file=file if same else os.path.relpath(span.file))
+        return span._replace(file=_shown(span.file, file)) if span else None
 
     notes = tuple(replace(note, span=shown(note.span)) for note in found.notes)
     return replace(found, span=shown(found.span), notes=notes)
+
+
+def _shown(name: str, file: str) -> str:
+    """Return a file's name as seen from the working folder; ``file`` is as it is named."""
+    return file if Path(name).absolute() == Path(file).absolute() else os.path.relpath(name)

@@ -10,21 +10,23 @@ from tfcompose.findings import Finding, RejectedError, Span, finding
 from tfcompose.load import allows_in_xml
 from tfcompose.urdf.blocks import with_hardware
 from tfcompose.urdf.convert import Converted, robot_of
-from tfcompose.urdf.read import read_xml
+from tfcompose.urdf.read import read_expansion, read_xml
 from tfcompose.urdf.xacro import macros_in
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
+    from tfcompose.findings import Allow
     from tfcompose.model import Robot
     from tfcompose.urdf.packages import Packages
     from tfcompose.urdf.read import Element
+    from tfcompose.urdf.xacro import Expansion
 
 _RULES = tuple(rule for rule in RULES.values() if rule.of_urdf)
 
 
 def lint_urdf(file: str, packages: Packages) -> list[Finding]:
-    """Return what is wrong with the file, by place. A xacro file is expanded, and places are those of the result."""
+    """Return what is wrong with the file, by place. A xacro file is expanded; places are where elements are written."""
     try:
         document = read_urdf(file, packages)
     except RejectedError as error:
@@ -34,12 +36,14 @@ def lint_urdf(file: str, packages: Packages) -> list[Finding]:
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A URDF that was read: its elements, and what they describe."""
+    """A URDF that was read: its elements, and what they describe.
 
-    name: str
-    text: str
+    ``allows`` are the comments in it, and in the files that it includes, that allow findings.
+    """
+
     root: Element
     converted: Converted
+    allows: tuple[Allow, ...]
 
     @property
     def robot(self) -> Robot:
@@ -48,10 +52,9 @@ class Document:
 
     def findings(self) -> list[Finding]:
         """Return what is wrong with it, by place, but for what its comments allow."""
-        allows = allows_in_xml(self.text, self.name)
         found = dict.fromkeys([*self.converted.found, *check(with_hardware(self.robot), _RULES)])
-        kept, used = apply(found, allows)
-        return sorted([*kept, *unused_allows(allows, used)], key=lambda one: one.sort_key)
+        kept, used = apply(found, self.allows)
+        return sorted([*kept, *unused_allows(self.allows, used)], key=lambda one: one.sort_key)
 
 
 def read_urdf(file: str, packages: Packages, arguments: Mapping[str, str] | None = None) -> Document:
@@ -69,12 +72,25 @@ def read_urdf(file: str, packages: Packages, arguments: Mapping[str, str] | None
     if arguments and not is_xacro:
         advice = "only xacro files take arguments"
         raise RejectedError([finding("TF106", f"unknown argument {next(iter(arguments))}", Span(file), help=advice)])
-    name, text = (f"{file} (expanded)", disk.expand(file, packages, arguments or {}, None)) if is_xacro else (file, raw)
-    root = read_xml(text, name)
-    converted = robot_of(root, name, packages.asset)
+    if is_xacro:
+        expansion = disk.expand(file, packages, arguments or {}, None)
+        root, files = read_expansion(expansion, file, disk.read), expansion.files
+        allows = tuple(_kept(expansion, disk.read))
+    else:
+        root, files, allows = read_xml(raw, file), (), allows_in_xml(raw, file)
+    converted = robot_of(root, file, packages.asset, files)
     macros = list(macros_in(raw)) if is_xacro and not converted.robot.frames else []
     if macros:
         advice = f"a part can call one: parts: {{NAME: {{xacro: {file}, macro: {macros[0]}, …}}}}"
         message = f"{file} defines macros but no links: {', '.join(macros)}"
         raise RejectedError([finding("TF206", message, Span(file), help=advice)])
-    return Document(name, text, root, converted)
+    return Document(root, converted, allows)
+
+
+def _kept(expansion: Expansion, read: Callable[[str], str]) -> Iterator[Allow]:
+    """Yield the comments that allow findings, of those that xacro keeps: it leaves out what it does not expand."""
+    for number in dict.fromkeys(file for file, _, _ in expansion.comments):
+        begins = {(line, column + 1) for file, line, column in expansion.comments if file == number}
+        for allow in allows_in_xml(read(expansion.files[number]), expansion.files[number]):
+            if (allow.at.line, allow.at.column) in begins:
+                yield allow

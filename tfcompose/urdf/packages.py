@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from tfcompose.geometry import Vector
     from tfcompose.urdf.inertia import Moments
-    from tfcompose.urdf.xacro import Use
+    from tfcompose.urdf.xacro import Expansion, Use
 
 _PACKAGE_NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://")
@@ -31,7 +31,7 @@ FETCH = "run git lfs pull to fetch the file"
 _HIGHEST = 12  # so many folders above a file its package.xml is looked for
 
 
-def _not_expanded(file: str, *_: object) -> str:
+def _not_expanded(file: str, *_: object) -> Expansion:
     raise RejectedError([finding("TF001", "files cannot be read here", Span(file))])
 
 
@@ -39,7 +39,7 @@ def _not_expanded(file: str, *_: object) -> str:
 class Disk:
     """What a compiler may ask about files. ``prefixes`` are those of AMENT_PREFIX_PATH, in order.
 
-    ``expand`` gives the URDF that xacro makes of a file, with arguments, or of what a robot file uses of it.
+    ``expand`` gives what xacro makes of a file, with arguments, or of what a robot file uses of it.
     ``moments`` gives those of a mesh file at a scale, and raises ``UnmeasurableError`` with the finding's parts.
     ``is_pointer`` tells whether a file is a pointer that Git LFS has yet to replace by the file itself.
     """
@@ -49,7 +49,7 @@ class Disk:
     is_folder: Callable[[str], bool]
     prefixes: tuple[str, ...] = ()
     moments: Callable[[str, Vector], Moments] | None = None
-    expand: Callable[[str, Packages, Mapping[str, Any], Use | None], str] = _not_expanded
+    expand: Callable[[str, Packages, Mapping[str, Any], Use | None], Expansion] = _not_expanded
     is_pointer: Callable[[str], bool] = lambda _: False
 
 
@@ -89,38 +89,40 @@ class Packages:
         advice = f"{searched}; {f'did you mean {near}?' if near else self.advice.format(name=name)}"
         return finding("TF724", f"package {name} not found", at, help=advice, severity="warning")
 
-    def asset(self, uri: str, at: Span) -> tuple[Asset, Finding | None]:
+    def asset(self, uri: str, at: Span, document: str = "") -> tuple[Asset, Finding | None]:
         """Return the file that is addressed at a place, and what is wrong with the address, if anything is.
 
         ``package://NAME/PATH`` is in a package, ``file:///PATH`` and plain paths are files; relative ones begin in
-        the folder of the file that names them. Other schemes (``http``, ``model``) are for others to resolve.
+        the folder of the file that names them, or of the ``document`` that includes it. Other schemes (``http``,
+        ``model``) are for others to resolve.
         """
+        document = document or at.file
         meant = _MEANT.fullmatch(uri)
         if meant or not uri:
             advice = f"package://{meant[1] or meant[2]}/{meant[3]}" if meant else "write package://NAME/PATH or a path"
             return Asset(uri, at), finding("TF723", f"{uri or repr(uri)} is not a valid file address", at, help=advice)
         scheme = _SCHEME.match(uri)
         if scheme and scheme[1] == "package":
-            return self._in_package(uri, at)
+            return self._in_package(uri, at, document)
         if scheme and scheme[1] != "file":
             return Asset(uri, at), None
         path = unquote(uri[scheme.end() :]) if scheme else uri
         if scheme and not path.startswith("/"):
             wrong = f"{uri} is not a valid file address"
             return Asset(uri, at), finding("TF723", wrong, at, help="file:// with an absolute path has three slashes")
-        path = posixpath.normpath(path) if path.startswith("/") else path_named(path, at)
+        path = posixpath.normpath(path) if path.startswith("/") else path_named(path, Span(document))
         package, inside = self._package_above(path)
         return Asset(uri, at, path, package, inside), self._missing(path, f"file {uri} not found", at)
 
-    def _in_package(self, uri: str, at: Span) -> tuple[Asset, Finding | None]:
+    def _in_package(self, uri: str, at: Span, document: str) -> tuple[Asset, Finding | None]:
         name, _, inside = unquote(uri.partition("://")[2]).partition("/")
         if not name or not inside:
             advice = f"one slash too many: package://{inside}" if "/" in inside else "package://NAME/PATH"
             return Asset(uri, at), finding("TF723", f"{uri} is not a valid file address", at, help=advice)
-        folder = self.folder(name, at.file)
+        folder = self.folder(name, document)
         if folder is None:
-            is_new = self.disk is not None and (name, at.file) not in self._missed
-            self._missed.add((name, at.file))  # a missing package is reported once for each file
+            is_new = self.disk is not None and (name, document) not in self._missed
+            self._missed.add((name, document))  # a missing package is reported once for each file
             return Asset(uri, at, "", name, inside), self.not_found(name, at) if is_new else None
         if folder not in self.candidates(name):
             self.local[name] = folder

@@ -1,4 +1,4 @@
-"""XML text as elements that know the place of every tag and attribute.
+"""XML text as elements that know the place of every tag and attribute, in expanded xacro too.
 
 Own code on expat, because no XML library gives the columns of attributes. Documents that declare entities or a document
 type are refused: a robot needs neither, and both can make a small file large or read other files.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
+from dataclasses import dataclass
 from itertools import accumulate
 from typing import TYPE_CHECKING
 from xml.parsers import expat
@@ -16,14 +17,17 @@ from tfcompose.findings import RejectedError, Span, finding
 from tfcompose.load import MOST_VALUES, refuse_unreadable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
+
+    from tfcompose.urdf.xacro import Expansion
 
 DEEPEST = 100
 
 #: Four times what a robot file may have: URDF takes about three times as many characters for the same robot.
 MOST_CHARACTERS = 16_000_000
 
-_ATTRIBUTE = re.compile(r"""([^\s=/>"']+)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
+_TAG = re.compile(r"<[^\s/>]+")
+_ATTRIBUTE = re.compile(r"""\s*([^\s=/>"']+)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 _BROKEN = re.compile(r"""=\s*(?:"[^"<>]*[\t\r\n]|'[^'<>]*[\t\r\n])""")
 _BREAK = re.compile("\r\n|\r|\n")
 #: The bytes that begin no character in UTF-8.
@@ -43,6 +47,7 @@ class _Text:
         if len(self.data) != len(text):
             lengths = (_characters(self.data[at : at + _BLOCK]) for at in range(0, len(self.data), _BLOCK))
             self.before = list(accumulate(lengths, initial=0))
+        self._tag: tuple[int, dict[str, tuple[int, int]], int] = (-1, {}, 0)
 
     def position(self, byte: int) -> int:
         """Return the character that begins at a byte."""
@@ -57,37 +62,66 @@ class _Text:
         line, end_line = bisect_right(self.starts, begin), bisect_right(self.starts, end)
         return Span(self.file, line, begin - self.starts[line - 1] + 1, end_line, end - self.starts[end_line - 1] + 1)
 
+    def tag_at(self, begin: int) -> tuple[dict[str, tuple[int, int]], int]:
+        """Return where the values of a tag's attributes begin and end, and where the last one ends, quotes aside.
+
+        The tag begins at a character, where there must be one. The last tag is remembered.
+        """
+        if self._tag[0] != begin:
+            name = _TAG.match(self.text, begin)
+            position, values = name.end() if name else begin, {}
+            while attribute := _ATTRIBUTE.match(self.text, position):
+                values[attribute[1]] = attribute.span(2 if attribute[2] is not None else 3)
+                position = attribute.end()
+            self._tag = (begin, values, position)
+        return self._tag[1:]
+
 
 def _characters(data: bytes) -> int:
     return len(data.translate(None, _INSIDE))
 
 
+@dataclass(frozen=True, slots=True)
+class _Origin:
+    """Where an element is written: the text, and the character at which its tag begins."""
+
+    source: _Text
+    begin: int
+
+
 class Element:
     """A tag with its attributes and child elements; ``text`` is its own text, if it was asked for.
 
-    ``begin`` and ``end`` are the bytes at which its first and its last tag begin.
+    ``begin`` and ``end`` are the bytes at which its first and its last tag begin. Places are those in the text, or, of
+    an expanded document, in the file that the element comes from.
     """
 
-    __slots__ = ("_source", "attributes", "begin", "children", "end", "tag", "text")
+    __slots__ = ("_origin", "_source", "attributes", "begin", "children", "end", "tag", "text")
 
-    def __init__(self, tag: str, attributes: dict[str, str], source: _Text, begin: int) -> None:
+    def __init__(
+        self, tag: str, attributes: dict[str, str], source: _Text, begin: int, origin: _Origin | None = None
+    ) -> None:
         self.tag, self.attributes = tag, attributes
         self.children: list[Element] = []
         self.text = ""
         self.begin = self.end = begin
-        self._source = source
+        self._source, self._origin = source, origin
+
+    def _declared(self) -> _Origin:
+        return self._origin or _Origin(self._source, self._source.position(self.begin))
 
     @property
     def at(self) -> Span:
         """The place of its tag."""
-        return self._source.span(self._source.position(self.begin), len(self.tag) + 1)
+        declared = self._declared()
+        return declared.source.span(declared.begin, len(self.tag) + 1)
 
     @property
     def raw(self) -> str:
         """The element's source text."""
-        text, begin = self._source.text, self._source.position(self.begin)
-        after = max((attribute.end() for attribute in self._raw_attributes()), default=begin)
-        end = text.find(">", after)
+        text = self._source.text
+        begin = self._source.position(self.begin)
+        end = text.find(">", self._source.tag_at(begin)[1])
         if text[end - 1] != "/":  # it has an end tag; of the others expat's versions give different places
             end = text.find(">", self._source.position(self.end))
         return text[begin : end + 1]
@@ -103,32 +137,29 @@ class Element:
                 return child
         return None
 
+    def walk(self) -> Iterator[Element]:
+        """Yield this element and all in it, in the order of the text."""
+        waiting = [self]
+        while waiting:
+            element = waiting.pop()
+            yield element
+            waiting += reversed(element.children)
+
     def at_value(self, name: str) -> Span:
         """Return the place of an attribute's value, or the element's where it is missing."""
-        for attribute in self._raw_attributes():
-            if attribute[1] == name:
-                group = 2 if attribute[2] is not None else 3
-                return self._source.span(attribute.start(group), len(attribute[group]) or 1)
-        return self.at
+        declared = self._declared()
+        place = declared.source.tag_at(declared.begin)[0].get(name)
+        return declared.source.span(place[0], place[1] - place[0] or 1) if place else self.at
 
     def raw_value(self, name: str) -> str:
-        """Return an attribute's value as in the source: XML turns tabs and line breaks in it into spaces."""
-        return next((found[2] or found[3] or "" for found in self._raw_attributes() if found[1] == name), "")
+        """Return an attribute's value as in the text: XML turns tabs and line breaks in it into spaces."""
+        begin, end = self._source.tag_at(self._source.position(self.begin))[0].get(name, (0, 0))
+        return self._source.text[begin:end]
 
     @property
     def has_broken_values(self) -> bool:
-        """Whether in the file a value of some attribute holds a tab or a line break."""
+        """Whether in the text a value of some attribute holds a tab or a line break."""
         return self._source.has_broken_values
-
-    def _raw_attributes(self) -> Iterator[re.Match[str]]:
-        """Yield the attributes as they are in the source."""
-        position = self._source.position(self.begin) + 1 + len(self.tag)
-        for _ in self.attributes:
-            attribute = _ATTRIBUTE.search(self._source.text, position)
-            if attribute is None:
-                return
-            yield attribute
-            position = attribute.end()
 
 
 def read_xml(text: str, file: str, *, with_text: bool = False) -> Element:
@@ -144,12 +175,30 @@ def read_xml(text: str, file: str, *, with_text: bool = False) -> Element:
     return reader.read()
 
 
+def read_expansion(expansion: Expansion, file: str, read: Callable[[str], str]) -> Element:
+    """Return the root of the document that xacro made of a file; elements are placed where they were written.
+
+    Raises:
+        RejectedError: as ``read_xml``.
+    """
+    refuse_unreadable(expansion.text, file, MOST_CHARACTERS)
+    reader = _Reader(expansion.text, file)
+    texts = [_Text(read(name), name) for name in expansion.files]
+    nowhere = _Origin(_Text("", file), 0)
+    reader.origins = [
+        _Origin(texts[place[0]], texts[place[0]].starts[place[1] - 1] + place[2]) if place else nowhere
+        for place in expansion.places
+    ]
+    return reader.read()
+
+
 class _Reader:
     def __init__(self, text: str, file: str) -> None:
         self.source = _Text(text, file)
         self.stack: list[Element] = []
         self.root: Element | None = None
         self.elements = 0
+        self.origins: list[_Origin] = []
         self.parser = expat.ParserCreate("utf-8")
         self.parser.StartElementHandler = self._open
         self.parser.EndElementHandler = self._close
@@ -180,8 +229,9 @@ class _Reader:
         )
 
     def _open(self, tag: str, attributes: dict[str, str]) -> None:
+        origin = self.origins[self.elements] if self.origins else None
         self.elements += 1
-        element = Element(tag, attributes, self.source, self.parser.CurrentByteIndex)
+        element = Element(tag, attributes, self.source, self.parser.CurrentByteIndex, origin)
         if self.elements > MOST_VALUES or len(self.stack) >= DEEPEST:
             what = (
                 f"more than {MOST_VALUES:,} elements"

@@ -1,4 +1,7 @@
-"""What a xacro file defines, and how one of its macros is called. ``expand`` runs xacro, ``macro`` writes a macro."""
+"""What a xacro file defines, how one of its macros is called, and what xacro makes.
+
+``expand`` runs xacro, ``macro`` writes a macro.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,21 @@ NAMESPACE = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
 #: How a file defines a macro, up to its name, and the macro's parameters in that tag.
 _MACRO = re.compile(r"""<xacro:macro\s[^>]*?\bname\s*=\s*["'](?:xacro:)?([^"']+)""")
 _PARAMS = re.compile(r"""\bparams\s*=\s*(?:"([^"]*)"|'([^']*)')""")
+
+
+@dataclass(frozen=True, slots=True)
+class Expansion:
+    """What xacro makes of a file, with where that is written.
+
+    ``places`` are those of the elements, in the order of the text: a file of ``files``, by its number, a line, and a
+    column, which counts from 0; None for an element that is in no file. ``comments`` are those of comments that allow
+    findings, and were kept.
+    """
+
+    text: str
+    files: tuple[str, ...]
+    places: tuple[tuple[int, int, int] | None, ...]
+    comments: tuple[tuple[int, int, int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -255,7 +255,7 @@ def _strangers() -> Iterator[guarded.History]:
         strict = _running(guard=GuardPolicy("strict"))
         rogue = strict.joins("/rogue")
         rogue.fenced = fenced
-        yield strict.repeat(rogue, "map odom", 3)
+        yield strict.repeat(rogue, "map odom", 5)
     past = _running(guard=GuardPolicy("strict"))
     past.joins("/slam", process="slam").fenced = False
     yield past.wait(1)
@@ -483,6 +483,8 @@ def _unfit() -> Iterator[tuple[Plan, dict[str, str]]]:
     yield plan(owner, guard_process, guard=partition), {"RMW_IMPLEMENTATION": "rmw_x"}
     yield plan(replace(owner, remap={"/tf": "tf"}), guard_process, guard=partition), {}
     yield plan(owner, guard_process, guard=partition), {"FASTRTPS_DEFAULT_PROFILES_FILE": "/no/such.xml"}
+    sets = "export FASTRTPS_DEFAULT_PROFILES_FILE=/opt/my.xml; exec slam"
+    yield plan(replace(owner, argv=("/bin/sh", "-c", sets)), guard_process, guard=partition), {}
     shell = replace(owner, argv=("/bin/sh", "-c", "slam | tee log"))
     yield plan(shell, replace(shell, name="more", owns=(("odom", "a"),)), guard_process, guard=remap), {}
     yield plan(run("nav", "${launch:nav2/nav.launch.py}")), {}

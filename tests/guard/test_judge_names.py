@@ -212,7 +212,7 @@ def test_a_child_with_a_stopped_owners_name_is_not_the_owner() -> None:
     running.leaves(slam)
     running.judge.absent("slam")
     child = running.joins("/slam", process="joints")
-    running.repeat(child, "map odom", 3)
+    running.repeat(child, "map odom", 5)
     assert running.judge.admitted == frozenset()
     expect(running.only(), "TF801", "another /slam")
 
@@ -252,8 +252,8 @@ def identity(process: str, *, fenced: bool) -> Identity:
     ("environments", "expected"),
     [
         (None, Identity()),
-        ([], Identity(ours=False, fenced=False)),
-        ([{"RUN": "other"}], Identity(ours=False, fenced=False)),
+        ([], Identity(ours=False)),
+        ([{"RUN": "other"}], Identity(ours=False)),
         ([{"RUN": "1", "P": "arm/a", "XML": "/run/plan-1/fence/arm.a.xml"}], identity("arm/a", fenced=True)),
         ([{"RUN": "1", "P": "a", "XML": "/home/me/fast.xml"}], identity("a", fenced=False)),
         ([{"RUN": "1", "P": "a", "XML": "/run/plan-1/fence/b.xml"}], identity("a", fenced=False)),

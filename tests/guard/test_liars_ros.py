@@ -157,14 +157,15 @@ def test_a_child_with_an_owners_name_gets_nothing_of_that_owners_through(run: Ca
 
 
 @pytest.mark.parametrize(
-    "slip", ["export FASTRTPS_DEFAULT_PROFILES_FILE=own.xml; ", "unset FASTRTPS_DEFAULT_PROFILES_FILE; "]
+    "slip", ["export FASTRTPS_DEFAULT_PROFILES_FILE=own.xml\n", "unset FASTRTPS_DEFAULT_PROFILES_FILE\n"]
 )
 def test_a_child_that_leaves_the_fence_is_named_and_stopped(
     run: Callable[..., Liars], tmp_path: Path, slip: str
 ) -> None:
     (tmp_path / "own.xml").write_text("<?xml version='1.0'?><dds/>\n", encoding="utf-8")
+    (tmp_path / "setup.sh").write_text(slip, encoding="utf-8")
     words = " ".join(f"'{word}'" for word in Liars.command("rogue", CHILD_X, "base_link hand"))
-    robot = run("mode: strict", ["/bin/sh", "-c", f"{slip}exec {words}"])
+    robot = run("mode: strict", ["/bin/sh", "-c", f". ./setup.sh; exec {words}"])
     robot.says("error[TF852]", "/rogue", "rogue")
     robot.says("note: ", "rogue is stopped")
     assert until(lambda: gone(robot.pid_of("rogue")))

@@ -84,12 +84,41 @@ def test_a_strict_plan_fences_off_what_children_send_and_lets_the_guard_read_bot
     assert "leaseAnnouncement" not in (commands["slam"].fence or ("", ""))[1]
 
 
-def test_a_users_own_profiles_stay_behind_the_fence(tmp_path: Path) -> None:
-    own = tmp_path / "own.xml"
-    own.write_text("<profiles><data_writer profile_name='/scan'/></profiles>")
-    commands, found = inspect(tmp_path, SLAM, GUARD, FASTRTPS_DEFAULT_PROFILES_FILE=str(own))
-    assert found == []
-    assert "profile_name='/scan'" in (commands["slam"].fence or ("", ""))[1]
+#: A file as users have them: the writers' default, one for a topic of TF, and one for another.
+USERS = """<?xml version="1.0" encoding="ISO-8859-1"?>
+<!-- caf\xe9 -->
+<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
+  <profiles>
+    <publisher profile_name="all" is_default_profile="true">
+      <historyMemoryPolicy>DYNAMIC</historyMemoryPolicy>
+    </publisher>
+    <data_writer profile_name="/scan"><userDefinedID>7</userDefinedID></data_writer>
+    <data_writer profile_name="/tf_static">
+      <propertiesPolicy><properties><property><name>a</name><value>b</value></property></properties></propertiesPolicy>
+    </data_writer>
+  </profiles>
+</dds>
+"""
+
+
+def test_the_fence_is_merged_into_a_users_own_profiles(tmp_path: Path) -> None:
+    (tmp_path / "own.xml").write_text(USERS, encoding="iso-8859-1")
+    drive = replace(SLAM, name="drive", cwd=str(tmp_path), owns=(("odom", "base"),))
+    commands, found = inspect(tmp_path, drive, GUARD, FASTRTPS_DEFAULT_PROFILES_FILE=str(tmp_path / "own.xml"))
+    relative, more = inspect(tmp_path, drive, FASTRTPS_DEFAULT_PROFILES_FILE="own.xml")
+    assert found == more == []
+    assert commands["drive"].fence == relative["drive"].fence, "a relative path is one of the process's folder"
+    text = commands["drive"].fence[1] if commands["drive"].fence else ""
+    name = "{http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles}"
+    root = ET.fromstring(text)  # noqa: S314 (made here)
+    writers = {one.attrib["profile_name"]: one for one in root.iter() if one.tag == f"{name}data_writer"}
+    writers |= {one.attrib["profile_name"]: one for one in root.iter() if one.tag == f"{name}publisher"}
+    values = {topic: [value.text for value in one.iter(f"{name}value")] for topic, one in writers.items()}
+    assert values == {"all": [], "/scan": [], "/tf_static": ["b", "tfc_rover"], "/tf": ["tfc_rover"]}
+    assert writers["/tf"].findtext(f"{name}historyMemoryPolicy") == "DYNAMIC", "what holds for all writers"
+    assert [topic for topic, one in writers.items() if one.get("is_default_profile")] == ["all"]
+    assert writers["/scan"].findtext(f"{name}userDefinedID") == "7"
+    assert "tfc_rover" in (commands["guard"].fence or ("", ""))[1]
 
 
 def test_a_process_that_sends_on_topics_that_nobody_judges_is_left_alone(tmp_path: Path) -> None:
@@ -103,25 +132,64 @@ def test_a_process_that_sends_on_topics_that_nobody_judges_is_left_alone(tmp_pat
         assert commands["debug"].argv[1:] == ()
 
 
+IN_A_PARTITION = "<property><name>partitions</name><value>mine</value></property>"
+POLICY = f"<propertiesPolicy><properties>{IN_A_PARTITION}</properties></propertiesPolicy>"
+#: Files to which no fence can be added.
+BAD_PROFILES = (
+    f"<profiles><publisher profile_name='/tf'>{POLICY}</publisher></profiles>",
+    '<!DOCTYPE dds [<!ENTITY a "aa"><!ENTITY b "&a;&a;">]><dds><profiles>&b;</profiles></dds>',
+    "<dds>" + "<a>" * 200 + "</a>" * 200 + "</dds>",
+    "<dds>" + " " * (1 << 20) + "</dds>",
+    "<robot/>",
+    "<dds><profiles></dds>",
+    '<?xml version="1.0" encoding="none-such"?><dds/>',
+    "",
+)
+
+
 @pytest.mark.parametrize(
     ("remap", "env", "names"),
     [
         ({}, {"RMW_IMPLEMENTATION": "rmw_x"}, ["rmw_fastrtps_cpp", "rmw_x"]),
         ({"/tf": "tf"}, {}, [" tf,", "slash"]),
         ({}, {"FASTRTPS_DEFAULT_PROFILES_FILE": "/no/such.xml"}, ["/no/such.xml", "fence: remap"]),
-        ({}, {"FASTRTPS_DEFAULT_PROFILES_FILE": "OWN"}, ["own.xml", "fence: remap"]),
+        ({}, {"FASTRTPS_DEFAULT_PROFILES_FILE": "/dev/zero"}, ["/dev/zero", "fence: remap"]),
+        *(({}, {"FASTRTPS_DEFAULT_PROFILES_FILE": text}, ["own.xml", "fence: remap"]) for text in BAD_PROFILES),
     ],
 )
 def test_what_a_partition_cannot_fence_off_is_one_finding_that_names_all(
     tmp_path: Path, remap: dict[str, str], env: dict[str, str], names: list[str]
 ) -> None:
     own = tmp_path / "own.xml"
-    own.write_text('<profiles><data_writer profile_name="/tf"></data_writer></profiles>')
-    env = {name: value.replace("OWN", str(own)) for name, value in env.items()}
+    for name, value in env.items():
+        if value in BAD_PROFILES:
+            own.write_text(value)
+            env = {name: str(own)}
     both = [PlanProcess(name, "run", argv=("true",), remap=remap, owns=(("map", name),)) for name in ("slam", "drive")]
     _, (found,) = inspect(tmp_path, *both, fence="partition", **env)
     expect(found, "TF902", *names)
     assert found.message.endswith(": slam, drive")
+
+
+OWN = "FASTRTPS_DEFAULT_PROFILES_FILE"
+
+
+@pytest.mark.parametrize(
+    ("argv", "names"),
+    [
+        (("/bin/sh", "-c", f"export {OWN}='/opt/my.xml'; exec drive"), [OWN, "/opt/my.xml"]),
+        (("/bin/sh", "-c", f"unset {OWN}; exec drive"), [OWN]),
+        (("env", f"{OWN}=/opt/my.xml", "drive"), [OWN, "/opt/my.xml"]),
+        (("env", "-u", OWN, "drive"), [OWN]),
+    ],
+)
+def test_an_owner_whose_command_names_a_profile_by_itself_is_not_started(
+    tmp_path: Path, argv: tuple[str, ...], names: list[str]
+) -> None:
+    drive = replace(SLAM, name="drive", argv=argv)
+    _, (found,) = inspect(tmp_path, drive, GUARD, fence="partition")
+    expect(found, "TF902", "drive", "fence: remap", *names)
+    assert inspect(tmp_path, replace(drive, owns=()), GUARD, fence="partition")[1] == [], "who may send no TF at all"
 
 
 # By remapping.

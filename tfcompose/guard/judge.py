@@ -62,6 +62,7 @@ class Judge:
     """The state of one watch over one plan. ``settle_s`` is how many seconds it observes before it reports all clear.
 
     ``says_who`` says whether the ids of messages are those of the graph; where they are not, they tell senders apart.
+    ``remapped`` says that what the plan's processes send is fenced off by remappings.
     ``admitted`` are the edges of the last message that may pass in a strict plan; None: all.
     """
 
@@ -70,6 +71,7 @@ class Judge:
     begun: float
     begun_ns: int
     says_who: bool = True
+    remapped: bool = False
     live: Liveness = field(init=False)
     clocks: Clocks = field(init=False)
     cases: Cases = field(init=False)
@@ -118,7 +120,7 @@ class Judge:
         """Take who publishes on /tf and /tf_static now, and return what that means."""
         self._senders.update(publishers)
         events = [*self._see_again(now), *self._publishers.wrong_settings(publishers)]
-        events += self._publishers.unfenced(publishers)
+        events += self._publishers.unfenced(publishers, remapped=self.remapped)
         if self._start.cleared is not None and now >= self._finds_until:
             events += self.live.static_writers({one.node for one in publishers if one.static and one.node is not None})
         return events

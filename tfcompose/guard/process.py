@@ -103,9 +103,14 @@ class TopicWatch:
         if self.relay and memory:
             self.relay.recall(memory, lambda message: self.judge.admits(message, now), now + FINDING_S)
 
+    def close(self) -> None:
+        """End what must end before the node does."""
+        self._graph.close()
+
     def step(self) -> None:
         """Take what has come, and from time to time the graph."""
         taken = list(self._taken())
+        self._graph.hear_public()
         now = time.monotonic()
         strangers = {each.received.gid for each in taken} - self._known
         self._known |= strangers
@@ -262,6 +267,7 @@ def guard(own: Own, stop: Stop) -> None:
                 step()
         for watch in watches:
             watch.report(0.0)
+            watch.close()
 
 
 def _watches(
@@ -276,7 +282,8 @@ def _watches(
     watches = []
     for topics, plan in plans.items():
         # One that judges nobody, or joins, takes every owner as the plan's, whenever it began.
-        judge = Judge(plan, settle_s, now, 0 if joins or not judges else time.time_ns(), says_who=says_who)
+        begun_ns = 0 if joins or not judges else time.time_ns()
+        judge = Judge(plan, settle_s, now, begun_ns, says_who=says_who, remapped=private is not None)
         watches.append(TopicWatch(node, topics, judge, emit, _of(private, own.plan, topics)))
         if joins or not judges:
             watches[-1].begin(now, left.get(" ".join(topics)))

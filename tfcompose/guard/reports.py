@@ -56,6 +56,8 @@ _FATE = {
     False: "not behind the fence, so it cannot be held back: listeners get it",
     None: "whether it is behind the fence cannot be seen: what is, is held back",
 }
+#: So long a strict guard waits until it knows whether listeners get it, in seconds.
+FATE_S = 0.3
 #: Violations that ``stop-offender`` ends: who commits them breaks the tree.
 _STOPPED_FOR = frozenset({"TF801", "TF802", "TF803", "TF820"})
 
@@ -136,7 +138,7 @@ class Cases:
         shows a while later are named.
         """
         for case in self.open.values():
-            if case.reported or self._may_learn_more(case.gid, now):
+            if case.reported or self._may_learn_more(case.gid, now) or self._may_see_fate(case, now):
                 continue
             if case.violation.namesake and case.gid is not None and not self._senders.is_sure(case.gid):
                 if now - case.since < NAMELESS_S:
@@ -163,7 +165,7 @@ class Cases:
         found = violation_finding(violations, self._plan, where, driven)
         if advice := misnamed_help(violations, self._plan, self._senders.process(cases[0].gid)):
             found = replace(found, help=advice)
-        if self._plan.guard.mode == "strict" and not violations[0].is_of_stamps:
+        if self._says_fate(violations[0]):
             found = replace(found, notes=(*found.notes, Note(_FATE[self._senders.is_held_back(cases[0].gid)])))
         process = self._process(violations[0], cases[0].gid)
         if not process and self._may_be_ours(violations[0]):
@@ -179,6 +181,14 @@ class Cases:
         """Return whether somebody would be stopped for it, if it were proven to be a process of this run."""
         is_policy = self._plan.guard.on_violation == "stop-offender" and violation.code in _STOPPED_FOR
         return is_policy and not self._nodes.isdisjoint(violation.nodes)
+
+    def _says_fate(self, violation: Violation) -> bool:
+        return self._plan.guard.mode == "strict" and not violation.is_of_stamps
+
+    def _may_see_fate(self, case: Case, now: float) -> bool:
+        """Whether it may be seen soon if listeners get what was sent."""
+        is_open = self._says_fate(case.violation) and self._senders.is_held_back(case.gid) is None
+        return is_open and now - case.since < FATE_S
 
     def _may_learn_more(self, gid: bytes | None, now: float) -> bool:
         """Whether more messages of this publisher can tell if it was there before the start."""
@@ -294,13 +304,15 @@ class PublisherReports:
         if not one.reliable:
             yield best_effort_publisher(one.node, topic)
 
-    def unfenced(self, publishers: Sequence[Publisher]) -> list[Found]:
-        """Return the findings for the run's own processes that send past the fence of a strict plan."""
+    def unfenced(self, publishers: Sequence[Publisher], *, remapped: bool) -> list[Found]:
+        """Return the findings for the run's own processes that send past the fence, which may be of remappings."""
         return [
             replace(found, process=one.process)
             for one in publishers
             if one.node and one.ours and one.process and one.fenced is False
-            for found in self._once(one, unfenced(one.node, one.process, one.topic or GLOBAL[one.static]))
+            for found in self._once(
+                one, unfenced(one.node, one.process, one.topic or GLOBAL[one.static], remapped=remapped)
+            )
         ]
 
     def floods(self, senders: Senders, flooders: set[bytes | None]) -> list[Found]:

@@ -10,15 +10,16 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, finding
+from tfcompose.launcher.fastdds_profile import with_partitions
 from tfcompose.plan.topics import GLOBAL, fence_file, judged_topics, partition_of, private_topics, takes_remappings
 from tfcompose.ros.environment import PROFILE_VARIABLES, RosError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
+    from pathlib import Path
     from typing import Literal
 
     from tfcompose.launcher.child import Command
@@ -27,55 +28,13 @@ if TYPE_CHECKING:
     Way = Literal["", "partition", "remap"]
 
 
-_EMPTY = """<?xml version="1.0" encoding="UTF-8"?>
-<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles">
-  <profiles>
-  </profiles>
-</dds>
-"""
-_END = "</profiles>"
-_PROFILE = """\
-    <{kind} profile_name="{topic}">
-      <propertiesPolicy>
-        <properties>
-          <property>
-            <name>partitions</name>
-            <value>{partitions}</value>
-          </property>
-        </properties>
-      </propertiesPolicy>
-    </{kind}>
-"""
+#: A command sets or clears the profile file by itself.
+_LEAVES = re.compile(rf"\b({'|'.join(PROFILE_VARIABLES)})\b(=(?P<file>[^\s;&|]*))?")
 
 
 def can_fence(env: Mapping[str, str]) -> bool:
     """Return whether the processes' rmw knows partitions: rmw_fastrtps, which is the default."""
     return (env.get("RMW_IMPLEMENTATION") or "rmw_fastrtps_cpp").startswith("rmw_fastrtps")
-
-
-def profile(env: Mapping[str, str], topics: Sequence[str], partition: str, *, reads: bool) -> str:
-    """Return the text of a profile file that puts the writers of these topics into the partition.
-
-    With ``reads`` it opens the readers of these topics to the partition as well as to everybody's. What the file that
-    ``env`` names holds stays.
-
-    Raises:
-        RosError: if that file cannot be read, or has profiles of these topics itself.
-    """
-    file = next((env[name] for name in PROFILE_VARIABLES if env.get(name)), None)
-    try:
-        text = Path(file).read_text(encoding="utf-8") if file else _EMPTY
-    except (OSError, UnicodeDecodeError) as error:
-        raise RosError(f"the profile file {file} cannot be read: {error}") from None
-    at = text.rfind(_END)
-    kind = "data_reader" if reads else "data_writer"
-    profiles = set(re.findall(rf"<{kind}\s[^>]*profile_name\s*=\s*[\"']([^\"']*)[\"']", text))
-    if at < 0 or profiles & set(topics):
-        why = "says what its writers of TF do" if profiles else "holds no profiles"
-        raise RosError(f"the profile file {file} {why}: guard: strict cannot add to it")
-    partitions = f";{partition}" if reads else partition
-    added = "".join(_PROFILE.format(kind=kind, topic=topic, partitions=partitions) for topic in dict.fromkeys(topics))
-    return text[:at].rstrip() + "\n" + added + "  " + text[at:]
 
 
 RMW = "RMW_IMPLEMENTATION"
@@ -132,7 +91,8 @@ def by_partition(plan: Plan, commands: Mapping[str, Command], folder: Path) -> t
         if not topics:
             continue
         try:
-            text = _profile(plan, command.env, topics, reads=reads)
+            _refuse_own_profile(process, command)
+            text = _profile(plan, command, topics, reads=reads)
         except _CannotFenceError as error:
             wrong.setdefault((error.message, error.advice), []).append(name)
             continue
@@ -153,7 +113,8 @@ class _CannotFenceError(Exception):
         self.advice = advice
 
 
-def _profile(plan: Plan, env: Mapping[str, str], topics: list[str], *, reads: bool) -> str:
+def _profile(plan: Plan, command: Command, topics: list[str], *, reads: bool) -> str:
+    env = command.env
     moved = [topic for topic in topics if not topic.startswith("/")]
     if moved:
         message = f"guard: strict needs full names of TF's topics, not {_all(moved)}, which has"
@@ -161,10 +122,29 @@ def _profile(plan: Plan, env: Mapping[str, str], topics: list[str], *, reads: bo
     if not can_fence(env):
         message = f"guard: {{fence: partition}} needs rmw_fastrtps_cpp, and {env[RMW]} is what they are started with"
         raise _CannotFenceError(message, f"let it fence off by remapping: leave fence out; or unset {RMW}")
+    named = next((env[name] for name in PROFILE_VARIABLES if env.get(name)), None)
+    file = command.folder / named if named else None
+    partition = partition_of(plan)
     try:
-        return profile(env, topics, partition_of(plan), reads=reads)
+        if reads:  # its readers stay open to everybody
+            return with_partitions(file, "data_reader", topics, f";{partition}")
+        return with_partitions(file, "data_writer", topics, partition)
     except RosError as error:
-        raise _CannotFenceError(str(error), "let it fence off by remapping: guard: {fence: remap}") from None
+        message = f"guard: strict cannot add its fence to the profile file {file}: {error}"
+        raise _CannotFenceError(message, "let it fence off by remapping: guard: {fence: remap}") from None
+
+
+def _refuse_own_profile(process: PlanProcess, command: Command) -> None:
+    """Refuse an owner whose command names another profile file by itself: it would leave the fence."""
+    found = next(filter(None, map(_LEAVES.search, command.argv)), None) if process.owns else None
+    if found is None:
+        return
+    variable, file = found[1], (found["file"] or "").strip("\"'")
+    message = (
+        f"a command sets {variable} itself{f' to {file}' if file else ''}, and so leaves the fence of guard: strict"
+    )
+    advice = f"name the file in the robot's file, and the fence is added to it: env: {{{variable}: {file or 'FILE'}}}"
+    raise _CannotFenceError(message, f"{advice}; or let it fence off by remapping: guard: {{fence: remap}}")
 
 
 def _all(names: list[str]) -> str:

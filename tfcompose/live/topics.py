@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from hashlib import blake2b
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.live.publishers import PARTICIPANT, Publisher
 from tfcompose.live.state import NO_NODE
 from tfcompose.plan.topics import GLOBAL, is_fence
 from tfcompose.ros.graph import BARE_DDS, UNKNOWN_NODE, ids_say_who, own_gid, writers, writers_unmapped
-from tfcompose.ros.node import TFSubscription
+from tfcompose.ros.node import PublicTFReader, TFSubscription
 from tfcompose.ros.processes import environments, origin
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
     from rclpy.node import Node
 
@@ -82,7 +82,7 @@ class Identity:
     Attributes:
         ours: whether it is of one's own run.
         process: the plan's process that it is of.
-        fenced: whether it was started with its profile of the fence.
+        fenced: whether it was started with its profile of the fence; None too where it is of another run.
     """
 
     ours: bool | None = None
@@ -108,10 +108,21 @@ class RunMarks:
             return Identity()
         own = [one for one in found if one.get(self.variable) == self.run]
         if len(own) != 1:
-            return Identity(ours=bool(own), fenced=False if self.profile and not own else None)
+            return Identity(ours=bool(own))
         process = own[0].get(self.process, "")
         fenced = is_fence(own[0].get(self.profile, ""), process) if self.profile and process else None
         return Identity(ours=True, process=process, fenced=fenced)
+
+
+#: Of publishers that have left so many are known, so that who comes and goes takes a bounded memory.
+MOST_LEFT = 1000
+
+
+def forget_oldest(known: dict[bytes, Any], present: Collection[bytes]) -> None:
+    """Forget what came first of publishers that are not present, where there are more than ``MOST_LEFT`` of them."""
+    left = [gid for gid in known if gid not in present] if len(known) > len(present) + MOST_LEFT else []
+    for gid in left[: len(left) - MOST_LEFT]:
+        del known[gid]
 
 
 class TFGraph:
@@ -139,9 +150,30 @@ class TFGraph:
         self._where: dict[bytes, str] = {}
         self._ours: dict[bytes, Identity] = {}
         self._own = b""
+        #: Those who were heard outside of the fence's partition.
+        self._public: dict[bytes, None] = {}
+        fenced = ours is not None and bool(ours.profile)
+        self._readers = [PublicTFReader(node, topics[fixed], static=fixed) for fixed in (False, True)] if fenced else []
+
+    def close(self) -> None:
+        """End its readers, before the node ends."""
+        for reader in self._readers:
+            reader.close()
+
+    def hear_public(self) -> None:
+        """Note who is heard outside of the fence's partition, as every listener hears them."""
+        for reader in self._readers:
+            self._public |= dict.fromkeys(reader.senders())
 
     def publishers(self) -> list[Publisher]:
         """Return who publishes now: on the pair of topics, and on those that processes are remapped to."""
+        found = self._publishers()
+        present = {one.gid for one in found}
+        for known in (self._where, self._ours, self._public):
+            forget_oldest(known, present)
+        return found
+
+    def _publishers(self) -> list[Publisher]:
         if self._private is None:
             return self._on(writers, self.topics)
         found = self._on(writers, self.topics, fenced=False)
@@ -158,7 +190,9 @@ class TFGraph:
         if gid not in self._ours:
             return None
         known = self._ours[gid]
-        return bool(known.ours and known.fenced) if self._private is None else known.ours is not False
+        if self._private is None:
+            return bool(known.ours and known.fenced and gid not in self._public)
+        return known.ours is not False
 
     def sends_clock(self) -> bool:
         """Return whether /clock has a publisher."""
@@ -209,7 +243,7 @@ class TFGraph:
             one.reliability == "reliable",
             self._where[one.gid],
             known.ours,
-            known.fenced if fenced is None else fenced,
+            fenced if fenced is not None else False if one.gid in self._public else known.fenced,
             process=known.process,
         )
 

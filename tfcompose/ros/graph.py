@@ -228,4 +228,10 @@ def rcl() -> ctypes.CDLL:
     library.rcutils_reset_error.argtypes = ()
     library.rcutils_reset_error.restype = None
     library.rcl_take_serialized_message.argtypes = (ctypes.c_void_p,) * 4
+    library.rcl_node_get_rmw_handle.restype = ctypes.c_void_p
+    library.rcl_node_get_rmw_handle.argtypes = (ctypes.c_void_p,)
+    library.rmw_create_subscription.restype = ctypes.c_void_p
+    library.rmw_create_subscription.argtypes = (*(ctypes.c_void_p,) * 2, ctypes.c_char_p, *(ctypes.c_void_p,) * 2)
+    library.rmw_take_serialized_message_with_info.argtypes = (ctypes.c_void_p,) * 5
+    library.rmw_destroy_subscription.argtypes = (ctypes.c_void_p,) * 2
     return library

@@ -28,7 +28,7 @@ from std_msgs.msg import String
 
 from tfcompose.ros.environment import RosError
 from tfcompose.ros.graph import Allocator, gid_of, ids_say_who, rcl
-from tfcompose.ros.typesupport import tf_message_type
+from tfcompose.ros.typesupport import capsule_address, tf_message_type
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -293,6 +293,83 @@ class TFSubscription(Subscription):
     def __init__(self, node: Node, *, static: bool, topic: str | None = None, deep: bool = False) -> None:
         profiles = (TF_READER, TF_STATIC_READER, DEEP_TF_READER, DEEP_TF_STATIC_READER)
         super().__init__(node, tf_message_type(), topic or _topic(static=static), profiles[static + 2 * deep])
+
+
+class _Time(ctypes.Structure):
+    """rmw_time_t."""
+
+    _fields_ = (("sec", ctypes.c_uint64), ("nsec", ctypes.c_uint64))
+
+
+class _Qos(ctypes.Structure):
+    """rmw_qos_profile_t."""
+
+    _fields_ = (
+        ("history", ctypes.c_int),
+        ("depth", ctypes.c_size_t),
+        ("reliability", ctypes.c_int),
+        ("durability", ctypes.c_int),
+        ("deadline", _Time),
+        ("lifespan", _Time),
+        ("liveliness", ctypes.c_int),
+        ("liveliness_lease", _Time),
+        ("avoid_ros_namespace_conventions", ctypes.c_bool),
+    )
+
+
+class _Options(ctypes.Structure):
+    """rmw_subscription_options_t."""
+
+    _fields_ = (
+        ("payload", ctypes.c_void_p),
+        ("ignore_local_publications", ctypes.c_bool),
+        ("unique_network_flow_endpoints", ctypes.c_int),
+        ("content_filter", ctypes.c_void_p),
+    )
+
+
+class PublicTFReader:
+    """Says who sends on a TF topic outside of all partitions, whatever partitions this process's profiles add.
+
+    Profiles of readers go by the topic's name in ROS. This reader is of the same DDS topic under no name of ROS's, made
+    with rmw itself: rcl takes names only that begin with a slash. Call ``close`` before the node ends.
+
+    Raises:
+        RosError: if rmw makes no such reader.
+    """
+
+    def __init__(self, node: Node, topic: str, *, static: bool) -> None:
+        library = rcl()
+        profile = TF_STATIC_READER if static else TF_READER
+        numbers = (int(profile.history), profile.depth, int(profile.reliability), int(profile.durability))
+        qos = _Qos(*numbers, avoid_ros_namespace_conventions=True)
+        self._depth, self._type = profile.depth, tf_message_type()
+        self._node = ctypes.c_void_p(library.rcl_node_get_rmw_handle(node.handle.pointer))
+        support, options = ctypes.c_void_p(capsule_address(self._type._TYPE_SUPPORT)), _Options()  # noqa: SLF001 (what rclpy takes of a message's class)
+        named = (f"rt{node.resolve_topic_name(topic)}".encode(), ctypes.byref(qos), ctypes.byref(options))
+        made = library.rmw_create_subscription(self._node, support, *named)
+        if not made:
+            library.rcutils_reset_error()
+            raise RosError(f"rmw makes no reader of {topic} outside of partitions")
+        self._reader: ctypes.c_void_p | None = ctypes.c_void_p(made)
+        self._bytes = _Bytes(allocator=library.rcutils_get_default_allocator())
+        weakref.finalize(self, library.rcutils_uint8_array_fini, ctypes.byref(self._bytes))
+
+    def senders(self) -> set[bytes]:
+        """Return the ids of those whose messages have come since the last time; at most a hundred messages count."""
+        library, info, taken, found = rcl(), _MessageInfo(), ctypes.c_bool(), set[bytes]()
+        where = (self._reader, ctypes.byref(self._bytes), ctypes.byref(taken), ctypes.byref(info), None)
+        for _ in range(self._depth if self._reader else 0):
+            if library.rmw_take_serialized_message_with_info(*where) != _OK or not taken.value:
+                break
+            found.add(bytes(info.gid))
+        return found
+
+    def close(self) -> None:
+        """End the reader."""
+        if self._reader:
+            rcl().rmw_destroy_subscription(self._node, self._reader)
+            self._reader = None
 
 
 def wait(node: Node, subscriptions: Sequence[Subscription], timeout_s: float | None, stop: Stop) -> None:

@@ -56,9 +56,12 @@ def flood(node: str, where: str) -> Finding:
     return finding("TF853", message, None, notes=notes, help=f"end {node}, or let it use the same frames again")
 
 
-def unfenced(node: str, process: str, topic: str) -> Finding:
-    """Return the finding for a process of a strict plan that was started without its profile of the fence."""
+def unfenced(node: str, process: str, topic: str, *, remapped: bool) -> Finding:
+    """Return the finding for a process of a strict plan that is not behind the fence, which may be of remappings."""
     message = f"{node} of {process} publishes {topic} past the fence of guard: strict: every listener receives it"
+    if remapped:
+        advice = "let it take ROS arguments: start it as {package, executable}, or add --ros-args to its words"
+        return finding("TF852", message, None, help=advice)
     advice = f"name its profile file in the robot's file, and the fence is added: processes: {{{process}: {{env: "
     advice += "{FASTRTPS_DEFAULT_PROFILES_FILE: FILE}}}; or guard: {fence: remap}"
     return finding("TF852", message, None, help=advice)

@@ -1,0 +1,198 @@
+"""A robot among liars: strange publishers beside it, and children that try to slip out of its guard's sight.
+
+Each edge's x says who sent it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shlex
+import signal
+import sys
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.support import processes
+from tests.support.domains import reserved_domain
+from tests.support.waiting import TIMEOUT_S, complete_lines, until
+from tfcompose.ros.node import TFSubscription, open_node, wait
+from tfcompose.ros.tf_codec import decode
+from tfcompose.signals import Stop
+
+if TYPE_CHECKING:
+    import subprocess
+    from collections.abc import Iterator, Mapping, Sequence
+    from pathlib import Path
+
+#: The ways in which a guard can watch.
+GUARDS = {"watch": "mode: watch", "strict": "mode: strict", "remap": "mode: strict, fence: remap"}
+#: A node that sends edges at 20 Hz, or what is given as ``hex:`` and the bytes of a message in hexadecimal.
+NODE = """
+import os, signal, sys, time
+from tfcompose.ros.tf_codec import Transform, encode
+from tfcompose.ros.node import TFPublisher, open_node
+words, _, ros = "\\n".join(sys.argv[1:]).partition("\\n--ros-args\\n")
+name, namespace, x, *edges = words.split("\\n")
+signal.signal(signal.SIGTERM, lambda *_: sys.exit())
+signal.signal(signal.SIGINT, lambda *_: sys.exit())
+def message():
+    if edges[0].startswith("hex:"):
+        return bytes.fromhex(edges[0][4:])
+    now, rest = time.time_ns(), ((float(x), 0, 0), (0, 0, 0, 1))
+    return encode([Transform(now, *edge.split(), *rest) for edge in edges])
+with open_node(name, namespace, args=ros.split("\\n") if ros else []) as node:
+    publisher = TFPublisher(node, static=False, topic=os.environ.get("TOPIC", "/tf"))
+    print("ready", flush=True)
+    while True:
+        publisher.publish(message())
+        time.sleep(0.05)
+"""
+#: What the true owner sends, and those that are started beside the robot.
+OWNER_X, OTHER_X = 1.0, 2.0
+
+
+def node(name: str, x: float, *edges: str, namespace: str = "/") -> list[str]:
+    """Return the command of a node, in the robot's folder."""
+    return [sys.executable, "node.py", name, namespace, str(x), *edges]
+
+
+def foreign(x: float, *edges: str) -> list[str]:
+    """Return the command of a program of another vendor's DDS, which is no ROS node."""
+    return [sys.executable, "-m", "tests.support.foreign_dds", str(x), *edges]
+
+
+def in_shell(first: str, command: Sequence[str]) -> list[str]:
+    """Return the command of a shell that does something first."""
+    return ["/bin/sh", "-c", f"{first} {shlex.join(command)}"]
+
+
+@dataclass
+class Child:
+    """A process of the robot's: its command, and the frame below base_link that it owns, if any; its node is /NAME."""
+
+    command: Sequence[str]
+    frame: str = ""
+
+
+class Robot:
+    """A running robot with an owner /slam of map → odom, drive of odom → base_link, and further children."""
+
+    def __init__(self, folder: Path, guard: str, children: Mapping[str, Child], env: Mapping[str, str]) -> None:
+        (folder / "node.py").write_text(NODE, encoding="utf-8")
+        self.folder, self.env, self.output = folder, dict(env), folder / "output.txt"
+        self.guard = guard
+        lines = [
+            *("tfcompose: 1", "robot: liars", "ros: {discovery: localhost}", "links: {base_link: {}}"),
+            f"guard: {{{GUARDS[guard]}}}",
+            *(
+                "frames:",
+                "  map: {}",
+                "  odom: {parent: map, owner: slam}",
+                "  base_link: {parent: odom, owner: drive}",
+            ),
+            *(f"  {one.frame}: {{parent: base_link, owner: {name}}}" for name, one in children.items() if one.frame),
+            *("processes:", "  drive: {simulate: {fixed: {}, rate: 20 Hz}}"),
+            f"  slam: {{run: {json.dumps(node('slam', OWNER_X, 'map odom'))}, node: /slam}}",
+        ]
+        for name, one in children.items():
+            more = {"run": one.command, "node": f"/{name}", "required": False, "restart": "no"}
+            lines.append(f"  {name}: {json.dumps(more)}")
+        (folder / "robot.yaml").write_text("\n".join(lines), encoding="utf-8")
+        with self.output.open("wb") as out:
+            command = [sys.executable, "-m", "tfcompose", "up"]
+            self.popen = processes.start(command, cwd=folder, stdout=out, stderr=out, env=self.env)
+
+    @property
+    def text(self) -> str:
+        """What it has said until now."""
+        return "\n".join(complete_lines(self.output))
+
+    def output_after(self, lines: int) -> str:
+        """Return what it has said behind so many lines."""
+        return "\n".join(complete_lines(self.output)[lines:])
+
+    def says(self, *words: str, after: int = 0) -> str:
+        """Wait for a line with all these words behind so many lines, and return it."""
+
+        def found() -> list[str]:
+            return [line for line in complete_lines(self.output)[after:] if all(word in line for word in words)]
+
+        until(lambda: found() or self.popen.poll() is not None)
+        assert found(), (words, self.text)
+        return found()[0]
+
+    def pid_of(self, process: str) -> int:
+        """Return the process number of one of its own."""
+        match = re.search(rf"started {process} \(pid (\d+)\)", self.text)
+        assert match, process
+        return int(match[1])
+
+    def start(self, command: Sequence[str], **env: str) -> subprocess.Popen[str]:
+        """Start a program beside the robot."""
+        out = (self.folder / "rogue.txt").open("wb")
+        with out:
+            return processes.start(command, cwd=self.folder, env=self.env | env, stdout=out, stderr=out)
+
+    @staticmethod
+    def stop(started: subprocess.Popen[str]) -> None:
+        """Let a program leave: one that is killed is in the graph for a while."""
+        started.terminate()
+        try:
+            started.wait(TIMEOUT_S)
+        finally:
+            processes.end(started)
+
+    def lines(self) -> int:
+        """Return how many lines it has said."""
+        return len(complete_lines(self.output))
+
+    def end(self) -> int:
+        """Interrupt it and return its exit code."""
+        self.popen.send_signal(signal.SIGINT)
+        try:
+            return self.popen.wait(TIMEOUT_S)
+        finally:
+            processes.end(self.popen)
+
+
+@contextmanager
+def running(folder: Path, guard: str, children: Mapping[str, Child]) -> Iterator[Robot]:
+    """Run a robot in a domain of its own, which is this process's as well; what it keeps is in the folder."""
+    with reserved_domain() as domain, pytest.MonkeyPatch.context() as patch:
+        for name in ("XDG_RUNTIME_DIR", "ROS_LOG_DIR"):
+            (folder / name).mkdir(mode=0o700)
+            patch.setenv(name, str(folder / name))
+        patch.setenv("ROS_DOMAIN_ID", str(domain))
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        robot = Robot(folder, guard, children, os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))})
+        try:
+            yield robot
+        finally:
+            robot.end()
+
+
+class PlainListener:
+    """A listener like anybody's, which notes the x of each child frame."""
+
+    def __init__(self) -> None:
+        self.heard: dict[str, list[float]] = {}
+
+    def until(self, child: str, x: float, times: int = 20) -> list[float]:
+        """Listen until this x came so often for the frame, and return all that came for it."""
+        with open_node("late", "/test") as own:
+            reader = TFSubscription(own, static=False)
+
+            def enough() -> bool:
+                wait(own, [reader], 0.1, Stop())
+                for received in reader.take():
+                    for one in decode(received.data):
+                        self.heard.setdefault(one.child, []).append(one.xyz[0])
+                return self.heard.get(child, []).count(x) >= times
+
+            assert until(enough), self.heard
+        return self.heard[child]

@@ -1,0 +1,120 @@
+"""Profile files of Fast DDS (XML), with partitions added for the writers or readers of topics.
+
+rmw_fastrtps takes the profile that has a topic's name for its writers and readers, and nothing of the default one
+then: what a new profile does not say is taken from the default profile of the file, if there is one.
+"""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from typing import TYPE_CHECKING, Literal
+from xml.etree import ElementTree as ET
+from xml.parsers import expat
+
+from tfcompose.ros.environment import RosError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+#: What a writer's or reader's profile is called, the second by older releases.
+WRITERS, READERS = ("data_writer", "publisher"), ("data_reader", "subscriber")
+Kind = Literal["data_writer", "data_reader"]
+
+#: No profile file is longer, in bytes, or nested deeper.
+MOST_BYTES = 1 << 20
+DEEPEST = 100
+_EMPTY = b'<dds xmlns="http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"><profiles/></dds>'
+_PARTITIONS = "partitions"
+
+
+def with_partitions(file: Path | None, kind: Kind, topics: Sequence[str], partitions: str) -> str:
+    """Return the text of a profile file that puts what writes or reads these topics into the partitions.
+
+    What ``file`` holds stays, but for its comments.
+
+    Raises:
+        RosError: with the reason, if it cannot be read, or puts one of the topics into a partition itself.
+    """
+    root = _read(file)
+    profiles = root if root.tag == "profiles" else root.find("profiles")
+    if profiles is None:
+        if root.tag != "dds":
+            raise RosError(f"it begins with <{root.tag}>, not with <dds>")
+        profiles = ET.SubElement(root, "profiles")
+    names = WRITERS if kind == "data_writer" else READERS
+    known = [one for one in root.iter() if one.tag in names]
+    default = next((one for one in known if one.get("is_default_profile") == "true"), None)
+    for topic in dict.fromkeys(topics):
+        profile = next((one for one in known if one.get("profile_name") == topic), None)
+        if profile is None:
+            profile = ET.Element(kind) if default is None else deepcopy(default)
+            profile.attrib.pop("is_default_profile", None)
+            profile.set("profile_name", topic)
+            profiles.append(profile)
+        properties = _below(_below(profile, "propertiesPolicy"), "properties")
+        if any((one.findtext("name") or "").strip() == _PARTITIONS for one in properties):
+            raise RosError(f"it puts {topic} into a partition itself")
+        added = ET.SubElement(properties, "property")
+        ET.SubElement(added, "name").text = _PARTITIONS
+        ET.SubElement(added, "value").text = partitions
+    ET.indent(root)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
+
+
+def _below(parent: ET.Element, name: str) -> ET.Element:
+    found = parent.find(name)
+    return ET.SubElement(parent, name) if found is None else found
+
+
+def _read(file: Path | None) -> ET.Element:
+    if file is None:
+        return _Reader().read(_EMPTY)
+    try:
+        if not file.is_file():
+            raise RosError("it is no plain file" if file.exists() else "it is not there")
+        with file.open("rb") as opened:
+            data = opened.read(MOST_BYTES + 1)
+    except OSError as error:
+        raise RosError(f"it cannot be read: {error.strerror}") from None
+    if len(data) > MOST_BYTES:
+        raise RosError(f"it is longer than {MOST_BYTES >> 20} MiB")
+    try:
+        return _Reader().read(data)
+    except (expat.ExpatError, ValueError, LookupError) as error:
+        raise RosError(f"it cannot be read: {error}") from None
+
+
+class _Reader:
+    """Reads XML as Fast DDS does: names stand for themselves, whatever namespace they are in.
+
+    Raises:
+        ValueError: with one sentence, for a document type with its entities, or elements nested too deep.
+        expat.ExpatError: for what is not XML.
+    """
+
+    def __init__(self) -> None:
+        self._builder = ET.TreeBuilder()
+        self._depth = 0
+        self._parser = expat.ParserCreate()
+        self._parser.StartElementHandler = self._start
+        self._parser.EndElementHandler = self._end
+        self._parser.CharacterDataHandler = self._builder.data
+        self._parser.StartDoctypeDeclHandler = self._refuse
+
+    def read(self, data: bytes) -> ET.Element:
+        self._parser.Parse(data, True)  # noqa: FBT003 (expat's: this is all)
+        return self._builder.close()
+
+    def _start(self, name: str, attributes: dict[str, str]) -> None:
+        self._depth += 1
+        if self._depth > DEEPEST:
+            raise ValueError(f"its elements are nested more than {DEEPEST} deep")
+        self._builder.start(name, attributes)
+
+    def _end(self, name: str) -> None:
+        self._depth -= 1
+        self._builder.end(name)
+
+    def _refuse(self, *_: object) -> None:
+        raise ValueError("it declares a document type, which no profile needs")

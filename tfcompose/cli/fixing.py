@@ -10,6 +10,7 @@ import os
 import re
 from collections import Counter
 from dataclasses import dataclass, field
+from difflib import unified_diff
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +19,7 @@ from tfcompose.cli.reading import read_text
 from tfcompose.cli.writing import replace_file
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from tfcompose.findings import Edit, Finding
 
@@ -65,6 +66,13 @@ class Fixer:
         """
         for path, text in self.texts.items():
             rewrite(Path(path), self._read[path], text)
+
+    def diff(self) -> Iterator[str]:
+        """Yield the lines of a unified diff of the files that would change, under the names that they were given."""
+        names = {_path(file): file for file in self.files}
+        for path, text in self.texts.items():
+            before = self._read[path].splitlines(keepends=True)
+            yield from unified_diff(before, text.splitlines(keepends=True), names[path], names[path])
 
     def read(self, file: str) -> str:
         """Return the file's text as it will be; a file is read once."""

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import contextlib
 import re
+import sys
 from functools import cache
 from pathlib import Path
 
 from tfcompose.findings import Finding, RejectedError, Span, finding
 
 MOST_BYTES = 16_000_000
+#: The name of standard input.
+STDIN = "-"
 
 #: Pipes that the shell has opened. One with a name would be waited for until somebody writes to it.
 _OPEN_ALREADY = ("/dev/fd/", "/dev/stdin", "/proc/")
 
 
 def read_text(path: str) -> str:
-    """Return the file's text.
+    """Return the file's text; ``-`` is standard input, which is read once.
 
     Raises:
         RejectedError: with one TF001 or TF008 finding, if it cannot be read, is no text, or is too large.
@@ -25,8 +28,11 @@ def read_text(path: str) -> str:
     try:
         if file.is_fifo() and not path.startswith(_OPEN_ALREADY):
             raise RejectedError([finding("TF001", "cannot be read: it is a pipe, not a file", Span(path))])
-        with file.open("rb") as stream:
-            data = stream.read(MOST_BYTES + 1)
+        if path == STDIN:
+            data = _standard_input()
+        else:
+            with file.open("rb") as stream:
+                data = stream.read(MOST_BYTES + 1)
     except OSError as error:
         raise RejectedError([_unreadable(path, error)]) from None
     except ValueError:
@@ -37,6 +43,11 @@ def read_text(path: str) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         return _decode_as_declared(path, data, error)
+
+
+@cache
+def _standard_input() -> bytes:
+    return sys.stdin.buffer.read(MOST_BYTES + 1)
 
 
 def _decode_as_declared(path: str, data: bytes, error: UnicodeDecodeError) -> str:
@@ -74,6 +85,11 @@ def _lines(file: str) -> list[str]:
         return read_text(file).splitlines()
     except RejectedError:
         return []
+
+
+def forget_lines() -> None:
+    """Let ``line_of`` read files anew."""
+    _lines.cache_clear()
 
 
 def line_of(file: str, line: int) -> str | None:

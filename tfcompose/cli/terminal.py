@@ -18,9 +18,12 @@ if TYPE_CHECKING:
 
     from tfcompose.findings import Finding
 
-#: Exit codes: findings, or a process that failed; wrong use, or what cannot be read; and as a shell has them for a
-#: program that was ended by Ctrl-C, or by writing where nobody reads.
+#: Exit codes: findings, or a process that failed; wrong use, what cannot be read, or what is not installed; and as a
+#: shell has them for a program that was ended by Ctrl-C, or by writing where nobody reads.
 FAILED, UNREADABLE, INTERRUPTED, OUTPUT_CLOSED = 1, 2, 130, 141
+
+#: A file that cannot be read; ROS, trimesh and rosbags.
+_LACKING = frozenset({"TF001", "TF901", "TF905", "TF906"})
 
 #: Control sequences (ECMA-48): those that end in m set colours, the others do something; and titles and links.
 _SEQUENCE = re.compile(r"(\033\[[0-?]*[ -/]*[@-~]|\033\][^\033\a]*(?:\a|\033\\)?|\033[ -/]*[0-~])")
@@ -53,20 +56,22 @@ def reject(found: Sequence[Finding], code: int | None = None) -> NoReturn:
     """Print findings to stderr and end the command.
 
     Raises:
-        SystemExit: with the exit code, unless given 2 where a file cannot be read, else 1.
+        SystemExit: with the exit code, unless given that of ``exit_code_of``.
     """
     print_findings(found, sys.stderr)
-    raise SystemExit(code or (UNREADABLE if unreadable(found) else FAILED))
+    raise SystemExit(code or exit_code_of(found))
 
 
-def unreadable(found: Sequence[Finding]) -> bool:
-    """Return whether the findings say that a file cannot be read at all."""
-    return any(one.code == "TF001" for one in found)
+def exit_code_of(found: Sequence[Finding]) -> int:
+    """Return 2 where the command cannot do its work, since it lacks a file, ROS or a package, else 1."""
+    return UNREADABLE if any(one.code in _LACKING for one in found) else FAILED
 
 
 def coloured(stream: TextIO) -> bool:
-    """Return whether to colour: on a terminal, unless NO_COLOR is set (no-color.org)."""
-    return can_redraw(stream) and not os.environ.get("NO_COLOR")
+    """Return whether to colour: on a terminal, or with FORCE_COLOR; never with NO_COLOR (no-color.org)."""
+    if os.environ.get("NO_COLOR"):
+        return False
+    return bool(os.environ.get("FORCE_COLOR")) or can_redraw(stream)
 
 
 def can_redraw(stream: TextIO) -> bool:

@@ -69,12 +69,13 @@ def _excerpt(span: Span, line_of: Callable[[str, int], str | None], paint: _Pain
     return [f"{span.line:>5} | {shown}", f"      | {lead}{paint('^' * width, shade, BOLD)}"]
 
 
-def summary(found: Sequence[Finding], files: int) -> str:
-    """Return the last line: the number of findings and of files."""
+def summary(found: Sequence[Finding], files: int, *, warnings_fail: bool = False) -> str:
+    """Return the last line: the number of findings and of files, and why warnings alone exit 0, if they do."""
     errors = sum(one.severity == "error" for one in found)
     warnings = len(found) - errors
     where = f"in {counted(files, 'file')}"
     if not found:
         return f"no findings {where}\n"
     parts = [counted(n, word) for n, word in ((errors, "error"), (warnings, "warning")) if n]
-    return f"{' and '.join(parts)} {where}\n"
+    exits = "" if errors or warnings_fail else " (exit code 0; --fail-on warning makes it 1)"
+    return f"{' and '.join(parts)} {where}{exits}\n"

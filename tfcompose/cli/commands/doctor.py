@@ -14,7 +14,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_for, add_format, add_variant, namespace
-from tfcompose.cli.terminal import UNREADABLE, complain, fail, print_findings, printable
+from tfcompose.cli.terminal import UNREADABLE, complain, exit_code_of, fail, print_findings, printable
 from tfcompose.text import counted
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def _print(found: list[Finding], form: str) -> int:
         sys.stdout.write(render_json(found))
     else:
         print_findings(found, sys.stdout)
-    return int(bool(found))
+    return exit_code_of(found) if found else 0
 
 
 def _summary(found: list[Finding]) -> str:

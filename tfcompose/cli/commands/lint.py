@@ -8,16 +8,18 @@ from __future__ import annotations
 import os
 import re
 import sys
+import time
+from argparse import ArgumentTypeError
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose import __version__
 from tfcompose.cli.options import DEFAULT_FILE, add_format, add_variant
-from tfcompose.cli.terminal import UNREADABLE, print_findings, unreadable
+from tfcompose.cli.terminal import UNREADABLE, can_redraw, exit_code_of, fail, has_reader, print_findings
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from tfcompose.cli.fixing import Fixer
     from tfcompose.findings import Finding
@@ -29,6 +31,10 @@ _ROBOT = re.compile(
 )
 
 URDF_ENDINGS = (".urdf", ".xacro")
+#: How often --watch checks the files, in seconds.
+CHECK_EVERY_S = 0.3
+#: Moves the cursor home and clears the screen (ECMA-48).
+CLEAR = "\033[H\033[2J"
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -38,42 +44,150 @@ def arguments(parser: ArgumentParser) -> None:
         nargs="*",
         metavar="FILE",
         default=[],
-        help="robot files, folders of them, or .urdf and .xacro files; default: robot.yaml",
+        help="robot files, folders of them, .urdf and .xacro files, or - for standard input; default: robot.yaml",
     )
     parser.add_argument(
         "--urdf", action="append", default=[], metavar="FILE", dest="urdfs",
         help="check FILE as a URDF or xacro file, whatever its suffix; repeatable",
     )  # fmt: skip
     add_variant(parser, "check only this combination")
-    add_format(parser, "json", "sarif", "github")
+    add_format(parser, "json", "sarif", "github", "junit")
     parser.add_argument("--fix", action="store_true", help="apply unambiguous fixes to the named files")
+    parser.add_argument(
+        "--diff", action="store_true", help="print what --fix would change, and write nothing; exit code 1 if anything"
+    )
     parser.add_argument(
         "--fail-on", choices=("error", "warning"), default="error", help="lowest severity that exits 1; default: error"
     )
+    parser.add_argument(
+        "--select", action="extend", type=codes, default=[], metavar="CODES",
+        help="report only these codes, or codes that begin so: TF401,TF7; what prevents a build is always reported",
+    )  # fmt: skip
+    parser.add_argument(
+        "--ignore", action="extend", type=codes, default=[], metavar="CODES", help="do not report these codes"
+    )
+    parser.add_argument("--skip-foreign", action="store_true", help="skip named YAML files that are not robot files")
+    parser.add_argument("-w", "--watch", action="store_true", help="check again whenever a file changes, until Ctrl-C")
+
+
+def codes(text: str) -> list[str]:
+    """Read codes, or what they begin with, separated by commas.
+
+    Raises:
+        ArgumentTypeError: if there is no such code, or none that may be silenced.
+    """
+    from tfcompose.catalogue import CATALOGUE
+
+    beginnings = [one.strip() for one in text.split(",")]
+    for one in beginnings:
+        named = [code for code in CATALOGUE.values() if one and code.code.startswith(one)]
+        if not named:
+            raise ArgumentTypeError(f"there is no code {one}; tfcompose explain --table lists them")
+        if not any(code.can_be_allowed for code in named):
+            raise ArgumentTypeError(f"{one} is reported always: without it a robot cannot be read or built")
+    return beginnings
 
 
 def run(arguments: Namespace) -> int:
     """Lint the files; exit code 0, 1 with findings that count, 2 where a file cannot be read."""
+    from tfcompose.cli.reading import STDIN, read_text
+
+    if (arguments.fix or arguments.diff or arguments.watch) and STDIN in arguments.files:
+        fail("standard input cannot be fixed or watched: name a file", UNREADABLE)
+    return _watch(arguments) if arguments.watch else _lint(arguments, read_text)
+
+
+def _lint(arguments: Namespace, read: Callable[[str], str]) -> int:
+    """Lint the files once and return the exit code."""
     from tfcompose.cli.compiling import library
-    from tfcompose.cli.reading import read_text
 
     presets = library()
-    names = arguments.files or ([] if arguments.urdfs else [DEFAULT_FILE])
-    files = dict.fromkeys(file for name in names for file in robots_in(name))
+    files = _files(arguments)
     urdfs = dict.fromkeys([*arguments.urdfs, *(file for file in files if file.endswith(URDF_ENDINGS))])
     robots = [file for file in files if file not in urdfs]
-    if arguments.fix:
+
+    def lint(file: str, read: Callable[[str], str]) -> list[Finding]:
+        return _selected(lint_file(file, presets, arguments, read), arguments)
+
+    is_changed = False
+    if arguments.fix or arguments.diff:
         from tfcompose.cli.fixing import Fixer
 
-        fixer = Fixer(robots, lambda file, read: lint_file(file, presets, arguments, read))
-        found = _fix(fixer, arguments.format)
+        fixer = Fixer(robots, lint)
+        cases = _fix(fixer, arguments)
+        is_changed = bool(arguments.diff and fixer.texts)
     else:
-        found = [one for file in robots for one in lint_file(file, presets, arguments, read_text)]
-    found += [one for file in urdfs for one in _lint_urdf(file)]
-    _print(found, arguments.format, len(robots) + len(urdfs))
-    if unreadable(found):
+        cases = {file: lint(file, read) for file in robots}
+    cases |= {file: _selected(_lint_urdf(file), arguments) for file in urdfs}
+    found = [one for case in cases.values() for one in case]
+    _print(cases, arguments, len(robots) + len(urdfs))
+    if exit_code_of(found) == UNREADABLE:
         return UNREADABLE
-    return int(any(one.severity == "error" or arguments.fail_on == "warning" for one in found))
+    return int(is_changed or any(one.severity in _failing(arguments) for one in found))
+
+
+def _watch(arguments: Namespace) -> int:
+    """Lint again whenever a file changes that was read, or one comes to a folder; Ctrl-C ends it."""
+    from tfcompose.cli.reading import forget_lines, read_text
+
+    read: set[str] = set()
+
+    def remembering(file: str) -> str:
+        read.add(file)
+        return read_text(file)
+
+    while True:
+        if can_redraw(sys.stdout):
+            sys.stdout.write(CLEAR)
+        state = _state(arguments, read)
+        _lint(arguments, remembering)
+        sys.stdout.write("watching; Ctrl-C ends it\n")
+        sys.stdout.flush()
+        state |= _state(arguments, read - state.keys())
+        while _state(arguments, read) == state:
+            if not has_reader(sys.stdout):
+                raise BrokenPipeError
+            time.sleep(CHECK_EVERY_S)
+        forget_lines()
+
+
+def _state(arguments: Namespace, read: Iterable[str]) -> dict[str, tuple[int, int] | None]:
+    """Return each file's time and size, or None if it is not there."""
+    state: dict[str, tuple[int, int] | None] = {}
+    for file in (*_files(arguments), *arguments.urdfs, *arguments.overlays, *read):
+        try:
+            found = Path(file).stat()
+            state[file] = found.st_mtime_ns, found.st_size
+        except OSError:
+            state[file] = None
+    return state
+
+
+def _files(arguments: Namespace) -> list[str]:
+    """Return the files that are named, those of folders among them."""
+    names = arguments.files or ([] if arguments.urdfs else [DEFAULT_FILE])
+    files = dict.fromkeys(file for name in names for file in robots_in(name))
+    if not arguments.skip_foreign:
+        return list(files)
+    return [file for file in files if not file.endswith((".yaml", ".yml")) or _is_robot(Path(file))]
+
+
+def _selected(found: list[Finding], arguments: Namespace) -> list[Finding]:
+    """Return the findings that --select and --ignore leave."""
+    from tfcompose.catalogue import CATALOGUE
+
+    select, ignore = tuple(arguments.select), tuple(arguments.ignore)
+    return [
+        one
+        for one in found
+        if not CATALOGUE[one.code].can_be_allowed
+        or ((not select or one.code.startswith(select)) and not one.code.startswith(ignore))
+    ]
+
+
+def _failing(arguments: Namespace) -> frozenset[str]:
+    """Return the severities that make the exit code 1."""
+    return frozenset({"error"} if arguments.fail_on == "error" else {"error", "warning"})
 
 
 def _lint_urdf(file: str) -> list[Finding]:
@@ -85,17 +199,20 @@ def _lint_urdf(file: str) -> list[Finding]:
     return lint_urdf(file, Packages(disk(), advice="source the workspace's setup file"))
 
 
-def _fix(fixer: Fixer, form: str) -> list[Finding]:
-    """Fix the files, say what was fixed, and return what remains: everything, where a file cannot be written."""
+def _fix(fixer: Fixer, arguments: Namespace) -> dict[str, list[Finding]]:
+    """Fix the files, or print the difference, and return what remains in each; a file that cannot be written, alone."""
     from tfcompose.findings import Span, finding
 
-    found = [one for file in fixer.files for one in fixer.fix(file)]
+    found = {file: fixer.fix(file) for file in fixer.files}
+    if arguments.diff:
+        sys.stdout.writelines(fixer.diff())
+        return found
     try:
         fixer.write()
     except OSError as error:
-        message = f"cannot be fixed: {error.strerror}"
-        return [finding("TF001", message, Span(error.filename or "?"))]
-    stream = sys.stdout if form == "text" else sys.stderr
+        name = error.filename or "?"
+        return {name: [finding("TF001", f"cannot be fixed: {error.strerror}", Span(name))]}
+    stream = sys.stdout if arguments.format == "text" else sys.stderr
     for one in fixer.fixed:
         now = " … ".join(edit.text.strip(", \n") for edit in one.edits)
         stream.write(f"{one.span}: fixed[{one.code}] {one.message}: now {now}\n")
@@ -123,12 +240,15 @@ def _is_robot(file: Path) -> bool:
         return True
 
 
-def _print(found: list[Finding], form: str, files: int) -> None:
+def _print(cases: dict[str, list[Finding]], arguments: Namespace, files: int) -> None:
+    """Print the findings of each file; what --diff prints for programs goes without."""
+    form, found = arguments.format, [one for case in cases.values() for one in case]
     if form == "text":
         from tfcompose.render.text import summary
 
-        print_findings(found, sys.stdout)
-        sys.stdout.write(summary(found, files))
+        stream = sys.stderr if arguments.diff else sys.stdout
+        print_findings(found, stream)
+        stream.write(summary(found, files, warnings_fail=arguments.fail_on == "warning"))
     elif form == "json":
         from tfcompose.render.formats import render_json
 
@@ -137,6 +257,11 @@ def _print(found: list[Finding], form: str, files: int) -> None:
         from tfcompose.render.formats import render_github
 
         sys.stdout.write(render_github(found))
+    elif form == "junit":
+        from tfcompose.render.formats import render_junit
+
+        rows = [("lint", file, tuple(case)) for file, case in cases.items()]
+        sys.stdout.write(render_junit("tfcompose", rows, failing=_failing(arguments), seconds=0.0))
     else:
         from tfcompose.pages import page
         from tfcompose.render.formats import render_sarif

@@ -121,3 +121,33 @@ def test_where_nothing_comes_it_says_so_with_exit_code_1() -> None:
     done = monitor("--for", "0.5", code=1)
     assert done.stdout == ""
     assert "error[TF811] " in done.stderr
+
+
+def test_between_two_frames_each_edge_has_its_publisher_and_the_net_delay_is_that_of_the_last() -> None:
+    def is_named(seconds: float) -> None:
+        done = json.loads(monitor("map", "/base_link", "--for", str(seconds), "--format", "json").stdout)
+        assert done["chain"] == ["map", "odom", "base_link"]
+        assert [(each["child"], each["publisher"]) for each in done["edges"]] == [
+            ("odom", "/ekf"),
+            ("base_link", "/drive"),
+        ]
+        assert done["most_behind"] == ["map", "odom"]
+        assert 0.25 + 0.5 / 20 * 0.9 <= done["net_delay_s"] <= done["most_net_delay_s"]
+
+    def is_printed(seconds: float) -> None:
+        text = monitor("map", "base_link", "--for", str(seconds)).stdout.splitlines()
+        assert [line.split()[2] for line in text[2:]] == ["odom", "base_link"]
+        assert "by map → odom" in text[0]
+
+    def is_unknown(seconds: float) -> None:
+        assert "base_link?" in monitor("map", "base_lnk", "--for", str(seconds), code=1).stdout
+
+    with (
+        sending("drive", "odom", "base_link", rate=50),
+        sending("ekf", "map", "odom", rate=20, late_s=0.25),
+        sending("other", "x", "y", rate=50),
+    ):
+        at_last(is_named)
+        at_last(is_printed)
+        at_last(is_unknown)
+    assert "A and B" in monitor("map", code=2).stderr

@@ -14,6 +14,7 @@ from tfcompose.text import counted
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from tfcompose.live.chain import Chain
     from tfcompose.live.edges import EdgeState, TreeObserver
 
 #: A stamp that is farther off is taken to be of another clock.
@@ -90,15 +91,39 @@ def duration(seconds: float | None) -> str:
     return f"{seconds * 1e3:.1f} ms" if abs(seconds) < 1 else f"{seconds:.2f} s"
 
 
-def objects_of(edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int) -> str:
+def chain_line(chain: Chain | str, a: str, b: str) -> str:
+    """Return how many edges are between two frames and how old the newest pose is, or why there is none."""
+    ends = f"{printable(a)} → {printable(b)}"
+    if isinstance(chain, str):
+        return f"{ends}: {printable(chain)}"
+    parts = [counted(len(chain.newest), "edge")]
+    if delay := chain.delay:
+        times = f"{duration(delay.mean_s)} in the mean, {duration(delay.most_s)} at most"
+        parts.append(f"net delay {times}, by {printable(delay.edge.name)}")
+    else:
+        parts.append("none of them moves")
+    return f"{ends}: {', '.join(parts)}"
+
+
+def objects_of(
+    edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int, chain: Chain | str | None = None
+) -> str:
     """Return one line of JSON: what was counted, and a list of edges; times in seconds, stamps in nanoseconds."""
-    data = {
+    data: dict[str, Any] = {
         "time_ns": now_ns,
         "messages": observer.messages,
         "delay_until": "recording" if observer.end_ns else "arrival",
         "malformed": sum(observer.malformed.values()),
         "edges": [object_of(state) for state in edges],
     }
+    if isinstance(chain, str):
+        data["chain"], data["reason"] = None, chain
+    elif chain is not None:
+        delay = chain.delay
+        data["chain"] = list(chain.frames)
+        data["net_delay_s"] = delay and delay.mean_s
+        data["most_net_delay_s"] = delay and delay.most_s
+        data["most_behind"] = delay and [delay.edge.parent, delay.edge.child]
     return json.dumps(data, ensure_ascii=False) + "\n"
 
 

@@ -91,7 +91,7 @@ def listen(  # noqa: PLR0913 (all but three are named)
     *,
     duration_s: float | None,
     every_s: float = 1.0,
-    show: Callable[[int], None] | None = None,
+    show: Callable[[int], object] | None = None,
 ) -> tuple[float, tuple[str, ...]]:
     """Feed the observers of the topics (moving, fixed) for so many seconds, or until ``stop`` is requested.
 

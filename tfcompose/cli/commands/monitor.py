@@ -3,7 +3,8 @@
 Print each edge of the running tree, or of a bag, with its publisher's node, rate, jitter (the standard deviation of the
 time between messages), longest gap, age of the newest stamp, and delay (arrival minus stamp), over the last 5 to 10 s,
 or over everything with --for or --bag. On a terminal the table refreshes in place until Ctrl-C; into a pipe each table
-follows the last.
+follows the last. With A and B only the edges between them are shown, in their order, and the net delay: how old the
+newest pose of B in A is.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ WINDOW_S = 5.0
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
+    parser.add_argument("a", nargs="?", metavar="A", help="with B: only the edges between the frames A and B")
+    parser.add_argument("b", nargs="?", metavar="B", help="the frame at the other end")
     add_for(parser, "print one table of S seconds and exit; default: until Ctrl-C")
     add_bag(parser)
     add_namespace(parser)
@@ -38,7 +41,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Monitor until a signal comes; exit code 1 if no TF came at all, 2 if a bag cannot be read."""
+    """Monitor until a signal comes; exit code 1 if no TF came, or no chain from A to B is there, 2 for a bad bag."""
     from tfcompose.cli.live import observe, read_bag
     from tfcompose.cli.tables import LiveLines
     from tfcompose.live.edges import SETTLE_S, TreeObserver
@@ -46,36 +49,43 @@ def run(arguments: Namespace) -> int:
 
     if arguments.bag and arguments.duration:
         fail("a recording is always read to its end: leave out --for", UNREADABLE)
+    if arguments.a and not arguments.b:
+        fail("the edges between two frames are shown: give both, A and B", UNREADABLE)
+    arguments.frames = [name.removeprefix("/") for name in (arguments.a, arguments.b) if name]
     topics = topics_below(arguments.namespace)
     covers_all = arguments.bag or arguments.duration
     observer = TreeObserver(0.0 if covers_all else WINDOW_S, 0.0 if arguments.bag else SETTLE_S)
     if arguments.bag:
         read_bag(arguments.bag, {topics: observer})
-        _show(arguments, observer, None, observer.end_ns)
-        return 0
+        return _show(arguments, observer, None, observer.end_ns)
     lines = LiveLines(sys.stdout) if arguments.format == "text" and can_redraw(sys.stdout) else None
     show = None if arguments.duration and not lines else partial(_show, arguments, observer, lines)
     observe("tfcompose_monitor", {topics: observer}, duration_s=arguments.duration, every_s=arguments.every, show=show)
-    if arguments.duration:
-        _show(arguments, observer, lines, time.time_ns())
-    return 0
+    return _show(arguments, observer, lines, time.time_ns()) if arguments.duration else 0
 
 
-def _show(arguments: Namespace, observer: TreeObserver, live: LiveLines | None, now_ns: int) -> None:
-    from tfcompose.cli.edge_table import lines_of, objects_of
+def _show(arguments: Namespace, observer: TreeObserver, live: LiveLines | None, now_ns: int) -> int:
+    """Print one table; return 1 if there is no chain between the two frames."""
+    from tfcompose.cli.edge_table import chain_line, lines_of, objects_of
     from tfcompose.cli.live import names_of
+    from tfcompose.live.chain import chain_between
     from tfcompose.plan.topics import topics_below
 
     edges = sorted(observer.edges(now_ns), key=lambda state: state.stream.static)  # what moves first
+    chain = chain_between(edges, *arguments.frames) if arguments.frames else None
+    shown = edges if chain is None else () if isinstance(chain, str) else chain.all_edges
     if arguments.format == "json":
-        sys.stdout.write(objects_of(edges, observer, now_ns))
+        sys.stdout.write(objects_of(shown, observer, now_ns, chain))
         sys.stdout.flush()
-        return
-    lines = lines_of(edges, observer, now_ns, table_width(sys.stdout), coloured=coloured(sys.stdout))
+        return int(isinstance(chain, str))
+    lines = lines_of(shown, observer, now_ns, table_width(sys.stdout), coloured=coloured(sys.stdout))
+    if chain is not None:
+        lines[0] = chain_line(chain, *arguments.frames)
     if not observer.heard:
         lines = [f"no TF yet on {names_of([topics_below(arguments.namespace)])}"]
     if live is not None:
         live.draw(lines)
-        return
-    sys.stdout.write("".join(f"{line}\n" for line in lines))
-    sys.stdout.flush()
+    else:
+        sys.stdout.write("".join(f"{line}\n" for line in lines))
+        sys.stdout.flush()
+    return int(isinstance(chain, str))

@@ -5,8 +5,8 @@ import pytest
 
 from tfcompose.findings import RejectedError
 from tfcompose.plan import PlanProcess, Simulation
-from tfcompose.process import read_own
-from tfcompose.publishers import joints, static
+from tfcompose.process import Own, read_own, start
+from tfcompose.signals import Stop
 
 
 def _last_error(capsys: pytest.CaptureFixture[str]) -> str:
@@ -15,20 +15,24 @@ def _last_error(capsys: pytest.CaptureFixture[str]) -> str:
     return error
 
 
+def never(own: Own, _: Stop) -> None:
+    raise AssertionError(f"{own.process.name} begins")
+
+
 def test_wrong_arguments_end_with_code_2_and_the_usage(capsys: pytest.CaptureFixture[str]) -> None:
-    assert static.main(["plan.json"]) == 2
+    assert start(["plan.json"], "static", never) == 2
     assert "usage: python -m tfcompose.publishers.static " in _last_error(capsys)
 
 
 def test_a_missing_plan_ends_with_code_2_and_its_name(capsys: pytest.CaptureFixture[str]) -> None:
-    assert joints.main(["no/such/plan.json", "joints"]) == 2
+    assert start(["no/such/plan.json", "joints"], "joints", never) == 2
     assert "no/such/plan.json" in _last_error(capsys)
 
 
 def test_what_is_no_plan_ends_with_code_2(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     file = tmp_path / "plan.json"
     file.write_text("{}")
-    assert static.main([str(file), "static"]) == 2
+    assert start([str(file), "static"], "static", never) == 2
     assert "not a plan" in _last_error(capsys)
 
 
@@ -57,5 +61,5 @@ def test_without_ros_it_ends_with_code_1_and_says_what_to_install(
     write: Callable[..., Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tfcompose.process.missing_ros", lambda: "no rclpy: install it")
-    assert static.main([str(write([], PlanProcess("static", "static"))), "static"]) == 1
+    assert start([str(write([], PlanProcess("static", "static"))), "static"], "static", never) == 1
     assert _last_error(capsys) == "no rclpy: install it\n"

@@ -30,6 +30,17 @@ def start_order_loop(robot: Robot) -> Iterator[Finding]:
         yield finding("TF812", message, waiting[names[0]].at, notes=notes, help="remove one of their after entries")
 
 
+def _needed(robot: Robot) -> set[str]:
+    """Return the processes that own an edge, drive a sensor, publish TF by default, or are waited for."""
+    publishers = {claim.node for claim in robot.claims}
+    return (
+        {edge.owner for edge in robot.edges}
+        | {sensor.driver for sensor in robot.sensors}
+        | {name for process in robot.processes for name in process.after}
+        | {process.name for process in robot.processes if not publishers.isdisjoint(process.nodes)}
+    )
+
+
 @rule("TF815", idle=True)
 def process_without_role(robot: Robot) -> Iterator[Finding]:
     """An external or simulated process is not used.
@@ -38,18 +49,14 @@ def process_without_role(robot: Robot) -> Iterator[Finding]:
     it the owner of its edge, or remove it. Processes that tfcompose starts are exempt, as is an external process that
     may send the joint states because no simulated one does.
     """
-    owners = {edge.owner for edge in robot.edges}
-    drivers = {sensor.driver for sensor in robot.sensors}
-    awaited = {name for process in robot.processes for name in process.after}
-    publishers = {claim.node for claim in robot.claims}
-    busy = owners | drivers | awaited | {process.name for process in robot.processes if process.node in publishers}
-    names = {process.name for process in robot.processes}
-    if (owners | drivers) - names - {""}:
+    owners = {edge.owner for edge in robot.edges} | {sensor.driver for sensor in robot.sensors}
+    needed = _needed(robot)
+    if owners - {process.name for process in robot.processes} - {""}:
         return  # a name is misspelt, which TF302 reports
     moving = any(edge.joint for edge in robot.edges)
     states = any(process.simulate and process.simulate.kind == "joints" for process in robot.processes)
     for process in robot.processes:
-        if process.kind not in {"external", "simulate"} or process.name in busy or robot.excuses(process.name):
+        if process.kind not in {"external", "simulate"} or process.name in needed or robot.excuses(process.name):
             continue
         if process.kind == "external" and moving and not states:
             continue
@@ -68,13 +75,9 @@ def required_without_role(robot: Robot) -> Iterator[Finding]:
     When it ends, the whole robot stops, although nothing needs it. Remove ``required``, or declare who needs it:
     ``after: {NAME: ready}`` on that process.
     """
-    owners = {edge.owner for edge in robot.edges}
-    drivers = {sensor.driver for sensor in robot.sensors}
-    awaited = {name for process in robot.processes for name in process.after}
-    publishers = {claim.node for claim in robot.claims}
+    needed = _needed(robot)
     for process in robot.processes:
-        needed = process.name in owners | drivers | awaited or any(node in publishers for node in process.nodes)
-        if process.required and not needed and not robot.excuses(process.name):
+        if process.required and process.name not in needed and not robot.excuses(process.name):
             message = f"{process.name} is required, but owns no edge, and nothing waits for it"
             advice = f"remove required, or write after: {{{process.name}: ready}} on the process that needs it"
             yield finding("TF818", message, process.at, help=advice)

@@ -13,7 +13,7 @@ from tfcompose.process import ready, say, start, wait_for_go
 from tfcompose.text import counted, listed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from tfcompose.process import Own
     from tfcompose.publishers.joint_mover import JointMover
@@ -80,10 +80,5 @@ class _Missing:
         return f"{self._topic} comes from {', '.join(names)}" if names else f"nobody publishes {self._topic}"
 
 
-def main(argv: Sequence[str]) -> int:
-    """Run it until a signal comes and return the exit code; ``process.start`` says which."""
-    return start(argv, "joints", joints)
-
-
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(start(sys.argv[1:], "joints", joints))

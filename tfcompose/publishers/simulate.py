@@ -166,10 +166,5 @@ def swept(sweep: Sweep, start: float, time_s: float) -> float:
     return middle + half * math.sin(phase + math.asin(max(-1.0, min(1.0, (start - middle) / half))))
 
 
-def main(argv: Sequence[str]) -> int:
-    """Run it until a signal comes and return the exit code; ``process.start`` says which."""
-    return start(argv, "simulate", simulate)
-
-
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(start(sys.argv[1:], "simulate", simulate))

@@ -14,8 +14,6 @@ from tfcompose.ros.tf_codec import Transform, encode
 from tfcompose.text import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from tfcompose.process import Own
     from tfcompose.signals import Stop
 
@@ -52,10 +50,5 @@ def _joints_of(own: Own) -> str:
     return f"{own.process.name.removesuffix('static')}joints"
 
 
-def main(argv: Sequence[str]) -> int:
-    """Run it until a signal comes and return the exit code; ``process.start`` says which."""
-    return start(argv, "static", static)
-
-
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(start(sys.argv[1:], "static", static))

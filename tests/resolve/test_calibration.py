@@ -326,7 +326,7 @@ def test_an_inverse_is_suspected_by_the_nominal_pose_or_by_the_robots_bodies() -
     nominal = f"xyz: {list(back.xyz)}, quat_xyzw: {list(back.quat_xyzw)}, "
     robot = "frames: {lens: {parent: base_link, %scalibration: c.yaml}}\n"
     found = compiled(robot % nominal, c_yaml=autoware()).found
-    assert [(one.code, one.severity) for one in found] == [("TF615", "error")]
+    assert {(one.code, one.severity) for one in found} == {("TF615", "error"), ("TF616", "warning")}
     assert "c.yaml:2 (autoware)" in found[0].message
     assert "0 mm and 0 deg" in found[0].message, "the distance of the inverse"
     # A body 1 m to the left; the sensor is said to be 1 m ahead, looking left, so the way back leads to that body.
@@ -338,6 +338,16 @@ def test_an_inverse_is_suspected_by_the_nominal_pose_or_by_the_robots_bodies() -
     outside = compile_robot(head + mast + robot % "", "r.yaml", library(), read=lambda _: text).found
     assert [(one.code, one.severity) for one in outside] == [("TF615", "warning")]
     assert not compiled(robot % "", c_yaml=autoware()).found
+
+
+def test_an_inverse_that_is_nearer_and_not_near_is_a_wrong_nominal_pose() -> None:
+    """Half a turn and 12 mm from nominal; inverted it would be a quarter turn and 11 cm."""
+    frames = "frames: {lens: {parent: base_link, xyz: [0, 0, 0.05], rpy: [90 deg, 0, -90 deg], calibration: c.yaml}}\n"
+    text = "base_link: {lens: {x: 0.0125, y: 0, z: 0.05, roll: 0, pitch: 0, yaw: !degrees 90}}\n"
+    found = compiled(frames, c_yaml=text).found
+    assert [one.code for one in found] == ["TF616"]
+    assert "12.5 mm and 180 deg" in found[0].message
+    assert [one.code for one in compiled(f"{frames}rules: {{TF615: off}}\n", c_yaml=text).found] == ["TF616"]
 
 
 def test_the_robots_bodies_are_found_above_and_below_the_measured_frame() -> None:

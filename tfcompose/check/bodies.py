@@ -28,7 +28,7 @@ def inertia_missing(robot: Robot) -> Iterator[Finding]:
         if edge.kind == "static":
             fixed.setdefault(edge.parent, []).append(edge.child)
     moving = [edge for edge in robot.edges if (edge.joint or edge.free) and edge.child in robot.links]
-    masses = {name for name, link in robot.links.items() if link.inertial}
+    masses = {name for name, link in robot.links.items() if link.inertial or link.has_mass}
     own = masses - {frame for sensor in robot.sensors for frame in (sensor.mount, *sensor.frames)}
     other = next((edge.child for edge in moving if _has_one(own, fixed, edge.child)), None)
     for edge in moving if other else ():

@@ -166,6 +166,7 @@ def driver_publishes_too(robot: Robot) -> Iterator[Finding]:
             sensor.driver_frames
             and not sensor.publishes
             and sensor.switch
+            and (sensor.by_default or _is_switched_on(process, sensor.switch))
             and not _is_switched_off(process, sensor.switch)
         ):
             count, first = len(sensor.driver_frames), sensor.driver_frames[0]
@@ -187,6 +188,15 @@ def _is_switched_off(process: Process, switch: dict[str, Any]) -> bool:
             (process.package and process.params.get(key) == value) or f"{key}:={value}".lower() in words
             for key, value in switch.items()
         )
+    )
+
+
+def _is_switched_on(process: Process, switch: dict[str, Any]) -> bool:
+    """Return whether the process is told to publish, or not told what to do in a way that could be read."""
+    words = " ".join(process.argv).lower()
+    told = [process.params[key] != value for key, value in switch.items() if key in process.params]
+    return any(told) or any(
+        f"{key}:=" in words and f"{key}:={value}".lower() not in words for key, value in switch.items()
     )
 
 

@@ -7,52 +7,14 @@ from typing import TYPE_CHECKING
 
 from tfcompose.check.rule import rule
 from tfcompose.findings import Finding, finding
-from tfcompose.geometry import IDENTITY_XYZW, OPTICAL_XYZW, Pose, angle_between, norm, rotate
-from tfcompose.model import OPTICAL_ENDINGS, is_optical
+from tfcompose.geometry import Pose, norm, rotate
+from tfcompose.model import is_optical
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tfcompose.geometry import Vector
     from tfcompose.model import Edge, Robot, Shape
-
-
-_OPTICAL_TOLERANCE_RAD = 2e-3
-
-
-@rule("TF401", of_urdf=True, follows="pose")
-def optical_frame_not_rotated(robot: Robot) -> Iterator[Finding]:
-    """A frame is named like an optical frame but not rotated like one.
-
-    By REP-103 an optical frame has z forward, x right and y down, and its body frame x forward, y left and z up. The
-    rotation from body to optical frame is rpy [-90 deg, 0, -90 deg]; without it point clouds are turned on their side.
-    Rounded constants (−1.57) pass: they are off by 0.0011 rad each. So do frames of presets whose vendor uses other
-    axes (RealSense T265).
-    """
-    for edge in robot.edges:
-        if edge.kind != "static" or edge.other_axes or not is_optical(edge.child) or is_optical(edge.parent):
-            continue
-        off = angle_between(edge.pose.quat_xyzw, OPTICAL_XYZW)
-        is_body = _stem(edge.child).startswith(_stem(edge.parent))
-        unrotated = angle_between(edge.pose.quat_xyzw, IDENTITY_XYZW) <= _OPTICAL_TOLERANCE_RAD
-        if off > _OPTICAL_TOLERANCE_RAD and (is_body or unrotated):
-            message = (
-                f"{edge.child} is named like an optical frame but not rotated like one: "
-                f"it is {math.degrees(off):.2f} deg off"
-            )
-            advice = "rpy: [-90 deg, 0, -90 deg]"
-            if robot.is_foreign(edge.at):
-                advice = '<origin rpy="-1.5707963267948966 0 -1.5707963267948966"/>'
-            advice = f"an optical frame has {advice} in {edge.parent}"
-            yield finding("TF401", message, edge.at, help=advice, edits=edge.optical_edits())
-
-
-def _stem(frame: str) -> str:
-    """Return what a frame and its optical frame have in common: camera_link, camera_optical_frame → camera."""
-    for ending in (*OPTICAL_ENDINGS, "_link", "_frame"):
-        if frame.endswith(ending):
-            return frame.removesuffix(ending)
-    return frame
 
 
 #: Degrees that people write. Read as radians, all but 5 are more than a full turn, which nobody means.

@@ -1,4 +1,4 @@
-"""Rules about sensors: calibrations, mounts, optical frames and serial numbers."""
+"""Rules about sensors: calibrations, mounts and serial numbers."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ import math
 import re
 from typing import TYPE_CHECKING
 
-from tfcompose.check.poses import CAMERAS, are_mirrored, envelope, is_near, twins
+from tfcompose.check.poses import are_mirrored, envelope, is_near, twins
 from tfcompose.check.rule import rule
 from tfcompose.findings import Finding, Note, finding
 from tfcompose.geometry import Pose, angle_between, norm
-from tfcompose.model import is_optical
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,27 +18,32 @@ if TYPE_CHECKING:
     from tfcompose.model import Calibration, Edge, MountedSensor, Process, Robot
 
 
-#: How much closer to the nominal pose the inverse must be.
-_NEARER = 0.9
+#: How much closer to the nominal pose the inverse must be, and within how many times the limit.
+_NEARER, _NEAR = 0.9, 3.0
 
 
 @rule("TF615")
 def calibration_probably_inverse(robot: Robot) -> Iterator[Finding]:
     """A calibration is probably inverted.
 
-    Its inverse is closer to the nominal pose, the one in the robot file; or there is none, and the calibration puts the
-    sensor outside the robot while its inverse does not. Calibration tools differ in whether they write the pose of the
-    camera in the base or of the base in the camera. Check which one the file holds, then invert its values, or swap the
-    frames under ``calibration``: ``parent`` and ``child``.
+    It is beyond its limit from the nominal pose, the one in the robot file, and its inverse is closer, within three
+    times the limit; or there is no nominal pose, and the calibration puts the sensor outside the robot while its
+    inverse does not. Calibration tools differ in whether they write the pose of the camera in the base or of the base
+    in the camera. Check which one the file holds, then invert its values, or swap the frames under ``calibration``:
+    ``parent`` and ``child``.
     """
     for edge in robot.edges:
         measured, why = edge.calibration, _why_inverse(robot, edge)
         if measured and why:
             message = f"{measured.name} is probably the pose of {measured.parent} in {measured.child}: {why}"
-            advice = f"if the file holds the pose of {measured.parent}, swap parent and child, or invert its values"
+            advice = _if_inverse(measured)
             note = Note("measured here", measured.at)
             severity: Severity = "error" if measured.nominal else "warning"
             yield finding("TF615", message, measured.named_at, help=advice, notes=[note], severity=severity)
+
+
+def _if_inverse(measured: Calibration) -> str:
+    return f"if the file holds the pose of {measured.parent}, swap parent and child, or invert its values"
 
 
 def _why_inverse(robot: Robot, edge: Edge) -> str:
@@ -52,8 +56,8 @@ def _why_inverse(robot: Robot, edge: Edge) -> str:
 
 
 def _nearer(measured: Calibration, back: Pose) -> str:
-    times = _times_limit(measured, measured.pose)
-    if times > 1 and _times_limit(measured, back) < _NEARER * times:
+    times, inverted_times = _times_limit(measured, measured.pose), _times_limit(measured, back)
+    if times > 1 and inverted_times < min(_NEAR, _NEARER * times):
         direct, inverted = (_distance(*measured.off(pose)) for pose in (measured.pose, back))
         return f"{direct} from nominal, and {inverted} if inverted"
     return ""
@@ -82,7 +86,7 @@ def calibration_far_from_nominal(robot: Robot) -> Iterator[Finding]:
     """
     for edge in robot.edges:
         measured = edge.calibration
-        if measured is None or _is_all_zero(measured) or _why_inverse(robot, edge):
+        if measured is None or _is_all_zero(measured):
             continue
         far, turned = measured.off(measured.pose)
         if far > measured.limit_m or turned > measured.limit_rad:
@@ -92,13 +96,20 @@ def calibration_far_from_nominal(robot: Robot) -> Iterator[Finding]:
             x, y, z = measured.pose.xyz
             if far > measured.limit_m >= measured.off(Pose((x / 1000, y / 1000, z / 1000)))[0]:
                 advice = "the file's positions are probably in millimetres: convert them to metres"
+            elif _why_inverse(robot, edge):
+                advice = _if_inverse(measured)
             notes = [Note("measured here", measured.at)]
             yield finding("TF616", message, measured.named_at, help=advice, notes=notes)
 
 
+#: From here on angles are shown in whole degrees.
+_WHOLE_DEG = 10
+
+
 def _distance(metres: float, radians: float) -> str:
     length = f"{round(metres * 1000, 3):.3g} mm" if metres < 1 else f"{metres:.3g} m"
-    return f"{length} and {round(math.degrees(radians), 3):.2g} deg"
+    angle_deg = round(math.degrees(radians), 3)
+    return f"{length} and {angle_deg:.2g} deg" if angle_deg < _WHOLE_DEG else f"{length} and {angle_deg:.0f} deg"
 
 
 @rule("TF617")
@@ -139,33 +150,6 @@ def calibration_copied(robot: Robot) -> Iterator[Finding]:
             notes = [Note(f"{other.child} was measured here", other.at), Note("measured here", measured.at)]
             advice = "name each mount's own entry, or calibrate the second one"
             yield finding("TF618", message, measured.named_at, help=advice, notes=notes)
-
-
-@rule("TF620")
-def camera_without_optical_frame(robot: Robot) -> Iterator[Finding]:
-    """A camera has no optical frame.
-
-    By REP-103 images are stamped with a frame whose z points forward and y down, named ``…_optical_frame``. Without one
-    the driver stamps them with the body frame, and everything that projects pixels is rotated by 90 degrees twice. Give
-    the sensor one: ``frames: {NAME_optical_frame: {parent: NAME_link, rpy: [-90 deg, 0, -90 deg]}}``, or keep the
-    preset's name for it.
-    """
-    children = robot.children()
-    for sensor in robot.sensors:
-        if sensor.kind not in CAMERAS:
-            continue
-        below: set[str] = set()
-        waiting = [sensor.mount]
-        while waiting:
-            frame = waiting.pop()
-            if frame not in below:
-                below.add(frame)
-                waiting += [edge.child for edge in children.get(frame, ())]
-        by_other_names = any(edge.other_axes for edge in robot.edges if edge.child in below)
-        if not by_other_names and not any(is_optical(frame) for frame in below):
-            message = f"camera {sensor.name} has no optical frame"
-            advice = f"add a frame {sensor.name}_optical_frame with rpy: [-90 deg, 0, -90 deg]"
-            yield finding("TF620", message, sensor.at, help=advice)
 
 
 #: What is built into other devices, and so may share their pose.

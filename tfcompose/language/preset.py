@@ -119,6 +119,7 @@ class PresetDriver(Spec):
     )
     prefixed: Boolean = key(False, "true: a parameter takes the robot's frame prefix")
     tf: SensorPublisher = key("driver", "who publishes the frames that the driver can, by default")
+    by_default: Boolean = key(True, "false: it publishes them only if a parameter says so")
     on: Parameters = key({}, "parameters, or arguments, that make it publish them", {"publish_tf": True})
     off: Parameters | None = key(
         None, "those that keep it from that; left out: there is no switch", {"publish_tf": False}

@@ -74,13 +74,14 @@ class Inertial:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """The body on a frame."""
+    """The body on a frame. ``has_mass`` says that it was given one, even if no inertia could be computed from it."""
 
     name: str
     at: Span
     visuals: tuple[Shape, ...] = ()
     collisions: tuple[Shape, ...] = ()
     inertial: Inertial | None = None
+    has_mass: bool = False
 
 
 def materials(links: Mapping[str, Link]) -> list[Material]:

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from tfcompose.model.hardware import Block, Hardware
     from tfcompose.model.process import Claim, Process
 
-#: How names of optical frames end: REP-103's suffix, the spelling of newer ZED wrappers, and a short one.
-OPTICAL_ENDINGS = ("_optical_frame", "_frame_optical", "_optical")
+#: How names of optical frames end: REP-103's suffix, the spelling of newer ZED wrappers, a link's, and a short one.
+OPTICAL_ENDINGS = ("_optical_frame", "_frame_optical", "_optical_link", "_optical")
 
 
 def is_optical(frame: str) -> bool:
@@ -32,9 +32,10 @@ class MountedSensor:
     """A sensor as the rules see it: the frames that it brings, and its driver.
 
     ``driver`` is the name of the driver's process, empty without one; ``switch`` holds the parameters that keep the
-    driver from publishing frames (None: there are none), ``publishes`` says that it may. ``claims`` are the edges
-    outside the sensor that it publishes by default and does not own, each with the parameters that keep it from that.
-    ``serial_option`` is the preset's option for a serial number, empty where it has none.
+    driver from publishing frames (None: there are none), ``publishes`` says that it may, ``by_default`` that it does
+    where no parameter says so. ``claims`` are the edges outside the sensor that it publishes by default and does not
+    own, each with the parameters that keep it from that. ``serial_option`` is the preset's option for a serial number,
+    empty where it has none.
     """
 
     name: str
@@ -48,6 +49,7 @@ class MountedSensor:
     switch: dict[str, Any] | None = None
     publishes: bool = False
     claims: dict[str, dict[str, Any]] = field(default_factory=dict)
+    by_default: bool = True
     serial_option: str = ""
     serial: str | None = None
     tf_at: Span | None = None

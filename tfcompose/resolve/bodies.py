@@ -37,7 +37,7 @@ class Bodies:
         visuals, collisions, inertial = self._known[id(body)]
         if inertial and inertial.at:
             inertial = replace(inertial, at=place)
-        return Link(name, place, visuals, collisions, inertial)
+        return Link(name, place, visuals, collisions, inertial, has_mass=body.inertial is not None)
 
     def _parts(self, body: specs.LinkSpec, at: Path) -> tuple[tuple[Shape, ...], tuple[Shape, ...], Inertial | None]:
         visuals = self._shapes(body.visual, (*at, "visual"))

@@ -146,6 +146,7 @@ class _Mounting:
             preset.driver.off if preset.driver else None,
             sensor.tf == DRIVER,
             {f"{claim.parent} → {self.renamed(sensor.named(claim.child))}": claim.off for claim in claims_of(sensor)},
+            preset.driver is None or preset.driver.by_default,
             serial,
             sensor.options.get(serial) if serial else None,
             self.place("tf"),

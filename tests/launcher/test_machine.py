@@ -40,7 +40,7 @@ from tfcompose.launcher.events import (
 )
 from tfcompose.launcher.machine import step, wake_time
 from tfcompose.launcher.state import initial
-from tfcompose.plan import GuardPolicy, PlanProcess
+from tfcompose.plan import GuardPolicy, PlanProcess, Ready
 from tfcompose.variables import SETTLE
 
 DRIVE = PlanProcess("drive", "external", owns=(("odom", "base_link"),))
@@ -183,6 +183,19 @@ def test_a_program_that_ends_with_0_is_done_and_the_others_go_on() -> None:
     history = begin(STATIC, SLAM).feed(Exited("slam", 0))
     assert history.states("slam")[-1] == "EXITED"
     assert (history.found(), history.killed, history.exit_code) == ([], [], None)
+
+
+def test_a_required_program_that_others_wait_for_until_it_is_done_may_end_with_0() -> None:
+    """A spawner of controllers: it loads one, ends, and what drives starts then."""
+    drive = run_process("drive", after={"spawner": "done"})
+    spawners = (run_process("spawner", required=True), run_process("spawner", required=True, ready=Ready("exit")))
+    for spawner, others in zip(spawners, ((drive,), ()), strict=True):
+        history = begin(spawner, STATIC, *others).feed(Exited("spawner", 0))
+        assert (history.found(), history.exit_code) == ([], None)
+        assert history.started == ["spawner", "static", *(one.name for one in others)]
+    for code, others in ((0, ()), (1, (drive,))):
+        history = begin(spawners[0], STATIC, *others).feed(Exited("spawner", code))
+        expect(history.only(), "TF808", "spawner", f"exit code {code}")
 
 
 def test_when_every_program_is_done_the_launcher_is_too() -> None:

@@ -192,10 +192,10 @@ def _is_switched_off(process: Process, switch: dict[str, Any]) -> bool:
 
 
 def _is_switched_on(process: Process, switch: dict[str, Any]) -> bool:
-    """Return whether the process is told to publish, or not told what to do in a way that could be read."""
+    """Return whether a parameter or an argument has another value than the one that switches it off."""
     words = " ".join(process.argv).lower()
-    told = [process.params[key] != value for key, value in switch.items() if key in process.params]
-    return any(told) or any(
+    others = [process.params[key] != value for key, value in switch.items() if key in process.params]
+    return any(others) or any(
         f"{key}:=" in words and f"{key}:={value}".lower() not in words for key, value in switch.items()
     )
 

@@ -102,14 +102,14 @@ def calibration_far_from_nominal(robot: Robot) -> Iterator[Finding]:
             yield finding("TF616", message, measured.named_at, help=advice, notes=notes)
 
 
-#: From here on angles are shown in whole degrees.
-_WHOLE_DEG = 10
+#: From here on angles are shown rounded to degrees.
+_ROUNDED_FROM_DEG = 10
 
 
 def _distance(metres: float, radians: float) -> str:
     length = f"{round(metres * 1000, 3):.3g} mm" if metres < 1 else f"{metres:.3g} m"
     angle_deg = round(math.degrees(radians), 3)
-    return f"{length} and {angle_deg:.2g} deg" if angle_deg < _WHOLE_DEG else f"{length} and {angle_deg:.0f} deg"
+    return f"{length} and {angle_deg:.2g} deg" if angle_deg < _ROUNDED_FROM_DEG else f"{length} and {angle_deg:.0f} deg"
 
 
 @rule("TF617")

@@ -283,7 +283,8 @@ class Started(Checked):
     host: Text | None = key(None, "the computer that it runs on", "jetson", to=ALL)
     required: Boolean | None = key(
         None,
-        "true: its end stops everything; false: the rest goes on when it fails; default: its failure stops everything",
+        "true: its end stops everything, unless another process waits until it is done; false: the rest goes on when "
+        "it fails; default: its failure stops everything",
         to=KEPT_ALIVE,
     )
     restart: RestartPolicy = key(DEFAULTS.restart, "when it is started again after it has ended", to=KEPT_ALIVE)

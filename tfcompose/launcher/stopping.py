@@ -61,9 +61,15 @@ def process_exited(step: Transition, event: Exited) -> None:
         step.track(name, replace(step.state.tracked[name], ready=True, ready_since=before.ready_since or step.now))
     early = name == step.state.guard and step.state.clear is None
     when = " before it reported whether the plan's edges are published already" if early else ""
-    if not done or process.required:
+    if not done or (process.required and not _is_to_end(step.state, process)):
         when = ", and the plan requires it" if done else when
         step.fail_process(name, ended_by_itself(name, event.returncode, when, event.last_lines))
+
+
+def _is_to_end(state: State, process: PlanProcess) -> bool:
+    """Return whether the process is there to end: it is ready then, or another one waits until it is done."""
+    ends = process.ready is not None and process.ready.kind == "exit"
+    return ends or any(one.process.after.get(process.name) == "done" for one in state.tracked.values())
 
 
 def _guard_exited(step: Transition, one: Tracked, event: Exited) -> None:

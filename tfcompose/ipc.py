@@ -151,7 +151,7 @@ GUARD_ORDERS = TaggedUnion[GuardOrder]("order", get_args(GuardOrder))
 
 # Notices: what the launcher tells a person, and whoever listens at its control socket.
 
-#: supervisord's names, and EXPECTED for a process that somebody else starts.
+#: supervisord's names, and EXPECTED for an external process.
 StateName = Literal["STOPPED", "STARTING", "RUNNING", "BACKOFF", "STOPPING", "EXITED", "FATAL", "EXPECTED"]
 Stream = Literal["stdout", "stderr"]
 

@@ -260,10 +260,10 @@ Fixed edges belong on /tf_static, moving ones on /tf; when an edge changes betwe
 The finding lists where tfcompose looked. A package's executables are found once its setup file is sourced.""",
     "TF811": """An edge was not published while the plan ran.
 
-The finding names its owner: a process that somebody else starts may not be running, or its node has another name.""",
+The finding names its owner: an external process may not be running, or its node has another name.""",
     "TF813": """A process waits for one that does not exist, or for the end of one that never ends.
 
-tfcompose's own processes, and those that somebody else starts, have no end; they can be started and ready.""",
+tfcompose's own processes, and external ones, have no end; they can be started and ready.""",
     "TF814": """There is no live pose of one frame in another.
 
 A frame is unknown, the two are in two trees, their edges have no time in common, or nothing is published at all.""",

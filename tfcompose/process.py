@@ -60,7 +60,7 @@ class Own:
 
     @property
     def description(self) -> Path:
-        """The file that becomes ``robot_description``; it stands beside the plan."""
+        """The file that becomes ``robot_description``; it is beside the plan."""
         return self.file.parent / (self.process.description or self.plan.description)
 
     @property

@@ -282,7 +282,7 @@ def test_the_plans_own_offender_is_stopped_and_stays_so_where_the_policy_is_stop
         "STOPPED",
         None,
     )
-    expect(history.feed(Found(ERROR, "slam")).found()[-1], "TF801", "nothing is stopped", "slam does not run")
+    expect(history.feed(Found(ERROR, "slam")).found()[-1], "TF801", "nothing is stopped", "slam")
 
 
 def test_an_offender_that_somebody_else_started_is_not_stopped() -> None:

@@ -100,7 +100,7 @@ def test_what_is_no_bag_is_reported_in_one_sentence(tmp_path: Path) -> None:
 def test_without_the_library_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
     monkeypatch.setitem(sys.modules, "rosbags", None)
     for words in (["monitor"], ["verify", "robots/my_robot.yaml"], ["tree"], ["echo", "a", "b"]):
-        assert main([*words, "--bag", "some.mcap"]) == 1
+        assert main([*words, "--bag", "some.mcap"]) == 2
         output = capsys.readouterr()
         assert "error[TF906]" in output.err
         assert "pip install 'tfcompose[bag]'" in output.err

@@ -154,7 +154,7 @@ def test_without_ros_the_running_tree_is_no_traceback(robot: str) -> None:
         ("doctor", robot),
     )
     for words in (("verify", robot), *observing):
-        done = tfcompose_without_ros(*words, code=1)
+        done = tfcompose_without_ros(*words, code=2)
         first, advice = (done.stdout + done.stderr).splitlines()
         assert first.startswith("error[TF901]")
         assert "pip install 'tfcompose[ros]'" in advice

@@ -38,7 +38,7 @@ def unknown_owner(robot: Robot) -> Iterator[Finding]:
     """An edge names an owner that is not a process.
 
     An owner is one of the robot's processes: one under ``processes``, a sensor with a driver, or the built-in
-    ``static`` and ``joints``. A process that somebody else starts is declared with ``external: true``.
+    ``static`` and ``joints``. A process that tfcompose does not start is declared with ``external: true``.
     """
     names = {process.name: None for process in robot.processes}
     lost: dict[tuple[str, Span], list[Edge]] = {}  # a part's owner owns many edges, and is one typo
@@ -46,7 +46,7 @@ def unknown_owner(robot: Robot) -> Iterator[Finding]:
         if edge.owner not in names and not robot.excuses(edge.owner):
             lost.setdefault((edge.owner, edge.owner_at or edge.at), []).append(edge)
     for (owner, at), edges in lost.items():
-        declare = f"declare it: processes: {{{owner}: {{external: true}}}}, if somebody else starts it"
+        declare = f"declare it: processes: {{{owner}: {{external: true}}}}, if it is started elsewhere"
         message = f"unknown owner {owner} of {with_more(edges[0].name, len(edges) - 1)}"
         yield finding("TF302", message, at, help=did_you_mean(owner, names, declare))
 
@@ -152,7 +152,7 @@ def driver_publishes_too(robot: Robot) -> Iterator[Finding]:
     """A sensor's driver publishes frames that tfcompose owns, and tfcompose cannot switch them off.
 
     With ``tf: tfcompose`` tfcompose publishes the frames inside a sensor and switches off those of a driver that it
-    starts itself. It cannot do so for a driver that somebody else starts, or that has a command of its own: both would
+    starts itself. It cannot do so for an external driver, or one that has a command of its own: both would
     publish, and tf2 takes the last message. Set the driver's parameter where it is started and allow this finding, or
     leave the frames to the driver with ``tf: driver``. The same holds for edges outside the sensor that a driver
     publishes by default, such as map → laser of sick_scan_xd.

@@ -212,7 +212,7 @@ def serial_missing(robot: Robot) -> Iterator[Finding]:
 
     Each driver takes the first device that it finds: at the next start left and right may be swapped, or both drivers
     compete for one device. Give each its serial number: ``options: {serial: "123456789012"}``. Another parameter that
-    identifies the device (``usb_port_id``, ``device_type``) will do. Drivers that somebody else starts are exempt.
+    identifies the device (``usb_port_id``, ``device_type``) will do. External drivers are exempt.
     """
     processes = {process.name: process for process in robot.processes if process.kind == "run" and process.package}
     groups: dict[tuple[str | None, str | None, str | None], list[MountedSensor]] = {}

@@ -52,9 +52,9 @@ ALL_HEARD_S = 2.0
 _TAKES = frozenset({"TF801", "TF802", "TF820"})
 #: What becomes of it in a strict plan, by whether it is behind the fence.
 _FATE = {
-    True: "held back: no listener gets it",
-    False: "not behind the fence, so it cannot be held back: listeners get it",
-    None: "whether it is behind the fence cannot be seen: what is, is held back",
+    True: "held back: no listener receives it",
+    False: "not fenced off, so it cannot be held back: listeners receive it",
+    None: "whether it is fenced off is unknown; if it is, it is held back",
 }
 #: So long a strict guard waits until it knows whether listeners get it, in seconds.
 FATE_S = 0.3

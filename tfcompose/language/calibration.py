@@ -342,7 +342,7 @@ class _Reader:
     found: list[Finding] = field(default_factory=list)
 
     def model(self, model: type[M], data: Any, path: Path) -> M | None:
-        """Return what stands at a path as the model, or None after noting what is wrong with it."""
+        """Return what is at a path as the model, or None after noting what is wrong with it."""
         made, refusals = read(model, data)
         missing: set[Path] = set()
         for one in refusals:

@@ -135,7 +135,7 @@ class _Merger:
     def note_removal(self, was_there: bool, key: Place, path: Path) -> None:  # noqa: FBT001 (the fact itself)
         """Say so if nothing was removed."""
         if not was_there:
-            message = f"{'.'.join(map(str, path))} is removed here, but nothing is there"
+            message = f"{'.'.join(map(str, path))} is removed here, but does not exist"
             self.found.append(finding("TF010", message, key.span))
 
     def remember(self, path: Path, old: Place) -> None:
@@ -260,7 +260,7 @@ def _wrong_profiles(source: Source) -> list[Finding]:
             found.append(finding("TF103", message, span, help=f"for example {name}: {{sensors: {{…}}}}"))
         elif "profiles" in profile:
             message, span = f"the profile {name} holds profiles", source.at_key(("profiles", name, "profiles"))
-            found.append(finding("TF101", message, span, help="profiles stand side by side: --profile a --profile b"))
+            found.append(finding("TF101", message, span, help="combine profiles instead: --profile a --profile b"))
     return found
 
 

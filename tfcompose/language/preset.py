@@ -176,7 +176,7 @@ def wrong_names(preset: PresetSpec) -> Iterator[Refusal]:
     yield from _options(preset)
     driver = preset.driver
     if driver and (driver.executable is None) == (driver.launch is None):
-        yield Refusal("TF606", ("driver",), "one of executable and launch says what is started", on_key=True)
+        yield Refusal("TF606", ("driver",), "give either executable or launch", on_key=True)
     if driver and driver.args and not driver.launch:
         yield Refusal("TF606", ("driver", "args"), "a node takes params; args are a launch file's", on_key=True)
 

@@ -250,7 +250,7 @@ class Started(Checked):
         {"package": "slam_toolbox", "executable": "async_slam_toolbox_node"},
     )
     simulate: Simulate | None = key(None, "a simulation of it", {"circle": {"radius": "1 m"}, "rate": "50 Hz"})
-    external: OnlyTrue | None = key(None, "true: somebody else starts it", True)
+    external: OnlyTrue | None = key(None, "true: tfcompose does not start it", True)
     shell: OnlyTrue | None = key(None, "true: run is one string, which /bin/sh reads", True)
     node: Annotated[NamedNode, short("name", NamedNode)] | None = key(
         None,

@@ -101,7 +101,7 @@ def _path_of(loc: tuple[int | str, ...], data: Any) -> Path:
 
 
 def _without(data: Any, paths: Iterable[Path], gone: set[Path]) -> Any:
-    """Return the data without what stands at the paths, or None if that is all of it; the paths are added to ``gone``.
+    """Return the data without what is at the paths, or None if that is all of it; the paths are added to ``gone``.
 
     A list goes with one of its items. Nothing that is given changes.
     """

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from tfcompose.load import Path
 
 Pattern = tuple[str, ...]
-"""Where something stands in the language: keys, and ``*`` for any name. Items of a list stand where the list does."""
+"""Where something is in the language: keys, and ``*`` for any name. Items of a list stand where the list does."""
 
 
 class Spec(BaseModel):
@@ -130,7 +130,7 @@ def fields_of(kind: Any) -> Mapping[str, FieldInfo]:
 
 
 def below(annotation: Any, step: str | int) -> Any:
-    """Return the annotation of what stands at a key or an index below one that is annotated so, or None."""
+    """Return the annotation of what is at a key or an index below one that is annotated so, or None."""
     for kind in kinds_of(annotation):
         if is_mapping(kind):
             if step in fields_of(kind):
@@ -156,7 +156,7 @@ def measure_of(annotation: Any) -> Measure | None:
 
 
 def at(model: Any, path: tuple[str | int, ...]) -> Any:
-    """Return the annotation of what stands at a path in a file of the model, or None."""
+    """Return the annotation of what is at a path in a file of the model, or None."""
     for step in path:
         model = below(model, step)
     return model
@@ -175,7 +175,7 @@ def mapping_at(model: Any, path: tuple[str | int, ...]) -> Any:
 
 
 def walk(annotation: Any, pattern: Pattern = ()) -> Iterator[tuple[Pattern, Any]]:
-    """Yield every mapping with known keys below an annotation, and where it stands; itself first."""
+    """Yield every mapping with known keys below an annotation, and where it is; itself first."""
     for kind in kinds_of(annotation):
         if is_mapping(kind):
             yield pattern, kind

@@ -68,7 +68,7 @@ def waits_in_vain(name: str, other: str, what: str, why: str) -> Finding:
 def never_clear(name: str, seconds: float) -> Finding:
     """Return the finding for a guard that does not report whether the plan's edges are free."""
     message = f"{name} did not report within {seconds:g} s whether the plan's edges are published already"
-    return finding("TF808", message, None, help="its own log says how far it came; --guard off starts without it")
+    return finding("TF808", message, None, help="its log shows how far it got; --guard off starts without it")
 
 
 def never_published(owner: Tracked, edges: tuple[PlanEdge, ...]) -> Finding:

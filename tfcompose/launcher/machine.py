@@ -252,7 +252,7 @@ def _violation(step: Transition, found: Finding, process: str) -> None:
         step.report(_noted(found, f"nothing is stopped: {why}"))
     else:
         why = "guard is strict" if found.code in _STOPPED_BY_STRICT else "on_violation is stop-offender"
-        step.report(_noted(found, f"{process} is stopped for it, and stays so: {why}"))
+        step.report(_noted(found, f"{process} is stopped and not restarted: {why}"))
         process_requested(step, ProcessRequest("stop", process))
 
 

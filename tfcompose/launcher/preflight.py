@@ -105,7 +105,7 @@ def _command_of(
         return finding("TF902", f"the plan does not say how {process.name} is started", None)
     folder = folder_of(process, *files)
     if not own and not folder.is_dir():
-        lost = f"the folder {folder} that {process.name} runs in is not there"
+        lost = f"the folder {folder} that {process.name} runs in does not exist"
         optional = process.required is False
         return Command(argv, env, folder, missing=lost) if optional else finding("TF810", lost, None)
     command: Command | NotFound | Finding
@@ -135,7 +135,8 @@ def _never_started(plan: Plan) -> list[Finding]:
             if name not in known:
                 found.append(finding("TF902", f"{process.name} waits for {name}, which is not in the plan", None))
             elif what not in _promises(known[name]):
-                found.append(finding("TF902", f"{process.name} waits until {name} is {what}: that never comes", None))
+                message = f"{process.name} waits until {name} is {what}, which never happens"
+                found.append(finding("TF902", message, None))
     waiting = {process.name: set(process.after) & set(known) for process in plan.processes if process.kind != "guard"}
     while free := [name for name, others in waiting.items() if not others & set(waiting)]:
         for name in free:
@@ -254,7 +255,7 @@ def _can_run(path: Path) -> bool:
 def _why_not(path: Path) -> str:
     if path.is_file():
         return f"{path} may not be executed"
-    return f"{path} is a folder" if path.is_dir() else f"{path} is not there"
+    return f"{path} is a folder" if path.is_dir() else f"{path} does not exist"
 
 
 # Launch files.

@@ -133,13 +133,13 @@ def refusal(state: State, name: str, verb: Verb) -> str | None:
     if state.stop:
         return "everything is being stopped"
     if one.state == "EXPECTED":
-        return f"somebody else starts and stops {name}"
+        return f"{name} is external, and started and stopped elsewhere"
     if name == state.guard and verb != "restart":
         return f"{name} watches the others and is not stopped alone; tfcompose up --guard off judges nobody"
     if verb == "start" and one.alive and one.leaving != "stop":
         return f"{name} runs already, with pid {one.pid}"
     if verb == "stop" and not one.alive and one.state != "BACKOFF" and not (one.state == "STOPPED" and one.wanted):
-        return f"{name} does not run"
+        return f"{name} is not running"
     return None
 
 

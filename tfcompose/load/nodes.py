@@ -209,7 +209,7 @@ class Reader:
 
     def _alias(self, event: yaml.AliasEvent) -> None:
         if event.anchor not in self._anchors:
-            message = f"no anchor &{event.anchor} stands above this alias"
+            message = f"no anchor &{event.anchor} is defined before this alias"
             raise RejectedError([finding("TF002", message, self._place(event).span)])
         part = self._anchors[event.anchor]
         if part is None or len(self._stack) + part.height > DEEPEST:
@@ -301,7 +301,7 @@ class Place:
         return Place(self._at, inside, keys)
 
     def get(self, path: Path) -> Place | None:
-        """Return the place of what stands at ``path`` below, or None."""
+        """Return the place of what is at ``path`` below, or None."""
         place: Place | None = self
         for step in path:
             if place is None:
@@ -310,7 +310,7 @@ class Place:
         return place
 
     def nearest(self, path: Path) -> Place:
-        """Return the place of what stands at ``path`` below, or of the nearest thing around it that there is."""
+        """Return the place of what is at ``path`` below, or of the nearest thing around it that there is."""
         place = self
         for step in path:
             below = place.inside.get(step)

@@ -27,7 +27,7 @@ MOST_CHARACTERS = 4_000_000
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A file's plain data, where each key and value stands, and what was found on the way.
+    """A file's plain data, where each key and value is, and what was found on the way.
 
     Aliases of one anchor are one object in ``data``, which nothing changes. ``replaced`` has the places of the
     values that others were laid over, by path, the last one first. ``has_nulls`` says that values may be null,

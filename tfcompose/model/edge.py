@@ -90,7 +90,7 @@ class Calibration:
     """A pose that was measured: that of ``child`` in ``parent``, frames of the robot.
 
     ``nominal`` is the same by the pose that is written beside it, if one is. ``named_at`` is the place in the robot
-    file, ``at`` the entry in the calibration file, ``entry`` its pose as it stands there; ``inverted`` says that it was
+    file, ``at`` the entry in the calibration file, ``entry`` its pose as it is there; ``inverted`` says that it was
     taken the other way round. The limits (m, rad) say how far from nominal is too far.
     """
 

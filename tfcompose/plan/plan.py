@@ -19,7 +19,7 @@ EdgeKind = Literal["static", "joint", "dynamic"]
 #: How a joint moves; of planar and floating ones joint states say nothing.
 JointType = Literal["revolute", "continuous", "prismatic", "planar", "floating"]
 
-#: What a process is: one of tfcompose's own, one that somebody else starts, or a program.
+#: What a process is: one of tfcompose's own, one that is started elsewhere, or a program.
 ProcessKind = Literal["static", "joints", "guard", "simulate", "external", "run"]
 #: After which ends a process is started again.
 RestartPolicy = Literal["no", "on-failure", "always"]

@@ -141,7 +141,7 @@ class Drafts:
         first, more = taken[0], f" and {len(taken) - 1} more" if taken[1:] else ""
         notes = [Note(f"{first} is defined here", there[first]), Note("and here", brought[first])]
         advice = f"{else_[0]}a prefix of its own, prefix: {part.name}/{else_[1]}"
-        message = f"the part {part.name} brings the {kind} {first}{more}, which is there already"
+        message = f"the part {part.name} brings the {kind} {first}{more}, which already exists"
         place = self.source.at_key(("parts", part.name))
         self.found.append(finding("TF505", message, place, notes=notes, help=advice))
 

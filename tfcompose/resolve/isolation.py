@@ -152,7 +152,7 @@ class Filler:
             advice = "a path from this file's folder; or write the path alone, which no other machine has"
             self.found.append(finding("TF106", f"${{file({name})}} is an absolute path", at, help=advice))
         elif self.disk and not (self.disk.is_file(place) or self.disk.is_folder(place)):
-            message = f"${{file({name})}}: {place} is not there"
+            message = f"${{file({name})}}: {place} does not exist"
             self.found.append(finding("TF019", message, at, help="a path is relative to the file that writes it"))
         return f"${{file:{place}}}"
 
@@ -164,7 +164,7 @@ class Filler:
         place = path_named(cwd, at)
         if self.disk and not self.disk.is_folder(place):
             advice = "a path is relative to the file that writes it"
-            self.found.append(finding("TF019", f"cwd: the folder {place} is not there", at, help=advice))
+            self.found.append(finding("TF019", f"cwd: the folder {place} does not exist", at, help=advice))
         return f"${{file:{place}}}"
 
     def _check_paths(self, process: Process, node: Node) -> None:

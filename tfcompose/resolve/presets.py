@@ -271,7 +271,7 @@ class Library:
         else:
             below = self.source(base, deep + 1) if self.file(base) else None
         if below is None:
-            raise RejectedError([finding("TF606", f"{name} extends {base}, which is not there", at)])
+            raise RejectedError([finding("TF606", f"{name} extends {base}, which does not exist", at)])
         return lay_over(without(below, "extends"), own, is_overlay=False, of=PresetSpec)
 
     def _later(self, file: str) -> str | None:

@@ -119,7 +119,7 @@ def unknown_names(
         for other, what in process.after.items():
             if what == "done" and other in lasting:
                 place = source.at((section, process.name, *inside, other))
-                message = f"{process.name} waits until {other} is done: that never comes"
+                message = f"{process.name} waits until {other} is done, which never happens"
                 found.append(finding("TF813", message, place, help=f"after: {{{other}: ready}}, or started"))
             elif other not in known and not other.startswith(missing):
                 place = source.at_key((section, process.name, *inside, other))
@@ -239,7 +239,7 @@ def _idle_rate(path: Path, name: str, process: Started, source: Source) -> Itera
     """Yield a finding about a rate: only ``joints`` has one."""
     if process.rate is None or path == ("processes", JOINTS):
         return
-    advice = "remove it; an edge says itself how often it is sent: odom: {parent: map, owner: …, rate: 10 Hz}"
+    advice = "remove it; the rate belongs to the edge: odom: {parent: map, owner: …, rate: 10 Hz}"
     if process.simulate:
         advice = "write it under simulate"
     elif path == ("processes", STATIC):
@@ -258,9 +258,9 @@ def _idle(path: Path, name: str, process: Started, source: Source) -> Iterator[F
         return  # no driver is simulated: that is refused
     what, whom = "simulated", "the real process"
     if way == "external":
-        what, whom = "started by others", "whoever starts the process"
+        what, whom = "external", "whoever starts the process"
     for key in process.model_fields_set - keys_of(way) - RUNNING - {"rate"}:  # which are refused elsewhere
-        message, advice = f"{name} is {what}: {key} does nothing there", f"remove it: it is for {whom}"
+        message, advice = f"{name} is {what}, so {key} has no effect", f"remove it: it is for {whom}"
         yield finding("TF851", message, source.at_key((*path, key)), help=advice)
 
 

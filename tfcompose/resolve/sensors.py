@@ -96,9 +96,9 @@ class _Mounting:
         if self.unknown:
             sensor, first = self.sensor, next(iter(self.unknown))
             *others, last = self.unknown
-            names = f"{', '.join(others)} and {last} are" if others else f"{last} is"
+            names = f"{', '.join(others)} and {last}" if others else last
             parent = "" if others else f" in {sensor.parent_of(first, sensor.frames()[first])}"
-            message = f"{sensor.spec.preset} does not know where {names}{parent}"
+            message = f"{sensor.spec.preset} has no pose of {names}{parent}"
             frames = ", ".join(self.unknown.values())
             advice = f"measure, and write: sensors: {{{sensor.name}: {{frames: {{{frames}}}}}}}"
             self.drafts.found.append(finding("TF605", message, self.place("preset"), help=advice))
@@ -168,7 +168,7 @@ class _Mounting:
                 self.drafts.found.append(finding("TF203", message, source.at((*at, name, "parent")), help=advice))
         mounted = sensor.spec.frames.get(original)
         if mounted and (mounted.xyz or mounted.parent or rotation_of(mounted)):
-            advice = f"the pose of {sensor.name} itself says where it is"
+            advice = f"its pose is that of {sensor.name}"
             message = f"{mount} is the mount, and has no pose inside"
             self.drafts.found.append(finding("TF106", message, source.at_key((*at, original)), help=advice))
         if mount in sensor.frames():

@@ -71,7 +71,7 @@ def data_beyond_tf(state: TreeState) -> Iterator[Finding]:
         for lack_s, age_s, edge in _latest_above(state, each):
             fault = _off_clock(state, each, edge, age_s, simulated=simulated)
             if fault:
-                message = f"{each.topic} from {sender} {fault}: no lookup brings it together with {edge.name}"
+                message = f"{each.topic} from {sender} {fault}: no lookup can combine it with {edge.name}"
                 yield finding("TF841", message, None, help=_clock_help(each, age_s))
             elif lack_s > LACK_S:
                 message = f"{each.topic} from {sender} is stamped {duration(lack_s)} after the newest {edge.name}"
@@ -102,7 +102,7 @@ def late_stamps(state: TreeState) -> Iterator[Finding]:
 
     for edges in by_publisher(state, is_late):
         late = duration(late_s(edges[0]))
-        message = f"{names_of(edges)} from {who(edges[0])} is stamped {late} ago when it comes"
+        message = f"{names_of(edges)} from {who(edges[0])} arrives {late} after its stamp"
         notes = [Note(f"a lookup of now, or of data that is newer, is extrapolation into the future by {late}")]
         advice = "stamp with the time of the measurement and send at once; is the node overloaded, or its clock behind?"
         yield finding("TF833", message, None, severity="warning", notes=notes, help=advice)

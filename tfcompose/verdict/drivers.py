@@ -164,5 +164,5 @@ def _not_taken(node: str, name: str, wanted: Value, found: Value | None, drives:
     if found is None:
         advice = "is it a version of the node that has another switch, or another node of that name?"
         return finding("TF829", f"{node} has no parameter {name}, and {plan}{of}", None, help=advice)
-    advice = f"start it with {name}: {json.dumps(wanted)}; what it publishes is otherwise not what the plan says"
+    advice = f"start it with {name}: {json.dumps(wanted)}; otherwise it publishes what the plan does not expect"
     return finding("TF829", f"{node} has {name}: {json.dumps(found)}, and {plan}{of}", None, help=advice)

@@ -144,7 +144,7 @@ def violation_finding(
 ) -> Finding:
     """Return the finding for violations of one kind by one node, that runs ``where`` and may drive a sensor.
 
-    ``place`` is where the edge stands in the robot's file, if that is at hand.
+    ``place`` is where the edge is in the robot's file, if that is at hand.
     """
     first = found[0]
     mild = first.code in _WARNINGS or (first.code == "TF803" and plan.guard.unknown_edges == "warn")
@@ -257,7 +257,7 @@ def _driver_help(found: Violation, driven: Driven | None) -> str:
         return ""
     if driven.publishes and found.code in _OTHERWISE and _is_own(found):
         frames = f"frames: {{{found.child}: {{parent: {found.parent}}}}}"
-        return f"let sensors.{driven.sensor} say what its driver does: " + (
+        return f"describe what the driver does under sensors.{driven.sensor}: " + (
             frames if found.edge else "options with that frame"
         )
     switch = ", ".join(f"{name}: {json.dumps(value)}" for name, value in driven.switch.items())

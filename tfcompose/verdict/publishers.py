@@ -83,7 +83,7 @@ def leak(node: str, topic: str, own: str) -> Finding:
 def replaced_latched(node: str, sent_before: int, missing: Sequence[str]) -> Finding:
     """Return the finding for a publisher whose last latched message, which the guard heard, lacks these edges."""
     lost, named = counted(sent_before, "message"), listed(missing, LISTED_AT_MOST)
-    message = f"{node} sent {lost} on /tf_static before the guard heard it, and none since holds {named}"
+    message = f"{node} sent {lost} on /tf_static before the guard received it, and none since contains {named}"
     advice = "send all fixed edges in each message: a latched topic keeps the last one only"
     return finding("TF850", message, None, severity="warning", help=advice)
 
@@ -240,7 +240,7 @@ def compared(expected: Pose, observed: Pose) -> str:
 def pose_differs(off: Sequence[tuple[PlanEdge, str, Pose]], publisher: str, place: Span | None = None) -> Finding:
     """Return the finding for edges that come with another pose than the plan's: each with its parent, as it was sent.
 
-    ``publisher`` is empty where it is not known; ``place`` is where the first edge stands in the robot's file.
+    ``publisher`` is empty where it is not known; ``place`` is where the first edge is in the robot's file.
     """
     (edge, parent, pose), *others = off
     by = f" from {publisher}" if publisher else ""

@@ -35,14 +35,14 @@ SURE_S = 1.0
 NAMED_AT_MOST = 6
 
 
-# Edges of a plan; ``place`` is where the first one stands in the robot's file.
+# Edges of a plan; ``place`` is where the first one is in the robot's file.
 
 
 def never_received(edges: Sequence[PlanEdge], advice: str, place: Span | None = None) -> Finding:
     """Return the finding for edges of one owner that did not come."""
     several = len(edges) > 1
     named = with_more(edges[0].name, len(edges) - 1)
-    message = f"{named} {'were' if several else 'was'} never seen; {'their' if several else 'its'} owner is "
+    message = f"{named} {'were' if several else 'was'} never received; {'their' if several else 'its'} owner is "
     return finding("TF811", message + _owner(edges[0]), place, notes=[] if place else _declared(edges), help=advice)
 
 

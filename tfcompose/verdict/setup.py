@@ -56,7 +56,7 @@ def no_tf(state: TreeState) -> Iterator[Finding]:
         notes.append(Note(f"there is TF on {listed(elsewhere)}"))
         advice = f"look there: tfcompose doctor {namespace_options(elsewhere)}"
     elif state.plan and not state.nodes:
-        advice = f"is {state.plan.robot} up, and with these settings? tfcompose ps says which robots run"
+        advice = f"is {state.plan.robot} running, and with these settings? tfcompose ps lists the running robots"
     elif state.nodes:
         advice = "start robot_state_publisher, or tfcompose up; tfcompose doctor --for 20 looks longer"
     else:
@@ -82,13 +82,13 @@ def other_settings(state: TreeState) -> Iterator[Finding]:
         number = "a ROS process" if len(processes) == 1 else f"{len(processes)} ROS processes"
         settings = [f"{name}={value}" for name, value in apart_items]
         here = [f"{name} is {state.settings.get(name) or DEFAULTS[name] or 'unset'}" for name, _ in apart_items]
-        message = f"{number} on this machine cannot be heard from here: started with {', '.join(settings)}, "
+        message = f"{number} on this machine cannot be reached from here: started with {', '.join(settings)}, "
         message += f"and here {' and '.join(here)}"
         notes = [Note(f"pid {one.pid}: {one.command}") for one in processes[:MOST_PROCESSES]]
         more = len(processes) - len(notes)
         notes += [Note(f"and {more} more")] if more else []
         advice = (
-            f"to look there: {' '.join(settings)} tfcompose doctor; who is to hear each other needs the same settings"
+            f"to look there: {' '.join(settings)} tfcompose doctor; processes that communicate need the same settings"
         )
         yield finding("TF908", message, None, severity="warning", notes=notes, help=advice)
 
@@ -104,7 +104,7 @@ def settings_contradict(state: TreeState) -> Iterator[Finding]:
     value = settings.get(RANGE, "")
     if settings.get(LOCALHOST_ONLY) == "1":
         if value not in {"", "LOCALHOST"}:
-            message = f"{LOCALHOST_ONLY}=1 is set, so {RANGE}={value} does not count: other machines are not heard"
+            message = f"{LOCALHOST_ONLY}=1 is set, so {RANGE}={value} has no effect: other machines are not reached"
             yield finding("TF909", message, None, severity="warning", help=f"unset {LOCALHOST_ONLY}; it is out of use")
     elif value not in {"", "SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT"}:
         message = f"{RANGE}={value} is not one of SUBNET, LOCALHOST, OFF, SYSTEM_DEFAULT"

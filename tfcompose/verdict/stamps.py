@@ -102,7 +102,7 @@ def advice(code: str, detail: str) -> str:
         )
     if detail == "without a stamp":
         return "a node with use_sim_time stamps 0 while there is no /clock; else set header.stamp from the node's clock"
-    apart = "no lookup brings it together with the rest"
+    apart = "no lookup can combine it with the rest"
     if "simulated" in detail or "/clock" in detail:
         return f"{apart}: use_sim_time must be the same for all nodes, and agree with ros.clock"
     return f"{apart}: is a bag played without --clock, or a machine's clock not in sync?"
@@ -297,8 +297,8 @@ def clock_missing(state: TreeState) -> Iterator[Finding]:
             advice = "start the simulator, play the bag with --clock, or set use_sim_time: false"
             yield finding("TF836", message, None, help=advice)
         elif not state.clock_moves:
-            stands = "has sent nothing" if state.clock_ns is None else f"stands at {state.clock_ns / 1e9:.3f} s"
-            message = f"{users}, and /clock from {listed(topic.publishers)} {stands}"
+            stuck = "has sent nothing" if state.clock_ns is None else f"is stuck at {state.clock_ns / 1e9:.3f} s"
+            message = f"{users}, and /clock from {listed(topic.publishers)} {stuck}"
             yield finding("TF836", message, None, help="is the simulator paused, or the bag at its end?")
 
 

@@ -215,8 +215,8 @@ def missing_help(state: TreeState, plan: Plan, edge: PlanEdge) -> str:
         return f"{edge.node} is running and sends nothing: what does it wait for, and is its TF switched on?"
     kind = next((process.kind for process in plan.processes if process.name == edge.owner), "")
     if kind == "external":
-        return f"nobody named {edge.node} is seen: start it, or correct node: of the process {edge.owner}"
-    return f"nobody named {edge.node} is seen: is the robot up? tfcompose ps"
+        return f"no node {edge.node} was found: start it, or correct node: of the process {edge.owner}"
+    return f"no node {edge.node} was found: is the robot running? tfcompose ps"
 
 
 # Differences as findings.
@@ -233,7 +233,7 @@ def grouped(found: Iterable[Difference]) -> list[list[Difference]]:
 def group_finding(
     group: Group, state: TreeState, plan: Plan, place: Span | None = None, slow_is: Severity = "warning"
 ) -> Finding:
-    """Return the finding for differences of one group; ``place`` is where the first edge stands in the robot's file."""
+    """Return the finding for differences of one group; ``place`` is where the first edge is in the robot's file."""
     first = group[0]
     found = (
         _violation_finding(group, state, plan, place)

@@ -239,13 +239,16 @@ def load(text: str, file: Path, monkeypatch: pytest.MonkeyPatch) -> list[Recorde
         return lambda *words, **given: Recorded(kind=name, words=words, **given)
 
     for module in (
-        "launch", "launch.actions", "launch.event_handlers", "launch.events", "launch_ros", "launch_ros.actions",
+        "ament_index_python", "ament_index_python.packages", "launch", "launch.actions", "launch.event_handlers",
+        "launch.events", "launch.launch_description_sources", "launch_ros", "launch_ros.actions",
         "launch_ros.event_handlers", "launch_ros.events", "launch_ros.events.lifecycle",
         "launch_ros.parameter_descriptions",
     ):  # fmt: skip
         stand_in = ModuleType(module)
         stand_in.__getattr__ = kind  # type: ignore[method-assign]
         monkeypatch.setitem(sys.modules, module, stand_in)
+    shares = sys.modules["ament_index_python.packages"]
+    shares.get_package_share_directory = lambda name: str(file.parents[1] / "share" / name)  # type: ignore[attr-defined]
     messages = ModuleType("lifecycle_msgs.msg")
     messages.Transition = SimpleNamespace(TRANSITION_CONFIGURE=1, TRANSITION_ACTIVATE=3)  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "lifecycle_msgs.msg", messages)
@@ -314,6 +317,122 @@ def test_a_driver_is_a_node_with_its_name_parameters_and_remappings(
     assert len(handlers) == 2, "configured when it was started, and activated when it is inactive"
     variables = [action.words for action in actions if action.kind == "SetEnvironmentVariable"]
     assert variables == [("ROS_DOMAIN_ID", "7"), ("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")]
+
+
+JOINTED = """
+tfcompose: 1
+robot: arm
+ros: {{discovery: localhost, namespace: left, clock: sim}}
+links:
+  base_link: {{}}
+  upper: {{}}
+joints:
+  shoulder: {{type: revolute, parent: base_link, child: upper, axis: [0, 0, 1], limit: {{lower: -1, upper: 1}}}}
+processes:
+  joints: {joints}
+"""
+
+
+@pytest.mark.parametrize(
+    ("joints", "parameters"),
+    [
+        ("{rate: 50 Hz}", {"publish_frequency": 1000.0}),
+        ("{params: {publish_frequency: 50}}", {"publish_frequency": 50.0}),
+        ("{params: {publish_frequency: 5000, ignore_timestamp: true}}", {"publish_frequency": 1000.0}),
+    ],
+)
+def test_a_stock_state_publisher_passes_on_as_many_joint_states_as_ours(
+    joints: str, parameters: dict[str, float], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its own default is 20 Hz, of which 16.7 are left of 50."""
+    _, actions = launched(JOINTED.format(joints=joints), tmp_path, monkeypatch)
+    (node,) = (action for action in actions if getattr(action, "executable", "") == "robot_state_publisher")
+    (given,) = node.parameters
+    assert given.pop("robot_description").value_type is str
+    expected = {**parameters, "use_sim_time": True}
+    assert given == expected | ({"ignore_timestamp": True} if "ignore" in joints else {})
+
+
+TIMED = """
+tfcompose: 1
+robot: delayed
+frames:
+  base_link: {}
+  lidar: {parent: base_link, xyz: [0, 0, 0.3]}
+processes:
+  usb: {run: [usb_power], ready: {time: 30 s}}
+  camera: {run: {package: camera, executable: node}, node: camera, lifecycle: active, after: {usb: ready}}
+  filter: {run: [filter], ready: {time: 0.5 s}, after: {camera: started}}
+  last: {run: [last], after: {filter: ready, usb: ready}}
+  other: {run: [other], after: {usb: started}}
+"""
+
+
+def test_who_waits_for_a_time_is_started_so_much_later(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _, actions = launched(TIMED, tmp_path, monkeypatch)
+    late = [(action.period, action.actions[0].name) for action in actions if action.kind == "TimerAction"]
+    assert late == [(30.0, "camera"), (30.0, "filter"), (30.5, "last")]
+    assert {"usb", "other"} <= {getattr(action, "name", "") for action in actions}, "these are started at once"
+
+
+def test_a_unit_is_started_for_others_when_its_time_has_passed() -> None:
+    made = units(compiled_plan(TIMED))
+    settling = {name: one.get("Service", {}).get("ExecStartPost") for name, one in made.items()}
+    assert {name: words for name, words in settling.items() if words} == {
+        "delayed-usb.service": ["/bin/sleep 30"],
+        "delayed-filter.service": ["/bin/sleep 0.5"],
+    }
+    assert made["delayed-usb.service"]["Service"]["TimeoutStartSec"] == ["90"]
+    assert made["delayed-camera.service"]["Unit"]["After"] == ["delayed-usb.service"]
+    _, gaps = systemd(compiled_plan(TIMED), Machine("/opt/rover"))
+    assert not [line for line in gaps if {"usb", "executed"} <= words_of(line)]
+    assert [line for line in gaps if line.startswith("other")]
+
+
+INCLUDING = """
+tfcompose: 1
+robot: including
+ros: {namespace: r1, clock: sim}
+frames:
+  base_link: {}
+  lidar: {parent: base_link, xyz: [0, 0, 0.3]}
+processes:
+  camera:
+    run: {launch: camera_driver/camera.launch.py, args: {camera_name: front, config: "${build_dir}/x.yaml"}}
+    namespace: eyes
+    env: {LEVEL: debug}
+    remap: {image: image_raw}
+    restart: always
+"""
+
+
+@pytest.mark.parametrize("below", ["", "launch/", "launch/deeper/"])
+def test_a_launch_file_of_the_plan_is_included(below: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "share" / "camera_driver" / f"{below}camera.launch.py"
+    file.parent.mkdir(parents=True)
+    file.touch()
+    plan, actions = launched(INCLUDING, tmp_path, monkeypatch)
+    assert not [action for action in actions if action.kind == "ExecuteProcess"]
+    (group,) = (action for action in actions if action.kind == "GroupAction")
+    *settings, include = group.words[0]
+    assert [(each.kind, each.words) for each in settings] == [
+        ("SetEnvironmentVariable", ("LEVEL", "debug")),
+        ("PushRosNamespace", ("r1/eyes",)),
+        ("SetRemap", ("image", "image_raw")),
+        ("SetParameter", ("use_sim_time", True)),
+    ]
+    assert include.words[0].words == (str(file),)
+    assert include.launch_arguments == [("camera_name", "front"), ("config", f"{tmp_path}/x.yaml")]
+    _, gaps = launch(plan, Machine(".."), built(INCLUDING)["robot.urdf"])
+    assert [words for line in gaps if (words := words_of(line)) >= {"camera", "again"}]
+
+
+@pytest.mark.parametrize(("text", "profiles"), [(DRIVEN, ()), (ROBOT, ("demo",)), (INCLUDING, ()), (TIMED, ())])
+def test_no_line_of_a_launch_file_is_long(text: str, profiles: tuple[str, ...]) -> None:
+    files = built(text, *profiles)
+    (file,), _ = launch(read_plan(files["plan.json"], "plan.json"), Machine(".."), files["robot.urdf"])
+    assert max(map(len, file.text.splitlines())) <= 120
+    assert all(len(line) <= 100 for line in file.text.partition("return LaunchDescription")[2].splitlines())
 
 
 def test_what_launch_does_otherwise_with_a_process_is_reported() -> None:

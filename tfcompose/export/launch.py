@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+import json
 import re
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
-from tfcompose.export.supervisors import plain_name, started
+from tfcompose.export.supervisors import plain_name, started, waiting_s
 from tfcompose.files import File
 from tfcompose.numbers import number
+from tfcompose.plan.stock import MOST_HZ, OWN_KINDS, STATE_PUBLISHER, static_names
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from tfcompose.export.supervisors import Machine
     from tfcompose.plan import Plan, PlanEdge, PlanProcess
 
 _EXECUTABLE = re.compile(r"\$\{executable:([^/}]+)/([^/}]+)\}")
-_NO_NODE = re.compile(r"\W")
-_OWN = ("static", "joints")
+_LAUNCH = re.compile(r"\$\{launch:([^/}]+)/([^}]+)\}")
 _MOVED = ("-r", "--params-file")
+#: No line is longer, unless a single word is.
+_WIDTH = 100
 
 _HEAD = '''\
 """The TF tree and the processes of {robot}, for ros2 launch."""
@@ -27,11 +32,22 @@ _HEAD = '''\
 import sys
 from pathlib import Path
 
+from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
-from launch.actions import EmitEvent, ExecuteProcess, RegisterEventHandler, SetEnvironmentVariable, Shutdown
+from launch.actions import (
+    EmitEvent,
+    ExecuteProcess,
+    GroupAction,
+    IncludeLaunchDescription,
+    RegisterEventHandler,
+    SetEnvironmentVariable,
+    Shutdown,
+    TimerAction,
+)
 from launch.event_handlers import OnProcessStart
 from launch.events import matches_action
-from launch_ros.actions import LifecycleNode, Node
+from launch.launch_description_sources import AnyLaunchDescriptionSource
+from launch_ros.actions import LifecycleNode, Node, PushRosNamespace, SetParameter, SetRemap
 from launch_ros.event_handlers import OnStateTransition
 from launch_ros.events.lifecycle import ChangeState
 from launch_ros.parameter_descriptions import ParameterValue
@@ -44,6 +60,20 @@ def process(name, **more):
     """One of tfcompose's own, or one that only the plan knows how to start."""
     command = [sys.executable, "-m", "tfcompose.launcher.exec", str(BUILD / "plan.json"), name]
     return ExecuteProcess(cmd=command, name=name, output="screen", **more)
+
+
+def description():
+    """What robot_state_publisher is given."""
+    return ParameterValue((BUILD / "robot.urdf").read_text(encoding="utf-8"), value_type=str)
+
+
+def fixed(name, parent, child, xyz, quat_xyzw, **more):
+    """A fixed edge that is not in the URDF."""
+    keys = ("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw")
+    pose = [word for key, value in zip(keys, (*xyz, *quat_xyzw)) for word in (key, str(value))]
+    ends = ["--frame-id", parent, "--child-frame-id", child]
+    program = {"package": "tf2_ros", "executable": "static_transform_publisher"}
+    return Node(**program, name=name, arguments=pose + ends, output="screen", **more)
 
 
 def change(node, transition):
@@ -63,9 +93,49 @@ def managed(node, active):
     yield RegisterEventHandler(OnProcessStart(target_action=node, on_start=[configure]))
 
 
+def included(package, name, arguments, settings):
+    """A package's launch file, in its share folder or anywhere below, in a group with what holds for all its nodes."""
+    share = Path(get_package_share_directory(package))
+    direct = [file for file in (share / name, share / "launch" / name) if file.is_file()]
+    file = (direct or sorted(share.rglob(name)) or [share / name])[0]
+    source = AnyLaunchDescriptionSource(str(file))
+    return GroupAction([*settings, IncludeLaunchDescription(source, launch_arguments=arguments)])
+
+
 def generate_launch_description():
     return LaunchDescription([
 '''
+
+
+@dataclass(frozen=True, slots=True)
+class _Code:
+    """An expression in brackets: what is before its parts, the parts, and what is behind them."""
+
+    begin: str
+    parts: tuple[_Code | str, ...]
+    end: str
+
+    def __str__(self) -> str:
+        return f"{self.begin}{', '.join(map(str, self.parts))}{self.end}"
+
+    def lines(self, indent: str = "") -> Iterator[str]:
+        """Yield it in lines, in one if that is short enough; each part on a line of its own otherwise."""
+        if len(indent) + len(str(self)) <= _WIDTH:
+            yield f"{indent}{self}"
+            return
+        yield f"{indent}{self.begin}"
+        for part in self.parts:
+            *most, last = [f"{indent}    {part}"] if isinstance(part, str) else part.lines(f"{indent}    ")
+            yield from (*most, f"{last},")
+        yield f"{indent}{self.end}"
+
+
+def _call(name: str, *parts: _Code | str) -> _Code:
+    return _Code(f"{name}(", parts, ")")
+
+
+def _list(items: Iterable[_Code | str], keyword: str = "") -> _Code:
+    return _Code(f"{keyword}=[" if keyword else "[", tuple(items), "]")
 
 
 def launch(plan: Plan, machine: Machine, urdf: str) -> tuple[tuple[File, ...], list[str]]:
@@ -74,30 +144,54 @@ def launch(plan: Plan, machine: Machine, urdf: str) -> tuple[tuple[File, ...], l
     A stock robot_state_publisher sends what that URDF holds as fixed or jointed, and a static_transform_publisher each
     fixed edge elsewhere; where the URDF is not all of what tfcompose's own publishers send, these are started instead.
     """
-    lines, gaps = [], []
-    for name, value in _variables(plan):
-        lines.append(f"SetEnvironmentVariable({name!r}, {value!r}),")
+    actions: list[_Code] = [
+        _call("SetEnvironmentVariable", repr(name), repr(value)) for name, value in _variables(plan)
+    ]
+    gaps = []
     stock = _stock(plan, urdf)
     if stock is not None:
-        lines += [*_state_publisher(plan), *(_static_transform(plan, edge, name) for edge, name in stock)]
+        names = static_names(plan)
+        actions += [_state_publisher(plan), *(_fixed(plan, edge, names[edge.child]) for edge in stock)]
         gaps.append("robot_description is robot.urdf, in which edges of other owners are floating joints")
     for process in started(plan):
         if process.kind == "guard":
             gaps.append("the guard is left out: it belongs to tfcompose up")
-        elif process.kind not in _OWN or stock is None:
-            lines += _started(process)
-        if process.after and process.kind != "guard":
-            gaps.append(f"{process.name} does not wait for {', '.join(process.after)}: launch knows no readiness")
+        elif process.kind not in OWN_KINDS or stock is None:
+            delay_s = _delay_s(plan, process)
+            action = _started(plan, process)
+            delayed = _call("TimerAction", f"period={delay_s!r}", _list([action], "actions"))
+            actions.append(delayed if delay_s else action)
+        unheeded = [name for name, what in process.after.items() if not waiting_s(plan, name, what)]
+        if unheeded and process.kind != "guard":
+            gaps.append(f"{process.name} does not wait for {', '.join(unheeded)}: launch knows no readiness")
         gaps += _unlike(process)
     head = _HEAD.replace("{robot}", plan.robot).replace("{folder!r}", repr(machine.folder))
-    text = head + "".join(f"        {line}\n" for line in lines) + "    ])\n"
+    text = head + "".join(f"{line}\n" for action in actions for line in _element(action)) + "    ])\n"
     return (File(f"{plain_name(plan.robot)}.launch.py", text),), gaps
+
+
+def _element(action: _Code) -> Iterator[str]:
+    """Yield the action in lines, as an element of the list of all."""
+    *most, last = action.lines(" " * 8)
+    yield from (*most, f"{last},")
+
+
+def _delay_s(plan: Plan, process: PlanProcess) -> float:
+    """Return how long after the launch it is started: when all for which it waits so many seconds have had them."""
+    waits = [(plan.process(name), waiting_s(plan, name, what)) for name, what in process.after.items()]
+    return max((_delay_s(plan, other) + seconds for other, seconds in waits), default=0.0)
 
 
 def _unlike(process: PlanProcess) -> Iterator[str]:
     """Yield what launch does otherwise with a process."""
     if process.kind == "run" and process.lifecycle and not _is_node(process):
         yield f"{', '.join(process.lifecycle)} of {process.name} is not brought into its lifecycle state"
+    if _is_launch(process):
+        if process.restart != "no":
+            yield f"{process.name} is not started again: it is a launch file"
+        if process.required:
+            yield f"{process.name} is required: its end does not end the others here"
+        return
     if process.kind == "run" and process.restart != "no":
         whatever = "whatever its exit code, and " if process.restart == "on-failure" else ""
         yield f"{process.name} is started again {whatever}without a limit"
@@ -122,25 +216,19 @@ def published_by(urdf: str, prefix: str) -> set[tuple[str, str]]:
     }
 
 
-def _stock(plan: Plan, urdf: str) -> list[tuple[PlanEdge, str]] | None:
-    """Return the fixed edges outside the URDF, each with a node's name; None where own publishers must send all."""
-    own = {process.name for process in started(plan) if process.kind in _OWN}
-    if not own or len(own) > len(_OWN) or any(plan.process(name).description for name in own):
+def _stock(plan: Plan, urdf: str) -> list[PlanEdge] | None:
+    """Return the fixed edges outside the URDF; None where own publishers must send all."""
+    own = {process.name for process in started(plan) if process.kind in OWN_KINDS}
+    if not own or len(own) > len(OWN_KINDS) or any(plan.process(name).description for name in own):
         return None
-    if any(_package(process) == "robot_state_publisher" for process in plan.processes):
+    if any(_package(process) == STATE_PUBLISHER for process in plan.processes):
         return None
     edges = {(edge.parent, edge.child): edge for edge in plan.edges if edge.owner in own}
     of_urdf = published_by(urdf, plan.ros.frame_prefix)
     rest = [edge for ends, edge in edges.items() if ends not in of_urdf]
     if not of_urdf or of_urdf - set(edges) or any(edge.kind != "static" for edge in rest):
         return None
-    names: dict[str, PlanEdge] = {}
-    for edge in rest:
-        name = f"static_{_NO_NODE.sub('_', edge.child)}"
-        while name in names:
-            name += "_"
-        names[name] = edge
-    return [(edge, name) for name, edge in names.items()]
+    return rest
 
 
 def _package(process: PlanProcess) -> str:
@@ -148,51 +236,80 @@ def _package(process: PlanProcess) -> str:
     return meant[1] if meant else ""
 
 
-def _keywords(plan: Plan) -> str:
+def _keywords(plan: Plan) -> tuple[str, _Code]:
     """Return the keywords of stock nodes: namespace, and the publishers' remappings."""
-    remap = {old: new for one in started(plan) if one.kind in _OWN for old, new in one.remap.items()}
-    return f"namespace={plan.ros.namespace!r}, remappings={list(remap.items())!r}, output='screen'"
+    remap = {old: new for one in started(plan) if one.kind in OWN_KINDS for old, new in one.remap.items()}
+    return f"namespace={plan.ros.namespace!r}", _list(map(repr, remap.items()), "remappings")
 
 
-def _state_publisher(plan: Plan) -> list[str]:
-    prefix = {"frame_prefix": plan.ros.frame_prefix} if plan.ros.frame_prefix else {}
-    values = prefix | {"use_sim_time": plan.ros.clock == "sim"}
-    description = 'ParameterValue((BUILD / "robot.urdf").read_text(encoding="utf-8"), value_type=str)'
-    parameters = f'[{{"robot_description": {description}}}, {values!r}]'
-    package = 'package="robot_state_publisher", executable="robot_state_publisher", name="robot_state_publisher"'
-    return [f"Node({package}, {_keywords(plan)}, parameters={parameters}),"]
+def _state_publisher(plan: Plan) -> _Code:
+    """Return robot_state_publisher, which passes on as many joint states as the plan's publisher does."""
+    joints = next((process for process in started(plan) if process.kind == "joints"), None)
+    given = _params(joints.argv) if joints else {}
+    values = {"publish_frequency": min(given.pop("publish_frequency", MOST_HZ), MOST_HZ), **given}
+    values["use_sim_time"] = plan.ros.clock == "sim"
+    if plan.ros.frame_prefix:
+        values["frame_prefix"] = plan.ros.frame_prefix
+    params = _Code("{", ('"robot_description": description()', *(f"{k!r}: {v!r}" for k, v in values.items())), "}")
+    named = (f"package={STATE_PUBLISHER!r}", f"executable={STATE_PUBLISHER!r}", f"name={STATE_PUBLISHER!r}")
+    return _call("Node", *named, *_keywords(plan), _list([params], "parameters"), "output='screen'")
 
 
-def _static_transform(plan: Plan, edge: PlanEdge, name: str) -> str:
-    pose = edge.pose
-    named = zip(("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw"), (*pose.xyz, *pose.quat_xyzw), strict=True)
-    words = [word for key, value in named for word in (key, number(value))]
-    words += ["--frame-id", edge.parent, "--child-frame-id", edge.child]
-    package = 'package="tf2_ros", executable="static_transform_publisher"'
-    return f"Node({package}, name={name!r}, {_keywords(plan)}, arguments={words!r}),"
+def _params(argv: tuple[str, ...]) -> dict[str, Any]:
+    """Return the parameters that one of tfcompose's own processes is given in its command."""
+    words = [word for before, word in pairwise(argv) if before == "-p"]
+    return {name: json.loads(value) for name, _, value in (word.partition(":=") for word in words)}
 
 
-def _started(process: PlanProcess) -> list[str]:
-    again = "" if process.restart == "no" else ", respawn=True, respawn_delay=1.0"
-    ends = ", on_exit=Shutdown()" if process.required else ""
+def _fixed(plan: Plan, edge: PlanEdge, name: str) -> _Code:
+    ends = (repr(name), repr(edge.parent), repr(edge.child))
+    numbers = (_Code("(", tuple(map(number, part)), ")") for part in (edge.pose.xyz, edge.pose.quat_xyzw))
+    return _call("fixed", *ends, *numbers, *_keywords(plan))
+
+
+def _started(plan: Plan, process: PlanProcess) -> _Code:
+    if _is_launch(process):
+        return _included(plan, process)
+    again = () if process.restart == "no" else ("respawn=True", "respawn_delay=1.0")
+    ends = ("on_exit=Shutdown()",) if process.required else ()
     package = _EXECUTABLE.fullmatch(process.argv[0]) if process.argv else None
     if package is None or not _is_node(process):
-        return [f"process({process.name!r}{again}{ends}),"]
+        return _call("process", repr(process.name), *again, *ends)
     own, ros_words = _rest(process)
     namespace, _, node = process.nodes[0].rpartition("/")
-    arguments, ros_arguments = ([_filled(word) for word in words] for words in (own, ros_words))
-    keywords = [
-        f"package={package[1]!r}, executable={package[2]!r}, name={node!r}, namespace={namespace or '/'!r}",
-        f"remappings={list(process.remap.items())!r}",
-        f"arguments=[{', '.join(arguments)}]",
-        *([f"ros_arguments=[{', '.join(ros_arguments)}]"] if ros_arguments else []),
+    parts: list[_Code | str] = [
+        f"package={package[1]!r}", f"executable={package[2]!r}", f"name={node!r}", f"namespace={namespace or '/'!r}",
+        _list(map(repr, process.remap.items()), "remappings"),
+        _list(map(_filled, own), "arguments"),
+        *([_list(map(_filled, ros_words), "ros_arguments")] if ros_words else []),
         *([f"parameters=[str(BUILD / {process.params_file!r})]"] if process.params_file else []),
-        *([f"additional_env={{{_environment(process)}}}"] if process.env else []),
-        "output='screen'",
-    ]
-    made = f"({', '.join(keywords)}{again}{ends})"
+        *([_Code("additional_env={", _environment(process), "}")] if process.env else []),
+        "output='screen'", *again, *ends,
+    ]  # fmt: skip
     state = process.lifecycle.get(process.nodes[0])
-    return [f"*managed(LifecycleNode{made}, active={state == 'active'}),"] if state else [f"Node{made},"]
+    if not state:
+        return _call("Node", *parts)
+    return _call("*managed", _call("LifecycleNode", *parts), f"active={state == 'active'}")
+
+
+def _is_launch(process: PlanProcess) -> bool:
+    return bool(process.argv) and _LAUNCH.fullmatch(process.argv[0]) is not None
+
+
+def _included(plan: Plan, process: PlanProcess) -> _Code:
+    """Return the launch file with its arguments, and what ``up`` sets for all of its nodes."""
+    meant = _LAUNCH.fullmatch(process.argv[0])
+    package, file = (meant[1], meant[2]) if meant else ("", "")
+    arguments = [word.split(":=", 1) for word in process.argv[1:]]
+    namespace = plan.ros.namespace if process.namespace is None else process.namespace
+    settings = [
+        *(_call("SetEnvironmentVariable", repr(name), _filled(value)) for name, value in process.env.items()),
+        *([_call("PushRosNamespace", repr(namespace))] if namespace else []),
+        *(_call("SetRemap", repr(old), repr(new)) for old, new in process.remap.items()),
+        *([_call("SetParameter", "'use_sim_time'", "True")] if plan.ros.clock == "sim" else []),
+    ]
+    given = _list(f"({name!r}, {_filled(value)})" for name, value in arguments)
+    return _call("included", repr(package), repr(file), given, _list(settings))
 
 
 def _is_node(process: PlanProcess) -> bool:
@@ -214,8 +331,8 @@ def _rest(process: PlanProcess) -> tuple[list[str], list[str]]:
     return words[:at], kept
 
 
-def _environment(process: PlanProcess) -> str:
-    return ", ".join(f"{name!r}: {_filled(value)}" for name, value in process.env.items())
+def _environment(process: PlanProcess) -> tuple[str, ...]:
+    return tuple(f"{name!r}: {_filled(value)}" for name, value in process.env.items())
 
 
 def _filled(word: str) -> str:

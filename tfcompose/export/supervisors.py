@@ -77,6 +77,12 @@ def after(plan: Plan, process: PlanProcess) -> dict[str, str]:
     return dict.fromkeys(() if process.kind == "guard" else guards, "started") | waits
 
 
+def waiting_s(plan: Plan, name: str, what: str) -> float:
+    """Return how many seconds after its start a process is ready, where that is known and waited for; else 0."""
+    ready = plan.process(name).ready
+    return ready.number if what == "ready" and ready and ready.kind == "time" else 0.0
+
+
 def gaps_of(plan: Plan) -> list[str]:
     """Return what a supervisor that knows nothing of ROS does not do of the plan, one sentence each."""
     gaps = []
@@ -100,7 +106,8 @@ def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
     """Return the units, and what they do not keep of the plan.
 
     tfcompose's own processes say when they are ready (``Type=notify``), so that ``After=`` waits for that; of others
-    systemd knows that they were executed. One that others wait for until it is done is ``Type=oneshot``.
+    systemd knows that they were executed. One that others wait for until it is done is ``Type=oneshot``. One that is
+    ready so many seconds after its start has only started, for systemd, when a sleep of so many has ended.
     """
     target = f"{plain_name(plan.robot)}.target"
     awaited = {name for process in started(plan) for name, what in process.after.items() if what == "done"}
@@ -112,8 +119,10 @@ def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
     for process in started(plan):
         for name, what in process.after.items():
             other = plan.process(name)
-            if what == "ready" and other.kind == "run":
+            if what == "ready" and other.kind == "run" and not waiting_s(plan, name, what):
                 gaps.append(f"{process.name} waits until {name} was executed: systemd cannot see that it is ready")
+            if what == "started" and _settling_s(plan, name):
+                gaps.append(f"{process.name} waits until {name} is ready, as others do")
     return (File(target, _target(plan, [unit.path for unit in units])), *units), gaps
 
 
@@ -130,11 +139,17 @@ def _target(plan: Plan, units: list[str]) -> str:
     )
 
 
+def _settling_s(plan: Plan, name: str) -> float:
+    """Return how many seconds after its start others wait for a process; 0 where none does."""
+    return max((waiting_s(plan, name, one.after[name]) for one in started(plan) if name in one.after), default=0.0)
+
+
 def _unit_text(plan: Plan, process: PlanProcess, machine: Machine, target: str, *, done: bool) -> str:
     before = [_unit(plan, name) for name in after(plan, process)]
     most = MAX_RESTARTS if process.max_restarts is None else process.max_restarts
     kind = "oneshot" if done else "exec" if process.kind == "run" else "notify"
     restart = restart_of(process)
+    settling_s = _settling_s(plan, process.name)
     unit = [
         f"Description={_plain(process.name)} of robot {plan.robot}",
         f"PartOf={target}",
@@ -143,11 +158,13 @@ def _unit_text(plan: Plan, process: PlanProcess, machine: Machine, target: str, 
     ]
     service = [
         f"Type={kind}",
-        *(["NotifyAccess=all", "TimeoutStartSec=60"] if kind == "notify" else []),
+        *(["NotifyAccess=all"] if kind == "notify" else []),
+        *([f"TimeoutStartSec={60 + settling_s:g}"] if kind == "notify" or settling_s else []),
         *(f"Environment={_quoted(f'{name}={value}')}" for name, value in sorted(machine.env.items())),
         *_logs(plan, machine),
         f"WorkingDirectory={_plain(machine.folder)}",
         f"ExecStart={_exec(process, machine)}",
+        *([f"ExecStartPost=/bin/sleep {settling_s:g}"] if settling_s else []),
         f"Restart={'on-failure' if done and restart == 'always' else restart}",
         "RestartSec=1",
         f"KillSignal={process.stop.signal}",

@@ -12,14 +12,12 @@ from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, finding
 from tfcompose.model import JOINTS, STATIC, Node
+from tfcompose.plan.stock import MOST_HZ
+from tfcompose.plan.stock import STATE_PUBLISHER as NAME
 from tfcompose.resolve.processes import full_name
 
 if TYPE_CHECKING:
     from tfcompose.model import Process, Robot
-
-NAME = "robot_state_publisher"
-#: The highest that it accepts: tfcompose's own passes every joint state on.
-MOST_HZ = 1000.0
 
 
 def with_stock(robot: Robot) -> tuple[Robot, list[Finding]]:

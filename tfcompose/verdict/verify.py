@@ -18,6 +18,7 @@ from tfcompose.findings import Finding, Note, did_you_mean
 from tfcompose.geometry import Offset, Pose, offset_of
 from tfcompose.live.state import TreeState
 from tfcompose.plan import SLOW_BELOW
+from tfcompose.plan.stock import stand_ins
 from tfcompose.plan.topics import parts_of
 from tfcompose.verdict.drivers import Expected, driver_pose_differs, drives_of, expected_of, is_off
 from tfcompose.verdict.ownership import SELF, Violation, code_of, may_be_owners, relays_of, sensor_of, violation_finding
@@ -79,9 +80,18 @@ class _Comparison:
     plan: Plan
     tolerance: Offset
     _relays: frozenset[str] = field(init=False)
+    _stand_ins: dict[str, frozenset[str]] = field(init=False)
 
     def __post_init__(self) -> None:
         self._relays = relays_of(self.plan)
+        present = {node for one in self.state.edges if one.present is not False for node in one.nodes}
+        others = stand_ins(self.plan)
+        # The stock nodes that may send an edge in its owner's place, where that is not there; by the edge's child.
+        self._stand_ins = {
+            edge.child: others[edge.child]
+            for edge in self.plan.edges
+            if edge.child in others and edge.node not in present
+        }
 
     @cached_property
     def by_child(self) -> dict[str, list[EdgeState]]:
@@ -152,7 +162,7 @@ class _Comparison:
             yield self._violated("TF801", edge, other, namesake=True)
 
     def _may_own(self, edge: PlanEdge, one: EdgeState) -> bool:
-        return may_be_owners(edge, one.nodes, self._relays)
+        return may_be_owners(edge, one.nodes, self._relays | self._stand_ins.get(edge.child, frozenset()))
 
     def _value(self, edge: PlanEdge, one: EdgeState) -> Iterator[Difference]:
         stream = one.stream

@@ -20,9 +20,19 @@ def start_order_loop(robot: Robot) -> Iterator[Finding]:
     None of them would ever start. Remove one of the entries under ``after``.
     """
     waiting = {process.name: process for process in robot.processes}
-    while free := [name for name, p in waiting.items() if not any(other in waiting for other in p.after)]:
-        for name in free:
-            del waiting[name]
+    open_ends = {name: sum(other in waiting for other in process.after) for name, process in waiting.items()}
+    free = [name for name, count in open_ends.items() if not count]
+    followers: dict[str, list[str]] = {}
+    for name, process in waiting.items():
+        for other in process.after:
+            followers.setdefault(other, []).append(name)
+    while free:
+        done = free.pop()
+        del waiting[done]
+        for name in followers.get(done, ()):
+            open_ends[name] -= 1
+            if not open_ends[name]:
+                free.append(name)
     names = list(waiting)
     if names:
         notes = [Note(f"{name} is defined here", waiting[name].at) for name in names[1:]]

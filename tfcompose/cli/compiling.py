@@ -143,8 +143,9 @@ def edges_between(robot: Robot, a: str, b: str) -> tuple[list[Edge], list[Edge]]
 
 
 def _ancestry(robot: Robot, frame: str) -> list[Edge]:
+    above = {edge.child: edge for edge in reversed(robot.edges)}  # of several parents the first
     chain = []
-    while edge := robot.parent_edge(frame):
+    while edge := above.get(frame):
         chain.append(edge)
         frame = edge.parent
     return chain

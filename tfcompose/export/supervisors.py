@@ -14,6 +14,8 @@ from tfcompose.emit.argv import mapping
 from tfcompose.files import File
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from tfcompose.plan import Plan, PlanProcess
 
 
@@ -53,10 +55,12 @@ def plain_names(plan: Plan) -> dict[str, str]:
     """Return the plain name of each process, by its own: no two are the same, and one that is plain stays."""
     processes = [process.name for process in plan.processes]
     names = {name: name for name in processes if plain_name(name) == name}
+    taken = set(names)
     for name in processes:
         if name not in names:
-            plain, taken = plain_name(name), set(names.values())
+            plain = plain_name(name)
             names[name] = next(one for n in count(1) if (one := f"{plain}-{n}" if n > 1 else plain) not in taken)
+            taken.add(names[name])
     return names
 
 
@@ -109,10 +113,10 @@ def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
     systemd knows that they were executed. One that others wait for until it is done is ``Type=oneshot``. One that is
     ready so many seconds after its start has only started, for systemd, when a sleep of so many has ended.
     """
-    target = f"{plain_name(plan.robot)}.target"
     awaited = {name for process in started(plan) for name, what in process.after.items() if what == "done"}
+    names = {name: f"{plain_name(plan.robot)}-{plain}.service" for name, plain in plain_names(plan).items()}
     units = [
-        File(_unit(plan, process.name), _unit_text(plan, process, machine, target, done=process.name in awaited))
+        File(names[process.name], _unit_text(plan, process, machine, names, done=process.name in awaited))
         for process in started(plan)
     ]
     gaps = gaps_of(plan)
@@ -123,11 +127,11 @@ def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
                 gaps.append(f"{process.name} waits until {name} was executed: systemd cannot see that it is ready")
             if what == "started" and _settling_s(plan, name):
                 gaps.append(f"{process.name} waits until {name} is ready, as others do")
-    return (File(target, _target(plan, [unit.path for unit in units])), *units), gaps
+    return (File(_target_name(plan), _target(plan, [unit.path for unit in units])), *units), gaps
 
 
-def _unit(plan: Plan, process: str) -> str:
-    return f"{plain_name(plan.robot)}-{plain_names(plan)[process]}.service"
+def _target_name(plan: Plan) -> str:
+    return f"{plain_name(plan.robot)}.target"
 
 
 def _target(plan: Plan, units: list[str]) -> str:
@@ -144,8 +148,10 @@ def _settling_s(plan: Plan, name: str) -> float:
     return max((waiting_s(plan, name, one.after[name]) for one in started(plan) if name in one.after), default=0.0)
 
 
-def _unit_text(plan: Plan, process: PlanProcess, machine: Machine, target: str, *, done: bool) -> str:
-    before = [_unit(plan, name) for name in after(plan, process)]
+def _unit_text(plan: Plan, process: PlanProcess, machine: Machine, names: Mapping[str, str], *, done: bool) -> str:
+    """Return the unit of a process; ``names`` are those of all units, by process."""
+    target = _target_name(plan)
+    before = [names[name] for name in after(plan, process)]
     most = MAX_RESTARTS if process.max_restarts is None else process.max_restarts
     kind = "oneshot" if done else "exec" if process.kind == "run" else "notify"
     restart = restart_of(process)
@@ -218,7 +224,7 @@ def compose(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
     A process that owns edges is healthy while the first of them is live; ``after: ready`` waits for that.
     """
     names = plain_names(plan)
-    services = {names[process.name]: _compose_service(plan, process, machine) for process in started(plan)}
+    services = {names[process.name]: _compose_service(plan, process, machine, names) for process in started(plan)}
     lines = [f"name: {plain_name(plan.robot)}", "services:", *mapping(services, "  ")]
     gaps = gaps_of(plan)
     for process in started(plan):
@@ -231,7 +237,8 @@ def compose(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
     return (File("compose.yaml", "\n".join([*lines, ""])),), gaps
 
 
-def _compose_service(plan: Plan, process: PlanProcess, machine: Machine) -> dict[str, Any]:
+def _compose_service(plan: Plan, process: PlanProcess, machine: Machine, names: Mapping[str, str]) -> dict[str, Any]:
+    """Return the service of a process; ``names`` are those of all services, by process."""
     edges = plan.edges_of(process.name)
     waits = after(plan, process)
     stop_s = STOP_S if process.stop.timeout_s is None else process.stop.timeout_s
@@ -250,7 +257,6 @@ def _compose_service(plan: Plan, process: PlanProcess, machine: Machine) -> dict
         "stop_grace_period": f"{round(stop_s * 1000)}ms",
     }
     if waits:
-        names = plain_names(plan)
         service["depends_on"] = {
             names[name]: {"condition": _MET[what if what != "ready" or plan.edges_of(name) else "started"]}
             for name, what in waits.items()

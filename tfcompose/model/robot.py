@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import slip_of
@@ -10,7 +12,7 @@ from tfcompose.plan import EdgePattern, GuardPolicy, RosSettings
 from tfcompose.tree import below, children_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable
+    from collections.abc import Callable, Iterable
 
     from tfcompose.findings import Note, Span
     from tfcompose.model.body import Link
@@ -91,7 +93,7 @@ class Part:
     robot: Robot
 
 
-def may_be_refused(name: str, broken: Collection[tuple[str, str]], known: Iterable[str]) -> bool:
+def may_be_refused(name: str, broken: frozenset[tuple[str, str]], known: Iterable[str]) -> bool:
     """Return whether a name is one that an entry among the ``broken`` ones, (section, name), would have brought.
 
     A part without a prefix may have brought any name; one that is a letter off the ``known`` ones is wrong still.
@@ -99,12 +101,16 @@ def may_be_refused(name: str, broken: Collection[tuple[str, str]], known: Iterab
     if ("parts", "") in broken:
         known = tuple(known)
         return name in known or slip_of(name, known) is None
-    return any(
-        name == entry
-        or (section == "sensors" and name.startswith(f"{entry}_"))
-        or (section == "parts" and name.startswith(entry))
-        for section, entry in broken
-    )
+    names, beginnings = _brought(broken)
+    return name in names or name.startswith(beginnings)
+
+
+@lru_cache(maxsize=8)  # a robot's names are looked up in the same entries
+def _brought(broken: frozenset[tuple[str, str]]) -> tuple[frozenset[str], tuple[str, ...]]:
+    """Return the names that refused entries would have brought, and how further ones would have begun."""
+    beginnings = [f"{entry}_" for section, entry in broken if section == "sensors"]
+    beginnings += [entry for section, entry in broken if section == "parts"]
+    return frozenset(entry for _, entry in broken), tuple(beginnings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +183,7 @@ class Robot:
 
     def excuses(self, name: str) -> bool:
         """Return whether a frame, process or joint may be missing only because an entry was refused already."""
-        return may_be_refused(name, self.broken, (*self.frames, *(process.name for process in self.processes)))
+        return may_be_refused(name, self.broken, chain(self.frames, (process.name for process in self.processes)))
 
     def is_foreign(self, at: Span | None) -> bool:
         """Return whether the place is in a file that somebody else wrote, a URDF: advice speaks of XML there."""

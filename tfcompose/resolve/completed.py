@@ -64,7 +64,8 @@ def _with_blocks(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, 
     """Return the robot with its hardware and raw blocks."""
     moving = [edge.joint.name for edge in robot.edges if edge.joint]
     hardware = hardware_of(spec.ros2_control, source)
-    frames = [frame for frame in robot.frames if frame in robot.links or robot.parent_edge(frame)]
+    children = {edge.child for edge in robot.edges}
+    frames = [frame for frame in robot.frames if frame in robot.links or frame in children]
     joints = [edge.joint_name for edge in robot.edges if edge.joint_name]
     blocks, found = blocks_of(spec.xml, source, Known(frames, robot.excuses), Known(joints, robot.excuses))
     found += unknown_joints(hardware, Known(moving, robot.excuses))

@@ -237,6 +237,13 @@ class _Bodies:
     root: Element
     found: list[Finding] = field(default_factory=list)
     _materials: dict[str, Material | None] = field(default_factory=dict)
+    _elements: dict[str, list[Element]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        visuals = [one for link in self.root.all("link") for one in link.all("visual")]
+        for around in (self.root, *visuals):
+            for material in around.all("material"):
+                self._elements.setdefault(material.attributes.get("name", ""), []).append(material)
 
     def link(self, name: str, element: Element) -> Link:
         """Return the body."""
@@ -307,9 +314,7 @@ class _Bodies:
 
     def _named(self, name: str) -> Material | None:
         if name not in self._materials:
-            visuals = [one for link in self.root.all("link") for one in link.all("visual")]
-            everywhere = [material for around in (self.root, *visuals) for material in around.all("material")]
-            described = (self._described(name, one) for one in everywhere if one.attributes.get("name") == name)
+            described = (self._described(name, one) for one in self._elements.get(name, ()))
             self._materials[name] = next((one for one in described if one), None)
         return self._materials[name]
 

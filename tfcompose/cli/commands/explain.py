@@ -133,10 +133,11 @@ def _entries(edge: Edge, source: Source) -> Iterator[Path]:
     sections = ("joints",) if edge.joint_name else ("sensors",) if edge.sensor else ("frames", "links", "parts")
     for section in sections:
         entries = source.data.get(section)
-        known = (
-            [one for one in entries if name.endswith(one) or section == "parts"] if isinstance(entries, dict) else []
-        )
-        for one in sorted(known, key=len, reverse=True):
+        if not isinstance(entries, dict):
+            continue
+        ends = (name[begin:] for begin in range(len(name) + 1))
+        known = sorted(entries, key=len, reverse=True) if section == "parts" else filter(entries.__contains__, ends)
+        for one in known:
             yield (section, one) if edge.given else (section, one, "frames", edge.child)
 
 

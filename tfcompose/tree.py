@@ -78,14 +78,41 @@ def loops(edges: Iterable[Edge]) -> list[tuple[str, ...]]:
 
     A frame that is its own parent is a loop of one.
     """
-    parents = parents_of(edges)
+    parents = _around_loops(parents_of(edges))
     found: dict[frozenset[str], tuple[str, ...]] = {}
+    done: set[str] = set()  # frames whose only way up is a loop that was found
     for start in sorted(parents):
-        loop = _shortest_loop(parents, start)
+        loop = () if start in done else _shortest_loop(parents, start)
+        if all(len(parents[frame]) == 1 for frame in loop):
+            done.update(loop)
         if loop and frozenset(loop) not in found:
             first = loop.index(min(loop))
             found[frozenset(loop)] = (*loop[first:], *loop[:first])
     return list(found.values())
+
+
+def _around_loops(parents: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
+    """Return the parents of the frames that are on loops, or between two, as far as they are so too."""
+    above = {frame: set(some) for frame, some in parents.items()}
+    below: dict[str, set[str]] = {}
+    for frame, some in parents.items():
+        for parent in some:
+            below.setdefault(parent, set()).add(frame)
+    ends = [frame for frame in {**above, **below} if not above.get(frame) or not below.get(frame)]
+    outside: set[str] = set()
+    while ends:
+        frame = ends.pop()
+        outside.add(frame)
+        for there, back in ((above, below), (below, above)):
+            for other in there.get(frame, ()):
+                back[other].discard(frame)
+                if not back[other] and other not in outside:
+                    ends.append(other)
+    return {
+        frame: [parent for parent in some if parent not in outside]
+        for frame, some in parents.items()
+        if frame not in outside
+    }
 
 
 def _shortest_loop(parents: Mapping[str, Sequence[str]], start: str) -> tuple[str, ...]:

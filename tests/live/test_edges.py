@@ -2,6 +2,7 @@
 
 import random
 import statistics
+from typing import Any
 
 import pytest
 
@@ -127,14 +128,14 @@ def test_a_sound_transform_is_not_refused_and_its_pose_is_kept() -> None:
 
 
 def test_a_flood_of_names_is_counted_and_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_STREAMS", 10)
+    monkeypatch.setattr(module, "MOST_EDGES", 10)
     monkeypatch.setattr("tfcompose.live.publishers.MOST_KNOWN", 10)
     observer = TreeObserver()
     for number in range(30):
         take(observer, f"map tag_{number}", S, gid=number.to_bytes(16, "big"))
         observer.take_malformed(number.to_bytes(16, "big"))
         observer.take_graph([Publisher(number.to_bytes(16, "big"), f"/n{number}", static=False)])
-    assert (len(observer.edges(S)), observer.beyond) == (10, 20)
+    assert (len(observer.edges(S)), sum(observer.beyond.values())) == (10, 20)
     assert len(observer.malformed) <= 10
     assert len(observer.publishers.known) <= 11
 
@@ -145,3 +146,17 @@ def test_stamps_are_compared_with_the_clock_that_is_given() -> None:
     observer.take(rows, static=False, gid=A, received_ns=1000 * S, clock_ns=10 * S)  # type: ignore[arg-type]
     observed = only(observer, 1001 * S)
     assert (observed.timing.delay_s, observed.data_age_s) == (1, 2)
+
+
+def test_one_who_floods_the_tree_leaves_room_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What one message holds is kept while there is room: robots of thousands of fixed edges send them at once."""
+    monkeypatch.setattr(module, "MOST_OF_ONE", 10)
+    observer = TreeObserver()
+    rows: Any = [row(f"base part_{number}") for number in range(20)]
+    observer.take(rows, static=True, gid=A, received_ns=S)
+    for number in range(30):
+        take(observer, f"map tag_{number}", S, gid=A)
+        take(observer, f"map own_{number}", S, gid=B) if number < 5 else None
+    assert observer.beyond == {A: 30}
+    assert (observer.floods(A), observer.floods(B)) == (True, False)
+    assert {one.child for one in observer.edges(S) if one.stream.gid == B} == {f"own_{number}" for number in range(5)}

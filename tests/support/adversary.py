@@ -52,6 +52,20 @@ with open_node(name, namespace, args=ros.split("\\n") if ros else []) as node:
         publisher.publish(message())
         time.sleep(0.05)
 """
+_FLOOD = """
+import signal, sys, time
+from tfcompose.ros.tf_codec import Template
+from tfcompose.ros.node import TFPublisher, open_node
+signal.signal(signal.SIGTERM, lambda *_: sys.exit())
+template = Template([(f"f00000000_{{i:05}}", f"f00000000_{{i + 1:05}}") for i in range({count})])
+with open_node("flood", "/") as node:
+    publisher, n, due = TFPublisher(node, static=False), 0, time.monotonic()
+    while True:
+        n, due = n + 1, due + 0.05
+        template.set_stamp(time.time_ns())
+        publisher.publish(template.data.replace(b"f00000000_", b"f%08d_" % n))
+        time.sleep(max(0.0, due - time.monotonic()))
+"""
 #: What the true owner sends, and those that are started beside the robot.
 OWNER_X, OTHER_X = 1.0, 2.0
 
@@ -64,6 +78,11 @@ def node(name: str, x: float, *edges: str, namespace: str = "/") -> list[str]:
 def foreign(x: float, *edges: str) -> list[str]:
     """Return the command of a program of another vendor's DDS, which is no ROS node."""
     return [sys.executable, "-m", "tests.support.foreign_dds", str(x), *edges]
+
+
+def flood(count: int) -> str:
+    """Return a program of a node /flood that sends so many new frames, in a chain, in each message, at 20 Hz."""
+    return _FLOOD.format(count=count)
 
 
 def in_shell(first: str, command: Sequence[str]) -> list[str]:

@@ -79,7 +79,8 @@ class Tree:
             self.observer.take_graph(
                 [Publisher(words["node"].encode(), words["node"], static=False) for words in self.sent.values()]
             )
-        verdicts = verify(plan, {TOPICS: self.observer}, 110 * S, TOLERANCE)
+        self.observer.observed_ns = 110 * S
+        verdicts = verify(plan, {TOPICS: self.observer}, TOLERANCE)
         return [found for verdict in verdicts for found in verdict.found]
 
 
@@ -193,7 +194,7 @@ def test_two_nodes_of_the_owners_name_are_one_too_many(plan: Plan, tree: Tree) -
         tree.send(child, **words)
     known = [Publisher(words["node"].encode(), words["node"], static=False) for words in tree.sent.values()]
     tree.observer.take_graph([*known, Publisher(b"twin", DRIVE, static=False)])
-    [found] = [one for verdict in verify(plan, {TOPICS: tree.observer}, 110 * S, TOLERANCE) for one in verdict.found]
+    [found] = [one for verdict in verify(plan, {TOPICS: tree.observer}, TOLERANCE) for one in verdict.found]
     expect(found, "TF801", "odom → base", f"another {DRIVE}", f"drive ({DRIVE})")
 
 
@@ -203,7 +204,7 @@ def test_a_publisher_that_has_left_is_reported(plan: Plan, tree: Tree) -> None:
     present = [words["node"] for child, words in tree.sent.items() if child != "laser"]
     tree.observer.take_graph([Publisher(STATIC.encode(), STATIC, static=True)])
     tree.observer.take_graph([Publisher(node.encode(), node, static=False) for node in present])
-    [found] = [one for verdict in verify(plan, {TOPICS: tree.observer}, 110 * S, TOLERANCE) for one in verdict.found]
+    [found] = [one for verdict in verify(plan, {TOPICS: tree.observer}, TOLERANCE) for one in verdict.found]
     expect(found, "TF804", "static (/rover/static)", "base → laser")
 
 
@@ -264,7 +265,7 @@ def test_where_publishers_have_no_ids_nobody_is_blamed_who_may_be_innocent(plan:
     for child, words in tree.sent.items():
         tree.send(child, **words)
     tree.observer.take_graph([*publishers, *(replace(one, static=True, gid=one.gid + b"s") for one in publishers)])
-    verdicts = verify(plan, {TOPICS: tree.observer}, 110 * S, TOLERANCE)
+    verdicts = verify(plan, {TOPICS: tree.observer}, TOLERANCE)
     assert [found.code for verdict in verdicts for found in verdict.found] == []
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.cli.tables import Table
 from tfcompose.cli.terminal import printable
 from tfcompose.render.text import YELLOW
-from tfcompose.text import counted
+from tfcompose.text import counted, listed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,8 +55,15 @@ def _summary(edges: Sequence[EdgeState], observer: TreeObserver, now_ns: int) ->
     bad = sum(observer.malformed.values())
     parts += [f"{bad} not readable"] if bad else []
     parts += ["delays are from stamp to recording"] if observer.end_ns else []
-    parts += [f"{observer.beyond} transforms of further edges not kept"] if observer.beyond else []
+    parts += [not_kept(observer)] if observer.beyond else []
     return ", ".join(parts)
+
+
+def not_kept(observer: TreeObserver) -> str:
+    """Return in words how many transforms came of edges that are not kept, and from whom."""
+    nodes = {node for gid in observer.beyond for node in observer.publishers.nodes(gid, static=False)}
+    by = f" from {printable(listed(sorted(nodes)))}" if nodes else ""
+    return f"{counted(sum(observer.beyond.values()), 'transform')} of further edges{by} not kept"
 
 
 def _row(state: EdgeState, several: set[str]) -> tuple[str, ...]:

@@ -89,7 +89,7 @@ def observe(  # noqa: PLR0913 (all but two are named)
     ros: RosSettings | None = None,
     duration_s: float | None,
     every_s: float = 1.0,
-    show: Callable[[int], object] | None = None,
+    show: Callable[[], object] | None = None,
     may_be_silent: bool = False,
 ) -> None:
     """Fill the observers from the running system, until the time is over or a signal comes.

@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from tfcompose.guard.channel import EventWriter, Memory, OrderReader, SilentEdges, SwitchMemory, recalled
@@ -19,6 +20,7 @@ from tfcompose.guard.gates import Gates, LifecycleDriver, Switches
 from tfcompose.guard.judge import FINDING_S, Judge, JudgeMemory
 from tfcompose.guard.relay import Feedback, Relay
 from tfcompose.ipc import Clear, Complete
+from tfcompose.live.flood import ReadingTime
 from tfcompose.live.publishers import MessageReader
 from tfcompose.live.topics import RunMarks, TFGraph, TFTopics
 from tfcompose.plan.codec import decode
@@ -55,8 +57,6 @@ if TYPE_CHECKING:
 
 
 CHECK_EVERY_S = 0.1
-#: Messages with ever new edges of one who floods the tree take so much of each second at most, in seconds.
-BUSY_S = 0.1
 #: How often a strict guard says what it held back, in seconds.
 REPORT_EVERY_S = 10.0
 
@@ -90,8 +90,7 @@ class TopicWatch:
         self._due = self._report_due = 0.0
         self._malformed: set[bytes | None] = set()
         self._known: set[bytes | None] = set()
-        self._busy: dict[bytes | None, float] = {}
-        self._busy_since = 0.0
+        self._time = ReadingTime(self._reader.decoder)
 
     def watch_global_topics(self) -> None:
         """Look for nodes of the plan on the global topics too, where they do not belong."""
@@ -145,15 +144,7 @@ class TopicWatch:
 
     def _take(self, data: TFData, now: float) -> None:
         """Take a message; of who floods the tree one with other edges than before only while that took little time."""
-        gid, decoder = data.received.gid, self._reader.decoder
-        if now - self._busy_since >= 1.0:
-            self._busy, self._busy_since = {}, now
-        if self._busy.get(gid, 0.0) > BUSY_S and not decoder.knows(data.received.data):
-            return
-        before, begun = decoder.read_anew, time.thread_time()
-        self._read(data, now)
-        if decoder.read_anew != before and self.judge.is_flooded_by(gid):
-            self._busy[gid] = self._busy.get(gid, 0.0) + time.thread_time() - begun
+        self._time.read(data.received, partial(self._read, data, now), self.judge.is_flooded_by, now)
 
     def _read(self, data: TFData, now: float) -> None:
         received = data.received

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import TYPE_CHECKING
 
+from tfcompose.live.flood import EdgeBounds, ReadingTime
 from tfcompose.live.listener import tf_elsewhere
 from tfcompose.live.pose_query import NoPose
 from tfcompose.live.topics import TFTopics
@@ -17,6 +19,7 @@ from tfcompose.tf2.exceptions import Rejection
 
 if TYPE_CHECKING:
     from tfcompose.live.pose_query import OnPose, PoseQuery
+    from tfcompose.live.topics import TFData
     from tfcompose.signals import Stop
 
 TOO_EARLY = "echo hears the tree from its own start on; for an earlier time read a recording: --bag"
@@ -31,13 +34,15 @@ def echo(query: PoseQuery, on_pose: OnPose, stop: Stop) -> NoPose | None:
     listened = _Listened(query)
     with open_node("tfcompose_echo", "") as node:
         data, clock, decoder = TFTopics(node, query.topics), SimClock(node), Decoder()
+        reading = ReadingTime(decoder)
         begun = last = next_at = time.monotonic()
         given_ns: int | None = None
         while not stop.requested:
             wait(node, data.subscriptions, 0.05, stop)
             clock_ns = clock.now_ns()  # before what is taken, so that nothing of a time before the jump comes after it
             for each in data.take():
-                listened.take(decoder, each.received.data, static=each.static)
+                read = partial(listened.take, decoder, each)
+                reading.read(each.received, read, listened.bounds.floods, time.monotonic())
             listened.follow(clock_ns)
             now = time.monotonic()
             if now < next_at:
@@ -69,15 +74,17 @@ class _Listened:
 
     def __init__(self, query: PoseQuery) -> None:
         self.buffer = Buffer()
+        self.bounds = EdgeBounds()
         self.messages = 0
         self._query = query
         self._clock_ns = 0
         self._rejected: tuple[str, Rejection] | None = None
 
-    def take(self, decoder: Decoder, data: bytes, *, static: bool) -> None:
+    def take(self, decoder: Decoder, data: TFData) -> None:
         self.messages += 1
         try:
-            rejected = self.buffer.insert(decoder.rows(data), static=static)
+            rows = self.bounds.kept(decoder.rows(data.received.data), data.received.gid)
+            rejected = self.buffer.insert(rows, static=data.static)
         except ValueError:
             return
         self._rejected = next(iter(rejected), self._rejected)
@@ -91,6 +98,8 @@ class _Listened:
 
     def missed(self, reason: str) -> NoPose:
         """Return why there was no pose, with what explains it."""
+        if beyond := sum(self.bounds.beyond.values()):
+            reason += f"; {beyond} transforms of further frames came, of publishers that send too many"
         advice = TOO_EARLY if self._query.at_ns > 0 and "into the past" in reason else ""
         if self._rejected is None:
             return NoPose(reason, advice)

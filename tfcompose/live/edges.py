@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.geometry import Pose
 from tfcompose.live.arrivals import Arrivals, Timing
+from tfcompose.live.flood import MOST_EDGES, MOST_OF_ONE
 from tfcompose.live.publishers import Publisher, Publishers
 from tfcompose.tf2.exceptions import DENORMALISED, Rejection, rejection_of
 from tfcompose.tree import below, children_of, drawn, loops, trees
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     from tfcompose.ros.tf_codec import Row
 
 
-#: So many edges are kept, counting an edge once for each publisher; what comes beyond is counted only.
-MOST_STREAMS = 20_000
 #: So long after an edge first came its times are not counted: a new subscriber gets at once what was kept.
 SETTLE_S = 0.3
 #: A frame that stays in each parent for so many transforms, or more, in the mean, is handed over.
@@ -206,7 +205,9 @@ class TreeObserver:
 
     ``window_s`` is the stretch of time to which rates, jitter, gaps and delays refer (one to two of them); 0: all. Of
     the first ``settle_s`` of each edge they take nothing. ``end_ns`` is when a recording ended, of any topic; 0 for a
-    running tree. ``nodes`` are the names of all nodes in the graph.
+    running tree, of which ``observed_ns`` says when what had come was taken last. ``nodes`` are the names of all nodes
+    in the graph. ``beyond`` counts the transforms of edges that are not kept, by their publisher's id: so many edges of
+    one publisher, and of all together, are.
     """
 
     window_s: float = 0.0
@@ -215,11 +216,13 @@ class TreeObserver:
     begun_ns: int = 0
     last_ns: int = 0
     end_ns: int = 0
-    beyond: int = 0
+    observed_ns: int = 0
+    beyond: dict[bytes | None, int] = field(default_factory=dict)
     malformed: dict[bytes | None, int] = field(default_factory=dict)
     publishers: Publishers = field(default_factory=Publishers)
     nodes: tuple[str, ...] = ()
     _streams: dict[tuple[str, str, bytes | None, bool], EdgeStream] = field(default_factory=dict)
+    _counts: dict[bytes, int] = field(default_factory=dict)
     _handovers: dict[tuple[str, bytes], Handover] = field(default_factory=dict)
 
     def take(
@@ -231,22 +234,29 @@ class TreeObserver:
         self.last_ns = received_ns
         clock = received_ns if clock_ns is None else clock_ns
         streams = self._streams
+        is_full = gid is not None and self._counts.get(gid, 0) >= MOST_OF_ONE
         for row in rows:
             stream = streams.get((row[0], row[1], gid, static))
             if stream is None:
-                stream = self._new(row, static=static, gid=gid, received_ns=received_ns)
+                stream = self._new(row, static=static, gid=gid, received_ns=received_ns, is_full=is_full)
                 if stream is None:
-                    self.beyond += 1
+                    self.beyond[gid] = self.beyond.get(gid, 0) + 1
                     continue
             stream.take(row, received_ns, clock)
 
-    def _new(self, row: Row, *, static: bool, gid: bytes | None, received_ns: int) -> EdgeStream | None:
+    def floods(self, gid: bytes | None) -> bool:
+        """Return whether the publisher has sent more edges than are kept."""
+        return gid in self.beyond
+
+    def _new(self, row: Row, *, static: bool, gid: bytes | None, received_ns: int, is_full: bool) -> EdgeStream | None:
         """Return the stream of an edge that is new, or written with a slash; None where there are too many."""
         parent, child = row[0].removeprefix("/"), row[1].removeprefix("/")
         stream = self._streams.get((parent, child, gid, static))
         if stream is None:
-            if len(self._streams) >= MOST_STREAMS:
+            if is_full or len(self._streams) >= MOST_EDGES:
                 return None
+            if gid is not None:
+                self._counts[gid] = self._counts.get(gid, 0) + 1
             arrivals = Arrivals(int(self.window_s * _SECOND_NS), int(self.settle_s * _SECOND_NS))
             stream = EdgeStream(parent, child, static, gid, arrivals, received_ns, row)
             self._streams[parent, child, gid, static] = stream
@@ -258,13 +268,18 @@ class TreeObserver:
 
     def take_malformed(self, gid: bytes | None) -> None:
         """Count a message that is no TFMessage."""
-        if gid in self.malformed or len(self.malformed) < MOST_STREAMS:
+        if gid in self.malformed or len(self.malformed) < MOST_EDGES:
             self.malformed[gid] = self.malformed.get(gid, 0) + 1
 
     def take_graph(self, publishers: Sequence[Publisher], nodes: Sequence[str] = ()) -> None:
         """Take who is in the graph now, and the names of its nodes; what is known of one that has left is kept."""
         self.nodes = tuple(nodes)
         self.publishers.update(publishers)
+
+    @property
+    def until_ns(self) -> int:
+        """Until when anything is known: the end of the recording, or the last look; who looks late blames nobody."""
+        return self.end_ns or self.observed_ns or self.last_ns
 
     @property
     def heard(self) -> bool:

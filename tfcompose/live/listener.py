@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import TYPE_CHECKING
 
 from tfcompose.live.edges import nearer_clock
+from tfcompose.live.flood import ReadingTime
 from tfcompose.live.topics import TFGraph, TFTopics
 from tfcompose.ros.clock import SimClock, wall_ns
 from tfcompose.ros.graph import nodes, topics
@@ -28,6 +30,8 @@ ASK_EVERY_S = 0.5
 ASK_AGAIN_S = 0.02
 #: A wait for messages is not longer, so that what is shown is shown in time.
 _WAIT_S = 0.1
+#: So long the last look waits: where the whole process was kept from running, what came is still under way in it.
+LAST_WAIT_S = 0.1
 
 
 class TreeListener:
@@ -44,6 +48,7 @@ class TreeListener:
         self._data = TFTopics(node, topics)
         self._clock = SimClock(node)
         self._decoder = Decoder()
+        self._time = ReadingTime(self._decoder)
         self._requested_at = float("-inf")
 
     @property
@@ -59,19 +64,25 @@ class TreeListener:
         """
         wait(self.node, self._data.subscriptions, timeout_s, stop)
         sim_ns, now_ns = self.clock_ns, wall_ns()
-        taken = []
-        for data in list(self._data.take()):
+        self.observer.observed_ns = now_ns
+        taken: list[TFData] = []
+
+        def read(data: TFData) -> None:
             received = data.received
             try:
                 rows = tuple(self._decoder.rows(received.data))
             except ValueError:
                 self.observer.take_malformed(received.gid)
-                continue
+                return
             # Fast DDS tells when a message came; what waited here for its turn is not late.
             came_ns = received.received_ns or now_ns
             clock_ns = nearer_clock(rows, came_ns, sim_ns, static=data.static)
             self.observer.take(rows, static=data.static, gid=received.gid, received_ns=came_ns, clock_ns=clock_ns)
             taken.append(data)
+
+        now = time.monotonic()
+        for data in list(self._data.take()):
+            self._time.read(data.received, partial(read, data), self.observer.floods, now)
         self._ask_graph({each.received.gid for each in taken if each.received.gid is not None})
         return taken
 
@@ -91,11 +102,11 @@ def listen(  # noqa: PLR0913 (all but three are named)
     *,
     duration_s: float | None,
     every_s: float = 1.0,
-    show: Callable[[int], object] | None = None,
+    show: Callable[[], object] | None = None,
 ) -> tuple[float, tuple[str, ...]]:
     """Feed the observers of the topics (moving, fixed) for so many seconds, or until ``stop`` is requested.
 
-    ``show`` is called ``every_s`` with the time, in nanoseconds of the system's clock. The node's name is ``name``.
+    ``show`` is called ``every_s``. The node's name is ``name``.
     Return for how many seconds it listened, and the names of other topics on which there is TF.
 
     Raises:
@@ -111,9 +122,9 @@ def listen(  # noqa: PLR0913 (all but three are named)
                 listener.listen(min(_WAIT_S / len(listeners), end - now), stop)
             if show is not None and time.monotonic() >= due:
                 due = time.monotonic() + every_s
-                show(wall_ns())
+                show()
         for listener in listeners:
-            listener.listen(0.0, stop)  # what came while this process was kept from looking
+            listener.listen(LAST_WAIT_S, stop)  # what came while this process was kept from looking
         return time.monotonic() - begun, tf_elsewhere(topics(node), [topic for pair in observers for topic in pair])
 
 

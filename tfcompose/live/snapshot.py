@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ClassVar
 from xml.parsers import expat
 
 from tfcompose.live.edges import SETTLE_S, TreeObserver
-from tfcompose.live.listener import TreeListener
+from tfcompose.live.listener import LAST_WAIT_S, TreeListener
 from tfcompose.live.state import MovingJoint, RosProcess, StampedData, Topic, TreeState
 from tfcompose.plan.topics import GLOBAL
 from tfcompose.ros.clock import wall_ns
@@ -196,7 +196,7 @@ def observe(expected: Mapping[Topics, Plan | None], seconds: float, stop: Stop) 
                 for view in views:
                     view.sensors.subscribe(graph.values(), _robots_inside(view, graph))
         for view in views:
-            view.listen(0.0, stop)  # what came while this process was kept from looking
+            view.listen(LAST_WAIT_S, stop)  # what came while this process was kept from looking
         graph |= topics_in(node)  # the last word counts, but what was seen before is not forgotten
         common = TreeState(
             time.monotonic() - begun,
@@ -217,6 +217,7 @@ class _View:
     observer: TreeObserver = field(default_factory=lambda: TreeObserver(0.0, SETTLE_S))
     skews_s: dict[bytes, float] = field(default_factory=dict)
     clock: tuple[int | None, float] = (None, 0.0)  # the newest, and when it moved, of the monotonic clock; 0: not yet
+    observed: float = 0.0  # when what had come was taken last, of the monotonic clock
     listener: TreeListener = field(init=False)
     sensors: SensorTopics = field(init=False)
 
@@ -231,9 +232,9 @@ class _View:
     def listen(self, timeout_s: float, stop: Stop) -> None:
         for data in self.listener.listen(timeout_s, stop):
             self._compare_clocks(data)
-        clock_ns = self.listener.clock_ns
+        clock_ns, self.observed = self.listener.clock_ns, time.monotonic()
         if clock_ns != self.clock[0]:
-            self.clock = (clock_ns, 0.0 if self.clock[0] is None else time.monotonic())
+            self.clock = (clock_ns, 0.0 if self.clock[0] is None else self.observed)
         self.sensors.take(clock_ns)
 
     def _compare_clocks(self, data: TFData) -> None:
@@ -248,14 +249,15 @@ class _View:
         return replace(
             common,
             topics=self.topics,
-            edges=tuple(self.observer.edges(wall_ns())),
+            edges=tuple(self.observer.edges(self.observer.until_ns)),
             publishers=tuple(self.listener.graph.publishers()),
             volatile_readers=tuple(
                 name for name in volatile_readers(self.node, self.topics[1]) if not name.startswith(TOOLS)
             ),
             malformed=dict(self.observer.malformed),
+            beyond=dict(self.observer.beyond),
             clock_ns=self.listener.clock_ns,
-            clock_moves=self.clock[1] > time.monotonic() - CLOCK_STANDS_S,
+            clock_moves=self.clock[1] > self.observed - CLOCK_STANDS_S,
             skews_s=self.skews_s,
             stamped=self.sensors.stamped(),
             moving_joints=self.sensors.moving_joints,

@@ -87,6 +87,8 @@ class TreeState:
         skews_s: how far the clock of a publisher's machine is ahead of this one's, at least (negative: or its
             messages are that long under way), by id.
         malformed: how many messages came that are no TFMessage, by their publisher's id.
+        beyond: how many transforms came of edges that are not among ``edges``, because their publisher sends too many,
+            by its id.
         recorded: whether it is from a recording, which does not say who published.
     """
 
@@ -106,6 +108,7 @@ class TreeState:
     processes: tuple[RosProcess, ...] = ()
     skews_s: Mapping[bytes, float] = field(default_factory=dict)
     malformed: Mapping[bytes | None, int] = field(default_factory=dict)
+    beyond: Mapping[bytes | None, int] = field(default_factory=dict)
     plan: Plan | None = None
     recorded: bool = False
 

@@ -273,6 +273,7 @@ DIAGNOSES: tuple[Callable[[TreeState], Iterator[Finding]], ...] = (
     tree.loop,
     tree.second_parent,
     tree.two_trees,
+    publishers.flooded,
     publishers.two_publishers,
     publishers.both_topics,
     verify.differs_from_plan,

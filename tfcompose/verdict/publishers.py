@@ -56,6 +56,17 @@ def flood(node: str, where: str) -> Finding:
     return finding("TF853", message, None, notes=notes, help=f"end {node}, or let it use the same frames again")
 
 
+def flooded(state: TreeState) -> Iterator[Finding]:
+    """A node publishes more edges than are kept."""
+    named = {one.gid: one for one in state.publishers}
+    for gid, number in state.beyond.items():
+        one = named.get(gid) if gid is not None else None
+        node = one.node if one and one.node else NAMELESS
+        message = f"{node} publishes more edges than are kept: {counted(number, 'transform')} of further ones came"
+        notes = [Note(f"{node} runs {one.where}")] if one and one.where else []
+        yield finding("TF853", message, None, notes=notes, help=f"end {node}, or let it use the same frames again")
+
+
 def unfenced(node: str, process: str, topic: str, *, remapped: bool) -> Finding:
     """Return the finding for a process of a strict plan that is not behind the fence, which may be of remappings."""
     message = f"{node} of {process} publishes {topic} past the fence of guard: strict: every listener receives it"

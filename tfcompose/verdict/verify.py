@@ -20,9 +20,10 @@ from tfcompose.live.state import TreeState
 from tfcompose.plan import SLOW_BELOW
 from tfcompose.plan.stock import stand_ins
 from tfcompose.plan.topics import parts_of
+from tfcompose.text import listed
 from tfcompose.verdict.drivers import Expected, driver_pose_differs, drives_of, expected_of, is_off
 from tfcompose.verdict.ownership import SELF, Violation, code_of, may_be_owners, relays_of, sensor_of, violation_finding
-from tfcompose.verdict.publishers import pose_differs
+from tfcompose.verdict.publishers import flooded, pose_differs
 from tfcompose.verdict.rates import left, never_received, silent, slow
 from tfcompose.verdict.tree import rejected_transforms
 
@@ -336,19 +337,17 @@ class Verdict:
 def verify(
     plan: Plan,
     observers: Mapping[Topics, TreeObserver],
-    now_ns: int,
     tolerance: Offset,
     places: Mapping[str, Span] | None = None,
 ) -> list[Verdict]:
     """Return a verdict for each planned edge, in the plan's order, then one for each edge that is not in the plan.
 
-    ``now_ns`` is the time of the last observation, by the clock of the arrivals; ``places`` is where the edges stand in
-    the robot's file, by child.
+    ``places`` is where the edges stand in the robot's file, by child.
     """
     found: dict[str, list[Finding]] = {edge.child: [] for edge in plan.edges}
     extra = []
     for topics, part in parts_of(plan).items():
-        state = state_of(observers[topics], now_ns, topics)
+        state = state_of(observers[topics], topics)
         for edge in state.edges:
             if edge.stream.rejected is not None and edge.child in found:
                 found[edge.child] += rejected_transforms(edge)
@@ -360,17 +359,19 @@ def verify(
                 extra.append(Verdict(one.live.name, None, (reported,)))
             elif one.edge is not None:
                 found[one.edge.child].append(reported)
+        extra += [Verdict(listed(state.topics), None, (one,)) for one in flooded(state)]
     return [*(Verdict(edge.name, edge.owner, tuple(found[edge.child])) for edge in plan.edges), *extra]
 
 
-def state_of(observer: TreeObserver, now_ns: int, topics: Topics) -> TreeState:
-    """Return what an observer has received until ``now_ns`` on the topics (moving, fixed)."""
+def state_of(observer: TreeObserver, topics: Topics) -> TreeState:
+    """Return what an observer has received on the topics (moving, fixed)."""
     return TreeState(
-        max(0, now_ns - observer.begun_ns) / 1e9,
+        max(0, observer.until_ns - observer.begun_ns) / 1e9,
         topics,
-        tuple(observer.edges(now_ns)),
+        tuple(observer.edges(observer.until_ns)),
         tuple(observer.publishers.known.values()),
         observer.nodes,
+        beyond=dict(observer.beyond),
         recorded=observer.recorded,
     )
 

@@ -139,7 +139,7 @@ def graph_of_observers(
     """
     from tfcompose.draw import Arrow, Graph
 
-    edges = [one for observer in observers for one in observer.edges(observer.end_ns or observer.last_ns)]
+    edges = [one for observer in observers for one in observer.edges(observer.until_ns)]
     children = {one.stream.child for one in edges}
     missing = [edge for edge in plan.edges if edge.child not in children] if plan else []
     arrows = [_arrow(one, poses=poses) for one in edges]

@@ -10,7 +10,6 @@ newest pose of B in A is.
 from __future__ import annotations
 
 import sys
-import time
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -57,20 +56,21 @@ def run(arguments: Namespace) -> int:
     observer = TreeObserver(0.0 if covers_all else WINDOW_S, 0.0 if arguments.bag else SETTLE_S)
     if arguments.bag:
         read_bag(arguments.bag, {topics: observer})
-        return _show(arguments, observer, None, observer.end_ns)
+        return _show(arguments, observer, None)
     lines = LiveLines(sys.stdout) if arguments.format == "text" and can_redraw(sys.stdout) else None
     show = None if arguments.duration and not lines else partial(_show, arguments, observer, lines)
     observe("tfcompose_monitor", {topics: observer}, duration_s=arguments.duration, every_s=arguments.every, show=show)
-    return _show(arguments, observer, lines, time.time_ns()) if arguments.duration else 0
+    return _show(arguments, observer, lines) if arguments.duration else 0
 
 
-def _show(arguments: Namespace, observer: TreeObserver, live: LiveLines | None, now_ns: int) -> int:
+def _show(arguments: Namespace, observer: TreeObserver, live: LiveLines | None) -> int:
     """Print one table; return 1 if there is no chain between the two frames."""
     from tfcompose.cli.edge_table import chain_line, lines_of, objects_of
     from tfcompose.cli.live import names_of
     from tfcompose.live.chain import chain_between
     from tfcompose.plan.topics import topics_below
 
+    now_ns = observer.until_ns
     edges = sorted(observer.edges(now_ns), key=lambda state: state.stream.static)  # what moves first
     chain = chain_between(edges, *arguments.frames) if arguments.frames else None
     shown = edges if chain is None else () if isinstance(chain, str) else chain.all_edges

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import sys
-import time
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.options import DEFAULT_FILE, add_bag, add_for, add_format, add_namespace, add_variant
@@ -83,6 +82,7 @@ def _planned_edge(edge: PlanEdge) -> dict[str, Any]:
 
 
 def _print_published(arguments: Namespace) -> None:
+    from tfcompose.cli.edge_table import not_kept
     from tfcompose.cli.live import observe, observed_topics, read_bag
     from tfcompose.live.edges import SETTLE_S, TreeObserver, forest
     from tfcompose.plan.topics import parts_of
@@ -95,14 +95,14 @@ def _print_published(arguments: Namespace) -> None:
     else:
         observe("tfcompose_tree", observers, ros=plan.ros if plan else None, duration_s=arguments.duration)
     for pair, observer in observers.items():
-        now_ns = observer.end_ns if arguments.bag else time.time_ns()
         planned = {edge.child: edge for edge in parts[pair].edges} if pair in parts else None
-        trees = forest(observer.edges(now_ns), planned)
+        trees = forest(observer.edges(observer.until_ns), planned)
         if arguments.format == "json":
             sys.stdout.write(_published_json(pair, trees, plan=plan))
         else:
             heading = f"on {pair[0]} and {pair[1]}:\n" if len(pairs) > 1 else ""
-            sys.stdout.write(heading + _drawn(trees, plan=plan))
+            more = f"\n{not_kept(observer)}\n" if observer.beyond else ""
+            sys.stdout.write(heading + _drawn(trees, plan=plan) + more)
 
 
 def _drawn(trees: list[Tree], *, plan: Plan | None) -> str:

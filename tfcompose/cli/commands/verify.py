@@ -69,8 +69,7 @@ def run(arguments: Namespace) -> int:
     else:
         observe("tfcompose_verify", observers, ros=plan.ros, duration_s=arguments.duration, may_be_silent=may_be_silent)
     seconds = time.monotonic() - begun
-    now_ns = max(observer.end_ns for observer in observers.values()) if arguments.bag else time.time_ns()
-    return _report(arguments, plan, verify(plan, observers, now_ns, arguments.tolerance, places), seconds)
+    return _report(arguments, plan, verify(plan, observers, arguments.tolerance, places), seconds)
 
 
 def _running_plan(arguments: Namespace) -> tuple[Plan, dict[str, Span]] | None:

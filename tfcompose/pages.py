@@ -157,7 +157,8 @@ It has no parameter that switches off its frames, there is no driver, or tfcompo
     "TF605": """The preset does not know where a frame is.
 
 The vendor publishes no value, or only the device knows its own; 0 would be wrong. Measure it, or read it from the
-running driver with tfcompose echo, and give it under sensors.NAME.frames; or choose options without that frame.""",
+running driver with tfcompose echo, and give it under sensors.NAME.frames; or choose options without that frame. With
+``tf: driver`` no value is needed: the driver publishes the edge, and the URDF leaves the frame out.""",
     "TF606": """A preset contradicts itself: it names a frame or option that it does not have, or is not a tree.""",
     "TF607": """A preset of your own hides one that comes with tfcompose.
 

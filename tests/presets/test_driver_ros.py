@@ -214,6 +214,18 @@ def test_a_driver_that_does_otherwise_is_named_once(
     assert robot.ended().count(code) == 1
 
 
+def test_a_frame_whose_pose_only_the_driver_knows_is_owned_and_may_be_anywhere(
+    up: Callable[..., Up], tmp_path: Path
+) -> None:
+    text = (ROVER % "streams: [depth, color]}, tf: driver").replace("d435i", "d457")
+    robot = up(text, STAND_IN_OFF="color_frame:0.4")
+    robot.says("tree complete")
+    verified = processes.run([sys.executable, "-m", "tfcompose", "verify", "rover.yaml"], cwd=tmp_path)
+    assert (verified.returncode, re.findall(r"TF\d{3}", verified.stdout + verified.stderr)) == (0, []), verified.stdout
+    robot.popen.send_signal(signal.SIGINT)
+    assert robot.ended() == []
+
+
 def test_two_cameras_of_one_kind_get_names_and_serial_numbers_by_two_lines(
     up: Callable[..., Up], tmp_path: Path
 ) -> None:

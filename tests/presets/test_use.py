@@ -1,6 +1,7 @@
 """What a robot makes of presets: who publishes, what the driver is told, what is refused, and presets of one's own."""
 
 import json
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -97,10 +98,10 @@ def test_the_switch_is_among_the_parameters_of_the_driver(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in DRIVEN if name not in WITH_SWITCH])
 def test_without_a_switch_tfcompose_cannot_publish_what_the_driver_does(name: str) -> None:
-    done = compiled(name, tf="tfcompose", frames=unknown(name))
-    (found,) = done.errors
+    frames = unknown(name, tf="tfcompose", driver="none")
+    (found,) = compiled(name, tf="tfcompose", frames=frames).errors
     expect(found, "TF604", name)
-    assert not compiled(name, tf="tfcompose", driver="none", frames=unknown(name)).errors
+    assert not compiled(name, tf="tfcompose", driver="none", frames=frames).errors
     assert not compiled(name, tf="driver", frames=unknown(name)).errors
 
 
@@ -222,15 +223,66 @@ def test_a_unit_whose_cameras_hang_otherwise_says_on_what() -> None:
 
 
 def test_what_nobody_knows_is_requested_with_the_yaml_to_write_and_is_never_a_zero() -> None:
-    found = compiled("realsense/d457").found
+    found = compiled("realsense/d457", tf="tfcompose").found
     yaml_to_write = "sensors: {s: {frames: {s_color_frame: {xyz: [x, y, z], rpy: [roll, pitch, yaw]}}}}"
     expect(found[0], "TF605", "realsense/d457", "s_color_frame", "s_link", yaml_to_write)
-    (several,) = compiled("realsense/d457", options={"streams": ["infra2", "color"]}).found
+    (several,) = compiled("realsense/d457", tf="tfcompose", options={"streams": ["infra2", "color"]}).found
     expect(several, "TF605", "s_color_frame and s_infra2_frame")
     robot = robot_of("realsense/d457", frames={"s_color_frame": {"xyz": [0, -0.059, 0], "rpy": [0, 0, 0]}})
     assert edge_of(robot, "s_color_frame").pose.xyz == (0, -0.059, 0)
     assert not edge_of(robot, "s_color_frame").nominal
     assert [one.code for one in compiled("realsense/d457", options={"streams": ["depth"]}).found] == []
+
+
+@for_each(NAMES)
+def test_every_preset_has_no_findings_with_its_default_options(name: str) -> None:
+    found = compiled(name, xyz=[0.1, 0, 0.2]).found
+    assert found == ()
+
+
+def test_where_only_the_driver_knows_a_frame_is_its_edge_is_declared_without_a_pose() -> None:
+    on_it = 'frames: {"on_color": {"parent": "s_color_frame", "xyz": [0, 0, 1]}}\n'
+    robot = robot_of("realsense/d457", on_it, options={"streams": ["depth", "color"]})
+    edges = {edge.child: (edge.owner, edge.pose_known) for edge in robot.edges}
+    assert edges["s_color_frame"] == ("s", False)
+    assert edges["s_color_optical_frame"] == ("s", True)
+    assert edges["on_color"] == ("static", True)
+    files = {file.path: file.text for file in emit(robot)}
+    plan = json.loads(files["plan.json"])
+    assert [edge["child"] for edge in plan["edges"] if not edge.get("pose_known", True)] == ["s_color_frame"]
+    (driven,) = next(process for process in plan["processes"] if process["name"] == "s")["drives"]
+    assert driven["frames"]["s_color_frame"] == "unknown"
+    for path in ("r.urdf", "robot.urdf", "robot.full.urdf"):
+        text = files.get(path)
+        if text is not None:
+            links = set(re.findall(r'<link name="([^"]+)"', text))
+            assert not links & {"s_color_frame", "s_color_optical_frame", "on_color"}
+            assert {"s_depth_frame", "s_depth_optical_frame"} <= links
+            assert re.search(r"<!-- .*s_color_frame.* -->", text)
+
+
+def test_what_needs_an_unknown_pose_is_refused_and_says_what_would_give_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    placed = compiled("realsense/d457", place="s_color_optical_frame", xyz=[0, 0, 1]).errors
+    expect(placed[0], "TF404", "s_color_frame", "sensors.s.frames.s_color_frame")
+    file = tmp_path / "r.yaml"
+    file.write_text(f"{HEAD}sensors: {{s: {{preset: realsense/d457, parent: base_link, xyz: [1, 0, 0]}}}}\n")
+    assert main(["pose", str(file), "base_link", "s_depth_optical_frame"]) == 0
+    assert main(["pose", str(file), "base_link", "s_color_optical_frame"]) == 1
+    assert "s_color_frame" in capsys.readouterr().err
+    capsys.readouterr()
+    assert main(["tree", str(file), "--format", "json"]) == 0
+    (tree,) = json.loads(capsys.readouterr().out)["trees"]
+    shown = {edge["child"]: edge["xyz"] for edge in tree["edges"]}
+    assert (shown["s_color_frame"], shown["s_depth_frame"]) == (None, [0.0, 0.0, 0.0])
+
+
+def test_an_unknown_frame_stays_out_of_what_a_stock_publisher_takes_over() -> None:
+    on_it = 'frames: {"on_color": {"parent": "s_color_frame"}}\nros: {"state_publisher": "stock"}\n'
+    robot = robot_of("realsense/d457", on_it)
+    owners = {edge.child: edge.owner for edge in robot.edges}
+    assert (owners["on_color"], owners["s_link"], owners["s_color_frame"]) == ("static", "joints", "s")
 
 
 def test_a_name_that_the_driver_makes_itself_cannot_be_changed() -> None:

@@ -48,7 +48,8 @@ def optical_frame_not_rotated(robot: Robot) -> Iterator[Finding]:
     """
     above = {edge.child: edge for edge in robot.edges}
     for edge in robot.edges:
-        if edge.kind != "static" or edge.other_axes or not is_optical(edge.child) or is_optical(edge.parent):
+        is_fixed = edge.kind == "static" and edge.pose_known
+        if not is_fixed or edge.other_axes or not is_optical(edge.child) or is_optical(edge.parent):
             continue
         quat_xyzw = edge.pose.quat_xyzw
         if edge.calibration or _is_optical_in_camera(edge, above) or not _is_wrong(edge, robot):
@@ -74,7 +75,7 @@ def _is_optical_in_camera(edge: Edge, above: Mapping[str, Edge]) -> bool:
     quat_xyzw, step, passed = edge.pose.quat_xyzw, edge, {edge.child}
     while not _is_at(quat_xyzw, OPTICAL_XYZW):
         upper = above.get(step.parent)
-        if upper is None or upper.kind != "static" or upper.child in passed:
+        if upper is None or upper.kind != "static" or not upper.pose_known or upper.child in passed:
             return False
         turned = _is_at(upper.pose.quat_xyzw, OPTICAL_XYZW)
         if not turned and not _is_named_after(edge.child, upper.parent):

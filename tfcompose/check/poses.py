@@ -236,7 +236,8 @@ def placed(robot: Robot, *, moving: bool = False) -> dict[str, Pose]:
     while waiting:
         parent = waiting.pop()
         for edge in children.get(parent, ()):
-            if edge.child not in poses and (edge.kind == "static" or (moving and edge.joint)):
+            is_placed = edge.pose_known and (edge.kind == "static" or (moving and edge.joint))
+            if edge.child not in poses and is_placed:
                 poses[edge.child] = poses[parent] @ edge.pose
                 waiting.append(edge.child)
     return poses
@@ -283,7 +284,7 @@ def envelope(robot: Robot, frame: str, without: str | None = None) -> Box | None
 
 def _fixed_to(robot: Robot, frame: str) -> dict[str, Pose]:
     """Return the pose in ``frame`` of each frame that is fixed to it, up and down the tree."""
-    fixed = [edge for edge in robot.edges if edge.kind == "static"]
+    fixed = [edge for edge in robot.edges if edge.kind == "static" and edge.pose_known]
     neighbours: dict[str, list[tuple[str, Pose]]] = {}
     for edge in fixed:
         neighbours.setdefault(edge.parent, []).append((edge.child, edge.pose))

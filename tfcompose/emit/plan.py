@@ -171,7 +171,11 @@ def _claimed(sensor: MountedSensor) -> dict[str, Any]:
 def _driven(sensor: MountedSensor, robot: Robot) -> Driven:
     switch = _claimed(sensor) if sensor.publishes else _switch(sensor)
     inside = (edge for edge in robot.edges if edge.sensor == sensor.name and not edge.given)
-    frames: dict[str, PoseKnowledge] = {
-        edge.child: "nominal" if edge.nominal else "exact" for edge in inside if edge.owner == sensor.driver
-    }
+    frames: dict[str, PoseKnowledge] = {edge.child: _knowledge(edge) for edge in inside if edge.owner == sensor.driver}
     return Driven(sensor.name, sensor.preset, sensor.publishes, switch, frames)
+
+
+def _knowledge(edge: Edge) -> PoseKnowledge:
+    if not edge.pose_known:
+        return "unknown"
+    return "nominal" if edge.nominal else "exact"

@@ -205,6 +205,11 @@ class Robot:
             table.setdefault(edge.parent, []).append(edge)
         return table
 
+    def described(self) -> set[str]:
+        """Return the frames that a URDF can hold: the base, and what is below it over edges of known pose."""
+        known = [(edge.parent, edge.child) for edge in self.edges if edge.pose_known]
+        return below(children_of(known), self.base) if self.base is not None else set()
+
     def below(self, frame: str) -> set[str]:
         """Return the frame and every frame that hangs below it, over edges of any owner."""
         return below(children_of((edge.parent, edge.child) for edge in self.edges), frame)

@@ -36,7 +36,7 @@ LogLevel = Literal["debug", "info", "warn", "error", "fatal"]
 #: What a stand-in does.
 SimulationKind = Literal["circle", "fixed", "joints"]
 #: How well the pose of a frame is known that a driver publishes.
-PoseKnowledge = Literal["exact", "nominal"]
+PoseKnowledge = Literal["exact", "nominal", "unknown"]
 
 #: Whose time the whole plan runs by.
 Clock = Literal["wall", "sim"]
@@ -120,6 +120,7 @@ class PlanEdge:
     """One TF edge and the process that publishes it. ``node`` is the publishing node's full name.
 
     ``switched`` holds the further parents between which the owner may change the child; ``parent`` is the nominal one.
+    ``pose_known`` is False where only the owner knows where the child is; ``pose`` is the identity then.
     """
 
     parent: str
@@ -132,6 +133,7 @@ class PlanEdge:
     source: SourceLine
     joint: Joint | None = field(default=None, metadata=OMITTED)
     switched: tuple[str, ...] = field(default=(), metadata=OMITTED)
+    pose_known: bool = field(default=True, metadata=OMITTED)
 
     @property
     def name(self) -> str:
@@ -221,7 +223,7 @@ class Driven:
     """A sensor that a process drives. ``publishes`` says that the frames inside the sensor are the driver's.
 
     ``switch`` holds the parameters, or arguments, that keep the driver from publishing what is not its own. ``frames``
-    says of the frames that the driver publishes inside the sensor whether their poses are exact or nominal.
+    says of the frames that the driver publishes inside the sensor whether their poses are exact, nominal or unknown.
     """
 
     sensor: str

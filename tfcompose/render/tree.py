@@ -33,14 +33,19 @@ def _row(name: str, edge: Edge | None, width: int, owners: int) -> str:
     if edge is None:
         return name
     rate = f"{number(edge.rate)} Hz" if edge.rate else ""
-    rest = "  ".join(fact for fact in (short_pose(edge.pose), _switched(edge)) if fact)
+    rest = "  ".join(fact for fact in (pose_text(edge), _switched(edge)) if fact)
     return f"{name:<{width}}  {edge.kind:<7}  {edge.owner:<{owners}}  {rate:<6}  {rest}".rstrip()
+
+
+def pose_text(edge: Edge) -> str:
+    """Return the edge's pose as ``short_pose`` has it, or that only its owner knows it."""
+    return short_pose(edge.pose) if edge.pose_known else "pose unknown"
 
 
 def edge_facts(edge: Edge) -> str:
     """Return kind, owner, rate and pose of an edge, in one line."""
     rate = f"{number(edge.rate)} Hz" if edge.rate else ""
-    facts = (edge.kind, f"by {edge.owner}", rate, short_pose(edge.pose), _switched(edge))
+    facts = (edge.kind, f"by {edge.owner}", rate, pose_text(edge), _switched(edge))
     return "  ".join(fact for fact in facts if fact)
 
 
@@ -84,6 +89,6 @@ def _label(sensor: str, presets: dict[str, str]) -> str:
 
 def _arrows(edge: Edge, *, poses: bool) -> Iterator[Arrow]:
     rate = f"{number(edge.rate)} Hz" if edge.rate else ""
-    yield Arrow(edge.parent, edge.child, edge.kind, edge.owner, rate, short_pose(edge.pose) if poses else "")
+    yield Arrow(edge.parent, edge.child, edge.kind, edge.owner, rate, pose_text(edge) if poses else "")
     for parent in edge.switched:
         yield Arrow(parent, edge.child, edge.kind, edge.owner, alternative=True)

@@ -209,6 +209,12 @@ class Solver:
                 advice = "name a frame with only fixed edges on the way to it"
                 message = f"{what}, so the pose cannot be solved"
                 raise _UnsolvableError(finding("TF404", message, at, notes=[note], help=advice))
+            if not edge.pose_known and edge.owner == STATIC:
+                raise _UnsolvableError(None)  # TF605 says so
+            if not edge.pose_known:
+                message = f"only {edge.owner} knows where {edge.child} is, so the pose cannot be solved"
+                advice = f"give this unit's values: sensors.{edge.sensor}.frames.{edge.child}"
+                raise _UnsolvableError(finding("TF404", message, at, help=advice))
             pose = self._edge(index).pose @ pose
         return pose
 

@@ -65,31 +65,33 @@ class _Mounting:
         """Take one frame inside the sensor: the unit's own value before the preset's."""
         own, final = self.sensor.spec.frames.get(name), self.renamed(name)
         parent = self.sensor.parent_of(name, frame)
-        pose, measured = self.pose_of(name, frame, own)
         owner = publisher if frame.driver else STATIC
+        pose, missing = self.pose_of(name, frame, own)
+        if missing and owner == STATIC:
+            self.unknown[name] = f"{name}: {{{', '.join(missing)}}}"
         kind = "dynamic" if frame.driver == "dynamic" and owner != STATIC else "static"
         self.drafts.frames.setdefault(final, self.place())
-        nominal = frame.nominal and not measured
+        nominal = frame.nominal and not (own and (own.xyz or rotation_of(own, name)))
         edge = Edge(
             parent=self.renamed(parent), child=final, kind="dynamic" if kind == "dynamic" else "static", owner=owner,
             pose=pose, at=self.place(), given=False, sensor=self.sensor.name, nominal=nominal,
-            other_axes=frame.other_axes,
+            other_axes=frame.other_axes, pose_known=not missing,
         )  # fmt: skip
         self.drafts.edges.append(Draft(edge))
 
-    def pose_of(self, name: str, frame: PresetFrame, own: FrameOverride | None) -> tuple[Pose, bool]:
-        """Return the frame's pose in its parent, and whether it is the unit's own; note what nobody knows."""
+    def pose_of(self, name: str, frame: PresetFrame, own: FrameOverride | None) -> tuple[Pose, list[str]]:
+        """Return the frame's pose in its parent, and what is missing of it: then it is the identity."""
         at, rotation = frame.xyz, rotation_of(frame, name)
         if frame.by_driver and self.sensor.tf == DRIVER:
             at, rotation = frame.by_driver.xyz or at, rotation_of(frame.by_driver, name) or rotation
         turned = rotation_of(own, name) if own else None
-        unknown = ["xyz: [x, y, z]"] if at is None and not (own and own.xyz) else []
+        xyz = (own.xyz if own else None) or at
+        missing = ["xyz: [x, y, z]"] if xyz is None else []
         if at is None and rotation is None and turned is None:
-            unknown.append("rpy: [roll, pitch, yaw]")
-        if unknown:
-            self.unknown[name] = f"{name}: {{{', '.join(unknown)}}}"
-        xyz = (own.xyz if own else None) or at or (0.0, 0.0, 0.0)
-        return Pose(xyz, turned or rotation or Pose().quat_xyzw), bool(own and (own.xyz or turned))
+            missing.append("rpy: [roll, pitch, yaw]")
+        if xyz is None or missing:
+            return Pose(), missing
+        return Pose(xyz, turned or rotation or Pose().quat_xyzw), []
 
     def ask(self) -> None:
         """Note where nobody knows where frames are, with what to write."""

@@ -27,7 +27,7 @@ def with_stock(robot: Robot) -> tuple[Robot, list[Finding]]:
     """
     if robot.base is None:
         return robot, []
-    described = robot.below(robot.base)
+    described = robot.described()
     below = described - {robot.base}
     found = [
         finding(

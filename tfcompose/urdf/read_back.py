@@ -52,7 +52,7 @@ def differences(robot: Robot, text: str, target: Target, *, full: bool) -> Itera
     if there.name != robot.name:
         yield f"its name is {there.name}, not {robot.name}"
     base = robot.base or ""
-    frames = robot.below(base)
+    frames = robot.described()
     links = {link.name: link for link in there.links}
     joints = {joint.child: joint for joint in there.joints}
     edges = {edge.child: edge for edge in robot.edges if edge.child in frames and edge.child != base}

@@ -90,12 +90,15 @@ class Writer:
     def body(self, robot: Robot) -> tuple[list[str], list[str]]:
         """Return the links and joints below ``robot.base``, in full and for a stock publisher, as ``urdf`` does.
 
+        A frame of unknown pose is left out with what is below it, and a comment says so.
+
         For a stock publisher the root has no inertia: it has no use for one, and KDL, which it reads URDF with, takes
         none there and warns at each start.
         """
         if robot.base is None:
             raise ValueError(f"{robot.name} has no base")
-        edges = list(_below(robot.base, robot.children()))
+        described = robot.described()
+        edges = [edge for edge in _below(robot.base, robot.children()) if edge.child in described]
         links = [line for edge in edges for line in self.link(edge.child, robot.links.get(edge.child))]
         root = robot.links.get(robot.base)
         full = self.link(robot.base, root) + links
@@ -104,7 +107,8 @@ class Writer:
             joint = self.joint(edge, name, joint_type(edge))
             full += joint
             stock += joint if edge.owner in {STATIC, JOINTS} else self.joint(edge, name, "floating")
-        return full, stock
+        left_out = [_unknown(edge) for edge in robot.edges if not edge.pose_known and edge.parent in described]
+        return full + left_out, stock + left_out
 
     def link(self, name: str, link: Link | None) -> list[str]:
         """Return the link with its mass, shapes and colours."""
@@ -220,6 +224,11 @@ class Writer:
             if name not in ATTRIBUTES
         ]
         return [f"{head}>", *params, f"      </{tag}>"] if params else [f"{head}/>"]
+
+
+def _unknown(edge: Edge) -> str:
+    text = f"{edge.child} is not here, nor what is below it: only {edge.owner} knows where it is in {edge.parent}"
+    return f"  <!-- {text.replace('--', '- -')} -->"
 
 
 def _below(root: str, children: dict[str, list[Edge]]) -> Iterator[Edge]:

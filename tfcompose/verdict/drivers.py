@@ -58,7 +58,7 @@ def expected_of(plan: Plan) -> dict[str, Expected]:
         for process in plan.processes
         for driven in process.drives
         for child, kind in driven.frames.items()
-        if child in edges
+        if child in edges and kind != "unknown"
     }
 
 

@@ -10,6 +10,7 @@ from functools import reduce
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_format, add_frames, add_variant
+from tfcompose.cli.terminal import fail
 from tfcompose.geometry import Pose
 
 if TYPE_CHECKING:
@@ -27,12 +28,18 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Print the pose; exit code 1 if a frame is not there."""
+    """Print the pose; exit code 1 if a frame is not there, or only a driver knows where it is."""
     from tfcompose.cli.compiling import compiled_robot, edges_between
     from tfcompose.numbers import clean
     from tfcompose.render.pose import pose_json, pose_text
 
     rising, falling = edges_between(compiled_robot(arguments.file, arguments), arguments.a, arguments.b)
+    unknown = next((edge for edge in [*rising, *reversed(falling)] if not edge.pose_known), None)
+    if unknown:
+        fail(
+            f"only {unknown.owner} knows where {unknown.child} is in {unknown.parent}: "
+            f"tfcompose echo {arguments.a} {arguments.b} reads it from the running robot"
+        )
     pose = clean(_pose_in_top(rising).inverse() @ _pose_in_top(falling))
     if arguments.format == "json":
         sys.stdout.write(pose_json(arguments.a, arguments.b, pose))

@@ -76,8 +76,8 @@ def _planned_edge(edge: PlanEdge) -> dict[str, Any]:
         "owner": edge.owner,
         "node": edge.node,
         "rate": edge.rate,
-        "xyz": list(edge.pose.xyz),
-        "quat_xyzw": list(edge.pose.quat_xyzw),
+        "xyz": list(edge.pose.xyz) if edge.pose_known else None,
+        "quat_xyzw": list(edge.pose.quat_xyzw) if edge.pose_known else None,
     }
 
 

@@ -131,7 +131,7 @@ def test_where_a_publisher_runs_is_a_note(running: History) -> None:
     )
     running.send(rogue, "map odom")
     running.events += running.judge.tick(running.now + 0.1)
-    expect(running.only(), "TF801", "/rogue runs on another machine")
+    expect(running.only(), "TF801", "/rogue", "another machine")
 
 
 def test_the_process_that_can_be_stopped_is_named_only_where_it_is_sure() -> None:

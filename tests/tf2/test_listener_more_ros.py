@@ -119,7 +119,7 @@ def test_a_listener_of_its_own_follows_the_simulated_clock_and_says_when_it_goes
         assert until(lambda: not buffer.can_transform("odom", "base_link", Time()))
         publisher.publish(one(2.0, 5 * S))
         assert until(lambda: buffer.can_transform("odom", "base_link", Time(seconds=5)))
-    assert "time went back by 155.000 s: the TF buffer forgets all moving edges" in capfd.readouterr().err
+    assert "back by 155.000 s" in capfd.readouterr().err
 
 
 def test_a_node_with_use_sim_time_clears_the_buffer_that_it_was_given_to_once(domain: Any) -> None:

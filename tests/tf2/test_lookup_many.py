@@ -53,7 +53,7 @@ def test_zero_is_the_newest_common_time() -> None:
 def test_times_that_an_edge_does_not_know_raise_or_are_rows_of_nan() -> None:
     buffer = drive()
     stamps = [100 * S, 99 * S, 110 * S, 109 * S]
-    with pytest.raises(ExtrapolationException, match=r"odom → base at 99.* 1000 ms later.*; so it is for 2 of 4 times"):
+    with pytest.raises(ExtrapolationException, match=r"odom → base at 99.* 1000 ms .* 2 of 4 "):
         buffer.lookup_many("odom", "laser", stamps)
     found = buffer.lookup_many("odom", "laser", stamps, outside="nan")
     assert np.isnan(found.xyz[:, 0]).tolist() == [False, True, True, False]
@@ -103,7 +103,7 @@ def test_fixed_edges_and_a_frame_in_itself_fill_all_rows() -> None:
 
 @pytest.mark.parametrize("stamps", [[1.5], [[1, 2]], 5, ["now"]])
 def test_times_that_are_no_row_of_integers_are_refused(stamps: Any) -> None:
-    with pytest.raises(TypeError, match="one row of whole nanoseconds"):
+    with pytest.raises(TypeError, match="nanoseconds"):
         drive().lookup_many("odom", "base", stamps)
 
 

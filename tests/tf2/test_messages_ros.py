@@ -127,7 +127,7 @@ def test_an_organised_cloud_with_holes_and_colours(buffer: Buffer) -> None:
 def test_a_message_becomes_one_of_another_type_only_where_that_means_something(buffer: Buffer) -> None:
     point = headed(PointStamped)
     assert type(buffer.transform(point, "base", new_type=PointStamped)) is PointStamped
-    with pytest.raises(TypeException, match="nothing turns a PointStamped into a PoseStamped"):
+    with pytest.raises(TypeException, match=r"PointStamped .* PoseStamped"):
         buffer.transform(point, "base", new_type=PoseStamped)
 
 

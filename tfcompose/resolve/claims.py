@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def settled(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Finding]]:
-    """Return the robot with each node told what to publish and under which names, and what cannot be settled."""
+    """Return the robot whose nodes have the parameters that settle what they publish, and what cannot be settled."""
     work = _Work(robot, spec, source)
     processes = tuple(work.process(process) for process in robot.processes)
     edges = tuple(work.edge(edge) for edge in robot.edges)
@@ -41,7 +41,7 @@ class _Work:
     known: set[str] = field(default_factory=set)
 
     def process(self, process: Process) -> Process:
-        """Return the process with its nodes told."""
+        """Return the process with the parameters of its nodes."""
         if process.name not in self.spec.processes or process.kind not in {"run", "external"}:
             return process
         claimants = [self._node(process, node) for node in process.ros_nodes]
@@ -76,7 +76,7 @@ class _Work:
         return edge
 
     def _node(self, process: Process, node: Node) -> Claimant | None:
-        """Return what is known of a node and what it is told, or None where nothing is said."""
+        """Return what is known of a node and its parameters, or None where nothing is."""
         declared = self.spec.processes[process.name]
         inner = declared.nodes.get(str(node.path[-1])) if len(node.path) > 2 else None  # noqa: PLR2004 (below nodes)
         name = inner.preset if inner else declared.node.preset if declared.node and not declared.nodes else None
@@ -87,7 +87,7 @@ class _Work:
         claims = (*(preset.publishes if preset else ()), *by_hand)
         roles = Roles(self.robot, process.name, preset, claims)
         claimant = Claimant(process, node, claims, preset, roles, flat(node.params))
-        self._tell_names(claimant)
+        self._set_names(claimant)
         for claim in self._of_one(claimant) if preset and preset.one_of else claims:
             self._settle(claimant, claim)
         return claimant
@@ -113,7 +113,7 @@ class _Work:
                 return (claim,)
         return claimant.claims[:1]
 
-    def _tell_names(self, claimant: Claimant) -> None:
+    def _set_names(self, claimant: Claimant) -> None:
         """Write the parameters that hold frames' names, and those without which they would mean something else."""
         preset = claimant.preset
         if preset is None:
@@ -125,14 +125,14 @@ class _Work:
             given = claimant.given.get(described.parameter)
             if given is not None and not claimant.roles.is_bound(role) and self._is_frame(given):
                 continue  # the tree leaves it open
-            self._tell(claimant, described.parameter, self.robot.final(frame))
+            self._set(claimant, described.parameter, self.robot.final(frame))
         for key, value in preset.set.items():
-            self._tell(claimant, key, value)
+            self._set(claimant, key, value)
 
     def _is_frame(self, name: Any) -> bool:
         return any(name == self.robot.final(frame) for frame in self.robot.frames)
 
-    def _tell(self, claimant: Claimant, key: str, value: Any) -> None:
+    def _set(self, claimant: Claimant, key: str, value: Any) -> None:
         given = claimant.given.get(key)
         if given is None:
             claimant.computed[key] = value
@@ -170,9 +170,9 @@ class _Work:
     def _own(self, claimant: Claimant, claim: ClaimSpec, edge: Edge) -> None:
         self.publishers[claimant.process.name, edge.child] = claimant.node.name
         for key, value in claim.chosen_by.items():
-            self._tell(claimant, key, claimant.roles.final(value))
+            self._set(claimant, key, claimant.roles.final(value))
         for key, value in claim.on.items() if not claim.by_default else ():
-            self._tell(claimant, key, value)
+            self._set(claimant, key, value)
         if claimant.has(claim.off):
             message = (
                 f"{claimant.process.name} owns {edge.name}, but a parameter turns that off: {switch_text(claim.off)}"

@@ -87,7 +87,7 @@ class Drafts:
         """Take the edges between bodies."""
         for name, joint in self.spec.joints.items():
             moving = joint_of(name, joint, self.source.at_key(("joints", name)))
-            self.found += idle_keys(name, joint, self.source)
+            self.found += idle_joint_keys(name, joint, self.source)
             self.add(("joints", name), joint.parent, joint.child, joint, joint=moving, joint_name=name)
 
     def add_part(self, part: Joined) -> bool:
@@ -230,7 +230,7 @@ def joint_of(name: str, spec: JointSpec, at: Span) -> Joint | None:
     )
 
 
-def idle_keys(name: str, joint: JointSpec, source: Source) -> Iterator[Finding]:
+def idle_joint_keys(name: str, joint: JointSpec, source: Source) -> Iterator[Finding]:
     """Yield a finding where a joint has keys that joints of its type do not use."""
     at: Path = ("joints", name)
     idle = source.in_order(at, joint.model_fields_set & {*_IDLE.get(joint.type, ())})

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.load import path_named
-from tfcompose.model import SHELL
 from tfcompose.plan import RosSettings, known_at_launch
 from tfcompose.plan.codec import narrowed
 
@@ -47,7 +46,7 @@ def isolate(robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None = N
     found = _wrong(robot, spec, source)
     remap = topics_below(robot.ros.namespace, spec.ros.isolate)
     processes = []
-    filler = Filler(robot, source, disk)
+    filler = _Filler(robot, source, disk)
     for process in robot.processes:
         moved = replace(process, remap=remap | process.remap)
         processes.append(filler.filled(moved))
@@ -69,17 +68,11 @@ def _wrong(robot: Robot, spec: RobotSpec, source: Source) -> list[Finding]:
     return found
 
 
-_WORDS = {
-    "remap": "-r FROM:=TO",
-    "log_level": "--log-level LEVEL",
-    "namespace": "-r __ns:=/NAMESPACE",
-    "params": "--params-file ${params_file}",
-}
 _HOLE = re.compile(r"\$\{\s*(frame|file)\(\s*([^(){}]*?)\s*\)\s*\}")
 
 
 @dataclass(slots=True)
-class Filler:
+class _Filler:
     """Fills in processes; ``found`` is what cannot be."""
 
     robot: Robot
@@ -103,28 +96,6 @@ class Filler:
         for node in done.ros_nodes:
             self._check_paths(done, node)
         return done
-
-    def needless(self, process: Process) -> list[Finding]:
-        """Return what is said and reaches nobody: a file of no parameters, and keys beside a shell's text."""
-        at: Path = ("processes", process.name, "run")
-        names_params_file = any("${params_file}" in word for word in (*process.argv, *process.env.values()))
-        if process.argv[:2] == SHELL:
-            return self._not_reached(process, names_params_file=names_params_file)
-        if not names_params_file or any(node.params for node in process.ros_nodes) or not self.source.has(at):
-            return []
-        message = f"{process.name} is given ${{params_file}}, and has no parameters"
-        return [finding("TF816", message, self.source.at(at), help="params: {…}")]
-
-    def _not_reached(self, process: Process, *, names_params_file: bool) -> list[Finding]:
-        """Return a warning for each key that would be told by arguments, which end before the text's programs."""
-        found = []
-        for key in ("remap", "log_level", "namespace", *(() if names_params_file else ("params",))):
-            at: Path = ("processes", process.name, key)
-            if getattr(process, key) and self.source.has(at):
-                message = f"{key} does not reach {process.name}, which a shell reads"
-                advice = f"write it into the text: --ros-args {_WORDS[key]}; or give run as a list"
-                found.append(finding("TF107", message, self.source.at_key(at), help=advice, severity="warning"))
-        return found
 
     def _fill(self, value: Any, path: Path) -> Any:
         if isinstance(value, str):

@@ -19,6 +19,7 @@ from tfcompose.resolve.presets import node_preset, node_preset_names
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from tfcompose.findings import Span
     from tfcompose.language import Validated
     from tfcompose.language.process import ProcessSpec, ReadySpec, Run, Simulate, Started, Way
     from tfcompose.language.robot import RobotSpec
@@ -262,6 +263,35 @@ def _idle(path: Path, name: str, process: Started, source: Source) -> Iterator[F
     for key in process.model_fields_set - keys_of(way) - RUNNING - {"rate"}:  # which are refused elsewhere
         message, advice = f"{name} is {what}, so {key} has no effect", f"remove it: it is for {whom}"
         yield finding("TF851", message, source.at_key((*path, key)), help=advice)
+
+
+_WORDS = {
+    "remap": "-r FROM:=TO",
+    "log_level": "--log-level LEVEL",
+    "namespace": "-r __ns:=/NAMESPACE",
+    "params": "--params-file ${params_file}",
+}
+
+
+def unreached(process: Process, source: Source) -> list[Finding]:
+    """Return findings about a parameter file without parameters, and about keys that a shell's command cannot get."""
+    at: Path = ("processes", process.name)
+    names_params_file = any("${params_file}" in word for word in (*process.argv, *process.env.values()))
+    if process.argv[:2] == SHELL:
+        keys = ("remap", "log_level", "namespace", *(() if names_params_file else ("params",)))
+        given = [key for key in keys if getattr(process, key) and source.has((*at, key))]
+        return [_not_reached(key, process, source.at_key((*at, key))) for key in given]
+    if not names_params_file or any(node.params for node in process.ros_nodes) or not source.has((*at, "run")):
+        return []
+    message = f"{process.name} is given ${{params_file}}, and has no parameters"
+    return [finding("TF816", message, source.at((*at, "run")), help="params: {…}")]
+
+
+def _not_reached(key: str, process: Process, at: Span) -> Finding:
+    """Return a warning about a key that becomes ROS arguments, which end before the programs that a shell starts."""
+    advice = f"write it into the text: --ros-args {_WORDS[key]}; or give run as a list"
+    message = f"{key} does not reach {process.name}, which a shell reads"
+    return finding("TF107", message, at, help=advice, severity="warning")
 
 
 #: The key among a process's parameters that names files with more of them.

@@ -6,28 +6,32 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.findings import Finding, finding
+from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.load import path_named
 from tfcompose.model import Edge, Process, Robot, may_be_refused
+from tfcompose.resolve.blocks import with_blocks
 from tfcompose.resolve.bodies import Bodies, with_colours
 from tfcompose.resolve.calibration import calibrated
-from tfcompose.resolve.completed import completed
+from tfcompose.resolve.claims import settled
 from tfcompose.resolve.edges import Drafts, source_numbers
-from tfcompose.resolve.isolation import settings_of
+from tfcompose.resolve.isolation import isolate, settings_of
 from tfcompose.resolve.param_files import with_param_files
 from tfcompose.resolve.parts import Collected, Parts, Resolved
 from tfcompose.resolve.poses import Solver
 from tfcompose.resolve.presets import sensor_of
 from tfcompose.resolve.processes import (
     built_in,
+    has_claims,
     idle_keys,
     name_clashes,
     names_files,
     unknown_names,
+    unreached,
     user_process,
     with_positions,
 )
 from tfcompose.resolve.sensors import add_sensor
+from tfcompose.resolve.stock import with_stock
 from tfcompose.urdf.packages import Packages
 
 if TYPE_CHECKING:
@@ -101,7 +105,15 @@ class _Work:
         robot = self._take(with_positions(self._robot(drafts, edges, self._everybody(own)), self.spec, self.source))
         if any(names_files(node.params) for process in own for node in process.ros_nodes):
             robot = self._take(with_param_files(robot, self.source, self.read))
-        robot = self._take(completed(robot, self.spec, self.source, self.disk))
+        if self.spec.ros2_control or self.spec.xml:
+            robot = self._take(with_blocks(robot, self.spec, self.source))
+        robot = replace(robot, base=self._base(robot))
+        if self.spec.ros.state_publisher == "stock":
+            robot = self._take(with_stock(robot))
+        robot = self._take(isolate(robot, self.spec, self.source, self.disk))
+        if has_claims(self.spec):
+            robot = self._take(settled(robot, self.spec, self.source))
+        self.found += [one for process in robot.processes for one in unreached(process, self.source)]
         return Resolved(robot, (*self.of_parts, *self.found), self.collected)
 
     def _take(self, done: tuple[Robot, list[Finding]]) -> Robot:
@@ -163,6 +175,24 @@ class _Work:
         measured, refused = calibrated(drafts.edges, drafts.frames, self.spec, self.source, self.read)
         self.found += refused
         return measured
+
+    def _base(self, robot: Robot) -> str | None:
+        """Return where the URDF begins: as said; base_link, or a fixed base_footprint above it; else the only root."""
+        base = self.spec.base
+        if base is not None:
+            if base in robot.frames:
+                return base
+            if not robot.excuses(base):
+                advice = did_you_mean(base, robot.frames)
+                self.found.append(finding("TF203", f"no frame {base}", self.source.at(("base",)), help=advice))
+            return None
+        if "base_link" in robot.frames:
+            above = robot.parent_edge("base_link")
+            if above and above.kind == "static" and above.parent == "base_footprint":
+                return "base_footprint"
+            return "base_link"
+        roots = robot.roots()
+        return roots[0] if len(roots) == 1 else None
 
     def _wrong_names(self, own: list[Process]) -> list[Finding]:
         everybody = self._everybody(own)

@@ -47,7 +47,7 @@ class _Mounting:
         publisher = self.publisher()
         for name, frame in sensor.frames().items():
             self.add_frame(name, frame, publisher)
-        self.ask()
+        self.report_unknown()
         self.check_overrides(mount)
         self.add_body()
         drafts.sensors.append(self.mounted(mount))
@@ -93,8 +93,8 @@ class _Mounting:
             return Pose(), missing
         return Pose(xyz, turned or rotation or Pose().quat_xyzw), []
 
-    def ask(self) -> None:
-        """Note where nobody knows where frames are, with what to write."""
+    def report_unknown(self) -> None:
+        """Note the frames whose poses nobody knows, with what to write."""
         if self.unknown:
             sensor, first = self.sensor, next(iter(self.unknown))
             *others, last = self.unknown
@@ -120,7 +120,9 @@ class _Mounting:
         if declared.tf == DRIVER:
             why = "driver is none" if named == "none" else f"{declared.preset} has no driver"
             if driver and named != "none":
-                why = f"that of {declared.preset} publishes none" + (" with these options" if _can(sensor) else "")
+                why = f"that of {declared.preset} publishes none" + (
+                    " with these options" if _has_driven_frames(sensor) else ""
+                )
             self.refuse(f"{sensor.name}: the driver cannot publish its frames: {why}", "tf: tfcompose")
         elif declared.tf == TFCOMPOSE and driver and named is None and driver.off is None and sensor.driven():
             message = f"{sensor.name}: the driver of {declared.preset} has no switch for its frames"
@@ -189,7 +191,7 @@ class _Mounting:
         self.drafts.links[frame] = Link(frame, self.place(), (shape,), (shape,), inertial)
 
 
-def _can(sensor: Sensor) -> bool:
+def _has_driven_frames(sensor: Sensor) -> bool:
     return any(frame.driver for frame in sensor.preset.frames.values())
 
 

@@ -2,7 +2,7 @@
 
 Facts of robot_state_publisher 3.3 (ROS 2 Jazzy): fixed joints go to /tf_static, moving ones follow ``joint_states``,
 floating ones are skipped; ``frame_prefix`` is written in front of every frame; at most ``publish_frequency`` times a
-second, 20 unless told otherwise, a joint state is passed on; ``robot_description`` is published by it too.
+second, 20 by default, a joint state is passed on; ``robot_description`` is published by it too.
 """
 
 from __future__ import annotations

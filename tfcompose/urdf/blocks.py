@@ -108,6 +108,14 @@ def unknown_joint(name: str, at: Span, joints: Collection[str]) -> Finding:
     return finding("TF703", f"no moving joint {name}", at, help=advice)
 
 
+def unknown_joints(hardware: tuple[Hardware, ...], joints: Collection[str]) -> Iterator[Finding]:
+    """Yield a finding for each joint of the hardware that is none of these, the robot's moving joints."""
+    for one in hardware:
+        for component in one.components:
+            if component.kind == "joint" and component.name not in joints:
+                yield unknown_joint(component.name, component.at, joints)
+
+
 def within(block: Block, robot: Robot, frames: Collection[str], joints: Collection[str]) -> Block | None:
     """Return the block of a robot without those of its elements that are about others than these frames and joints.
 
@@ -125,6 +133,15 @@ def within(block: Block, robot: Robot, frames: Collection[str], joints: Collecti
         return block
     return replace(block, text="\n".join(element.raw for element in left)) if left else None
 
+
+def with_joints(hardware: Hardware, joints: Collection[str]) -> Hardware | None:
+    """Return the hardware with these of its joints only; None where it had some, and none is left."""
+    left = tuple(one for one in hardware.components if one.kind != "joint" or one.name in joints)
+    had_joints = any(one.kind == "joint" for one in hardware.components)
+    return replace(hardware, components=left) if not had_joints or any(one.kind == "joint" for one in left) else None
+
+
+# ros2_control.
 
 #: What ros2_control reads as attributes of an interface, and not as parameters.
 ATTRIBUTES = ("data_type", "size")
@@ -222,18 +239,3 @@ def _only(element: Element, *attributes: str, tags: tuple[str, ...] = ()) -> dic
     if set(element.attributes) - set(attributes) or {child.tag for child in element.children} - set(tags):
         raise _UnsupportedError
     return element.attributes
-
-
-def unknown_joints(hardware: tuple[Hardware, ...], joints: Collection[str]) -> Iterator[Finding]:
-    """Yield a finding for each joint of the hardware that is none of these, the robot's moving joints."""
-    for one in hardware:
-        for component in one.components:
-            if component.kind == "joint" and component.name not in joints:
-                yield unknown_joint(component.name, component.at, joints)
-
-
-def with_joints(hardware: Hardware, joints: Collection[str]) -> Hardware | None:
-    """Return the hardware with these of its joints only; None where it had some, and none is left."""
-    left = tuple(one for one in hardware.components if one.kind != "joint" or one.name in joints)
-    had_joints = any(one.kind == "joint" for one in hardware.components)
-    return replace(hardware, components=left) if not had_joints or any(one.kind == "joint" for one in left) else None

@@ -1,4 +1,7 @@
-"""What comes after the tree is known: raw blocks, the base, processes' topics and publishers."""
+"""``ros2_control`` and ``xml``: what a URDF holds next to links and joints, checked against the robot.
+
+The places of a raw block are lines of the robot file.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,8 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from tfcompose.findings import Finding, RejectedError, Span, did_you_mean, finding
+from tfcompose.findings import Finding, RejectedError, Span
 from tfcompose.model import Block, Component, Hardware, Interface
-from tfcompose.resolve.claims import settled
-from tfcompose.resolve.isolation import Filler, isolate
-from tfcompose.resolve.processes import has_claims
-from tfcompose.resolve.stock import with_stock
 from tfcompose.urdf.blocks import faults_of, read_block, unexpanded, unknown_joints
 
 if TYPE_CHECKING:
@@ -20,11 +19,10 @@ if TYPE_CHECKING:
     from tfcompose.language.robot import ComponentSpec, HardwareSpec, RobotSpec
     from tfcompose.load import Path, Source
     from tfcompose.model import Robot
-    from tfcompose.urdf.packages import Disk
 
 
 @dataclass(frozen=True, slots=True)
-class Known(Collection[str]):
+class _Known(Collection[str]):
     """Names, which count as known too where ``excuses`` says that they may be missing only for a refused entry."""
 
     names: Sequence[str]
@@ -40,61 +38,19 @@ class Known(Collection[str]):
         return len(self.names)
 
 
-def completed(robot: Robot, spec: RobotSpec, source: Source, disk: Disk | None) -> tuple[Robot, list[Finding]]:
-    """Return the robot with what stands beside links and joints, its base, and its processes' topics and publishers."""
-    found: list[Finding] = []
-    if spec.ros2_control or spec.xml:
-        robot, refused = _with_blocks(robot, spec, source)
-        found += refused
-    robot = replace(robot, base=_base(robot, spec, source, found))
-    if spec.ros.state_publisher == "stock":
-        robot, refused = with_stock(robot)
-        found += refused
-    robot, refused = isolate(robot, spec, source, disk)
-    found += refused
-    if has_claims(spec):  # what knows them is loaded only then
-        robot, refused = settled(robot, spec, source)
-        found += refused
-    filler = Filler(robot, source, disk)
-    found += [one for process in robot.processes for one in filler.needless(process)]
-    return robot, found
-
-
-def _with_blocks(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Finding]]:
+def with_blocks(robot: Robot, spec: RobotSpec, source: Source) -> tuple[Robot, list[Finding]]:
     """Return the robot with its hardware and raw blocks."""
     moving = [edge.joint.name for edge in robot.edges if edge.joint]
-    hardware = hardware_of(spec.ros2_control, source)
+    hardware = _hardware_of(spec.ros2_control, source)
     children = {edge.child for edge in robot.edges}
     frames = [frame for frame in robot.frames if frame in robot.links or frame in children]
     joints = [edge.joint_name for edge in robot.edges if edge.joint_name]
-    blocks, found = blocks_of(spec.xml, source, Known(frames, robot.excuses), Known(joints, robot.excuses))
-    found += unknown_joints(hardware, Known(moving, robot.excuses))
+    blocks, found = _blocks_of(spec.xml, source, _Known(frames, robot.excuses), _Known(joints, robot.excuses))
+    found += unknown_joints(hardware, _Known(moving, robot.excuses))
     return replace(robot, hardware=(*hardware, *robot.hardware), blocks=(*blocks, *robot.blocks)), found
 
 
-def _base(robot: Robot, spec: RobotSpec, source: Source, found: list[Finding]) -> str | None:
-    """Return where the URDF begins: as said; base_link, or a fixed base_footprint above it; else the only root."""
-    if spec.base is not None:
-        if spec.base in robot.frames:
-            return spec.base
-        if not robot.excuses(spec.base):
-            advice = did_you_mean(spec.base, robot.frames)
-            found.append(finding("TF203", f"no frame {spec.base}", source.at(("base",)), help=advice))
-        return None
-    if "base_link" in robot.frames:
-        above = robot.parent_edge("base_link")
-        if above and above.kind == "static" and above.parent == "base_footprint":
-            return "base_footprint"
-        return "base_link"
-    roots = robot.roots()
-    return roots[0] if len(roots) == 1 else None
-
-
-# ``ros2_control`` and ``xml``: what a URDF holds next to links and joints. Places in a raw block are those of the robot
-# file.
-
-
-def hardware_of(specs: dict[str, HardwareSpec], source: Source) -> tuple[Hardware, ...]:
+def _hardware_of(specs: dict[str, HardwareSpec], source: Source) -> tuple[Hardware, ...]:
     """Return the hardware components with the places of their joints."""
     return tuple(_hardware(name, spec, source) for name, spec in specs.items())
 
@@ -117,7 +73,7 @@ def _component(kind: str, name: str, spec: ComponentSpec, at: Span) -> Component
     return Component(kind, name, at, tuple(command), tuple(state), spec.params)
 
 
-def blocks_of(
+def _blocks_of(
     texts: dict[str, str], source: Source, frames: Collection[str], joints: Collection[str]
 ) -> tuple[tuple[Block, ...], list[Finding]]:
     """Return the raw blocks, and what is wrong with them. ``joints`` are the names of all joints of the robot."""

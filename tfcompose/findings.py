@@ -136,14 +136,19 @@ def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:
 
 
 def slip_of(word: str, known: Iterable[str]) -> str | None:
-    """Return the only known word that ``word`` is a slip of the pen away from, or None.
+    """Return the only known word that ``word`` is a slip of the pen away from, or None."""
+    near = slips_of(word, known)
+    return near[0] if len(near) == 1 else None
+
+
+def slips_of(word: str, known: Iterable[str]) -> list[str]:
+    """Return the known words that ``word`` is a slip of the pen away from.
 
     That is: another case; or else one letter too many, too few, wrong, or changed for its neighbour.
     """
     others = [name for name in known if name != word]
     cased = [name for name in others if name.lower() == word.lower()]
-    near = cased or [name for name in others if len(word) > 1 and _is_one_slip(word, name)]
-    return near[0] if len(near) == 1 else None
+    return cased or [name for name in others if len(word) > 1 and _is_one_slip(word, name)]
 
 
 def _is_one_slip(a: str, b: str) -> bool:

@@ -75,7 +75,7 @@ def test_an_unknown_unit_is_named_with_the_one_that_is_meant(unit: str, advice: 
 
 @pytest.mark.parametrize(
     ("unit", "advice"),
-    [("degg", "units of length: m, cm"), ("degrees", "units of length: m, cm"), ("cmm", "did you mean mm?")],
+    [("degg", "units of length: m, cm"), ("degrees", "units of length: m, cm"), ("cmm", "did you mean cm or mm?")],
 )
 def test_the_unit_that_is_advised_has_the_dimension_that_is_wanted(unit: str, advice: str) -> None:
     (found,) = validated(f"frames: {{a: {{xyz: [1 {unit}, 0, 0]}}}}\n").found

@@ -30,10 +30,6 @@ if TYPE_CHECKING:
     from tfcompose.model import Asset, Robot
 
 
-#: In a folder that a build chose by itself: the path of the robot file. Two files may name one robot.
-SOURCE = ".source"
-
-
 def replace_file(path: Path, data: bytes) -> None:
     """Write the file, whole or not at all; who reads it meanwhile sees the one before, whose mode and owner stay.
 
@@ -194,21 +190,26 @@ def build(arguments: Namespace) -> tuple[Path, list[str]]:
     try:
         write_all(folder, files)
         if not arguments.output and Path(arguments.file).is_file():
-            replace_file(folder / SOURCE, f"{Path(arguments.file).absolute()}\n".encode())
+            replace_file(_source_file(folder), os.fsencode(f"{os.path.relpath(arguments.file, folder)}\n"))
     except OSError as error:
         where = f": {error.filename}" if error.filename else ""
         fail(f"nothing was written to {folder}: {error.strerror}{where}", UNREADABLE)
     if shared:
-        complain(f"{folder} held the build of {shared}, which names its robot {robot.name} too: -o keeps them apart")
+        complain(f"{folder} held the build of {shared}; -o builds into another folder")
     return folder, [file.path for file in files]
+
+
+def _source_file(folder: Path) -> Path:
+    """Return the file, beside a folder that a robot's name chose, with the robot file's path: two may have one name."""
+    return folder.with_name(f".{folder.name}.source")
 
 
 def _other_source(folder: Path, file: str) -> Path | None:
     """Return the other robot file that the folder was built from, if that is still there."""
     with contextlib.suppress(OSError, ValueError):
-        before = Path((folder / SOURCE).read_text("utf-8").removesuffix("\n"))
+        before = folder / os.fsdecode(_source_file(folder).read_bytes()).removesuffix("\n")
         if not before.samefile(file):
-            return before
+            return Path(os.path.normpath(before))
     return None
 
 

@@ -8,7 +8,7 @@ from pydantic_core import PydanticCustomError
 
 from tfcompose.language.pose import MountKeys, Posed, Rotated
 from tfcompose.language.spec import Spec, key
-from tfcompose.language.values import Name, Rgba, Scale, Sizes, Text, Xyz, listed, short
+from tfcompose.language.values import Colour, Name, Scale, Sizes, Text, Xyz, listed, short
 from tfcompose.load import Path
 from tfcompose.units import Density, Inertia, Mass, Size, refused
 
@@ -49,7 +49,7 @@ class Material(Spec):
     """A colour or a texture, and its name. The name alone refers to the material that has it elsewhere."""
 
     name: Name | None = key(None, "its name; default: named after the colour", "blue")
-    rgba: Rgba | None = key(None, "red, green, blue and opacity, from 0 to 1", [0.2, 0.4, 0.8, 1])
+    rgba: Colour | None = key(None, "red, green, blue and opacity, from 0 to 1; or a name", [0.2, 0.4, 0.8, 1], "blue")
     texture: Text | None = key(None, "an image: package://…, file://…, or a relative path", "textures/wood.png")
 
 
@@ -59,7 +59,7 @@ SHAPES = frozenset({"box", "cylinder", "sphere", "capsule", "mesh"})
 class Shape(Posed):
     """One shape and where it is in its link: a box, cylinder, sphere, capsule or mesh."""
 
-    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (*Posed.EXCLUSIVE, SHAPES)
+    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (*Posed.EXCLUSIVE, SHAPES, frozenset({"color", "material"}))
 
     box: Sizes | None = key(None, "a box of these lengths along x, y and z, its middle at the origin", [0.5, 0.4, 0.15])
     cylinder: Cylinder | None = key(None, "a cylinder along z", {"radius": 0.1, "length": "5 cm"})
@@ -70,7 +70,12 @@ class Shape(Posed):
         {"radius": 0.1, "length": 0.3},
     )
     mesh: Annotated[Mesh, short("uri", Mesh)] | None = key(None, "a file, or {uri, scale}", "meshes/base.stl")
-    material: Material | None = key(None, "its colour or texture", {"rgba": [0.2, 0.4, 0.8, 1]})
+    color: Colour | None = key(
+        None, "red, green, blue and, if need be, opacity, from 0 to 1; or a name", [0, 0, 1], "blue"
+    )
+    material: Annotated[Material, short("name", Material)] | None = key(
+        None, "its colour or texture; or the name of one, or of a colour", {"rgba": [0.2, 0.4, 0.8, 1]}, "blue"
+    )
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:

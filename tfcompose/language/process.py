@@ -21,6 +21,7 @@ from tfcompose.language.values import (
     OnlyTrue,
     Parameters,
     Text,
+    TopicName,
     short,
 )
 from tfcompose.load import Path
@@ -168,10 +169,10 @@ class ReadySpec(Checked):
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (READY_WAYS,)
 
     edges: OnlyTrue | None = key(None, "true: when all the edges that it owns are live", True)
-    topic: Text | None = key(
+    topic: TopicName | None = key(
         None, "when this topic has a publisher; below the process's namespace unless it begins with /", "scan"
     )
-    service: Text | None = key(
+    service: TopicName | None = key(
         None, "when this service is there; below the process's namespace unless it begins with /", "map_server/load_map"
     )
     lifecycle: LifecycleState | None = key(None, "when its nodes are in this state, whoever brought them there")

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin
 from pydantic import ValidationError
 
 from tfcompose.findings import Edit, Finding, Note, did_you_mean, finding, slip_of
+from tfcompose.language.habits import habit
 from tfcompose.language.spec import FIRST, at, fields_of, kinds_of, mapping_at
 from tfcompose.units import shown
 
@@ -52,7 +53,18 @@ class Refusal:
         span = source.at_key(self.path) if self.on_key else source.at(self.path)
         notes = [Note("the other one", source.at_key(self.other))] if self.other else []
         edits = [Edit(span, self.instead)] if self.instead is not None else []
-        return finding(self.code, self.message, span, help=self.help, notes=notes, edits=edits)
+        advice = self.help
+        if self.code == "TF102" and source.is_variant:
+            advice = _laid_over_nothing(source, self.path) or advice
+        return finding(self.code, self.message, span, help=advice, notes=notes, edits=edits)
+
+
+def _laid_over_nothing(source: Source, path: Path) -> str:
+    """Return advice for an entry that a profile or an overlay adds, if it probably means one that is there."""
+    around = source.places.get(path[:-1])
+    names = list(around.keys) if around else []
+    before = names[: names.index(path[-1])] if path and path[-1] in names else []
+    return did_you_mean(str(path[-1]), before) if before else ""
 
 
 def read(model: type[M], data: Any, already: Iterable[Path] = ()) -> tuple[M | None, list[Refusal]]:
@@ -174,7 +186,11 @@ def _unknown_key(model: type[Spec], path: Path, data: Any, meant: Counter[tuple[
     for step in path[:-1]:
         around = around[step]
     is_safe = slip not in around and meant[path[:-1], slip] == 1
-    advice = did_you_mean(name, known, f"known here: {', '.join(known)}")
+    advice = f"did you mean {slip}?" if slip else habit(name, known)
+    if not advice:
+        listing = f"known here: {', '.join(known)}"
+        option = f"an option of its preset goes under options: {{{name}: …}}; " if "options" in known else ""
+        advice = did_you_mean(name, known, option + listing)
     return Refusal("TF101", path, f"unknown key {name}", advice, on_key=True, instead=slip if is_safe else None)
 
 
@@ -201,14 +217,30 @@ def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> Refusal:
         advice = "put it in quotes"
     elif kind in {"model_type", "dataclass_type"}:
         advice = f"its keys can be: {', '.join(fields_of(mapping_at(model, path)))}"
+    elif kind == "dict_type":
+        advice = f"for example {_example_of(model, path)}"
     return Refusal(code, path, message.format(value=shown(value), **context), advice, on_key)
+
+
+def _example_of(model: type[Spec], path: Path) -> str:
+    """Return an example of a mapping with keys of the user's own, as YAML in one line."""
+    around = mapping_at(model, path[:-1])
+    field = fields_of(around).get(str(path[-1])) if around else None
+    example = next((one for one in (field.examples or []) if isinstance(one, dict)), None) if field else None
+    inside = ", ".join(f"{key}: {_in_yaml(value)}" for key, value in example.items()) if example else "NAME: {…}"
+    return f"{path[-1]}: {{{inside}}}" if path else inside
+
+
+def _in_yaml(value: Any) -> str:
+    """Return a value as it is written in YAML, a plain word without quotes."""
+    return value if isinstance(value, str) and value.replace("/", "").isidentifier() else shown(value)
 
 
 #: pydantic's kinds of errors that the models can raise: code, message and help.
 WORDS = {
     "bool_type": ("TF103", "{value} is not true or false", ""),
     "dataclass_type": ("TF103", "{value} is not a mapping", ""),
-    "dict_type": ("TF103", "{value} is not a mapping", "for example name: {…}"),
+    "dict_type": ("TF103", "{value} is not a mapping", ""),
     "greater_than_equal": ("TF106", "{value} is less than {ge}", ""),
     "int_type": ("TF103", "{value} is not a whole number", ""),
     "less_than_equal": ("TF106", "{value} is greater than {le}", ""),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -115,11 +116,17 @@ def _nulls(source: Source) -> list[Refusal]:
                 found.append(Refusal("TF006", at, message, "give a value, or remove the item"))
             elif item is None and not is_for_later(path):
                 message, advice = f"{step} has no value", f"write {step}: {{}}, or remove it"
+                if _AFTER_A_COMMA.fullmatch(str(step)):
+                    advice = "decimals take a point, such as 1.5 kg; or a mapping is not closed"
                 found.append(Refusal("TF006", at, message, advice, on_key=True))
 
     if source.has_nulls:
         visit(source.data, ())
     return found
+
+
+#: What is left of a quantity such as 1,5 kg behind its comma.
+_AFTER_A_COMMA = re.compile(r"\d+(\s*[a-zA-Z°/^0-9]+)?")
 
 
 def _findings(refusals: Iterable[Refusal], source: Source) -> list[Finding]:

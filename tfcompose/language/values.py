@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, Strict
 from pydantic_core import core_schema
 
+from tfcompose.findings import did_you_mean
 from tfcompose.geometry import Vector, norm
 from tfcompose.units import NUMBER, SMALLEST, Length, Number, Quantity, Size, refused, shown
 
@@ -42,6 +43,9 @@ class Matches:
         return {**handler(schema), "pattern": f"^{self.pattern}$"}
 
 
+_AXES = ("x", "y", "z")
+
+
 @dataclass(frozen=True, slots=True)
 class InARow:
     """Annotates a tuple that is written as a list of ``count`` items, for example ``sample``."""
@@ -57,7 +61,18 @@ class InARow:
         """
         if isinstance(value, list) and len(value) == self.count:
             return value
-        raise refused("TF103", f"expected a list of {self.count}, got {shown(value)}", f"for example {self.sample}")
+        raise refused("TF103", f"expected a list of {self.count}, got {shown(value)}", self._advice(value))
+
+    def _advice(self, value: Any) -> str:
+        """Return what to write instead: what may be meant by a string, a mapping, or numbers with decimal commas."""
+        items = value.replace(",", " ").split() if isinstance(value, str) else None
+        if isinstance(value, dict) and self.count == len(_AXES) and value.keys() <= set(_AXES):
+            items = [shown(value.get(axis, 0)) for axis in _AXES]
+        if items and len(items) == self.count:
+            return f"write [{', '.join(items)}]"
+        if isinstance(value, list) and self.count < len(value) <= 2 * self.count:
+            return f"decimals take a point: {self.sample}"
+        return f"for example {self.sample}"
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], CoreSchema]) -> CoreSchema:
         return core_schema.no_info_before_validator_function(self.check, handler(source))
@@ -93,6 +108,16 @@ def _is_true(value: Any) -> bool:
     raise refused("TF106", f"{shown(value)} is not true", "remove the key")
 
 
+def _with_opacity(value: Any) -> Any:
+    """Return a colour's four parts for its name, or for its first three."""
+    if isinstance(value, str):
+        if value not in COLOURS:
+            advice = did_you_mean(value, COLOURS, f"[0.2, 0.4, 0.8], or one of: {', '.join(COLOURS)}")
+            raise refused("TF106", f"{shown(value)} is not a colour", advice)
+        return [*COLOURS[value], 1.0]
+    return [*value, 1.0] if isinstance(value, list) and len(value) == len(_AXES) else value
+
+
 def _colour_part(value: float) -> float:
     if 0 <= value <= 1:
         return value
@@ -112,6 +137,29 @@ def _is_visible(factors: Vector) -> Vector:
     raise refused("TF106", "a scale of 0: nothing is left of the mesh", "for example 0.001")
 
 
+#: Colours that have names, in red, green and blue: those of HTML 4 and three that robots often have.
+COLOURS = {
+    "black": (0.0, 0.0, 0.0),
+    "silver": (0.75, 0.75, 0.75),
+    "grey": (0.5, 0.5, 0.5),
+    "gray": (0.5, 0.5, 0.5),
+    "white": (1.0, 1.0, 1.0),
+    "maroon": (0.5, 0.0, 0.0),
+    "red": (1.0, 0.0, 0.0),
+    "purple": (0.5, 0.0, 0.5),
+    "magenta": (1.0, 0.0, 1.0),
+    "green": (0.0, 0.5, 0.0),
+    "lime": (0.0, 1.0, 0.0),
+    "olive": (0.5, 0.5, 0.0),
+    "yellow": (1.0, 1.0, 0.0),
+    "navy": (0.0, 0.0, 0.5),
+    "blue": (0.0, 0.0, 1.0),
+    "teal": (0.0, 0.5, 0.5),
+    "cyan": (0.0, 1.0, 1.0),
+    "orange": (1.0, 0.65, 0.0),
+    "brown": (0.65, 0.16, 0.16),
+}
+
 Anything = Annotated[Any, BeforeValidator(plain)]
 NoMapping = Annotated[Anything, Field(json_schema_extra={"not": {"type": "object"}})]
 Parameters = dict[str, Anything]
@@ -128,6 +176,13 @@ Namespace = Annotated[
 NodeName = Annotated[
     Text, Matches(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*", "a node's name: letters, digits and _")
 ]
+TopicName = Annotated[
+    Text,
+    Matches(
+        r"~?/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*",
+        "a topic's name: letters, digits, _ and /",
+    ),
+]
 Texts = tuple[Text, ...]
 #: A list of strings, or one string for a list of one.
 OneOrMore = Annotated[Texts, BeforeValidator(listed, Text | Texts)]
@@ -143,4 +198,9 @@ Scale = Annotated[
     BeforeValidator(lambda value: value if isinstance(value, list) else [value] * 3, Number | _Factors),
 ]
 _ColourPart = Annotated[Number, AfterValidator(_colour_part)]
-Rgba = Annotated[tuple[_ColourPart, _ColourPart, _ColourPart, _ColourPart], InARow(4, "[0.2, 0.4, 0.8, 1]")]
+_Rgba = Annotated[tuple[_ColourPart, _ColourPart, _ColourPart, _ColourPart], InARow(4, "[0.2, 0.4, 0.8, 1]")]
+#: Red, green, blue and opacity; without opacity, or a name, the colour is opaque.
+Colour = Annotated[
+    _Rgba,
+    BeforeValidator(_with_opacity, Literal[tuple(COLOURS)] | tuple[_ColourPart, _ColourPart, _ColourPart] | _Rgba),
+]

@@ -230,6 +230,11 @@ class Reader:
             message = f"a key must be a string; this one is {what}"
             self.found.append(finding("TF004", message, place.span, help="put it in quotes"))
             top.keeps = False
+        elif glued := _GLUED.match(key):
+            message = f"a space after the colon of {glued[1]} is missing" if glued[2] else f"{glued[1]} has no colon"
+            advice = f"write {glued[1]}: {glued[3]}"
+            self.found.append(finding("TF002", message, place.span, help=advice))
+            top.keeps = False
         elif key in top.keys:
             note = Note("first defined here", top.keys[key].span)
             self.found.append(finding("TF003", f"the key {key} is given twice", place.span, notes=[note]))
@@ -348,18 +353,35 @@ def no_character(error: yaml.reader.ReaderError, text: str, file: str) -> Findin
 
 def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Finding:
     """Return the finding for text that the parser refuses, with where it began."""
-    mark = error.problem_mark or error.context_mark
-    line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+    mark, began = error.problem_mark or error.context_mark, error.context_mark
     message, advice = ", ".join(filter(None, (error.context, error.problem))), ""
     lines = text.splitlines()
-    source_line = lines[line - 1] if line <= len(lines) else ""
-    if "\t" in source_line[: len(source_line) - len(source_line.lstrip())]:
+    source_line = lines[mark.line] if mark and mark.line < len(lines) else ""
+    indent = source_line[: len(source_line) - len(source_line.lstrip())]
+    if "\t" in indent:
         message, advice = "a tab in the indentation", "indent with spaces; YAML does not allow tabs there"
+    elif began and "expected ':'" in message and began.line < len(lines):
+        mark, message = began, f"{lines[began.line].strip()} has no colon"
+        advice = f"write {lines[began.line].strip()}:"
+    elif began and mark and "parsing a block" in message and len(indent) == mark.column != began.column:
+        message = f"indented by {mark.column} spaces, and what it belongs to by {began.column}"
+        advice = f"begin it in column {began.column + 1}, as line {began.line + 1} does"
+    elif mark and "parsing a flow" in message and "${" in source_line[max(0, mark.column - 2) : mark.column + 2]:
+        expression = _EXPRESSION.search(source_line)
+        example = expression[0] if expression else "${x}"
+        message = f"{example} is not in quotes, and stands in a list or mapping in brackets"
+        advice = f'write "{example}"'
+    line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
     notes = []
-    if error.context_mark and mark and error.context_mark.line != mark.line:
-        at = error.context_mark
-        notes = [Note("it began here", Span(file, at.line + 1, at.column + 1, at.line + 1, at.column + 2))]
+    if began and mark and began.line != mark.line:
+        notes = [Note("it began here", Span(file, began.line + 1, began.column + 1, began.line + 1, began.column + 2))]
     return finding("TF002", message, Span(file, line, column, line, column + 1), help=advice, notes=notes)
+
+
+#: A key that swallowed the beginning of its value: ``mast {parent``, ``mast:{parent``.
+_GLUED = re.compile(r"([\w/.-]+)\s*(:)?\s*([{\[].*)")
+
+_EXPRESSION = re.compile(r"\$\{[^{}\"']*\}")
 
 
 def no_yaml(text: str, file: str) -> Finding:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, finding
 from tfcompose.geometry import Pose
+from tfcompose.language.values import COLOURS
 from tfcompose.model import Inertial, Link, Material, Shape, colour_name, materials
 from tfcompose.resolve.poses import pose_of, rotation_of
 from tfcompose.urdf.inertia import Moments, UnmeasurableError, inertial, joined, of_primitive, trace, traces
@@ -49,7 +50,11 @@ class Bodies:
 
     def shape(self, shape: specs.Shape, at: Path) -> Shape:
         """Return the shape, which must have a form."""
-        material = self._material(shape.material, (*at, "material")) if shape.material else None
+        material = None
+        if shape.material:
+            material = self._material(shape.material, (*at, "material"))
+        elif shape.color:
+            material = Material(colour_name(shape.color), shape.color, at=self.source.at((*at, "color")))
         pose = pose_of(shape)
         if shape.box:
             return Shape("box", shape.box, pose, material)
@@ -134,11 +139,17 @@ class Bodies:
 
 
 def with_colours(links: dict[str, Link]) -> dict[str, Link]:
-    """Return the links in which a material that is a name alone is the first one that has a colour by that name."""
+    """Return the links in which a material that is a name alone has the colour of the first one by that name.
+
+    Where no other has one, it may be the name of a colour.
+    """
     known: dict[str, Material] = {}
     for material in materials(links):
         if material.rgba or material.texture:
             known.setdefault(material.name, material)
+    for material in materials(links):
+        if material.name in COLOURS:
+            known.setdefault(material.name, replace(material, rgba=(*COLOURS[material.name], 1.0)))
     bare = {one.name for one in materials(links) if not (one.rgba or one.texture) and one.name in known}
     return {name: _coloured(link, known, bare) for name, link in links.items()} if bare else links
 

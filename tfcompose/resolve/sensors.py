@@ -342,6 +342,10 @@ def _unreached(sensor: Sensor, spec: RobotSpec, source: Source) -> list[Finding]
     return found
 
 
+#: Words for no driver that YAML 1.2 reads as strings.
+OFF = frozenset({"off", "Off", "OFF", "no", "No", "NO", "null", "None", "NONE", "disabled"})
+
+
 def _named_driver(sensor: Sensor, name: str, validated: Validated) -> list[Finding]:
     """Return findings about a driver that is the name of a process: it must be one, and has its own keys."""
     at: Path = ("sensors", sensor.name, "driver")
@@ -351,6 +355,8 @@ def _named_driver(sensor: Sensor, name: str, validated: Validated) -> list[Findi
     found = []
     if name != "none" and name not in known:
         advice = did_you_mean(name, known, f"processes: {{{name}: {{external: true}}}}")
+        if name in OFF:
+            advice = "driver: none starts no driver"
         found.append(
             finding(
                 "TF813", f"the driver of {sensor.name} is {name}, which is not a process", source.at(at), help=advice

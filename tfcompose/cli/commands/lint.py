@@ -19,11 +19,13 @@ from tfcompose.cli.terminal import UNREADABLE, can_redraw, exit_code_of, fail, h
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable
 
     from tfcompose.cli.fixing import Fixer
     from tfcompose.findings import Finding
     from tfcompose.resolve import Library
+
+    _Stamp = tuple[int, int] | None
 
 #: What a robot file has at the begin of a line: its first key, or, with that misspelt, two others of its keys.
 _ROBOT = re.compile(
@@ -130,37 +132,39 @@ def _watch(arguments: Namespace) -> int:
     """Lint again whenever a file changes that was read, or one comes to a folder; Ctrl-C ends it."""
     from tfcompose.cli.reading import forget_lines, read_text
 
-    read: set[str] = set()
+    state: dict[str, _Stamp] = {}
 
     def remembering(file: str) -> str:
-        read.add(file)
+        state.setdefault(file, _stamp(file))
         return read_text(file)
 
     while True:
         if can_redraw(sys.stdout):
             sys.stdout.write(CLEAR)
-        state = _state(arguments, read)
+        state.clear()
+        state |= _stamps(arguments)
         _lint(arguments, remembering)
         sys.stdout.write("watching; Ctrl-C ends it\n")
         sys.stdout.flush()
-        state |= _state(arguments, read - state.keys())
-        while _state(arguments, read) == state:
+        while _stamps(arguments) | {file: _stamp(file) for file in state} == state:
             if not has_reader(sys.stdout):
                 raise BrokenPipeError
             time.sleep(CHECK_EVERY_S)
         forget_lines()
 
 
-def _state(arguments: Namespace, read: Iterable[str]) -> dict[str, tuple[int, int] | None]:
-    """Return each file's time and size, or None if it is not there."""
-    state: dict[str, tuple[int, int] | None] = {}
-    for file in (*_files(arguments), *arguments.urdfs, *arguments.overlays, *read):
-        try:
-            found = Path(file).stat()
-            state[file] = found.st_mtime_ns, found.st_size
-        except OSError:
-            state[file] = None
-    return state
+def _stamps(arguments: Namespace) -> dict[str, _Stamp]:
+    """Return the stamps of the files that are named."""
+    return {file: _stamp(file) for file in (*_files(arguments), *arguments.urdfs, *arguments.overlays)}
+
+
+def _stamp(file: str) -> _Stamp:
+    """Return the file's time of change and size, or None if it is not there."""
+    try:
+        found = Path(file).stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size
 
 
 def _files(arguments: Namespace) -> list[str]:

@@ -1,0 +1,111 @@
+"""What people write by mistake or by habit: each is found at its place, with help that names what to write."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.support.cli import tfcompose_in
+from tfcompose.language.habits import habit
+from tfcompose.language.values import COLOURS
+
+BASE = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
+CAM = BASE + "sensors:\n  cam: {preset: realsense/d435i, parent: base_link, %s}\n"
+FRAME = BASE + "frames:\n  mast: {parent: base_link, %s}\n"
+PROCESS = BASE + "processes:\n  a: {run: [sleep, '9']}\n  b: {run: [sleep, '9'], %s}\n"
+SHAPE = "tfcompose: 1\nrobot: r\nlinks: {base_link: {visual: {box: [1, 1, 1], %s}}}\n"
+
+#: (text, where and what is found, words of its help)
+MISTAKES = [
+    # keys of URDF, launch files, messages and compose files
+    (FRAME % "pose: [0, 0, 1, 0, 0, 0]", "5:29 TF101", "xyz rpy"),
+    (FRAME % "origin: {xyz: [0, 0, 1]}", "5:29 TF101", "xyz rpy"),
+    (FRAME % "translation: [0, 0, 1]", "5:29 TF101", "xyz"),
+    (FRAME % "position: [0, 0, 1]", "5:29 TF101", "xyz"),
+    (FRAME % "rotation: [0, 0, 1]", "5:29 TF101", "rpy quat_xyzw"),
+    (FRAME % "quaternion: [0, 0, 0, 1]", "5:29 TF101", "quat_xyzw"),
+    (FRAME % "frame_id: x", "5:29 TF101", "parent"),
+    (FRAME % "publisher: x", "5:29 TF101", "owner"),
+    (CAM % "position: [0, 0, 1]", "5:53 TF101", "xyz"),
+    (CAM % "imu: true", "5:53 TF101", "options: imu:"),
+    (CAM % "driver: off", "5:61 TF813", "none"),
+    (CAM.replace("realsense/", "") % "rate: 5", "5:17 TF601", "realsense/d435i"),
+    (PROCESS % "depends_on: [a]", "6:26 TF101", "after:"),
+    (PROCESS % "environment: [A=1]", "6:26 TF101", "env:"),
+    (PROCESS % "respawn: true", "6:26 TF101", "restart"),
+    (PROCESS % "after: [a]", "6:33 TF103", "after: {base_drive: ready}"),
+    (PROCESS % "env: [A=1]", "6:31 TF103", "env: {RCUTILS_COLORIZED_OUTPUT: '1'}"),
+    (PROCESS % "remap: ['/a:=/b']", "6:33 TF103", "remap: {scan: front/scan}"),
+    (PROCESS % "ready: {topic: '/sc an'}", "6:41 TF106", ""),
+    (SHAPE % "material: {color: [0, 0, 1]}", "3:57 TF101", "rgba"),
+    (SHAPE % "color: bleu", "3:53 TF106", "blue"),
+    (SHAPE % "color: [0, 0, 1], material: red", "3:64 TF107", ""),
+    # numbers
+    (FRAME % "xyz: [0,2, 0, 0,1]", "5:34 TF103", "point"),
+    (FRAME % "xyz: [0, 0, 1,5 m]", "5:34 TF103", "point"),
+    (FRAME % "xyz: ['0,2', 0, 0]", "5:35 TF103", "0.2"),
+    (FRAME % "xyz: 0.2 0 0.1", "5:34 TF103", "[0.2, 0, 0.1]"),
+    (FRAME % "xyz: {x: 0.2, z: 0.1}", "5:34 TF103", "[0.2, 0, 0.1]"),
+    (FRAME % "xyz: [30 cmm, 0, 0]", "5:35 TF104", "cm mm"),
+    (FRAME % "rate: 1,5 Hz", "5:37 TF006", "point"),
+    # YAML
+    (BASE + "frames:\n  mast: {parent: base_link}\n  cam {parent: mast}\n", "6:3 TF002", "cam:"),
+    (BASE + "frames:\n  mast:{parent: base_link}\n", "5:3 TF002", "mast:"),
+    (BASE + "frames\n  mast: {parent: base_link}\n", "4:1 TF002", "frames:"),
+    (BASE + "frames:\n  mast: {parent: base_link}\n   cam: {parent: mast}\n", "6:4 TF002", "column 3"),
+    (BASE + "  frames:\n    mast: {parent: base_link}\n", "4:3 TF002", "column 1"),
+    (FRAME % "xyz: [0, 0, ${mast}]", "5:42 TF002", '"${mast}"'),
+    (FRAME % "xyz: {${mast}}", "5:36 TF002", '"${mast}"'),
+    # names in profiles
+    (
+        CAM % "rate: 5" + "profiles:\n  demo:\n    sensors: {camm: {driver: none}}\n",
+        "8:15 TF102",
+        "cam?",
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("case", MISTAKES, ids=lambda case: case[1] + " " + case[2][:20])
+def test_a_mistake_is_found_at_its_place_with_help_that_names_what_to_write(
+    case: tuple[str, str, str], tmp_path: Path
+) -> None:
+    text, place, words = case
+    (tmp_path / "robot.yaml").write_text(text, "utf-8")
+    printed = tfcompose_in(tmp_path, "lint").stdout
+    where, code = place.split()
+    _, begin, rest = printed.partition(f"robot.yaml:{where}: error[{code}]")
+    assert begin, printed
+    advice = rest.partition("help: ")[2].partition("\n")[0]
+    assert all(word in advice for word in words.split()), printed
+
+
+@pytest.mark.parametrize(
+    "words", ["color: blue", "color: [0, 0, 1]", "color: [0, 0, 1, 1]", "material: blue", "material: {rgba: blue}"]
+)
+def test_a_colour_is_three_parts_four_or_a_name(words: str, tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text(SHAPE % words, "utf-8")
+    built = tfcompose_in(tmp_path, "build", "-o", "out")
+    assert built.returncode == 0, built.stderr
+    assert 'rgba="0 0 1 1"' in (tmp_path / "out" / "robot.urdf").read_text("utf-8")
+
+
+def test_a_material_that_is_defined_wins_over_the_colour_of_its_name(tmp_path: Path) -> None:
+    text = "tfcompose: 1\nrobot: r\nlinks:\n  base_link: {visual: {box: [1, 1, 1], material: blue}}\n"
+    text += "  arm: {parent: base_link, visual: {box: [1, 1, 1], material: {name: blue, rgba: [0, 0.1, 0.2]}}}\n"
+    (tmp_path / "robot.yaml").write_text(text, "utf-8")
+    assert tfcompose_in(tmp_path, "build", "-o", "out").returncode == 0
+    urdf = (tmp_path / "out" / "robot.urdf").read_text("utf-8")
+    assert urdf.count('rgba="0 0.1 0.2 1"') >= 1
+    assert 'rgba="0 0 1 1"' not in urdf
+
+
+def test_no_habit_names_a_key_that_is_not_there() -> None:
+    assert habit("position", {"xyz"})
+    assert not habit("position", {"rate"})
+    assert not habit("xyz", {"xyz"})
+    assert all(len(parts) == 3 for parts in COLOURS.values())
+
+
+def test_a_second_sensor_of_a_profile_is_not_taken_for_a_slip(tmp_path: Path) -> None:
+    profile = "profiles: {demo: {frames: {mast2: {parent: base_link}}}}\n"
+    (tmp_path / "robot.yaml").write_text(FRAME % "xyz: [0, 0, 1]" + profile, "utf-8")
+    assert tfcompose_in(tmp_path, "lint").returncode == 0

@@ -1,0 +1,62 @@
+"""What other formats call a key, and what is written here instead: URDF, launch files, ROS messages, compose files."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+_POSITION = "the position is xyz: [0.2, 0, 30 cm]"
+_ROTATION = "the rotation is rpy: [0, 0, 90 deg], or quat_xyzw: [0, 0, 0, 1], or look"
+_POSE = "the pose is xyz: [0.2, 0, 30 cm] and rpy: [0, 0, 90 deg]"
+_PARENT = "the frame that it is mounted on is parent"
+_OWNER = "the process that publishes the edge is owner"
+_MASS = "it belongs under inertial: {mass: 2 kg}"
+
+#: By the word: the key that has its meaning, where that is known, and what to write.
+_HABITS: dict[str, tuple[tuple[str, str], ...]] = {
+    word: meanings
+    for words, meanings in (
+        ("pose origin transform tf", (("xyz", _POSE),)),
+        ("position translation trans location offset x y z", (("xyz", _POSITION),)),
+        ("rotation orientation rot euler roll pitch yaw", (("rpy", _ROTATION),)),
+        ("quaternion quat q qx qy qz qw", (("quat_xyzw", "a quaternion is quat_xyzw: [0, 0, 0, 1], w last"),)),
+        ("parent_frame parent_link parent_frame_id base frame header", (("parent", _PARENT),)),
+        (
+            "frame_id child_frame child_frame_id",
+            (("parent", "the key before the colon names the frame; parent is the frame that it is mounted on"),),
+        ),
+        ("publisher broadcaster published_by publish", (("owner", _OWNER),)),
+        ("frequency hz fps", (("rate", "how often is rate: 50 Hz"),)),
+        (
+            "color colour rgb rgba",
+            (
+                ("color", "a colour is color: [0.2, 0.4, 0.8], or color: blue"),
+                ("rgba", "a colour is rgba: [0.2, 0.4, 0.8, 1], or rgba: blue"),
+                ("visual", "a colour belongs to a shape: visual: {box: [0.5, 0.4, 0.15], color: blue}"),
+            ),
+        ),
+        ("geometry", (("box", "shapes are written at once: box: [0.5, 0.4, 0.15]"),)),
+        ("mass inertia density", (("inertial", _MASS),)),
+        ("filename file", (("uri", "the file is uri"), ("mesh", "a file is mesh: meshes/base.stl"))),
+        ("depends_on requires wait_for needs", (("after", "what it waits for is after: {NAME: ready}"),)),
+        ("respawn", (("restart", "restart: on-failure, or always, starts it again"),)),
+        ("environment additional_env", (("env", "variables are env: {NAME: value}"),)),
+        ("remappings remaps", (("remap", "other names are remap: {scan: front/scan}"),)),
+        ("parameters ros__parameters", (("params", "parameters are params: {use_sim_time: false}"),)),
+        ("command cmd exec entrypoint", (("run", "the command is run: [program, argument]"),)),
+        (
+            "package pkg executable",
+            (("run", "a ROS node is run: {package: slam_toolbox, executable: async_slam_toolbox_node}"),),
+        ),
+        ("launch launch_file", (("run", "a launch file is run: {launch: slam_toolbox/online_async_launch.py}"),)),
+        ("type model", (("preset", "which sensor it is says preset: realsense/d435i; tfcompose presets lists them"),)),
+    )
+    for word in words.split()
+}
+
+
+def habit(word: str, known: Collection[str]) -> str:
+    """Return what to write instead of a key that another format has, where ``known`` are the keys; else nothing."""
+    return next((advice for key, advice in _HABITS.get(word, ()) if key in known), "")

@@ -21,7 +21,7 @@ from tests.support.waiting import TIMEOUT_S, gone, until
 from tfcompose.ipc import Done, DownRequest, ProcessRequest, ProcessStatus, RobotStatus, StatusRequest, Verb
 from tfcompose.launcher.child import BURST, PER_SECOND
 from tfcompose.launcher.control import ask, connect
-from tfcompose.launcher.processes import end, leftovers
+from tfcompose.launcher.procfs import end, leftovers
 from tfcompose.launcher.runtime_dir import RuntimeDir
 from tfcompose.launcher.supervisor import LONGEST_SLEEP_S
 from tfcompose.plan import Plan, PlanProcess, RosSettings

@@ -36,7 +36,7 @@ class Robot:
         return self.answer(bytes(data))
 
     def answer(self, data: bytes) -> dict[str, Transform]:
-        answer = self.mover.answer(data, 1000)
+        answer = self.mover.tf_message(data, 1000)
         return {transform.child: transform for transform in decode(answer)} if answer is not None else {}
 
 

@@ -98,7 +98,7 @@ class Own:
         masters = {e.joint.name: positions[e.joint.name] for e in self.moving if e.joint and not e.joint.mimic}
         state = encode_names(list(masters))
         fill(state, 1, list(masters.values()))
-        answer = self.mover.answer(bytes(state), 0)
+        answer = self.mover.tf_message(bytes(state), 0)
         moved = decode(answer) if answer else []
         at = {transform.child: Pose(transform.xyz, transform.quat_xyzw) for transform in moved}
         found: dict[str, Any] = {}

@@ -22,7 +22,7 @@ from tfcompose.ipc import (
     read_notice,
 )
 from tfcompose.launcher.control import RefusedError, ask, connect
-from tfcompose.launcher.processes import environment_of, leftovers
+from tfcompose.launcher.procfs import environment_of, leftovers
 from tfcompose.launcher.runtime_dir import RuntimeDirError, domain_of, runtime_dirs
 from tfcompose.plan.file import read_plan
 from tfcompose.plan.topics import judged_topics

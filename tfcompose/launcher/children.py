@@ -17,7 +17,7 @@ import regex
 from tfcompose.ipc import GUARD_EVENTS, GUARD_ORDERS, LogLine
 from tfcompose.launcher.child import LAST_LINE_LENGTH, Child, Pipe, has_ended, kill_group, reap_adopted, spawn
 from tfcompose.launcher.events import Exited, LogMatched, Started, StartFailed
-from tfcompose.launcher.processes import descendants, end, launcher_mark, leftovers, leftovers_of, signal_leftovers
+from tfcompose.launcher.procfs import descendants, end, launcher_mark, leftovers, leftovers_of, signal_leftovers
 from tfcompose.signals import SIGNALS
 from tfcompose.variables import (
     EVENTS_FD,

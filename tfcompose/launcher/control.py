@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeVar
 
 from tfcompose.ipc import REQUESTS, EventsRequest, Refusal
-from tfcompose.launcher.processes import is_suspended
+from tfcompose.launcher.procfs import is_suspended
 from tfcompose.plan.codec import decode, encode
 
 if TYPE_CHECKING:

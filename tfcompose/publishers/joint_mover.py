@@ -1,4 +1,4 @@
-"""From joint states to TF messages, bytes to bytes; what cannot be believed is said and left out.
+"""From joint states to TF messages, bytes to bytes; unusable joint states are reported and left out.
 
 The pose of a joint's edge is its pose at 0 followed by the motion (URDF). For a turn about the unit axis a that is
 p₀, q₀·(a sin q/2, cos q/2) = cos q/2 · q₀ + sin q/2 · q₀·(a, 0); for a slide p₀ + q · R₀a, q₀. Both are linear in what
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 _SECOND_NS = 1_000_000_000
 # Joint states come with one list of names from each driver; one that never repeats itself must not fill the memory.
 _MOST_SOURCES = 64
-# Faults are said by their sentence, which may hold a name; so many are said.
+# Faults are reported once by their sentence, which may hold a name; at most so many.
 _MOST_LINES = 64
 
 
@@ -95,7 +95,7 @@ class JointMover:
         names = {joint.name for index, joint in enumerate(self._all_joints) if index not in self._moved}
         return [joint.name for joint in self._all_joints if joint.name in names and joint.mimic not in names]
 
-    def answer(self, data: bytes, received_ns: int) -> bytes | None:
+    def tf_message(self, data: bytes, received_ns: int) -> bytes | None:
         """Return what a joint state says as a TFMessage, or None where it says nothing or is left out."""
         try:
             source = self._source(data)
@@ -107,7 +107,7 @@ class JointMover:
                 return None
             return source.moving.message(positions, stamp_ns)
         except ValueError as error:
-            self._once(f"dropped a joint state: {error} (said once)")
+            self._once(f"dropped a joint state: {error} (reported once)")
             return None
 
     def _source(self, data: bytes) -> _Source:
@@ -137,7 +137,7 @@ class JointMover:
         if self._ignores_time:
             return True
         if stamp_ns == source.last_ns:
-            self._once("left out a joint state with the same time as the one before (said once)")
+            self._once("left out a joint state with the same time as the one before (reported once)")
             return False
         # Half a period early is in time: the next one is due a period after this one was, so that a source's jitter
         # leaves nothing out and the mean stays.

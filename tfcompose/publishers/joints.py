@@ -51,7 +51,7 @@ def joints(own: Own, stop: Stop) -> None:
             is_waiting = missing.is_waiting or clock.is_waiting or description.is_waiting
             wait(node, [states, description.subscription], CHECK_EVERY_S if is_waiting else None, stop)
             for received in states.take():
-                message = mover.answer(received.data, received.received_ns)
+                message = mover.tf_message(received.data, received.received_ns)
                 if message is not None:
                     publisher.publish(message)
             description.check()

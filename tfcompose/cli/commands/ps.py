@@ -36,7 +36,7 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Print the table; exit code 0, 1 where no robot runs."""
     from tfcompose.cli.tables import Table
-    from tfcompose.launcher.processes import usage_of
+    from tfcompose.launcher.procfs import usage_of
 
     table = Table(least={1: 20, 0: 16}, spare=(5, 4, 3), colour=_colour)
     robots, code = _robots(arguments.robot)

@@ -105,6 +105,16 @@ def domain(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFac
 
 
 @pytest.fixture
+def node(domain: Domain) -> Iterator[Any]:
+    """A node of this process in a domain of its own."""
+    assert domain
+    from tfcompose.ros.node import open_node  # noqa: PLC0415 (tests without ROS share this file)
+
+    with open_node("of_the_test", "/test") as opened:
+        yield opened
+
+
+@pytest.fixture
 def start(domain: Domain) -> Iterator[Callable[..., Started]]:
     """Start ``python -m MODULE ARGUMENT…`` in the test's domain; what still runs at the test's end is killed."""
     running: list[Started] = []

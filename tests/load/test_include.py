@@ -2,18 +2,14 @@
 
 import pytest
 
-from tfcompose.findings import Finding, RejectedError, Span, finding
+from tests.support.texts import reader
+from tfcompose.findings import Finding, RejectedError, Span
 from tfcompose.language import composed, set_value, with_includes
 from tfcompose.load import Source, load
 
 
 def included(files: dict[str, str], file: str = "robot.yaml") -> Source:
-    def read(name: str) -> str:
-        if name not in files:
-            raise RejectedError([finding("TF001", "cannot be read", Span(name))])
-        return files[name]
-
-    return with_includes(load(files[file], file), read)
+    return with_includes(load(files[file], file), reader(files))
 
 
 def refused(files: dict[str, str]) -> tuple[Finding, ...]:

@@ -9,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from tests.support.texts import reader
 from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
-from tfcompose.findings import RejectedError, Span, finding
+from tfcompose.findings import Span
 from tfcompose.geometry import Pose, angle_between
 from tfcompose.language.calibration import read_calibration
 from tfcompose.model import Edge
@@ -31,12 +32,7 @@ def compiled(robot: str, **files: str) -> Compiled:
     """Compile the robot beside calibration files: a_yaml is the file a.yaml."""
     texts = {name.replace("_", "."): text for name, text in files.items()}
 
-    def read(name: str) -> str:
-        if name not in texts:
-            raise RejectedError([finding("TF001", "cannot be read: no such file", Span(name))])
-        return texts[name]
-
-    return compile_robot(HEAD + robot, "r.yaml", library(), read=read)
+    return compile_robot(HEAD + robot, "r.yaml", library(), read=reader(texts))
 
 
 def edge_of(result: Compiled, child: str) -> Edge:

@@ -8,10 +8,11 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.support.texts import reader
 from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
-from tfcompose.findings import RejectedError, Span, finding
+from tfcompose.findings import RejectedError
 from tfcompose.load.params import load_params
 from tfcompose.plan.file import read_plan
 from tfcompose.resolve.param_files import matches
@@ -33,12 +34,7 @@ robot1:
 def compiled(params: str, **files: str) -> Compiled:
     texts = {"p.yaml": FILE} | {f"{name}.yaml": text for name, text in files.items()}
 
-    def read(name: str) -> str:
-        if name not in texts:
-            raise RejectedError([finding("TF001", "cannot be read: no such file", Span(name))])
-        return texts[name]
-
-    return compile_robot(HEAD + PLANNER.replace("PARAMS", params), "r.yaml", library(), read=read)
+    return compile_robot(HEAD + PLANNER.replace("PARAMS", params), "r.yaml", library(), read=reader(texts))
 
 
 def source_text(params: str, **files: str) -> str:

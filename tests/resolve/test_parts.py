@@ -7,10 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.support.findings import words
+from tests.support.texts import reader
 from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
-from tfcompose.findings import RejectedError, Span, finding
 from tfcompose.plan.file import read_plan
 
 ROVER = """
@@ -70,12 +70,7 @@ def compiled(text: str, **files: str) -> Compiled:
     texts = {"robots/rover.yaml": ROVER, "arm.yaml": ARM}
     texts |= {name.replace("_", "."): text for name, text in files.items()}
 
-    def read(name: str) -> str:
-        if name not in texts:
-            raise RejectedError([finding("TF001", "cannot be read: no such file", Span(name))])
-        return texts[name]
-
-    return compile_robot(text, "fleet.yaml", library(), read=read)
+    return compile_robot(text, "fleet.yaml", library(), read=reader(texts))
 
 
 def sound(text: str, **files: str) -> Any:

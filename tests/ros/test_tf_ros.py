@@ -2,7 +2,6 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -19,13 +18,6 @@ pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
 
 ONE = Transform(1, "odom", "base", (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))
 UNTIL_S = 60.0
-
-
-@pytest.fixture
-def node(domain: object) -> Iterator[Any]:
-    assert domain
-    with open_node("listens", "/test") as opened:
-        yield opened
 
 
 def test_a_message_and_the_graph_name_the_same_publisher(node: Any) -> None:

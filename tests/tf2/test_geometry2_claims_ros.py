@@ -4,7 +4,6 @@ What their tests say of an exception's text is not repeated: the texts here
 are others.
 """
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,6 @@ from rclpy.time import Time
 from sensor_msgs.msg import PointCloud2, PointField
 
 from tests.support.waiting import until
-from tfcompose.ros.node import open_node
 from tfcompose.tf2 import (
     Buffer,
     BufferCore,
@@ -186,13 +184,6 @@ def test_a_coroutine_ends_at_the_step_after_its_transform_came(*, full: bool, la
     with pytest.raises(StopIteration) as ended:
         coroutine.send(None)
     assert ended.value.value == message
-
-
-@pytest.fixture
-def node(domain: object) -> Iterator[Any]:
-    assert domain
-    with open_node("talks_and_listens", "/test") as opened:
-        yield opened
 
 
 def test_what_broadcasters_send_a_listener_in_the_same_node_hears(node: Any) -> None:

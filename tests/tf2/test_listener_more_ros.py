@@ -26,13 +26,6 @@ UNIT = (0.0, 0.0, 0.0, 1.0)
 
 
 @pytest.fixture
-def node(domain: object) -> Iterator[Any]:
-    assert domain
-    with open_node("asks", "/test") as opened:
-        yield opened
-
-
-@pytest.fixture
 def other(domain: object) -> Iterator[Any]:
     assert domain
     with open_node("talks", "/test") as opened:

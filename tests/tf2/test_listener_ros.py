@@ -135,13 +135,6 @@ def test_a_program_that_sends_a_cameras_frames_serves_one_that_moves_its_clouds(
 
 
 @pytest.fixture
-def node(domain: object) -> Iterator[Any]:
-    assert domain
-    with open_node("asks", "/test") as opened:
-        yield opened
-
-
-@pytest.fixture
 def executor(node: Any) -> Iterator[Callable[[float], None]]:
     """Spin the node's executor for some seconds."""
     spinner = SingleThreadedExecutor(context=node.context)

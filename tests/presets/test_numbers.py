@@ -8,6 +8,7 @@ import math
 from typing import Any
 
 from tests.support.tables import for_each
+from tests.support.texts import robot_in
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.geometry import Pose, Vector, rotate
@@ -94,10 +95,7 @@ TABLE: list[tuple[str, dict[str, Any], str, Vector, Axes]] = [
 
 def robot_of(preset: str, options: dict[str, Any], **keys: Any) -> Robot:
     output = {"preset": preset, "parent": "base_link", "options": options} | keys
-    done = compile_robot(HEAD + "sensors: " + json.dumps({"s": output}) + "\n", "r.yaml", KNOWN)
-    assert done.robot
-    assert not done.errors, done.errors
-    return done.robot
+    return robot_in(compile_robot(HEAD + "sensors: " + json.dumps({"s": output}) + "\n", "r.yaml", KNOWN))
 
 
 def in_mount(robot: Robot, frame: str) -> Pose:

@@ -12,6 +12,7 @@ import yaml
 from tests.support.findings import expect
 from tests.support.presets import MAST, WRONG_IN_MAST
 from tests.support.tables import for_each
+from tests.support.texts import robot_in
 from tfcompose.cli import compiling
 from tfcompose.cli.commands import presets as presets_command
 from tfcompose.cli.compiling import library
@@ -34,10 +35,7 @@ def compiled(preset: str, top: str = "", file: str = "r.yaml", **keys: Any) -> C
 
 
 def robot_of(preset: str, top: str = "", **keys: Any) -> Robot:
-    done = compiled(preset, top, **keys)
-    assert done.robot
-    assert not done.errors, done.errors
-    return done.robot
+    return robot_in(compiled(preset, top, **keys))
 
 
 def edge_of(robot: Robot, child: str) -> Edge:

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.support.findings import words
-from tests.support.texts import reader
+from tests.support.texts import reader, robot_in
 from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit import emit
@@ -74,10 +74,7 @@ def compiled(text: str, **files: str) -> Compiled:
 
 
 def sound(text: str, **files: str) -> Any:
-    result = compiled(text, **files)
-    assert not result.errors, [(str(one.span), one.message) for one in result.errors]
-    assert result.robot
-    return result.robot
+    return robot_in(compiled(text, **files))
 
 
 def built(text: str, **files: str) -> dict[str, str]:

@@ -8,6 +8,7 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
+from tests.support.texts import robot_in
 from tfcompose.cli.commands.diff import differences
 from tfcompose.cli.compiling import library
 from tfcompose.compile import Compiled, compile_robot
@@ -25,10 +26,7 @@ def compiled(text: str, *profiles: str) -> Compiled:
 
 
 def robot_of(text: str, *profiles: str) -> Robot:
-    done = compiled(text, *profiles)
-    assert not done.errors, done.errors
-    assert done.robot
-    return done.robot
+    return robot_in(compiled(text, *profiles))
 
 
 def edge_of(robot: Robot, child: str) -> Edge:

@@ -1,4 +1,4 @@
-"""Files of a robot that are only texts."""
+"""Robots that are only texts."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from tfcompose.findings import RejectedError, Span, finding
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
+
+    from tfcompose.compile import Compiled
+    from tfcompose.model import Robot
 
 
 def reader(texts: Mapping[str, str]) -> Callable[[str], str]:
@@ -19,3 +22,10 @@ def reader(texts: Mapping[str, str]) -> Callable[[str], str]:
         return texts[name]
 
     return read
+
+
+def robot_in(compiled: Compiled) -> Robot:
+    """Return the robot that was compiled without errors."""
+    assert not compiled.errors, compiled.errors
+    assert compiled.robot
+    return compiled.robot

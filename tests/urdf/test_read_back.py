@@ -11,6 +11,7 @@ import pytest
 
 from tests.support.random_robot import spec
 from tests.support.robots import EVERYTHING
+from tests.support.texts import robot_in
 from tfcompose.cli import main
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
@@ -43,10 +44,7 @@ SPECS += [pytest.param(EVERYTHING, id="everything"), pytest.param(MORE, id="more
 
 
 def robot_of(text: str) -> Robot:
-    compiled = compile_robot(text, "r.yaml", PRESETS, read=lambda name: (ROBOTS / name).read_text("utf-8"))
-    assert not compiled.errors, compiled.errors
-    assert compiled.robot
-    return compiled.robot
+    return robot_in(compile_robot(text, "r.yaml", PRESETS, read=lambda name: (ROBOTS / name).read_text("utf-8")))
 
 
 def texts(robot: Robot) -> dict[str, str]:

@@ -16,6 +16,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.support.random_robot import TYPES, spec
+from tests.support.texts import robot_in
 from tests.support.urdf_readers import Body, Drake, MuJoCo, Pinocchio, Reader, Yourdfpy, together
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
@@ -51,10 +52,7 @@ FAR_M = 1e-9
 
 
 def robot_of(text: str) -> Robot:
-    compiled = compile_robot(text, "r.yaml", PRESETS, read=lambda name: (ROBOTS / name).read_text("utf-8"))
-    assert not compiled.errors, compiled.errors
-    assert compiled.robot
-    return compiled.robot
+    return robot_in(compile_robot(text, "r.yaml", PRESETS, read=lambda name: (ROBOTS / name).read_text("utf-8")))
 
 
 def generated(seed: int, reader: str) -> Robot:

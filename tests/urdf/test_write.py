@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from tests.support.texts import robot_in
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
@@ -28,10 +29,7 @@ HEAD = "tfcompose: 1\nrobot: r\n"
 
 
 def robot_of(text: str, profiles: tuple[str, ...] = ()) -> Robot:
-    compiled = compile_robot(text, "r.yaml", library(), profiles)
-    assert not compiled.errors, compiled.errors
-    assert compiled.robot
-    return compiled.robot
+    return robot_in(compile_robot(text, "r.yaml", library(), profiles))
 
 
 def example(name: str, profiles: tuple[str, ...] = ()) -> Robot:

@@ -116,8 +116,9 @@ Declare the edge with the node's process as its owner, so that the guard expects
 Edges that come and go, such as those of tags, are allowed under guard: allow.""",
     "TF332": """An edge's owner is not known to publish it.
 
-The process has several nodes, or nodes whose edges are known, and none of them publishes this edge. The guard would
-report whoever does. Name another owner, or declare which node publishes it: publishes: [{parent, child, off}].""",
+The process has several nodes, or nodes whose edges are known, and none of them publishes this edge; or it is a launch
+file, and none of its nodes is named. The guard would report whoever does. Name another owner, or declare which node
+publishes it: node: NAME, or publishes: [{parent, child, off}].""",
     "TF333": """A node's parameter contradicts the tree.
 
 tfcompose sets the names of frames, and what a node publishes, from the tree and its owners. Remove the parameter, or

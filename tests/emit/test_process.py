@@ -279,3 +279,23 @@ def test_a_file_that_is_missing_or_of_no_known_format_is_a_finding(
     found = built_at(tmp_path, "build/r", text.replace(old, new))
     assert isinstance(found, list)
     assert code in [one.code for one in found]
+
+
+ROS2 = {
+    "run: [ros2, run, p, e]": "run: {package: p, executable: e}",
+    "run: [ros2, run, p, e, --fast, now]": "run: {package: p, executable: e, args: [--fast, now]}",
+    "run: [ros2, launch, p, f.launch.py]": "run: {launch: p/f.launch.py}",
+    'run: [ros2, launch, p, f.launch.py, "map:=a"]': "run: {launch: p/f.launch.py, args: {map: a}}",
+}
+
+
+@pytest.mark.parametrize("words", ROS2)
+def test_a_ros2_command_is_started_as_the_package_or_launch_file_that_it_is(words: str) -> None:
+    more = "params: {rate: 5}" if "executable" in ROS2[words] else "log_level: debug"
+    assert process_of(f"{words}, {more}") == process_of(f"{ROS2[words]}, {more}")
+
+
+@pytest.mark.parametrize("words", ["./f.launch.py", "--debug, p, f.launch.py", "p, f.launch.py, --debug"])
+def test_a_launch_file_that_is_left_to_ros2_gets_no_ros_arguments(words: str) -> None:
+    head = HEAD.replace("frames: {map: {}}", "frames: {map: {}, odom: {parent: map, owner: a, rate: 9}}")
+    assert process_of(f"run: [ros2, launch, {words}], node: b", head).argv == ("ros2", "launch", *words.split(", "))

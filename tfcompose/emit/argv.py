@@ -6,7 +6,7 @@ import json
 import re
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.model import SHELL, AsInFile
+from tfcompose.model import AsInFile
 from tfcompose.plan import known_at_launch
 
 if TYPE_CHECKING:
@@ -57,9 +57,9 @@ def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> 
 def _is_node(process: Process, *, owns: bool) -> bool:
     """Whether a plain command is surely a ROS node: it owns an edge, or is told what only nodes are.
 
-    What follows a text that a shell reads does not reach the program.
+    What follows a text that a shell reads, or a launch file, does not reach the program.
     """
-    if process.argv[:2] == SHELL:
+    if not process.takes_ros_arguments:
         return False
     has_node_settings = process.log_level is not None or process.namespace is not None or bool(file_params(process))
     return owns or has_node_settings or bool(process.remap.keys() - _TF_TOPICS) or "--ros-args" in process.argv

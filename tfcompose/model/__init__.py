@@ -19,7 +19,7 @@ from tfcompose.model.edge import (
     SafetyController,
 )
 from tfcompose.model.hardware import Block, Component, Hardware, Interface
-from tfcompose.model.process import BUILT_IN, GUARD, JOINTS, SHELL, STATIC, AsInFile, Claim, Node, Process
+from tfcompose.model.process import BUILT_IN, GUARD, JOINTS, ROS2_LAUNCH, SHELL, STATIC, AsInFile, Claim, Node, Process
 from tfcompose.model.robot import OPTICAL_ENDINGS, MountedSensor, Part, Robot, SourceNumbers, is_optical, may_be_refused
 
 __all__ = [
@@ -30,6 +30,7 @@ __all__ = [
     "JOINTS",
     "MOVING",
     "OPTICAL_ENDINGS",
+    "ROS2_LAUNCH",
     "SHELL",
     "STATIC",
     "AsInFile",

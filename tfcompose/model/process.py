@@ -12,6 +12,8 @@ STATIC, JOINTS, GUARD = "static", "joints", "guard"
 BUILT_IN = (STATIC, JOINTS, GUARD)
 #: How a command begins that a shell reads.
 SHELL = ("/bin/sh", "-c")
+#: How a command begins that runs launch files.
+ROS2_LAUNCH = ("ros2", "launch")
 
 if TYPE_CHECKING:
     from tfcompose.findings import Span
@@ -67,6 +69,11 @@ class Process(PlanProcess):
     def planned(self, **made: Any) -> PlanProcess:
         """Return the process as the plan has it, with fields that follow from the whole robot."""
         return narrowed(PlanProcess, self, **made)
+
+    @property
+    def takes_ros_arguments(self) -> bool:
+        """Whether what follows on the command line reaches a node: a shell and a launch file do not pass it on."""
+        return self.launch is None and self.argv[:2] not in {SHELL, ROS2_LAUNCH}
 
     @property
     def node(self) -> str:

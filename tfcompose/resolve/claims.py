@@ -11,7 +11,7 @@ from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, RejectedError, Span, did_you_mean, finding
-from tfcompose.model import BUILT_IN, SHELL, AsInFile, Claim, Edge, Node, Process
+from tfcompose.model import BUILT_IN, AsInFile, Claim, Edge, Node, Process
 from tfcompose.plan import switch_text
 from tfcompose.resolve.presets import node_preset, node_preset_names
 
@@ -279,8 +279,7 @@ class Claimant:
         process = self.process
         if process.kind != "run":
             return False
-        is_node = process.launch is None and process.argv[:2] != SHELL
-        return is_node or "${params_file}" in " ".join(process.argv)
+        return process.takes_ros_arguments or "${params_file}" in " ".join(process.argv)
 
 
 _HOLE = re.compile(r"\{(\w+)\}")

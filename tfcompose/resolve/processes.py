@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, did_you_mean, finding
 from tfcompose.language.process import RUNNING, SIMULATIONS, SWEEP, keys_of
-from tfcompose.model import BUILT_IN, GUARD, JOINTS, MOVING, SHELL, STATIC, Node, Process
+from tfcompose.model import BUILT_IN, GUARD, JOINTS, MOVING, ROS2_LAUNCH, SHELL, STATIC, Node, Process
 from tfcompose.plan import Ready, Simulation, StopRule, Sweep
 from tfcompose.resolve.poses import pose_of
 from tfcompose.resolve.presets import node_preset, node_preset_names
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from tfcompose.language.process import ProcessSpec, ReadySpec, Run, Simulate, Started, Way
     from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Path, Source
-    from tfcompose.model import Joint, Robot
+    from tfcompose.model import Edge, Joint, Robot
     from tfcompose.plan import ProcessKind
 
 
@@ -131,6 +131,18 @@ def unknown_names(
     return found
 
 
+def unnamed_nodes(edges: tuple[Edge, ...], processes: list[Process], spec: RobotSpec) -> Iterator[Finding]:
+    """Yield a finding for each owner that is a launch file, if no node in it is named."""
+    owned = {edge.owner: edge for edge in reversed(edges)}
+    for process in processes:
+        edge, declared = owned.get(process.name), spec.processes.get(process.name)
+        is_launch = process.launch is not None or process.argv[:2] == ROS2_LAUNCH
+        if edge and declared and is_launch and declared.node is None and not declared.nodes:
+            message = f"{process.name} is a launch file, and the node in it that publishes {edge.name} is not named"
+            advice = f"processes: {{{process.name}: {{node: NAME}}}}"
+            yield finding("TF332", message, edge.owner_at or edge.at, help=advice)
+
+
 _FIELDS = frozenset(one.name for one in fields(Process) if one.init)
 
 
@@ -149,8 +161,30 @@ def how(declared: Started, namespace: str, way: Way = "run") -> dict[str, Any]:
 
 def program(run: Run, *, shell: bool) -> dict[str, Any]:
     """Return what is started: a package's program, a launch file, or a command; a shell's command is one text."""
-    argv = (*SHELL, *run.argv) if shell and run.argv else run.argv or run.args
-    return {"package": run.package, "executable": run.executable, "launch": run.launch, "argv": argv}
+    if shell and run.argv:
+        return {"argv": (*SHELL, *run.argv)}
+    return _of_ros2(run.argv) or {
+        "package": run.package,
+        "executable": run.executable,
+        "launch": run.launch,
+        "argv": run.argv or run.args,
+    }
+
+
+def _of_ros2(argv: tuple[str, ...]) -> dict[str, Any] | None:
+    """Return what a command line of ``ros2 run`` or ``ros2 launch`` starts, or None for any other.
+
+    Options of ``ros2`` itself, and a launch file that is given by its path, are left to ``ros2``.
+    """
+    match argv:
+        case ("ros2", "run", package, executable, *words) if not package.startswith("-"):
+            return {"package": package, "executable": executable, "argv": tuple(words)}
+        case ("ros2", "launch", package, file, *words) if not package.startswith("-") and all(
+            ":=" in word for word in (*words,)
+        ):
+            return {"launch": f"{package}/{file}", "argv": tuple(words)} if ":=" not in file else None
+        case _:
+            return None
 
 
 def _ready(declared: ReadySpec, namespace: str) -> Ready | None:
@@ -274,10 +308,10 @@ _WORDS = {
 
 
 def unreached(process: Process, source: Source) -> list[Finding]:
-    """Return findings about a parameter file without parameters, and about keys that a shell's command cannot get."""
+    """Return findings about a parameter file without parameters, and about keys that reach no node."""
     at: Path = ("processes", process.name)
     names_params_file = any("${params_file}" in word for word in (*process.argv, *process.env.values()))
-    if process.argv[:2] == SHELL:
+    if process.argv[:2] in {SHELL, ROS2_LAUNCH}:
         keys = ("remap", "log_level", "namespace", *(() if names_params_file else ("params",)))
         given = [key for key in keys if getattr(process, key) and source.has((*at, key))]
         return [_not_reached(key, process, source.at_key((*at, key))) for key in given]
@@ -288,9 +322,12 @@ def unreached(process: Process, source: Source) -> list[Finding]:
 
 
 def _not_reached(key: str, process: Process, at: Span) -> Finding:
-    """Return a warning about a key that becomes ROS arguments, which end before the programs that a shell starts."""
+    """Return a warning about a key that becomes ROS arguments, which neither a shell nor ``ros2 launch`` passes on."""
     advice = f"write it into the text: --ros-args {_WORDS[key]}; or give run as a list"
     message = f"{key} does not reach {process.name}, which a shell reads"
+    if process.argv[:2] == ROS2_LAUNCH:
+        advice = "write run: {launch: package/file.launch.py}, or an argument that the launch file takes"
+        message = f"{key} does not reach the nodes of {process.name}, which ros2 launch starts"
     return finding("TF107", message, at, help=advice, severity="warning")
 
 

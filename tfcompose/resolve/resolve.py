@@ -26,6 +26,7 @@ from tfcompose.resolve.processes import (
     name_clashes,
     names_files,
     unknown_names,
+    unnamed_nodes,
     unreached,
     user_process,
     with_positions,
@@ -102,6 +103,7 @@ class _Work:
         edges = solver.solve()
         own += drafts.drivers
         self.found += [*drafts.found, *bodies.found, *solver.found, *self._wrong_names(own)]
+        self.found += unnamed_nodes(edges, own, self.spec)
         robot = self._take(with_positions(self._robot(drafts, edges, self._everybody(own)), self.spec, self.source))
         if any(names_files(node.params) for process in own for node in process.ros_nodes):
             robot = self._take(with_param_files(robot, self.source, self.read))

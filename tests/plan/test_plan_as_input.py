@@ -3,6 +3,7 @@
 import json
 import os
 from collections.abc import Callable
+from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,14 @@ def changed(**processes: Any) -> Callable[[dict[str, Any]], None]:
     return lambda plan: plan["processes"][0].update(processes)
 
 
-WRONG: dict[str, Callable[[dict[str, Any]], None]] = {
+def deep(levels: int) -> list[Any]:
+    made: list[Any] = []
+    for _ in range(levels):
+        made = [made]
+    return made
+
+
+WRONG: dict[str, Callable[[dict[str, Any]], Any]] = {
     "a program as the robot's name": lambda plan: plan.update(robot='r"); import os; os.system("x'),
     "a line as the robot's name": lambda plan: plan.update(robot="r\nExecStart=/bin/x"),
     "a lone surrogate": lambda plan: plan.update(robot="\ud800x"),
@@ -29,6 +37,10 @@ WRONG: dict[str, Callable[[dict[str, Any]], None]] = {
     "an escape sequence in the environment": changed(env={"A": "\x1b[2J"}),
     "an escape sequence as a variable": changed(env={"\x1b[2J": "1"}),
     "a wait for nobody": changed(after={"nobody": "ready"}),
+    "processes that wait for each other": lambda plan: [
+        one.update(after={other["name"]: "ready"}) for one, other in permutations(plan["processes"][:2])
+    ],
+    "lists as deep as JSON is read": lambda plan: plan.update(more=deep(900), robot="\ud800"),
     "an owner that is no process": lambda plan: plan["edges"][0].update(owner="nobody"),
     "two processes of a name": lambda plan: plan["processes"].append(plan["processes"][0]),
     "parameters from elsewhere": changed(params_file="/etc/shadow"),
@@ -38,7 +50,7 @@ WRONG: dict[str, Callable[[dict[str, Any]], None]] = {
 }
 
 
-def plan_with(change: Callable[[dict[str, Any]], None]) -> str:
+def plan_with(change: Callable[[dict[str, Any]], Any]) -> str:
     plan = json.loads(json.dumps(BUILT))
     change(plan)
     return json.dumps(plan)

@@ -146,3 +146,10 @@ def test_stars_are_one_part_and_two_are_any_number(pattern: str, name: str, *, d
 def test_any_text_is_a_parameter_file_or_a_finding(text: str) -> None:
     with contextlib.suppress(RejectedError):
         load_params(text, "p.yaml")
+
+
+def test_a_file_that_is_nested_too_deep_is_refused_and_does_not_end_the_interpreter() -> None:
+    deep = f"p: {{ros__parameters: {{x: {'[' * 200_000}}}}}"
+    with pytest.raises(RejectedError) as rejected:
+        load_params(deep, "deep.yaml")
+    assert [one.code for one in rejected.value.findings] == ["TF008"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import graphlib
 import json
 import re
 from dataclasses import dataclass
@@ -148,6 +149,8 @@ def launch(plan: Plan, machine: Machine, urdf: str) -> tuple[tuple[File, ...], l
         _call("SetEnvironmentVariable", repr(name), repr(value)) for name, value in _variables(plan)
     ]
     gaps = []
+    delays_s = _delays_s(plan)
+    known = {process.name: process for process in plan.processes}
     stock = _stock(plan, urdf)
     if stock is not None:
         names = static_names(plan)
@@ -157,11 +160,11 @@ def launch(plan: Plan, machine: Machine, urdf: str) -> tuple[tuple[File, ...], l
         if process.kind == "guard":
             gaps.append("the guard is left out: it belongs to tfcompose up")
         elif process.kind not in OWN_KINDS or stock is None:
-            delay_s = _delay_s(plan, process)
+            delay_s = delays_s[process.name]
             action = _started(plan, process)
             delayed = _call("TimerAction", f"period={delay_s!r}", _list([action], "actions"))
             actions.append(delayed if delay_s else action)
-        unheeded = [name for name, what in process.after.items() if not waiting_s(plan, name, what)]
+        unheeded = [name for name, what in process.after.items() if not waiting_s(known[name], what)]
         if unheeded and process.kind != "guard":
             gaps.append(f"{process.name} does not wait for {', '.join(unheeded)}: launch knows no readiness")
         gaps += _unlike(process)
@@ -176,10 +179,14 @@ def _element(action: _Code) -> Iterator[str]:
     yield from (*most, f"{last},")
 
 
-def _delay_s(plan: Plan, process: PlanProcess) -> float:
-    """Return how long after the launch it is started: when all for which it waits so many seconds have had them."""
-    waits = [(plan.process(name), waiting_s(plan, name, what)) for name, what in process.after.items()]
-    return max((_delay_s(plan, other) + seconds for other, seconds in waits), default=0.0)
+def _delays_s(plan: Plan) -> dict[str, float]:
+    """Return how long after the launch each is started: when all for which it waits so many seconds have had them."""
+    known = {process.name: process for process in plan.processes}
+    delays: dict[str, float] = {}
+    for name in graphlib.TopologicalSorter({name: process.after for name, process in known.items()}).static_order():
+        waits = (delays[other] + waiting_s(known[other], what) for other, what in known[name].after.items())
+        delays[name] = max(waits, default=0.0)
+    return delays
 
 
 def _unlike(process: PlanProcess) -> Iterator[str]:

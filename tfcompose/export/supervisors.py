@@ -81,9 +81,9 @@ def after(plan: Plan, process: PlanProcess) -> dict[str, str]:
     return dict.fromkeys(() if process.kind == "guard" else guards, "started") | waits
 
 
-def waiting_s(plan: Plan, name: str, what: str) -> float:
+def waiting_s(process: PlanProcess, what: str) -> float:
     """Return how many seconds after its start a process is ready, where that is known and waited for; else 0."""
-    ready = plan.process(name).ready
+    ready = process.ready
     return ready.number if what == "ready" and ready and ready.kind == "time" else 0.0
 
 
@@ -123,9 +123,9 @@ def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
     for process in started(plan):
         for name, what in process.after.items():
             other = plan.process(name)
-            if what == "ready" and other.kind == "run" and not waiting_s(plan, name, what):
+            if what == "ready" and other.kind == "run" and not waiting_s(other, what):
                 gaps.append(f"{process.name} waits until {name} was executed: systemd cannot see that it is ready")
-            if what == "started" and _settling_s(plan, name):
+            if what == "started" and _settling_s(plan, other):
                 gaps.append(f"{process.name} waits until {name} is ready, as others do")
     return (File(_target_name(plan), _target(plan, [unit.path for unit in units])), *units), gaps
 
@@ -143,9 +143,10 @@ def _target(plan: Plan, units: list[str]) -> str:
     )
 
 
-def _settling_s(plan: Plan, name: str) -> float:
+def _settling_s(plan: Plan, process: PlanProcess) -> float:
     """Return how many seconds after its start others wait for a process; 0 where none does."""
-    return max((waiting_s(plan, name, one.after[name]) for one in started(plan) if name in one.after), default=0.0)
+    name = process.name
+    return max((waiting_s(process, one.after[name]) for one in started(plan) if name in one.after), default=0.0)
 
 
 def _unit_text(plan: Plan, process: PlanProcess, machine: Machine, names: Mapping[str, str], *, done: bool) -> str:
@@ -155,7 +156,7 @@ def _unit_text(plan: Plan, process: PlanProcess, machine: Machine, names: Mappin
     most = MAX_RESTARTS if process.max_restarts is None else process.max_restarts
     kind = "oneshot" if done else "exec" if process.kind == "run" else "notify"
     restart = restart_of(process)
-    settling_s = _settling_s(plan, process.name)
+    settling_s = _settling_s(plan, process)
     unit = [
         f"Description={_plain(process.name)} of robot {plan.robot}",
         f"PartOf={target}",

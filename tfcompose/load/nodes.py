@@ -26,7 +26,7 @@ MOST_VALUES = 400_000  # with those that aliases stand for
 #: NUL, which no file name, argument or variable can hold, and halves of characters, which no file can.
 _FORBIDDEN = re.compile("[\0\ud800-\udfff]")
 
-_LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
 
 @dataclass(slots=True)
@@ -85,7 +85,7 @@ class Reader:
             RejectedError: where the text stops being YAML, is too deep, or too large.
         """
         try:
-            for event in yaml.parse(text, Loader=_LOADER):
+            for event in yaml.parse(text, Loader=LOADER):
                 if isinstance(event, yaml.ScalarEvent):  # most of them are
                     self._scalar(event)
                 elif isinstance(event, yaml.CollectionStartEvent):

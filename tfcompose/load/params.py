@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from tfcompose.findings import Finding, RejectedError, Span, finding
+from tfcompose.load.nodes import DEEPEST, LOADER
 from tfcompose.load.source import MOST_VALUES, refuse_unreadable
 
 if TYPE_CHECKING:
@@ -53,12 +54,13 @@ def load_params(text: str, file: str) -> ParamsFile:
     """
     refuse_unreadable(text, file)
     try:
+        _refuse_deep(text, file)
         root = yaml.compose(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         at = Span(file, mark.line + 1, mark.column + 1, mark.line + 1, mark.column + 2) if mark else Span(file)
         raise RejectedError([finding("TF002", error.problem or "not YAML", at)]) from None
-    except (yaml.YAMLError, RecursionError) as error:
+    except (yaml.YAMLError, UnicodeEncodeError) as error:
         raise RejectedError([finding("TF002", f"not YAML: {type(error).__name__}", Span(file))]) from None
     if not isinstance(root, yaml.MappingNode):
         advice = "/NODE: {ros__parameters: {…}}"
@@ -66,6 +68,25 @@ def load_params(text: str, file: str) -> ParamsFile:
     reader = _Reader(file)
     reader.nodes(root, "")
     return reader.result
+
+
+def _refuse_deep(text: str, file: str) -> None:
+    """Do nothing for a text that is nested as deep as a file may be: PyYAML's composer recurses in C without bounds.
+
+    Raises:
+        RejectedError: if it is nested deeper.
+        yaml.YAMLError: if it is not YAML.
+    """
+    depth = 0
+    for event in yaml.parse(text, Loader=LOADER):
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+            if depth > DEEPEST:
+                mark: Any = event.start_mark
+                at = Span(file, mark.line + 1, mark.column + 1, mark.line + 1, mark.column + 2)
+                raise RejectedError([finding("TF008", f"nested deeper than {DEEPEST} levels", at)])
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
 
 
 class _Reader:

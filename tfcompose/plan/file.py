@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import graphlib
 import json
 import re
 from collections import Counter
@@ -53,25 +54,26 @@ def read_plan(text: str, file: str) -> Plan:
         plan = decode(Plan, data)
     except DecodeError as error:
         raise RejectedError([_bad(f"not a valid plan: {error}", Span(file))]) from None
-    wrong = [*_wrong_text(data, ()), *_wrong_names(plan)]
+    wrong = [*_wrong_text(data), *_wrong_names(plan)]
     if wrong:
         raise RejectedError([_bad(f"not a valid plan: {one}", Span(file)) for one in wrong])
     return plan
 
 
-def _wrong_text(data: Any, path: tuple[str, ...]) -> Iterator[str]:
+def _wrong_text(data: Any) -> Iterator[str]:
     """Yield what is wrong with each text: control characters would move a terminal's cursor, or begin a new line."""
-    if isinstance(data, str):
-        found = _CONTROL.findall(data)
-        if found and not (_FOR_PROGRAMS & set(path) and {"\n", "\t"}.issuperset(found)):
-            yield f"{'.'.join(path)} holds a control character: {json.dumps(data)[:60]}"
-    elif isinstance(data, dict):
-        for key, value in data.items():
-            yield from _wrong_text(key, (*path, "a key"))
-            yield from _wrong_text(value, (*path, key))
-    elif isinstance(data, list):
-        for number, value in enumerate(data):
-            yield from _wrong_text(value, (*path, str(number)))
+    waiting: list[tuple[Any, tuple[str, ...]]] = [(data, ())]  # what no field takes may be nested deeper than calls may
+    while waiting:
+        value, path = waiting.pop()
+        if isinstance(value, str):
+            found = _CONTROL.findall(value)
+            if found and not (_FOR_PROGRAMS & set(path) and {"\n", "\t"}.issuperset(found)):
+                yield f"{'.'.join(path)} holds a control character: {json.dumps(value)[:60]}"
+        elif isinstance(value, dict):
+            for key, one in reversed(value.items()):
+                waiting += [(one, (*path, key)), (key, (*path, "a key"))]
+        elif isinstance(value, list):
+            waiting += reversed([(one, (*path, str(number))) for number, one in enumerate(value)])
 
 
 def _wrong_names(plan: Plan) -> Iterator[str]:
@@ -95,10 +97,19 @@ def _wrong_names(plan: Plan) -> Iterator[str]:
         for other in process.after
         if other not in known
     )
+    if all(other in known for process in plan.processes for other in process.after):
+        yield from _wrong_order(plan)
     for ready, name in ((process.ready, process.name) for process in plan.processes):
         if ready and ready.kind == "log" and (error := _regex_error(ready.text)):
             yield f"{name} is ready at {shown(ready.text)}, not a regular expression: {error}"
     yield from _wrong_files(plan)
+
+
+def _wrong_order(plan: Plan) -> Iterator[str]:
+    try:
+        graphlib.TopologicalSorter({process.name: process.after for process in plan.processes}).prepare()
+    except graphlib.CycleError as error:
+        yield f"processes wait for each other: {', '.join(map(shown, error.args[1]))}"
 
 
 def _wrong_files(plan: Plan) -> Iterator[str]:

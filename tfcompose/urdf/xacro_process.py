@@ -104,7 +104,11 @@ class Expansion:
         try:
             with self._hooked():
                 document = self._document(request)
+                for node in document.childNodes:
+                    if node.nodeType == Node.COMMENT_NODE:  # xacro's own names the file
+                        node.data = node.data.encode("utf-8", "replace").decode()
                 text = document.toprettyxml(indent="  ")
+                text.encode()
         except Exception as error:  # noqa: BLE001 (xacro evaluates Python: anything can come out of it)
             return self._failure(error)
         if len(text) > MOST_BYTES:

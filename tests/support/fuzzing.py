@@ -1,0 +1,293 @@
+"""Mutated inputs for whatever reads what others wrote; each is read, or refused as it should be, in bounded time.
+
+``python -m tests.support.fuzzing COUNT SEED`` tries so many inputs of each kind, and keeps those that end otherwise in
+``tests/fuzz/corpus``, where the tests try them from then on.
+"""
+
+import hashlib
+import random
+import resource
+import signal
+import sys
+import tempfile
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+
+from tfcompose.cli.compiling import disk, library
+from tfcompose.cli.dry_run import _lines as plan_lines
+from tfcompose.cli.reading import read_text
+from tfcompose.cli.terminal import printable
+from tfcompose.compile import compile_robot
+from tfcompose.emit import emit
+from tfcompose.export.launch import launch
+from tfcompose.export.supervisors import Machine, compose, systemd
+from tfcompose.findings import Finding, RejectedError
+from tfcompose.ipc import GUARD_EVENTS, GUARD_ORDERS, REQUESTS, read_notice
+from tfcompose.load.params import load_params
+from tfcompose.plan.file import read_plan
+from tfcompose.render.formats import render_github, render_json, render_sarif
+from tfcompose.render.text import render_text
+from tfcompose.ros.tf_codec import Decoder, decode
+from tfcompose.urdf.lint import lint_urdf
+from tfcompose.urdf.packages import Packages
+
+CORPUS = Path(__file__).parents[1] / "fuzz" / "corpus"
+#: Processor time that an input may take, in seconds.
+MOST_S = 10.0
+#: What an input may hold; longer ones are cut.
+LONGEST = 20_000
+
+LIBRARY = library()
+WORDS = """
+{ } [ ] ,  - &a *a <<: ${ null ~ 1e999 -0.0 !x " ' \ufeff é < > /> <!-- &amp; &#xD800; "\\ud800" nan .inf true | #
+base_link ${1/0} $(find x)
+"""
+PIECES = [word.encode() for word in WORDS.split()] + [
+    b"\n",
+    b"\n  ",
+    b": ",
+    b"\t",
+    b"\x00",
+    b"\x1b[2J",
+    b"0x" + b"f" * 400,
+    b"9" * 400,
+    b"[" * 60,
+    b"{a: " * 60,
+    b"\xed\xa0\x80",
+    b"\xff",
+    b"\x00\x00\x00\x80",
+    b"\xff\xff\xff\xff",
+    b"\x7f\xff\xff\xff",
+]
+
+
+def mutated(data: bytes, others: list[bytes], rng: random.Random) -> bytes:
+    """Return the data with some pieces replaced, removed, doubled, or taken from others of their kind."""
+    for _ in range(rng.choice((1, 1, 2, 3, 6))):
+        at = rng.randrange(len(data) + 1)
+        end = min(len(data), at + rng.choice((0, 0, 1, 2, 4, 8, 40)))
+        kind = rng.randrange(6)
+        if kind == 0:
+            piece = rng.choice(PIECES)
+        elif kind == 1:
+            piece = bytes([rng.randrange(256)])
+        elif kind == 2 and end > at:
+            piece = bytes([data[at] ^ 1 << rng.randrange(8)]) + data[at + 1 : end]
+        elif kind == 3:
+            other = rng.choice(others)
+            begin = rng.randrange(len(other) + 1)
+            piece = other[begin : begin + rng.randrange(80)]
+        elif kind == 4:
+            begin = rng.randrange(len(data) + 1)
+            piece = data[begin : begin + rng.randrange(80)] * rng.choice((1, 1, 2, 20))
+        else:
+            piece = b""
+        data = data[:at] + piece + data[end:]
+    return data[:LONGEST]
+
+
+def _shown(found: list[Finding]) -> None:
+    """Render findings in each form; each says where and what in text that a terminal can take."""
+    assert not [one for one in found if one.code == "TF903"], found
+    for text in (
+        render_text(found, lambda *_: None, colour=False),
+        render_json(found),
+        render_github(found),
+        render_sarif(found, "0", {}),
+    ):
+        text.encode()
+        assert not {"\x1b", "\x00", "\x9b"} & set(text), ascii(text)
+
+
+def _compiled(file: Path) -> None:
+    try:
+        text = read_text(str(file))
+        compiled = compile_robot(text, str(file), LIBRARY, read=read_text, disk=disk())
+    except RejectedError as error:
+        _shown(list(error.findings))
+        return
+    _shown(list(compiled.found))
+    assert compiled.robot or compiled.errors
+    if compiled.robot and not compiled.errors:
+        for one in emit(compiled.robot):
+            one.text.encode()
+            if one.path == "plan.json":
+                read_plan(one.text, one.path)
+
+
+def robot(data: bytes, folder: Path) -> None:
+    """A robot file."""
+    file = folder / "robot.yaml"
+    file.write_bytes(data)
+    _compiled(file)
+
+
+def calibration(data: bytes, folder: Path) -> None:
+    """A calibration file, and the robot that it is about."""
+    (folder / "kit.calib").write_bytes(data)
+    (folder / "calibrated.yaml").write_text(
+        "tfcompose: 1\nrobot: r\ncalibrations: [kit.calib]\nlinks: {base_link: {}}\n"
+        "frames: {tool0: {parent: base_link}, eye: {parent: tool0, calibration: {file: kit.calib}}}\n",
+        "utf-8",
+    )
+    _compiled(folder / "calibrated.yaml")
+
+
+def params(data: bytes, folder: Path) -> None:
+    """A parameter file of ROS."""
+    file = folder / "nav.yaml"
+    file.write_bytes(data)
+    try:
+        _shown(load_params(read_text(str(file)), str(file)).found)
+    except RejectedError as error:
+        _shown(list(error.findings))
+
+
+def urdf(data: bytes, folder: Path) -> None:
+    """A URDF, which names no xacro."""
+    file = folder / "r.urdf"
+    file.write_bytes(data.replace(b"<xacro:", b"<xacro_"))
+    _shown(lint_urdf(str(file), Packages(disk())))
+
+
+def xacro(data: bytes, folder: Path) -> None:
+    """A xacro file."""
+    file = folder / "r.xacro"
+    file.write_bytes(data)
+    _shown(lint_urdf(str(file), Packages(disk())))
+
+
+def plan(data: bytes, folder: Path) -> None:
+    """A built plan: reviewed and exported, if it is one."""
+    try:
+        one = read_plan(
+            data.decode("utf-8", "surrogatepass" if len(data) % 2 else "replace"), str(folder / "plan.json")
+        )
+    except RejectedError as error:
+        _shown(list(error.findings))
+        return
+    except UnicodeDecodeError:
+        return
+    for line in plan_lines(one, {}):
+        line.encode()
+        assert printable(line).isprintable(), ascii(line)
+    for made, _ in (systemd(one, Machine("/robot")), compose(one, Machine(".")), launch(one, Machine("."), "<robot/>")):
+        for file in made:
+            file.text.encode()
+
+
+def message(data: bytes, _folder: Path) -> None:
+    """A line between processes: a request, a notice, an event or an order."""
+    for read in (REQUESTS.read, read_notice, GUARD_EVENTS.read, GUARD_ORDERS.read):
+        with suppress(ValueError, RecursionError):
+            read(data)
+
+
+def transforms(data: bytes, _folder: Path) -> None:
+    """The bytes of a TFMessage."""
+    with suppress(ValueError):
+        for one in decode(data):
+            assert isinstance(one.child, str)
+    decoder = Decoder()
+    for _ in range(2):
+        with suppress(ValueError):
+            list(decoder.rows(data))
+        with suppress(ValueError):
+            decoder.stamps(data)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of input: what reads it, and how many of it stand for one of another kind, since they are slow."""
+
+    read: Callable[[bytes, Path], None]
+    weight: float = 1.0
+
+    @property
+    def name(self) -> str:
+        return self.read.__name__
+
+    def corpus(self) -> list[bytes]:
+        """Return the inputs that mutations begin with."""
+        return [file.read_bytes() for file in sorted((CORPUS / self.name).iterdir())]
+
+
+KINDS = (
+    Kind(robot, 0.5),
+    Kind(calibration),
+    Kind(params),
+    Kind(urdf),
+    Kind(xacro, 0.05),
+    Kind(plan),
+    Kind(message),
+    Kind(transforms),
+)
+
+
+class TooLongError(BaseException):
+    """An input takes more processor time than it may."""
+
+
+def _refuse(_number: int, _frame: FrameType | None) -> None:
+    raise TooLongError
+
+
+@contextmanager
+def _bounded() -> Iterator[None]:
+    before = signal.signal(signal.SIGVTALRM, _refuse)
+    signal.setitimer(signal.ITIMER_VIRTUAL, MOST_S)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        signal.signal(signal.SIGVTALRM, before)
+
+
+def fault_of(kind: Kind, data: bytes, folder: Path) -> str:
+    """Return how the reading of an input ends where it should not: a traceback, or empty."""
+    try:
+        with _bounded():
+            kind.read(data, folder)
+    except (Exception, TooLongError):  # noqa: BLE001 (whatever it is, it should not be)
+        return traceback.format_exc()
+    return ""
+
+
+def inputs(kind: Kind, seed: int, count: int) -> Iterator[bytes]:
+    """Yield mutations of the corpus; the same ones for the same seed and corpus."""
+    corpus, rng = kind.corpus(), random.Random(f"{kind.name} {seed}")
+    for _ in range(count):
+        yield mutated(rng.choice(corpus), corpus, rng)
+
+
+def _kept(kind: Kind, data: bytes) -> Path:
+    file = CORPUS / kind.name / f"found-{hashlib.sha256(data).hexdigest()[:12]}"
+    file.write_bytes(data)
+    return file
+
+
+def main(count: int, seed: int) -> int:
+    """Try so many inputs of each kind; return how many ended otherwise than they should."""
+    failures = 0
+    with tempfile.TemporaryDirectory() as folder:
+        for kind in KINDS:
+            tried, found = 0, set[tuple[str, ...]]()
+            for data in inputs(kind, seed, int(count * kind.weight)):
+                fault, tried = fault_of(kind, data, Path(folder)), tried + 1
+                where = tuple(fault.splitlines()[-3:])
+                if fault and where not in found:
+                    found.add(where)
+                    sys.stderr.write(f"{_kept(kind, data)}\n{fault}\n")
+            failures += len(found)
+            peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+            sys.stdout.write(f"{kind.name}: {tried} inputs, {len(found)} faults; peak memory {peak} MB\n")
+            sys.stdout.flush()
+    return failures
+
+
+if __name__ == "__main__":
+    sys.exit(bool(main(int(sys.argv[1]), int(sys.argv[2]))))

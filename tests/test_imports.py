@@ -236,7 +236,7 @@ def test_help_loads_the_commands_and_nothing_of_their_work(bare: set[str]) -> No
     assert not foreign(loaded, bare)
     assert parts_in(loaded) == {"cli", "geometry", "render", "signals", "text"}
     assert {name for name in loaded if name.startswith("tfcompose.cli.") and ".commands" not in name} == {
-        f"tfcompose.cli.{name}" for name in ("options", "parser", "terminal")
+        f"tfcompose.cli.{name}" for name in ("command_parser", "options", "parser", "schemas", "terminal")
     }
     assert "dataclasses" not in loaded
 

@@ -10,8 +10,8 @@ import jsonschema
 import pytest
 
 from tests.support.tables import for_each
-from tfcompose.cli.commands.schema import LANGUAGES, schema_text
 from tfcompose.cli.compiling import library
+from tfcompose.cli.schemas import LANGUAGES, schema_text
 from tfcompose.compile import compile_robot
 from tfcompose.load import load
 

@@ -9,7 +9,7 @@ from typing import Any
 import jsonschema
 import pytest
 
-from tfcompose.cli.commands.schema import schema_text
+from tfcompose.cli.schemas import schema_text
 from tfcompose.plan import VERSION, Plan
 from tfcompose.plan.codec import DecodeError, decode
 

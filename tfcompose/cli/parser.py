@@ -10,14 +10,14 @@ import errno
 import gc
 import os
 import sys
-from argparse import ArgumentParser, HelpFormatter
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from tfcompose import __version__
+from tfcompose.cli.command_parser import Command, Parser, command_parser
 from tfcompose.cli.commands import (
     build,
+    completion,
     diff,
     doctor,
     down,
@@ -27,6 +27,7 @@ from tfcompose.cli.commands import (
     export,
     graph,
     importing,
+    init,
     lint,
     logs,
     monitor,
@@ -40,52 +41,41 @@ from tfcompose.cli.commands import (
     verify,
     wait,
 )
-from tfcompose.cli.terminal import INTERRUPTED, OUTPUT_CLOSED, UNREADABLE, size_of
+from tfcompose.cli.terminal import INTERRUPTED, OUTPUT_CLOSED, UNREADABLE
 from tfcompose.signals import RememberedInterrupt, take_interrupt
 
 if TYPE_CHECKING:
-    from argparse import Namespace
     from typing import TextIO
 
 
-class Command(Protocol):
-    """A module of ``commands``, or an object in one; its docstring is its line in the list, and below that its help."""
-
-    __doc__: str | None
-
-    def arguments(self, parser: ArgumentParser, /) -> None:
-        """Add the command's arguments."""
-
-    def run(self, arguments: Namespace, /) -> int:
-        """Do it and return the exit code."""
-
-
-COMMANDS: dict[str, Command] = {
-    "lint": lint,
-    "build": build,
-    "export": export,
-    "up": up,
-    "ps": ps,
-    "logs": logs,
-    "events": events,
-    "restart": steering.RESTART,
-    "stop": steering.STOP,
-    "start": steering.START,
-    "wait": wait,
-    "down": down,
-    "echo": echo,
-    "doctor": doctor,
-    "monitor": monitor,
-    "graph": graph,
-    "verify": verify,
-    "tree": tree,
-    "pose": pose,
-    "explain": explain,
-    "diff": diff,
-    "presets": presets,
-    "schema": schema,
-    "import": importing,
+#: The commands by what they are for, in the order of the help.
+GROUPS: dict[str, dict[str, Command]] = {
+    "Write": {"init": init, "import": importing, "presets": presets, "schema": schema},
+    "Check": {
+        "lint": lint,
+        "build": build,
+        "diff": diff,
+        "pose": pose,
+        "explain": explain,
+        "tree": tree,
+        "graph": graph,
+    },
+    "Run": {
+        "up": up,
+        "down": down,
+        "ps": ps,
+        "logs": logs,
+        "events": events,
+        "restart": steering.RESTART,
+        "stop": steering.STOP,
+        "start": steering.START,
+        "wait": wait,
+    },
+    "Look": {"doctor": doctor, "monitor": monitor, "echo": echo, "verify": verify},
+    "Ship": {"export": export},
+    "Help": {"completion": completion},
 }
+COMMANDS: dict[str, Command] = {name: command for group in GROUPS.values() for name, command in group.items()}
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -115,10 +105,12 @@ def main(argv: list[str] | None = None) -> int:
 
 def _main(words: list[str]) -> int:
     command = words[0] if words else ""
+    if command == "help" and words[1:]:
+        return _run(words[1], ["--help"]) if words[1] in COMMANDS else _unknown(words[1])
     if command in {"-h", "--help", "help"}:
         sys.stdout.write(help_text())
         return 0
-    if command == "--version":
+    if command in {"-V", "--version"}:
         sys.stdout.write(f"tfcompose {__version__}\n")
         return 0
     return _run(command, words[1:]) if command in COMMANDS else _unknown(command)
@@ -142,22 +134,16 @@ def _run_command(name: str, words: list[str]) -> int:
         sys.stdout.write(parser.format_help())
         return 0
     try:
-        return COMMANDS[name].run(parser.parse_args(words))
+        arguments = parser.parse_args(words)
+        arguments.commands = COMMANDS  # for those that are about commands
+        return COMMANDS[name].run(arguments)
     except SystemExit as end:  # after a complaint
         return end.code if isinstance(end.code, int) else UNREADABLE
 
 
-def parser_of(name: str) -> ArgumentParser:
+def parser_of(name: str) -> Parser:
     """Return the parser of one command."""
-    width = min(100, size_of(1)[0] - 2)
-    parser = ArgumentParser(
-        prog=f"tfcompose {name}",
-        description=(COMMANDS[name].__doc__ or "").partition("\n\n")[2],
-        formatter_class=partial(HelpFormatter, width=width),
-        allow_abbrev=False,
-    )
-    COMMANDS[name].arguments(parser)
-    return parser
+    return command_parser(name, COMMANDS[name])
 
 
 def summary_of(name: str) -> str:
@@ -168,14 +154,16 @@ def summary_of(name: str) -> str:
 def help_text() -> str:
     """Return what ``tfcompose --help`` prints."""
     width = max(map(len, COMMANDS))
-    rows = "".join(f"  {name:<{width}}  {summary_of(name)}\n" for name in COMMANDS)
+    groups = (
+        f"{title}:\n" + "".join(f"  {name:<{width}}  {summary_of(name)}\n" for name in commands)
+        for title, commands in GROUPS.items()
+    )
     return (
         "usage: tfcompose COMMAND [OPTION …]\n\n"
         "One YAML file says which frames a robot has and who publishes each TF edge.\n"
         "tfcompose checks it, builds it, starts it, and names any node that publishes\n"
-        "an edge owned by another.\n\n"
-        f"commands:\n{rows}\n"
-        "options:\n  --version  print the version\n  --help     print this help; after a command: its options\n"
+        "an edge owned by another.\n\n" + "\n".join(groups) + "\noptions:\n  -V, --version  print the version\n"
+        "  -h, --help     print this help; after a command, or as help COMMAND: its options\n"
     )
 
 
@@ -185,7 +173,7 @@ def _unknown(command: str) -> int:
         return UNREADABLE
     import difflib
 
-    near = difflib.get_close_matches(command, COMMANDS, 1)
+    near = difflib.get_close_matches(command, COMMANDS, 1, cutoff=0.7)
     advice = f"did you mean {near[0]}?" if near else "tfcompose --help lists them"
     kind = "option" if command.startswith("-") else "command"
     sys.stderr.write(f"tfcompose: unknown {kind} {command}; {advice}\n")

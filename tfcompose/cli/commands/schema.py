@@ -6,16 +6,15 @@ plan.json. With --reference print every key of the language as Markdown instead.
 
 from __future__ import annotations
 
-import json
 import sys
 from typing import TYPE_CHECKING
 
+from tfcompose.cli.schemas import LANGUAGES, schema_text
 from tfcompose.cli.terminal import UNREADABLE, fail
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
-LANGUAGES = ("robot", "overlay", "preset", "node", "plan")
 _WITHOUT_REFERENCE = {"overlay": "an overlay has the keys of a robot file", "plan": "plan.json is written by build"}
 
 
@@ -36,22 +35,3 @@ def run(arguments: Namespace) -> int:
 
     sys.stdout.write(reference(arguments.language))
     return 0
-
-
-def schema_text(language: str) -> str:
-    """Return the schema as the files under ``schemas/`` hold it."""
-    return json.dumps(_schema(language), indent=2, ensure_ascii=False) + "\n"
-
-
-def _schema(language: str) -> dict[str, object]:
-    if language == "plan":
-        from tfcompose.plan.schema import plan_schema
-
-        return plan_schema()
-    from tfcompose.cli.compiling import library
-    from tfcompose.language.json_schema import json_schema
-    from tfcompose.resolve.presets import node_preset_names
-
-    known = library()
-    presets = {name: known.get(name) for name in known.names}
-    return json_schema(language, presets, node_preset_names())

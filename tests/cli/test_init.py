@@ -1,0 +1,64 @@
+"""``tfcompose init``: what it writes lints without a finding, builds, and starts at once."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.support import processes
+from tests.support.cli import tfcompose_in
+from tests.support.waiting import TIMEOUT_S
+from tfcompose.cli.commands.init import FOLDER, TEMPLATES
+
+
+@pytest.mark.parametrize("template", TEMPLATES)
+def test_a_template_lints_in_every_profile_and_builds_under_its_new_name(template: str, tmp_path: Path) -> None:
+    assert tfcompose_in(tmp_path, "init", template, "--name", "my_robot").returncode == 0
+    linted = tfcompose_in(tmp_path, "lint", ".", "--fail-on", "warning")
+    assert linted.returncode == 0, linted.stdout
+    assert tfcompose_in(tmp_path, "build").returncode == 0
+    assert (tmp_path / "build" / "my_robot" / "plan.json").is_file()
+
+
+def test_every_template_is_listed_and_no_file_is_left_out() -> None:
+    others = {other.removesuffix(".yaml") for _, more in TEMPLATES.values() for other in more}
+    assert {file.stem for file in FOLDER.glob("*.yaml")} == TEMPLATES.keys() | others
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("template", TEMPLATES)
+def test_the_command_that_it_names_starts_the_robot(template: str, tmp_path: Path, domain: object) -> None:
+    assert domain
+    printed = tfcompose_in(tmp_path, "init", template).stdout
+    (up,) = (line.partition("#")[0].split() for line in printed.splitlines() if line.startswith("  tfcompose up"))
+    done = processes.run([sys.executable, "-m", *up, "--for", "4"], cwd=tmp_path, timeout_s=2 * TIMEOUT_S)
+    assert (done.returncode, "tree complete" in done.stdout) == (0, True), done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("there", ["robot.yaml", "cart.yaml", "robot.schema.json"])
+def test_nothing_is_replaced_and_all_or_nothing_is_made(there: str, tmp_path: Path) -> None:
+    (tmp_path / there).write_text("mine", "utf-8")
+    done = tfcompose_in(tmp_path, "init", "fleet", "--schema")
+    assert (done.returncode, there in done.stderr) == (2, True)
+    assert [file.name for file in tmp_path.iterdir()] == [there]
+    assert (tmp_path / there).read_text("utf-8") == "mine"
+
+
+@pytest.mark.parametrize("name", ["3x", "a b", "", "ä", "a/b"])
+def test_a_name_that_no_robot_can_have_is_refused(name: str, tmp_path: Path) -> None:
+    assert tfcompose_in(tmp_path, "init", "--name", name).returncode == 2
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_schema_is_in_the_folder_of_the_file_that_names_it(tmp_path: Path) -> None:
+    assert tfcompose_in(tmp_path, "init", "-o", "a/b/arm.yaml", "--schema").returncode == 0
+    (named,) = (
+        line.partition("$schema=")[2] for line in (tmp_path / "a/b/arm.yaml").read_text("utf-8").splitlines()[:1]
+    )
+    assert (tmp_path / "a/b" / named).is_file()
+
+
+def test_a_folder_that_refuses_files_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    done = tfcompose_in(tmp_path, "init", "-o", "file/robot.yaml")
+    assert (done.returncode, "file/robot.yaml" in done.stderr) == (2, True)

@@ -1,0 +1,53 @@
+"""How the options of one command are read, and what is said where they are wrong."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, HelpFormatter
+from functools import partial
+from typing import TYPE_CHECKING, NoReturn, Protocol
+
+from tfcompose.cli.terminal import UNREADABLE, fail, size_of
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+
+
+class Parser(ArgumentParser):
+    """Names the option that was probably meant, and where the help is."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong and exit with 2."""
+        import difflib
+
+        advice = f"{self.prog} --help lists what there is"
+        words = [word.partition("=")[0] for word in message.split() if word.startswith("-")]
+        known = [text for action in self._actions for text in action.option_strings]
+        near = [one for word in words if word not in known for one in difflib.get_close_matches(word, known, 1)]
+        if near:
+            advice = f"did you mean {near[0]}?"
+        fail(f"{self.prog.partition(' ')[2]}: {message}; {advice}", UNREADABLE)
+
+
+class Command(Protocol):
+    """A module of ``commands``, or an object in one; its docstring is its line in the list, and below that its help."""
+
+    __doc__: str | None
+
+    def arguments(self, parser: ArgumentParser, /) -> None:
+        """Add the command's arguments."""
+
+    def run(self, arguments: Namespace, /) -> int:
+        """Do it and return the exit code."""
+
+
+def command_parser(name: str, command: Command) -> Parser:
+    """Return the parser of a command."""
+    width = min(100, size_of(1)[0] - 2)
+    parser = Parser(
+        prog=f"tfcompose {name}",
+        description=(command.__doc__ or "").partition("\n\n")[2],
+        formatter_class=partial(HelpFormatter, width=width),
+        allow_abbrev=False,
+    )
+    command.arguments(parser)
+    return parser

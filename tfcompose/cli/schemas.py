@@ -1,0 +1,26 @@
+"""The JSON Schemas of all that users write, and of plan.json."""
+
+from __future__ import annotations
+
+import json
+
+LANGUAGES = ("robot", "overlay", "preset", "node", "plan")
+
+
+def schema_text(language: str) -> str:
+    """Return the schema as the files under ``schemas/`` hold it."""
+    return json.dumps(_schema(language), indent=2, ensure_ascii=False) + "\n"
+
+
+def _schema(language: str) -> dict[str, object]:
+    if language == "plan":
+        from tfcompose.plan.schema import plan_schema
+
+        return plan_schema()
+    from tfcompose.cli.compiling import library
+    from tfcompose.language.json_schema import json_schema
+    from tfcompose.resolve.presets import node_preset_names
+
+    known = library()
+    presets = {name: known.get(name) for name in known.names}
+    return json_schema(language, presets, node_preset_names())

@@ -43,7 +43,7 @@ from tfcompose.findings import RejectedError
 from tfcompose.ipc import AllReady, AllStarted, Ended, PlanChange, UpdateRequest
 from tfcompose.launcher.control import listen
 from tfcompose.launcher.output import Logs, NonBlockingOutput
-from tfcompose.launcher.preflight import commands_of, started_by_us
+from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDirError, runtime_dir_of
 from tfcompose.launcher.supervisor import Session, supervise
 from tfcompose.ros.environment import child_environment, ros_trouble
@@ -62,7 +62,7 @@ def start(file: Path, arguments: Namespace) -> int:
     if plan.guard.mode == "off" and arguments.settle is not None:
         fail("the guard is off, so --settle has no effect: leave it out", UNREADABLE)
     trouble = ros_trouble(child_environment(os.environ, plan.ros, own=True))
-    found = [trouble] if trouble else commands_of(plan, started_by_us(plan), file, os.environ, child_environment)[1]
+    found = [trouble] if trouble else commands_of(plan, plan.started, file, os.environ, child_environment)[1]
     if found:
         reject([_with_profiles(one, arguments) for one in found])
     try:
@@ -161,7 +161,7 @@ def _starts_with(profile: str, arguments: Namespace) -> bool:
     if compiled.robot is None or compiled.errors:
         return False
     plan = plan_of(compiled.robot)
-    return not commands_of(plan, started_by_us(plan), Path(file), os.environ, child_environment)[1]
+    return not commands_of(plan, plan.started, Path(file), os.environ, child_environment)[1]
 
 
 def detach(plan: Plan, place: RuntimeDir, lock: Lock, session: Session, arguments: Namespace) -> int:

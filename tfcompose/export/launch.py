@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
-from tfcompose.export.supervisors import plain_name, started, waiting_s
+from tfcompose.export.supervisors import plain_name, waiting_s
 from tfcompose.files import File
 from tfcompose.numbers import number
 from tfcompose.plan.stock import MOST_HZ, OWN_KINDS, STATE_PUBLISHER, static_names
@@ -156,7 +156,7 @@ def launch(plan: Plan, machine: Machine, urdf: str) -> tuple[tuple[File, ...], l
         names = static_names(plan)
         actions += [_state_publisher(plan), *(_fixed(plan, edge, names[edge.child]) for edge in stock)]
         gaps.append("robot_description is robot.urdf, in which edges of other owners are floating joints")
-    for process in started(plan):
+    for process in plan.started:
         if process.kind == "guard":
             gaps.append("the guard is left out: it belongs to tfcompose up")
         elif process.kind not in OWN_KINDS or stock is None:
@@ -225,7 +225,7 @@ def published_by(urdf: str, prefix: str) -> set[tuple[str, str]]:
 
 def _stock(plan: Plan, urdf: str) -> list[PlanEdge] | None:
     """Return the fixed edges outside the URDF; None where own publishers must send all."""
-    own = {process.name for process in started(plan) if process.kind in OWN_KINDS}
+    own = {process.name for process in plan.started if process.kind in OWN_KINDS}
     if not own or len(own) > len(OWN_KINDS) or any(plan.process(name).description for name in own):
         return None
     if any(_package(process) == STATE_PUBLISHER for process in plan.processes):
@@ -245,13 +245,13 @@ def _package(process: PlanProcess) -> str:
 
 def _keywords(plan: Plan) -> tuple[str, _Code]:
     """Return the keywords of stock nodes: namespace, and the publishers' remappings."""
-    remap = {old: new for one in started(plan) if one.kind in OWN_KINDS for old, new in one.remap.items()}
+    remap = {old: new for one in plan.started if one.kind in OWN_KINDS for old, new in one.remap.items()}
     return f"namespace={plan.ros.namespace!r}", _list(map(repr, remap.items()), "remappings")
 
 
 def _state_publisher(plan: Plan) -> _Code:
     """Return robot_state_publisher, which passes on as many joint states as the plan's publisher does."""
-    joints = next((process for process in started(plan) if process.kind == "joints"), None)
+    joints = next((process for process in plan.started if process.kind == "joints"), None)
     given = _params(joints.argv) if joints else {}
     values = {"publish_frequency": min(given.pop("publish_frequency", MOST_HZ), MOST_HZ), **given}
     values["use_sim_time"] = plan.ros.clock == "sim"

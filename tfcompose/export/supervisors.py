@@ -41,11 +41,6 @@ class Machine:
     image: str = ""
 
 
-def started(plan: Plan) -> list[PlanProcess]:
-    """Return the processes that an export starts."""
-    return [process for process in plan.processes if process.kind != "external"]
-
-
 def plain_name(name: str) -> str:
     """Return the name with nothing that units and services may not have in theirs."""
     return _NO_NAME.sub("-", name)
@@ -77,7 +72,7 @@ def restart_of(process: PlanProcess) -> str:
 def after(plan: Plan, process: PlanProcess) -> dict[str, str]:
     """Return which processes come first here, and what of them is waited for; a strict guard is among them."""
     waits = {name: what for name, what in process.after.items() if plan.process(name).kind != "external"}
-    guards = [one.name for one in started(plan) if one.kind == "guard" and plan.guard.mode == "strict"]
+    guards = [one.name for one in plan.started if one.kind == "guard" and plan.guard.mode == "strict"]
     return dict.fromkeys(() if process.kind == "guard" else guards, "started") | waits
 
 
@@ -113,14 +108,14 @@ def systemd(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
     systemd knows that they were executed. One that others wait for until it is done is ``Type=oneshot``. One that is
     ready so many seconds after its start has only started, for systemd, when a sleep of so many has ended.
     """
-    awaited = {name for process in started(plan) for name, what in process.after.items() if what == "done"}
+    awaited = {name for process in plan.started for name, what in process.after.items() if what == "done"}
     names = {name: f"{plain_name(plan.robot)}-{plain}.service" for name, plain in plain_names(plan).items()}
     units = [
         File(names[process.name], _unit_text(plan, process, machine, names, done=process.name in awaited))
-        for process in started(plan)
+        for process in plan.started
     ]
     gaps = gaps_of(plan)
-    for process in started(plan):
+    for process in plan.started:
         for name, what in process.after.items():
             other = plan.process(name)
             if what == "ready" and other.kind == "run" and not waiting_s(other, what):
@@ -146,7 +141,7 @@ def _target(plan: Plan, units: list[str]) -> str:
 def _settling_s(plan: Plan, process: PlanProcess) -> float:
     """Return how many seconds after its start others wait for a process; 0 where none does."""
     name = process.name
-    return max((waiting_s(process, one.after[name]) for one in started(plan) if name in one.after), default=0.0)
+    return max((waiting_s(process, one.after[name]) for one in plan.started if name in one.after), default=0.0)
 
 
 def _unit_text(plan: Plan, process: PlanProcess, machine: Machine, names: Mapping[str, str], *, done: bool) -> str:
@@ -225,10 +220,10 @@ def compose(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
     A process that owns edges is healthy while the first of them is live; ``after: ready`` waits for that.
     """
     names = plain_names(plan)
-    services = {names[process.name]: _compose_service(plan, process, machine, names) for process in started(plan)}
+    services = {names[process.name]: _compose_service(plan, process, machine, names) for process in plan.started}
     lines = [f"name: {plain_name(plan.robot)}", "services:", *mapping(services, "  ")]
     gaps = gaps_of(plan)
-    for process in started(plan):
+    for process in plan.started:
         for name, what in process.after.items():
             if what == "ready" and plan.process(name).kind != "external" and not plan.edges_of(name):
                 gaps.append(f"{process.name} waits until {name} was started: compose cannot see that it is ready")

@@ -284,6 +284,11 @@ class PartSpec(MountKeys):
     place: Text | None = key(None, "the frame of the part whose pose is given; the mount edge follows", "tool0")
     owner: Text | None = key(None, "the process that publishes every edge of the part", "arm_driver")
 
+    @property
+    def is_alone(self) -> bool:
+        """Whether it is a robot of its own beside the others, with joint states of its own."""
+        return bool((self.namespace or "").strip("/"))
+
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
         """Yield also a part that is nothing, or has keys of another kind of part."""

@@ -21,7 +21,7 @@ from tfcompose.ipc import (
     UpdateRequest,
 )
 from tfcompose.launcher.events import NewPlan
-from tfcompose.launcher.preflight import commands_of, started_by_us
+from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.readiness import is_ready, unmet_in_words, waits_for
 from tfcompose.launcher.stopping import refusal
 from tfcompose.plan import SourceLine
@@ -114,7 +114,7 @@ def _update(
     if state.stop:
         return Refusal("everything is being stopped"), None, None
     try:
-        commands, found = commands_of(plan, started_by_us(plan), file, base, environment, Path(request.base))
+        commands, found = commands_of(plan, plan.started, file, base, environment, Path(request.base))
     except ValueError as error:  # a NUL in the folder's name
         return Refusal(f"{request.base!r} cannot be used: {error}"), None, None
     if found:

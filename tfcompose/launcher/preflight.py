@@ -48,14 +48,9 @@ class Environment(Protocol):
         """
 
 
-def started_by_us(plan: Plan) -> list[PlanProcess]:
-    """Return the processes that the launcher starts, in the plan's order."""
-    return [process for process in plan.processes if process.kind != "external"]
-
-
 def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
     plan: Plan,
-    processes: list[PlanProcess],
+    processes: Sequence[PlanProcess],
     plan_file: Path,
     base: Mapping[str, str],
     environment: Environment,

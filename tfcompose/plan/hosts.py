@@ -21,7 +21,7 @@ _UNSEEN = ("log", "exit")
 
 def hosts_of(plan: Plan) -> tuple[str, ...]:
     """Return the machines that the plan names, in its order."""
-    named = (process.host for process in plan.processes if process.kind != "external")
+    named = (process.host for process in plan.started)
     return tuple(dict.fromkeys(host for host in named if host is not None))
 
 
@@ -63,7 +63,7 @@ def describe_share(plan: Plan) -> tuple[str, ...]:
     for process in plan.processes:
         if process.kind == "external":
             others.setdefault(f"of {process.host}" if process.host else "from elsewhere", []).append(process.name)
-    own = ", ".join(process.name for process in plan.processes if process.kind != "external")
+    own = ", ".join(process.name for process in plan.started)
     here = f"host {plan.host}" if plan.host else "this machine, which the plan does not name,"
     return (f"{here} starts {own}", *(f"expected {where}: {', '.join(names)}" for where, names in others.items()))
 

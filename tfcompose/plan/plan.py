@@ -370,6 +370,11 @@ class Plan:
                 return process
         raise KeyError(name)
 
+    @property
+    def started(self) -> tuple[PlanProcess, ...]:
+        """The processes that are started, in the plan's order: all but external ones."""
+        return tuple(process for process in self.processes if process.kind != "external")
+
     def guards_of(self, host: str | None) -> tuple[str, ...]:
         """Return the nodes of the guard of a host's share; None or empty: of the machine that has no name here."""
         own = [node for process in self.processes if process.kind == "guard" for node in process.nodes]

@@ -99,9 +99,8 @@ class Drafts:
         hanging = {edge.child for edge in robot.edges}
         free = part.shared | (self.spec.frames.keys() - hanging)  # a free root can have its edge here
         taken = [name for name in robot.frames if name in self.frames and name not in free]
-        joints = {
-            edge.joint_name: edge.joint_at or edge.at for edge in robot.edges if edge.joint_name and not part.alone
-        }
+        named = [edge for edge in robot.edges if edge.joint_name and not part.declared.is_alone]
+        joints = {edge.joint_name: edge.joint_at or edge.at for edge in named}
         taken_joints = [name for name in joints if name in self.joints]
         if taken:
             self._refuse_names(taken, part)

@@ -79,7 +79,7 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
     found = [one for one in (*converted.of_elements, *converted.of_blocks) if one.severity == "error"]
     found += converted.of_files
     own = _with_base(replace(robot, ros=part.settings, processes=_own(part), source_data={"urdf": digest}))
-    if part.alone and part.spec.ros.state_publisher == "stock":
+    if part.declared.is_alone and part.spec.ros.state_publisher == "stock":
         own, refused = with_stock(own)
         found += refused
     return Foreign(own, files, tuple(found), implied)

@@ -37,11 +37,6 @@ class Joined:
     root: str | None
     shared: frozenset[str]
 
-    @property
-    def alone(self) -> bool:
-        """Whether it is a robot of its own beside the others, with joint states of its own."""
-        return bool((self.declared.namespace or "").strip("/"))
-
 
 @dataclass(slots=True)
 class PartEntry:
@@ -64,11 +59,6 @@ class PartEntry:
     def place(self) -> Span:
         """The place of its name."""
         return self.source.at_key(self.at)
-
-    @property
-    def alone(self) -> bool:
-        """Whether it is a robot of its own beside the others."""
-        return bool((self.declared.namespace or "").strip("/"))
 
     @property
     def prefix(self) -> str:
@@ -97,7 +87,7 @@ class PartEntry:
         settings = {
             "namespace": self.settings.namespace,
             "frame_prefix": self.settings.frame_prefix,
-            "state_publisher": self.spec.ros.state_publisher if self.alone else "tfcompose",
+            "state_publisher": self.spec.ros.state_publisher if self.declared.is_alone else "tfcompose",
             "isolate": self.isolate,
         }
         source, found = as_part(inner, self.source, self.at, self.spec.ros, settings, self.declared.vars)
@@ -112,12 +102,12 @@ class PartEntry:
         shared = frozenset(robot.ros.shared_frames) & robot.frames.keys() | implied
         if self.declared.root is not None:
             robot = self._subtree(robot, self.declared.root)
-        names = Names(self.name, self.prefix, shared, self.alone)
+        names = Names(self.name, self.prefix, shared, self.declared.is_alone)
         again = renamed(robot, names)
         if self.declared.owner is not None:
             at = self.source.at((*self.at, "owner"))
             again = replace(again, edges=tuple(_owned(edge, self.declared.owner, at) for edge in again.edges))
-        if self.alone:
+        if self.declared.is_alone:
             again = replace(again, parts=(Part(self.name, self.prefix, robot), *again.parts))
         return Joined(self.name, self.declared, again, self._root(robot, names), shared)
 

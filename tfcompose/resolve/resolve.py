@@ -208,7 +208,7 @@ class _Work:
 
     def _robot(self, drafts: Drafts, edges: tuple[Edge, ...], everybody: list[Process]) -> Robot:
         parts = [part.robot for part in self.joined]
-        in_tree = [part.robot for part in self.joined if not part.declared.namespace]
+        in_tree = [part.robot for part in self.joined if not part.declared.is_alone]
         numbers = source_numbers(self.spec, self.source)
         return Robot(
             name=self.spec.robot,

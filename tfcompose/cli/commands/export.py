@@ -80,7 +80,6 @@ def run(arguments: Namespace) -> int:
 
 def _write(plan: Plan, file: Path, arguments: Namespace) -> None:
     from tfcompose.cli.writing import write_all
-    from tfcompose.export.supervisors import started
     from tfcompose.findings import RejectedError
 
     folder = Path(arguments.output or file.parent) / arguments.kind
@@ -93,7 +92,7 @@ def _write(plan: Plan, file: Path, arguments: Namespace) -> None:
         fail(f"nothing was written to {folder}: {error.strerror}", UNREADABLE)
     print(f"wrote {folder}: {', '.join(one.path for one in files)}")
     if plan.host is None:
-        differences += [f"{one.name} runs on {one.host}, and is here too: --host" for one in started(plan) if one.host]
+        differences += [f"{one.name} runs on {one.host}, and is here too: --host" for one in plan.started if one.host]
     for line in differences:
         print(f"differs from tfcompose up: {line}")
 

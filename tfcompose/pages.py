@@ -429,9 +429,9 @@ may be no ROS node: if it sends TF, start it as {package, executable}, or add --
 
 Of each publisher the guard judges a thousand edges that nobody declared, so that a flood of them neither stops it nor
 delays a strict robot: further ones are not reported one by one, and strict holds them back. Its declared edges are
-judged all the same, unless it sends other edges in each message, and so many that reading them takes a tenth of the
-guard's time: then some of its messages are skipped. Such a node usually invents a frame for each object or each
-message: let it use the same frames again, or end it.""",
+judged all the same; messages with ever other edges are read for a tenth of the guard's time, and some are skipped.
+doctor, verify, monitor and the live tree keep ten thousand edges of each publisher, and say how much more came. Such a
+node usually invents a frame for each object or each message: let it use the same frames again, or end it.""",
     "TF901": """ROS 2 is missing, or cannot be used.
 
 pip install 'tfcompose[ros]' brings it on x86-64 Linux; elsewhere source your distribution's setup file.""",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.support.adversary import GUARDS, OTHER_X, OWNER_X, PlainListener, Robot, foreign, node, running
+from tfcompose.ros.tf_codec import Transform, encode
 
 if TYPE_CHECKING:
     import subprocess
@@ -92,6 +93,20 @@ def test_a_program_of_another_dds_is_named_as_what_it_is_and_no_node_is_accused(
     robot.stop(one)
     assert accused(robot, after) == set()
     robot.says("over", f"{parent} → {child}", after=after)
+
+
+@of_each(*GUARDS)
+@pytest.mark.parametrize("odd", [b"b\xffd_name", b"b\0d_name"])
+def test_a_name_that_is_no_text_hides_nothing_of_its_message(
+    robot: Robot, rogue: Callable[..., subprocess.Popen[str]], odd: bytes
+) -> None:
+    after, rest = robot.lines(), ((OTHER_X, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+    data = encode([Transform(0, "odom", "bad_name", *rest), Transform(0, "map", "odom", *rest)])
+    one = rogue(node("odd", OTHER_X, f"hex:{data.replace(b'bad_name', odd).hex()}"))
+    robot.says("error[TF801]", "map → odom", "/odd", after=after)
+    robot.says("note: ", f"pid {one.pid}", after=after)
+    robot.stop(one)
+    robot.says("over", "map → odom", after=after)
 
 
 @of_each("strict", "remap")

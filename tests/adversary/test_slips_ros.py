@@ -28,7 +28,7 @@ CHILDREN = {
     **{name: Child(in_shell(f". ./{name}.sh; exec", node(name, PLAIN_X, f"odom {name}"))) for name in SETUPS},
     "plain": Child(node("plain", PLAIN_X, "odom plain")),
     "renamed": Child(node("slam", RENAMED_X, "map odom")),
-    "moved": Child(node("moved", PLAIN_X, "base_link moved", namespace="/other"), "moved"),
+    "moved": Child(node("moved", PLAIN_X, "base_link moved", namespace="/other"), ["moved"]),
     "forked": Child(
         ["/bin/sh", "-c", f"(setsid {shlex.join(node('forked', FORKED_X, 'odom base_link'))} &); exec sleep 600"]
     ),

@@ -129,7 +129,7 @@ def test_a_sound_transform_is_not_refused_and_its_pose_is_kept() -> None:
 
 def test_a_flood_of_names_is_counted_and_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MOST_EDGES", 10)
-    monkeypatch.setattr("tfcompose.live.publishers.MOST_KNOWN", 10)
+    monkeypatch.setattr("tfcompose.live.publishers.MOST_LEFT", 10)
     observer = TreeObserver()
     for number in range(30):
         take(observer, f"map tag_{number}", S, gid=number.to_bytes(16, "big"))

@@ -1,12 +1,15 @@
 """Messages read by their layout say what a plain decoder says, however publishers change what they send."""
 
+import pytest
+from geometry_msgs.msg import TransformStamped
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rclpy.serialization import deserialize_message, serialize_message
 
 from tfcompose.live.publishers import MessageReader
 from tfcompose.live.snapshot import joints_of
 from tfcompose.ros.node import Received
-from tfcompose.ros.tf_codec import Transform, decode, encode
+from tfcompose.ros.tf_codec import Layout, Transform, decode, encode
 
 NAMES = st.sampled_from(["a", "b", "odom", "base_link", "käse", "", "x" * 9])
 TRANSFORMS = st.lists(
@@ -59,6 +62,16 @@ def test_what_is_no_message_is_refused_as_a_plain_decoder_does_also_after_good_o
     assert (read is None) == (plain is None)
     if read and plain:
         assert list(read.stamps_ns) == [one.stamp_ns for one in plain]
+
+
+@pytest.mark.parametrize("name", [b"od\xffm\0", b"od\0m\0", b"\xed\xa0\x80m\0", b"odomX"])
+def test_names_of_any_bytes_are_those_that_rclpy_takes(name: bytes) -> None:
+    data = encode([Transform(0, "map", "odom", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
+    (one,) = decode(data.replace(b"odom\0", name))
+    stamped = serialize_message(TransformStamped(child_frame_id="odom"))
+    assert one.child == deserialize_message(stamped.replace(b"odom\0", name), TransformStamped).child_frame_id
+    assert Layout(data).exact
+    assert not Layout(data.replace(b"odom\0", name)).exact
 
 
 def test_names_are_those_that_tf2_takes_and_can_be_shown() -> None:

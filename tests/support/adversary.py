@@ -92,10 +92,10 @@ def in_shell(first: str, command: Sequence[str]) -> list[str]:
 
 @dataclass
 class Child:
-    """A process of the robot's: its command, and the frame below base_link that it owns, if any; its node is /NAME."""
+    """A process of the robot's: its command, and the frames below base_link that it owns; its node is /NAME."""
 
     command: Sequence[str]
-    frame: str = ""
+    frames: Sequence[str] = ()
 
 
 class Robot:
@@ -114,7 +114,11 @@ class Robot:
                 "  odom: {parent: map, owner: slam}",
                 "  base_link: {parent: odom, owner: drive}",
             ),
-            *(f"  {one.frame}: {{parent: base_link, owner: {name}}}" for name, one in children.items() if one.frame),
+            *(
+                f"  {frame}: {{parent: base_link, owner: {name}}}"
+                for name in children
+                for frame in children[name].frames
+            ),
             *("processes:", "  drive: {simulate: {fixed: {}, rate: 20 Hz}}"),
             f"  slam: {{run: {json.dumps(node('slam', OWNER_X, 'map odom'))}, node: /slam}}",
         ]

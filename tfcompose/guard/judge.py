@@ -140,6 +140,10 @@ class Judge:
         """Return whether the publisher has published more undeclared edges than are judged."""
         return gid in self._verdicts.flooders
 
+    def flooded_by(self, gid: bytes | None) -> None:
+        """Take the publisher as one of more undeclared edges than are judged."""
+        self._verdicts.flooders.add(gid)
+
     def tick(self, now: float) -> list[GuardEvent]:
         """Return what the passing of time means."""
         events = [*self._see_again(now), *self.cases.report(now), *map(Found, self._sent.judge())]

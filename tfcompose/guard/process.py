@@ -11,17 +11,16 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 from tfcompose.guard.channel import EventWriter, Memory, OrderReader, SilentEdges, SwitchMemory, recalled
 from tfcompose.guard.diagnostics import DiagnosticsPage
+from tfcompose.guard.flood import WAIT_S, FloodReader
 from tfcompose.guard.gates import Gates, LifecycleDriver, Switches
 from tfcompose.guard.judge import FINDING_S, Judge, JudgeMemory
 from tfcompose.guard.relay import Feedback, Relay
 from tfcompose.ipc import Clear, Complete
-from tfcompose.live.flood import ReadingTime
-from tfcompose.live.publishers import MessageReader
+from tfcompose.live.publishers import MessageReader, forget_oldest
 from tfcompose.live.topics import RunMarks, TFGraph, TFTopics
 from tfcompose.plan.codec import decode
 from tfcompose.plan.topics import GLOBAL, parts_of, private_topics
@@ -30,6 +29,7 @@ from tfcompose.ros.clock import ClockWatch, SimClock
 from tfcompose.ros.environment import PROFILE_VARIABLES
 from tfcompose.ros.graph import ids_say_who
 from tfcompose.ros.node import open_node, wait
+from tfcompose.ros.tf_codec import number_of_transforms
 from tfcompose.text import counted
 from tfcompose.variables import (
     JOINS,
@@ -40,6 +40,7 @@ from tfcompose.variables import (
     SETTLE,
 )
 from tfcompose.verdict.drivers import expected_of
+from tfcompose.verdict.ownership import MOST_UNDECLARED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -88,9 +89,11 @@ class TopicWatch:
         self._emit = emit
         self._leaks_to: tuple[str, str] | None = None
         self._due = self._report_due = 0.0
-        self._malformed: set[bytes | None] = set()
-        self._known: set[bytes | None] = set()
-        self._time = ReadingTime(self._reader.decoder)
+        self._malformed: dict[bytes | None, None] = {}
+        self._known: dict[bytes | None, None] = {}
+        self._decoder = self._reader.decoder
+        self._flood = FloodReader(frozenset(edge.child for edge in judge.plan.edges))
+        self._most = len(judge.plan.edges) + MOST_UNDECLARED  # who sends more floods the tree, whatever it sends
 
     def watch_global_topics(self) -> None:
         """Look for nodes of the plan on the global topics too, where they do not belong."""
@@ -102,6 +105,11 @@ class TopicWatch:
         if self.relay and memory:
             self.relay.recall(memory, lambda message: self.judge.admits(message, now), now + FINDING_S)
 
+    @property
+    def wait_s(self) -> float:
+        """How long the next step can wait at most, in seconds."""
+        return WAIT_S if self._flood.is_reading else CHECK_EVERY_S
+
     def close(self) -> None:
         """End what must end before the node does."""
         self._graph.close()
@@ -111,14 +119,17 @@ class TopicWatch:
         taken = list(self._taken())
         self._graph.hear_public()
         now = time.monotonic()
-        strangers = {each.received.gid for each in taken} - self._known
-        self._known |= strangers
+        strangers = {each.received.gid for each in taken} - self._known.keys()
+        self._known |= dict.fromkeys(strangers)
         if strangers:  # who sends once and goes is in the graph for a moment only
             self._ask_graph(now)
         if self._clock:
             self.judge.clock(self._clock.now_ns(), now)
         for each in taken:
             self._take(each, now)
+        declared = self._flood.read(now)  # after the others, which wait for nothing
+        if declared is not None:
+            self._read(declared, now)
         if now >= self._due:
             self._due = now + CHECK_EVERY_S
             if not strangers:  # after the messages: what a strict guard passes on does not wait for it
@@ -143,8 +154,14 @@ class TopicWatch:
             yield data if received.gid else replace(data, received=replace(received, gid=received.raw_gid))
 
     def _take(self, data: TFData, now: float) -> None:
-        """Take a message; of who floods the tree one with other edges than before only while that took little time."""
-        self._time.read(data.received, partial(self._read, data, now), self.judge.is_flooded_by, now)
+        """Take a message; what is long, or other than before from one who floods the tree, is read little by little."""
+        received, judge = data.received, self.judge
+        floods = number_of_transforms(received.data) > self._most or judge.is_flooded_by(received.gid)
+        if floods and not self._decoder.knows(received.data):
+            judge.flooded_by(received.gid)
+            self._flood.add(data)
+        else:
+            self._read(data, now)
 
     def _read(self, data: TFData, now: float) -> None:
         received = data.received
@@ -152,7 +169,7 @@ class TopicWatch:
             message = self._reader.read(received, static=data.static)
         except ValueError as error:
             if received.gid not in self._malformed:
-                self._malformed.add(received.gid)
+                self._malformed[received.gid] = None
                 say(f"dropped a TF message: {error} (reported once for each publisher)")
             return
         self._pass_on(self.judge.message(message, now))
@@ -162,6 +179,9 @@ class TopicWatch:
     def _ask_graph(self, now: float) -> None:
         """Take who publishes now; what waited for a name may pass."""
         publishers = self._graph.publishers()
+        present = {one.gid for one in publishers}
+        forget_oldest(self._known, present)
+        forget_oldest(self._malformed, present)
         self._pass_on(self.judge.graph(publishers, now))
         if self.relay:
             waiting, self.relay.waiting = self.relay.waiting, []
@@ -253,7 +273,7 @@ def guard(own: Own, stop: Stop) -> None:
         steps += [ClockWatch(node, say, sim=own.plan.ros.clock == "sim").check, *(watch.report for watch in watches)]
         subscriptions = [each for watch in watches for each in watch.data.subscriptions]
         while not stop.requested:
-            wait(node, subscriptions, CHECK_EVERY_S, stop)
+            wait(node, subscriptions, min(watch.wait_s for watch in watches), stop)
             for step in steps:
                 step()
         for watch in watches:

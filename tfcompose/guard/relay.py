@@ -88,6 +88,8 @@ class Relay:
             return
         if admitted is not None:
             self.held.count(message, admitted, who)
+        elif not message.exact:
+            admitted = message.edges  # it is sent anew, with the names that were judged
         data = sent.received.data
         if message.static:
             self._latch(gid, data, message, admitted, sent.process)

@@ -44,6 +44,8 @@ OVER_WHILE_PRESENT_S = 30.0
 #: come: who names frames after what it tracks has new ones each second.
 COLLECTED_S = 0.5
 COLLECTED_AT_MOST_S = 60.0
+#: Of so many publishers, and groups of cases, it is known that they were reported.
+MOST_REPORTED = 2000
 #: So many edges have a line each when they are over; more are reported in one.
 OVER_IN_LINES = 3
 #: So long after it was first heard, an owner's latched message is surely all that is left of those before, in seconds.
@@ -153,7 +155,10 @@ class Cases:
         if now - at < collected_s:
             return False
         goes_on = self._start.cleared is not None and now - at < 2 * collected_s
+        self._reported.pop(group, None)  # the newest comes last
         self._reported[group] = (now, min(2 * collected_s, COLLECTED_AT_MOST_S) if goes_on else COLLECTED_S)
+        if len(self._reported) > MOST_REPORTED:
+            del self._reported[next(iter(self._reported))]
         return True
 
     def _event(self, cases: list[Case], now: float) -> GuardEvent:
@@ -283,7 +288,7 @@ class PublisherReports:
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
         self._nodes = {node for process in plan.processes for node in process.nodes}
-        self._reported: set[tuple[str, bytes]] = set()
+        self._reported: dict[tuple[str, bytes], None] = {}
 
     @property
     def changes(self) -> int:
@@ -357,10 +362,12 @@ class PublisherReports:
 
     def recall(self, memory: tuple[tuple[str, str], ...]) -> None:
         """Take this as reported by the guard before."""
-        self._reported = {(code, bytes.fromhex(gid)) for code, gid in memory}
+        self._reported = {(code, bytes.fromhex(gid)): None for code, gid in memory}
 
     def _once(self, one: Publisher, found: Finding) -> list[Found]:
         if (found.code, one.gid) in self._reported:
             return []
-        self._reported.add((found.code, one.gid))
+        self._reported[found.code, one.gid] = None
+        if len(self._reported) > MOST_REPORTED:
+            del self._reported[next(iter(self._reported))]
         return [Found(found)]

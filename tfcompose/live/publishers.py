@@ -6,18 +6,18 @@ What messages say is read fast where a publisher sends the same edges again and 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from tfcompose.geometry import Pose
 from tfcompose.ros.tf_codec import Decoder, decode
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from tfcompose.ros.node import Received
     from tfcompose.ros.tf_codec import Layout
 
-
+Key = TypeVar("Key")
 #: So many layouts of publishers are remembered whose poses were read.
 _MOST = 1024
 
@@ -28,6 +28,7 @@ class Message:
 
     ``gid`` is the publisher's id, or None where the rmw gives none; ``sequence`` counts its messages from 1.
     ``stamps_ns`` are the transforms' stamps; ``received_ns`` is when it came, by this machine's system clock.
+    ``exact`` says that its names are all that was sent: listeners of other languages take more of one with a NUL.
     ``poses`` are there where frames are compared with presets, in the first message of a publisher with these edges.
     """
 
@@ -39,6 +40,7 @@ class Message:
     stamps_ns: Sequence[int] = ()
     received_ns: int = 0
     poses: Sequence[Pose] = ()
+    exact: bool = True
 
 
 class MessageReader:
@@ -61,7 +63,15 @@ class MessageReader:
         if self._frames and (received.gid, layout) not in self._posed:
             poses = self._poses(received, layout)
         return Message(
-            edges, static, received.gid, received.source_ns, received.sequence, stamps, received.received_ns, poses
+            edges,
+            static,
+            received.gid,
+            received.source_ns,
+            received.sequence,
+            stamps,
+            received.received_ns,
+            poses,
+            exact=layout.exact,
         )
 
     def _poses(self, received: Received, layout: Layout) -> tuple[Pose, ...]:
@@ -73,8 +83,8 @@ class MessageReader:
         return tuple(Pose(one.xyz, one.quat_xyzw) for one in decode(received.data))
 
 
-#: So many publishers that have left are remembered.
-MOST_KNOWN = 20_000
+#: Of publishers that have left so many are remembered: those that come and go take a bounded memory.
+MOST_LEFT = 1000
 #: So many bytes of an id are its participant's (RTPS: a GUID's prefix).
 PARTICIPANT = 12
 #: How many gaps between messages tell surely when a publisher began; so many at least, when time is short.
@@ -124,6 +134,13 @@ class Publisher:
         return () if self.node is None else (self.node, *self.others)
 
 
+def forget_oldest(known: dict[Key, Any], present: Collection[Key]) -> None:
+    """Forget what came first of publishers that are not present, where there are more than ``MOST_LEFT`` of them."""
+    left = [key for key in known if key not in present] if len(known) > len(present) + MOST_LEFT else []
+    for key in left[: len(left) - MOST_LEFT]:
+        del known[key]
+
+
 class Publishers:
     """All publishers that the graph has shown: those that are there, and the names of those that have left.
 
@@ -144,9 +161,8 @@ class Publishers:
         """Take who is in the graph now."""
         self.queried = True
         self.present = {one.gid: one for one in publishers}
-        if len(self.known) + len(publishers) > MOST_KNOWN:
-            self.known = {gid: one for gid, one in self.known.items() if gid in self.present}
         self.known |= {one.gid: one for one in publishers if one.node is not None or one.gid not in self.known}
+        forget_oldest(self.known, self.present)
 
     def is_named(self, gid: bytes | None) -> bool:
         """Return whether the publisher's node has a name."""
@@ -226,6 +242,11 @@ class Senders(Publishers):
     def __init__(self, *, says_who: bool = True) -> None:
         super().__init__(says_who=says_who)
         self._heard: dict[bytes, Sender] = {}
+
+    def update(self, publishers: Sequence[Publisher]) -> None:
+        """Take who is in the graph now."""
+        super().update(publishers)
+        forget_oldest(self._heard, self.present)
 
     def heard(self, message: Message, now: float) -> None:
         """Count a message. Without ids messages cannot be counted."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from hashlib import blake2b
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from tfcompose.live.publishers import PARTICIPANT, Publisher
+from tfcompose.live.publishers import PARTICIPANT, Publisher, forget_oldest
 from tfcompose.live.state import NO_NODE
 from tfcompose.plan.topics import GLOBAL, is_fence
 from tfcompose.ros.graph import BARE_DDS, UNKNOWN_NODE, ids_say_who, own_gid, writers, writers_unmapped
@@ -14,7 +14,7 @@ from tfcompose.ros.node import PublicTFReader, TFSubscription
 from tfcompose.ros.processes import environments, origin
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from rclpy.node import Node
 
@@ -112,17 +112,6 @@ class RunMarks:
         process = own[0].get(self.process, "")
         fenced = is_fence(own[0].get(self.profile, ""), process) if self.profile and process else None
         return Identity(ours=True, process=process, fenced=fenced)
-
-
-#: Of publishers that have left so many are known, so that who comes and goes takes a bounded memory.
-MOST_LEFT = 1000
-
-
-def forget_oldest(known: dict[bytes, Any], present: Collection[bytes]) -> None:
-    """Forget what came first of publishers that are not present, where there are more than ``MOST_LEFT`` of them."""
-    left = [gid for gid in known if gid not in present] if len(known) > len(present) + MOST_LEFT else []
-    for gid in left[: len(left) - MOST_LEFT]:
-        del known[gid]
 
 
 class TFGraph:

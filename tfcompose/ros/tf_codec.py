@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Literal
 from tfcompose.geometry import Pose, Quaternion, Vector
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
@@ -49,6 +49,9 @@ _FIRST_PARENT = 16
 # Layouts are remembered of messages that have together no more bytes than this, of one length and beginning so many.
 _MOST_BYTES = 1 << 22
 _MOST_ALIKE = 8
+# What stands before a name, and for bytes in it that are not UTF-8.
+_LENGTH = 4
+_REPLACED = "\ufffd"
 #: The longest name that is shown; no planned frame's is that long.
 LONGEST_NAME = 1024
 
@@ -213,17 +216,34 @@ def decode(data: bytes) -> list[Transform]:
     Raises:
         ValueError: with one sentence, if it is not one.
     """
+    return list(transforms(data))
+
+
+def transforms(data: bytes) -> Iterator[Transform]:
+    """Yield the transforms of a TFMessage as they are read, as ``decode`` returns them.
+
+    Raises:
+        ValueError: with one sentence, where it is not one.
+    """
     reader = _Reader(data)
-    return [reader.transform() for _ in range(reader.begin())]
+    for _ in range(reader.begin()):
+        yield reader.transform()
+
+
+def number_of_transforms(data: bytes) -> int:
+    """Return how many transforms a message claims to hold, or how many fit into it; nothing else is read."""
+    claimed = int.from_bytes(data[_HEADER : 2 * _HEADER], "big" if data[:2] == BIG_ENDIAN[:2] else "little")
+    return min(claimed, len(data) // _SHORTEST)
 
 
 class Layout:
     """What does not change from one message of a publisher to the next: the names, and where the numbers are.
 
-    ``edges`` holds each transform's parent and child, in order, as they were sent.
+    ``edges`` holds each transform's parent and child, in order, as they were sent. ``exact`` says that these are all of
+    the names' bytes.
     """
 
-    __slots__ = ("_fixed", "_plain", "_rows", "_stamps", "edges")
+    __slots__ = ("_fixed", "_plain", "_rows", "_stamps", "edges", "exact")
 
     def __init__(self, data: bytes) -> None:
         """Take the layout of a message.
@@ -237,6 +257,8 @@ class Layout:
         self._rows: tuple[struct.Struct, list[str], list[str]] | None = None
         values = self._stamps.unpack_from(data)
         self._fixed = (values[:2], values[4::4], values[5::4])
+        self.exact = all(raw.find(b"\0", _LENGTH) == len(raw) - 1 for raw in values[4::4] + values[5::4])
+        self.exact = self.exact and not any(_REPLACED in parent or _REPLACED in child for parent, child in edges)
 
     @property
     def plain_edges(self) -> Edges:
@@ -342,6 +364,11 @@ def _unpacking(data: bytes, pose: str) -> tuple[list[tuple[str, str]], struct.St
     return edges, struct.Struct(f"{reader.order}2s2xI{layout}")
 
 
+def _as_taken(raw: bytes) -> str:
+    """Return a name as rclpy takes it: up to the first NUL, with U+FFFD for what is not UTF-8."""
+    return raw.partition(b"\0")[0].decode(errors="replace")
+
+
 def plain_name(frame: str) -> str:
     """Return a frame's name as tf2 takes it, without a leading slash, and as it can be shown: printable, cut short."""
     name = frame.removeprefix("/")
@@ -421,10 +448,7 @@ class _Reader:
             raise ValueError(f"the message ends at byte {len(self._data)}, inside a name of {length} bytes")
         raw = self._data[self._at : end]
         self._at = end
-        try:
-            return raw.removesuffix(b"\0").decode()
-        except UnicodeDecodeError as error:
-            raise ValueError(f"a name in the message is not UTF-8: {error.reason}") from None
+        return _as_taken(raw)
 
     def transform(self) -> Transform:
         seconds, nanoseconds = self.numbers("iI", 4)

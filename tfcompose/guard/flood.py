@@ -1,0 +1,70 @@
+"""Reads what those send who flood the tree: beside everything else, and a little at a time, so that nothing waits."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tfcompose.live.flood import BUSY_S
+from tfcompose.ros.tf_codec import encode, transforms
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator
+
+    from tfcompose.live.topics import TFData
+    from tfcompose.ros.tf_codec import Transform
+
+#: At one time it reads for so long, in seconds, and as long as it has to read, the guard waits no longer than that.
+SLICE_S, WAIT_S = 0.002, 0.02
+_TOGETHER = 50
+
+
+class FloodReader:
+    """Takes the declared edges out of long messages, each message's as one of their own.
+
+    ``children`` are the frames whose edges are declared. A message that comes while another is read is skipped, and
+    ``skipped`` counts it; so much of each second goes into reading, whoever floods the tree.
+    """
+
+    def __init__(self, children: Collection[str]) -> None:
+        self.skipped = 0
+        self._children = children
+        self._data: TFData | None = None
+        self._rest: Iterator[Transform] = iter(())
+        self._found: list[Transform] = []
+        self._spent_s = self._since = 0.0
+
+    @property
+    def is_reading(self) -> bool:
+        """Whether there is something to read."""
+        return self._data is not None
+
+    def add(self, data: TFData) -> None:
+        """Take a message to read, unless there is one already."""
+        if self._data is not None:
+            self.skipped += 1
+            return
+        self._data, self._rest, self._found = data, transforms(data.received.data), []
+
+    def read(self, now: float) -> TFData | None:
+        """Read on for a moment, and return the declared edges of the message once it is read, if it has any."""
+        if now - self._since >= 1.0:
+            self._spent_s, self._since = 0.0, now
+        if self._data is None or self._spent_s > BUSY_S:
+            return None
+        begun = time.thread_time()
+        data = self._data
+        try:
+            while (spent := time.thread_time() - begun) < SLICE_S:
+                for _ in range(_TOGETHER):
+                    one = next(self._rest)
+                    if one.child.removeprefix("/") in self._children:
+                        self._found.append(one)
+        except (StopIteration, ValueError):  # it is read, or as much of it as can be
+            spent = time.thread_time() - begun
+            self._data = None
+        self._spent_s += spent
+        if self._data is not None or not self._found:
+            return None
+        return replace(data, received=replace(data.received, data=encode(self._found)))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from tests.support.findings import expect
-from tests.support.guard_history import EDGES, FIXED, PROCESSES, SETTLE_S, TICK_S, History
+from tests.support.guard_history import EDGES, FIXED, PROCESSES, SETTLE_S, TICK_S, History, edge
 from tfcompose.guard.judge import Judge
 from tfcompose.ipc import Found, Live, Recovered, Taken
 from tfcompose.live.publishers import Publisher
@@ -73,6 +73,15 @@ def test_two_publishers_of_one_name_that_alternate_are_reported_and_the_edge_is_
     for _ in range(20):
         running.send(a, "map odom").wait(0.1).send(b, "map odom").wait(0.1)
     expect(running.only(), "TF801", "map → odom", "another /slam", "slam (/slam)")
+
+
+def test_two_that_latch_alternately_may_be_one_owner_that_is_heard_again() -> None:
+    """What an owner latched comes again, by each of its publishers, whenever a subscription is made anew."""
+    running = History(edges=(edge("base arm", "arm", "static"),)).clear()
+    a, b = (running.joins("/arm", static=True) for _ in range(2))
+    for publisher in (a, b, a, b, a):
+        running.send(publisher, "base arm").wait(1)
+    assert running.reports() == []
 
 
 def test_a_second_static_process_is_reported_while_both_are_there_and_over_when_it_has_left(running: History) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
@@ -84,7 +84,7 @@ parts = st.lists(st.tuples(st.tuples(sizes, sizes, sizes), places, angles), min_
 
 
 @given(parts)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40, deadline=None, phases=[Phase.explicit, Phase.generate])  # shrinking takes ten minutes
 def test_several_turned_boxes_have_the_inertia_of_their_triangles(given: list[Any]) -> None:
     """The products of inertia too: trimesh integrates over the triangles of all boxes together."""
     meshes, shapes = [], []

@@ -317,6 +317,21 @@ def test_the_distance_from_nominal_is_that_of_the_frame_that_was_measured() -> N
     assert mount.calibration.off(mount.calibration.pose) == pytest.approx((0.03, 0.0), abs=1e-7)
 
 
+def test_the_nominal_pose_is_taken_to_the_frame_in_which_it_was_measured() -> None:
+    """The kit looks to the left, so that a nominal pose in it is another one in base_link."""
+    kit = Pose((1.0, 0.0, 0.0), (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)))
+    in_kit = kit.inverse() @ MEASURED
+    robot = "frames: {kit: {parent: base_link, xyz: [1, 0, 0], look: left}, lens: {parent: kit, %s, calibration: "
+    robot += "{file: c.yaml, parent: base_link, limit: {xyz: 10 mm, rot: 1 deg}}}}\n"
+    declared = f"xyz: {list(in_kit.xyz)}, quat_xyzw: {list(in_kit.quat_xyzw)}"
+    done = compiled(robot % declared, c_yaml=autoware())
+    calibration = edge_of(done, "lens").calibration
+    assert calibration
+    assert calibration.nominal
+    assert_same(calibration.nominal, MEASURED)
+    assert not {one.code for one in done.found} & {"TF615", "TF616"}
+
+
 def test_an_inverse_is_suspected_by_the_nominal_pose_or_by_the_robots_bodies() -> None:
     back = MEASURED.inverse()
     nominal = f"xyz: {list(back.xyz)}, quat_xyzw: {list(back.quat_xyzw)}, "

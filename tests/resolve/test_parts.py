@@ -211,6 +211,16 @@ def test_only_what_is_below_the_root_is_taken() -> None:
     assert "r1/odom" not in robot.frames
 
 
+def test_what_a_sensors_driver_publishes_has_the_parts_names_too() -> None:
+    robot = compiled(FLEET).robot
+    assert robot
+    for sensor in robot.sensors:
+        prefix = {"one": "r1/", "two": "r2/"}[sensor.name.partition("/")[0]]
+        assert sensor.driver_frames
+        assert all(frame.startswith(prefix) for frame in (sensor.mount, *sensor.frames, *sensor.driver_frames))
+    assert {sensor.name for sensor in robot.sensors} == {"one/camera", "two/camera"}
+
+
 def test_drivers_of_sensors_that_are_removed_are_removed_and_others_stay() -> None:
     cameras = """sensors:
   low: {preset: realsense/d435i, parent: foot, options: {serial: "1"}}

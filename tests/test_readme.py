@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.benchmarks import bench_buffer, bench_joints
+from tests.benchmarks import results
 from tests.support import processes
 from tests.support.tables import for_each
 from tfcompose.catalogue import CATALOGUE
@@ -105,10 +105,32 @@ def test_it_has_exactly_the_two_commands_that_ci_takes_out_of_it() -> None:
     assert commands[1].endswith("pytest")
 
 
-def test_its_figures_are_those_that_the_benchmarks_print() -> None:
-    section = README.partition("### What it costs\n")[2].partition("\n## ")[0]
-    shown = {row[0]: row[2] for row in re.findall(r"^\| (`?[^|]+) \| ([^|]+) \| ?([^|]*?) ?\|$", section, re.MULTILINE)}
-    assert shown == bench_buffer.ROWS | bench_joints.ROWS
+def test_its_figures_are_those_that_benchmarks_wrote() -> None:
+    assert results.rewritten(README) == README, "python -m tests.benchmarks.results --write"
+
+
+def test_every_file_of_figures_is_printed_and_says_where_it_is_from() -> None:
+    files = {file.stem for file in results.FOLDER.glob("*.json")}
+    assert files == results.named(README)
+    for name in files:
+        found = results.recorded(name)
+        assert (ROOT / "tests" / "benchmarks" / f"bench_{name}.py").is_file()
+        assert found["command"] == f"python -m tests.benchmarks.bench_{name} --record"
+        assert re.fullmatch(r"\d{4}-\d\d-\d\d", found["date"])
+        assert found["load"] >= 0
+        assert {"processor", "cores", "memory_gb", "system", "python"} == found["machine"].keys()
+
+
+#: Measures of time, memory and processors, as prose and tables write them; what an example prints stands in blocks.
+FIGURE = r"\d[\d,.]* (?:µs|ms|MB)\b|\d % of a core|\d times as (?:long|fast)|\d times faster"
+#: Figures that are settings or limits of the program, and no measurements.
+SET = {"8 MB", "1 MB", "100 ms"}
+
+
+def test_no_other_figure_is_printed() -> None:
+    prose = re.sub(r"^```.*?^```", "", README, flags=re.MULTILINE | re.DOTALL)
+    recorded = "".join(str(results.recorded(name)["rows"]) for name in results.named(README))
+    assert [figure for figure in re.findall(FIGURE, prose) if figure not in SET and figure not in recorded] == []
 
 
 def test_its_python_programs_run_and_give_what_they_say() -> None:

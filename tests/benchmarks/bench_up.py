@@ -1,4 +1,4 @@
-"""How soon ``up`` has a tree, and what it takes: ``python tests/benchmarks/bench_up.py``, or name the file to pytest.
+"""How soon ``up`` has a tree, and what it takes: ``python -m tests.benchmarks.bench_up``, or name the file to pytest.
 
 A robot with 100 fixed edges. Beside it a plain rclpy process that sends the same edges, started in turn with it, so
 that a busy moment meets both; both are measured from the start of their program to the moment when a listener that was
@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 import psutil
 import pytest
 
+from tests.benchmarks.results import record
 from tfcompose.ros.environment import FASTDDS_PROFILE, PROFILE_VARIABLES
 
 if TYPE_CHECKING:
@@ -177,7 +178,8 @@ def test_100_edges_are_live_soon_after_a_plain_process_and_at_once_for_who_joins
 
 
 if __name__ == "__main__":
-    observed = measure(*map(int, sys.argv[1:]))
+    before = os.getloadavg()[0]
+    observed = measure(*(int(word) for word in sys.argv[1:] if word.isdecimal()))
     plain, ours = median(observed["plain"]), median(observed["up"])
     sys.stdout.write(f"{EDGES} edges at a listener: plain {plain:.2f} s, up {ours:.2f} s ({ours - plain:+.2f} s)\n")
     sys.stdout.write(f"  plain {sorted(round(one, 2) for one in observed['plain'])}\n")
@@ -187,3 +189,10 @@ if __name__ == "__main__":
     sys.stdout.write(f"{late} of {len(observed['joined'])} over {JOINED_S} s\n")
     sys.stdout.write(f"memory: {sum(observed['memory']):.0f} MB: {[round(one) for one in observed['memory']]}\n")
     sys.stdout.write(f"dry run: {observed['dry run'][0]:.3f} s\n")
+    joiners = f"{median(observed['joined']):.2f} s, at most {max(observed['joined']):.2f} s"
+    rows = {
+        f"{EDGES} fixed edges are at a listener after": [f"{ours:.2f} s", f"{plain:.2f} s: a plain rclpy process"],
+        "a listener that joins has all edges after": [f"{joiners} in {len(observed['joined'])} tries", ""],
+        "memory, shared pages divided": [f"{sum(observed['memory']):.0f} MB", ""],
+    }
+    record("up", rows, before)

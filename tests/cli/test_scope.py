@@ -10,7 +10,7 @@ import pytest
 
 from tests.support.robots import ROVER
 from tfcompose.cli import main
-from tfcompose.cli.runs import chosen_run, complain_of_other_domains, run_of_domain
+from tfcompose.cli.runs import chosen_run, run_of_domain, warn_of_other_domains
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDir, runtime_dir_of
 from tfcompose.plan import Plan, RosSettings
 from tfcompose.plan.file import write_plan
@@ -110,7 +110,7 @@ def test_the_plan_of_the_domains_robot_is_known(runs: Run, monkeypatch: pytest.M
 def test_a_run_of_the_same_robot_in_another_domain_is_named(runs: Run, capsys: pytest.CaptureFixture[str]) -> None:
     runs("rover", 71)
     runs("crawler", 71)
-    complain_of_other_domains(runs("rover", 67))
+    warn_of_other_domains(runs("rover", 67))
     assert "--robot rover@71" in capsys.readouterr().err
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from tfcompose.bags import BagError, missing_rosbags, observe_bag
 from tfcompose.cli.plans import expected_plan
-from tfcompose.cli.terminal import INTERRUPTED, UNREADABLE, complain, fail, reject
+from tfcompose.cli.terminal import INTERRUPTED, UNREADABLE, fail, reject, warn
 from tfcompose.findings import Note, finding
 from tfcompose.plan import RosSettings
 from tfcompose.plan.topics import parts_of, topics_below
@@ -60,7 +60,7 @@ def read_bag(path: str, observers: Mapping[Topics, TreeObserver], *, may_be_sile
         SystemExit: after saying why not: nothing came is a reason, unless it ``may_be_silent``.
     """
     from_bag(lambda: observe_bag(path, observers))
-    if not may_be_silent and not any(observer.heard for observer in observers.values()):
+    if not may_be_silent and not any(observer.received_any for observer in observers.values()):
         message = f"no message was recorded on {names_of(observers)} in {path}"
         help_ = "was the robot running? /tf_static is sent once: record it with durability transient_local"
         reject([finding("TF811", message, None, help=help_)])
@@ -107,7 +107,7 @@ def observe(  # noqa: PLR0913 (all but two are named)
             seconds, elsewhere = listen(name, observers, stop, duration_s=duration_s, every_s=every_s, show=show)
         except RosError as error:
             reject([finding("TF901", str(error), None)])
-        heard = any(observer.heard for observer in observers.values())
+        heard = any(observer.received_any for observer in observers.values())
         if stop.requested:
             check_early_end(seconds, duration_s, heard=heard)
     if not heard and not may_be_silent:
@@ -139,7 +139,7 @@ def check_early_end(seconds: float, duration_s: float | None, *, heard: bool) ->
     if not heard:
         fail(f"ended by a signal after {seconds:.1f} s, before any message came", INTERRUPTED)
     if duration_s is not None:
-        complain(f"listened for only {seconds:.1f} s, too short to find every publisher")
+        warn(f"listened for only {seconds:.1f} s, too short to find every publisher")
 
 
 def _reject_silence(topics: Sequence[Topics], seconds: float, elsewhere: Sequence[str]) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from tfcompose.cli.options import DEFAULT_FILE
 from tfcompose.cli.reading import read_text
-from tfcompose.cli.terminal import FAILED, UNREADABLE, complain, fail, wait_for_data
+from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, wait_for_data, warn
 from tfcompose.findings import RejectedError
 from tfcompose.ipc import (
     REQUESTS,
@@ -109,9 +109,9 @@ def request(place: RuntimeDir, question: Request, answer: type[A]) -> A | None:
     try:
         return ask(place, question, answer)
     except RefusedError as error:
-        complain(str(error))
+        warn(str(error))
     except OSError as error:
-        complain(f"{place.name} does not answer: {error}")
+        warn(f"{place.name} does not answer: {error}")
     return None
 
 
@@ -165,7 +165,7 @@ def wait_until_ready(place: RuntimeDir, timeout_s: float | None) -> int:
         try:
             status = ask(place, StatusRequest(), RobotStatus)
         except OSError:
-            complain(f"{place.name} has ended; see tfcompose logs")
+            warn(f"{place.name} has ended; see tfcompose logs")
             return FAILED
         if status.ready:
             return 0
@@ -180,17 +180,17 @@ def print_missing(place: RuntimeDir, timeout_s: float) -> None:
     try:
         status = ask(place, StatusRequest(), RobotStatus)
     except OSError as error:
-        complain(f"{place.name} does not answer: {error}")
+        warn(f"{place.name} does not answer: {error}")
         return
     missing = status.missing
-    complain(f"{place.name} is not ready after {timeout_s:g} s and keeps running; see tfcompose logs and down")
+    warn(f"{place.name} is not ready after {timeout_s:g} s and keeps running; see tfcompose logs and down")
     for process in status.processes:
         if process.failed:
-            complain(f"  failed: {process.name} ({process.state.lower()}, {process.detail})")
+            warn(f"  failed: {process.name} ({process.state.lower()}, {process.detail})")
         elif not process.ready and process.state != "EXITED":
-            complain(f"  not ready: {process.name} ({_why_not_ready(process)})")
+            warn(f"  not ready: {process.name} ({_why_not_ready(process)})")
     if missing:
-        complain(f"  not live: {listed(missing, NAMED_AT_MOST)}")
+        warn(f"  not live: {listed(missing, NAMED_AT_MOST)}")
 
 
 def _why_not_ready(process: ProcessStatus) -> str:
@@ -226,7 +226,7 @@ def hidden_run(place: RuntimeDir) -> str | None:
     return None
 
 
-def complain_of_neighbours(place: RuntimeDir, plan: Plan) -> None:
+def warn_of_neighbours(place: RuntimeDir, plan: Plan) -> None:
     """Complain about other robots that run in the domain on the same TF topics: each guard would report the other's."""
     found = [
         (other.robot, holder)
@@ -235,9 +235,9 @@ def complain_of_neighbours(place: RuntimeDir, plan: Plan) -> None:
     ]
     for robot, holder in found:
         where = f"runs in domain {place.domain} on the same TF topics"
-        complain(f"{robot} (pid {holder.pid}, since {since(holder)}) {where}")
+        warn(f"{robot} (pid {holder.pid}, since {since(holder)}) {where}")
     if found:
-        complain(
+        warn(
             "each guard will report the other's edges: give one ros: {domain_id: N}, "
             "or ros: {namespace: NAME, isolate: topics}"
         )
@@ -249,11 +249,11 @@ def _share_topics(other: RuntimeDir, plan: Plan) -> bool:
     return running_plan is not None and not judged_topics(plan).isdisjoint(judged_topics(running_plan))
 
 
-def complain_of_other_domains(place: RuntimeDir) -> None:
+def warn_of_other_domains(place: RuntimeDir) -> None:
     """Complain about runs of the same robot in other domains, such as that of a domain_id that has changed."""
     for other, holder in running():
         if other.share == place.share and other.domain != place.domain:
-            complain(
+            warn(
                 f"{other.name} still runs (pid {holder.pid}, since {since(holder)}); "
                 f"tfcompose down --robot {other.name} stops it"
             )
@@ -278,11 +278,11 @@ def run_of_domain() -> tuple[RuntimeDir, Plan] | None:
     return (found[0], plan) if plan else None
 
 
-def complain_of_leftovers(place: RuntimeDir, run_id: str) -> None:
+def warn_of_leftovers(place: RuntimeDir, run_id: str) -> None:
     """Complain about processes of earlier runs that are still there."""
     found = [one for one in leftovers(f"{place.name}:") if one.run != run_id and one.launcher is None]
     for one in found:
-        complain(f"an earlier run left {one.pid} behind: {one.command}")
+        warn(f"an earlier run left {one.pid} behind: {one.command}")
     if found:
         them = "it" if len(found) == 1 else "them"
-        complain(f"tfcompose down --leftovers --robot {place.name} stops {them}")
+        warn(f"tfcompose down --leftovers --robot {place.name} stops {them}")

@@ -18,15 +18,15 @@ from tfcompose.cli.console import Console, StatusLine, vanished
 from tfcompose.cli.plans import built_plan, copy_plan, is_plan, plan_to_start
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.runs import (
-    complain_of_leftovers,
-    complain_of_neighbours,
-    complain_of_other_domains,
     hidden_run,
     notices,
     print_missing,
     request,
     since,
     wait_until_ready,
+    warn_of_leftovers,
+    warn_of_neighbours,
+    warn_of_other_domains,
 )
 from tfcompose.cli.terminal import (
     FAILED,
@@ -34,10 +34,10 @@ from tfcompose.cli.terminal import (
     UNREADABLE,
     can_redraw,
     coloured,
-    complain,
     fail,
     reject,
     size_of,
+    warn,
 )
 from tfcompose.findings import RejectedError
 from tfcompose.ipc import AllReady, AllStarted, Ended, PlanChange, UpdateRequest
@@ -78,7 +78,7 @@ def start(file: Path, arguments: Namespace) -> int:
         stack.callback(lock.close)
         if hidden := hidden_run(place):
             fail(hidden)
-        complain_of_other_domains(place)
+        warn_of_other_domains(place)
         copy = copy_plan(plan, file, place, alone=True)
         session = Session(copy, lock.run, file.absolute().parent, listen(place))
         if arguments.detach or arguments.wait:
@@ -94,8 +94,8 @@ def _run(plan: Plan, place: RuntimeDir, session: Session, output: NonBlockingOut
     status = StatusLine(plan, lambda: size_of(output.fd)[0]) if can_redraw(sys.stdout) else None
     console = Console(plan, output, colour=coloured(sys.stdout), keep=logs.write, status=status)
     session.refresh = console.refresh if status else None
-    complain_of_leftovers(place, session.run_id)
-    complain_of_neighbours(place, plan)
+    warn_of_leftovers(place, session.run_id)
+    warn_of_neighbours(place, plan)
     try:
         return supervise(plan, session.plan_file, report=console, duration_s=duration_s, session=session)
     finally:
@@ -117,7 +117,7 @@ def _update(plan: Plan, file: Path, place: RuntimeDir, arguments: Namespace) -> 
     if changes:
         print(f"{who}; {changes}")
     else:
-        complain(f"{who}; the plan is the same; tfcompose down stops it")
+        warn(f"{who}; the plan is the same; tfcompose down stops it")
     if answer.held and changes:
         print(vanished(answer.held))
     if arguments.wait:
@@ -166,8 +166,8 @@ def _starts_with(profile: str, arguments: Namespace) -> bool:
 
 def detach(plan: Plan, place: RuntimeDir, lock: Lock, session: Session, arguments: Namespace) -> int:
     """Start the launcher as a process of its own; return 0 when all is started, or ready; 1 when it is not."""
-    complain_of_leftovers(place, session.run_id)
-    complain_of_neighbours(place, plan)
+    warn_of_leftovers(place, session.run_id)
+    warn_of_neighbours(place, plan)
     sys.stdout.flush()
     sys.stderr.flush()
     pid = os.fork()
@@ -234,7 +234,7 @@ def _follow(plan: Plan, place: RuntimeDir, pid: int, arguments: Namespace) -> in
             print_missing(place, arguments.timeout)
             return FAILED
         except KeyboardInterrupt:
-            complain(f"{place.name} keeps running in the background: pid {pid}; tfcompose down stops it")
+            warn(f"{place.name} keeps running in the background: pid {pid}; tfcompose down stops it")
             return INTERRUPTED
-    complain(f"the launcher has ended; see {place.logs / 'launcher.err'}")
+    warn(f"the launcher has ended; see {place.logs / 'launcher.err'}")
     return FAILED

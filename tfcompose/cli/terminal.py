@@ -30,7 +30,7 @@ _SEQUENCE = re.compile(r"(\033\[[0-?]*[ -/]*[@-~]|\033\][^\033\a]*(?:\a|\033\\)?
 _COLOUR = re.compile(r"\033\[[0-9;:]*m")
 
 
-def complain(message: str) -> None:
+def warn(message: str) -> None:
     """Print one sentence to stderr."""
     sys.stderr.write(f"tfcompose: {message}\n")
 
@@ -41,7 +41,7 @@ def fail(message: str, code: int = FAILED) -> NoReturn:
     Raises:
         SystemExit: with the exit code.
     """
-    complain(message)
+    warn(message)
     raise SystemExit(code)
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import compiled_robot
-from tfcompose.cli.terminal import UNREADABLE, complain, fail, reject
+from tfcompose.cli.terminal import UNREADABLE, fail, reject, warn
 from tfcompose.emit import described, emit
 from tfcompose.files import Target, unaddressed
 from tfcompose.findings import Finding, finding
@@ -195,7 +195,7 @@ def build(arguments: Namespace) -> tuple[Path, list[str]]:
         where = f": {error.filename}" if error.filename else ""
         fail(f"nothing was written to {folder}: {error.strerror}{where}", UNREADABLE)
     if shared:
-        complain(f"{folder} held the build of {shared}; -o builds into another folder")
+        warn(f"{folder} held the build of {shared}; -o builds into another folder")
     return folder, [file.path for file in files]
 
 

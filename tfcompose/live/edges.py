@@ -282,7 +282,7 @@ class TreeObserver:
         return self.end_ns or self.observed_ns or self.last_ns
 
     @property
-    def heard(self) -> bool:
+    def received_any(self) -> bool:
         """Whether anything came, be it readable or not."""
         return bool(self.messages or self.malformed)
 

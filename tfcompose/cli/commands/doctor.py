@@ -14,7 +14,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_for, add_format, add_variant, namespace
-from tfcompose.cli.terminal import UNREADABLE, complain, exit_code_of, fail, print_findings, printable
+from tfcompose.cli.terminal import UNREADABLE, exit_code_of, fail, print_findings, printable, warn
 from tfcompose.text import counted
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ def _plan(arguments: Namespace) -> Plan | None:
     if running is None:
         return None
     place, plan = running
-    complain(f"{place.name} runs here, so its edges are expected")
+    warn(f"{place.name} runs here, so its edges are expected")
     return plan
 
 

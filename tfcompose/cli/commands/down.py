@@ -10,7 +10,7 @@ import os
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_robot, positive
-from tfcompose.cli.terminal import FAILED, complain, fail
+from tfcompose.cli.terminal import FAILED, fail, warn
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -58,7 +58,7 @@ def _stop_leftovers(robot: str | None) -> int:
         print(f"stopping {one.pid}: {one.command}")
     rest = end(found)
     for one in rest:
-        complain(f"{one.pid} is still running: {one.command}")
+        warn(f"{one.pid} is still running: {one.command}")
     if rest:
         return FAILED
     print(f"{len(found)} process{'' if len(found) == 1 else 'es'} of earlier runs stopped")

@@ -10,7 +10,7 @@ import time
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_format, add_robot
-from tfcompose.cli.terminal import FAILED, coloured, complain, fail
+from tfcompose.cli.terminal import FAILED, coloured, fail, warn
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -51,7 +51,7 @@ def run(arguments: Namespace) -> int:
     if ended:
         return 0
     slow = "reports faster than this terminal reads; run events again"
-    complain(f"{place.name} {slow if _is_held(place) else 'was killed'}")
+    warn(f"{place.name} {slow if _is_held(place) else 'was killed'}")
     return FAILED
 
 

@@ -81,7 +81,7 @@ def _show(arguments: Namespace, observer: TreeObserver, live: LiveLines | None) 
     lines = lines_of(shown, observer, now_ns, table_width(sys.stdout), coloured=coloured(sys.stdout))
     if chain is not None:
         lines[0] = chain_line(chain, *arguments.frames)
-    if not observer.heard:
+    if not observer.received_any:
         lines = [f"no TF yet on {names_of([topics_below(arguments.namespace)])}"]
     if live is not None:
         live.draw(lines)

@@ -12,7 +12,7 @@ import sys
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.cli.terminal import complain, print_findings, table_width
+from tfcompose.cli.terminal import print_findings, table_width, warn
 from tfcompose.text import counted
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def _list(only: str | None, known: Library, form: str) -> int:
     words = sorted({word for row in rows for word in _words(row)})
     rows = [row for row in rows if not only or only in _words(row)]
     if not rows:
-        complain(f"no preset, vendor or kind {only}; {did_you_mean(only or '', words, 'tfcompose presets lists them')}")
+        warn(f"no preset, vendor or kind {only}; {did_you_mean(only or '', words, 'tfcompose presets lists them')}")
         return 1
     if form == "json":
         sys.stdout.write(json.dumps(rows, indent=2, ensure_ascii=False) + "\n")

@@ -49,7 +49,7 @@ STOP = ProcessCommand(
     """Stop processes of a running robot.
 
 Stop processes as the plan says; they stay stopped until started again. The others keep running, and the guard does not
-complain about the missing edges.
+warn about the missing edges.
 """,
 )
 RESTART = ProcessCommand(

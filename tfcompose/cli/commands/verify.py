@@ -16,7 +16,7 @@ from argparse import ArgumentTypeError
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import DEFAULT_FILE, add_bag, add_for, add_format, add_variant
-from tfcompose.cli.terminal import complain, print_findings
+from tfcompose.cli.terminal import print_findings, warn
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -82,7 +82,7 @@ def _running_plan(arguments: Namespace) -> tuple[Plan, dict[str, Span]] | None:
     if running is None:
         return None
     place, plan = running
-    complain(f"{place.name} runs here, so its edges are expected")
+    warn(f"{place.name} runs here, so its edges are expected")
     return plan, {}
 
 

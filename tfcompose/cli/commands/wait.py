@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_robot, positive
-from tfcompose.cli.terminal import FAILED, complain
+from tfcompose.cli.terminal import FAILED, warn
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -35,9 +35,9 @@ def run(arguments: Namespace) -> int:
             if isinstance(notice, Ended):
                 return notice.exit_code
     except TimeoutError:
-        complain(f"{place.name} still runs after {arguments.timeout:g} s")
+        warn(f"{place.name} still runs after {arguments.timeout:g} s")
     except OSError as error:
-        complain(f"{place.name} does not answer: {error}")
+        warn(f"{place.name} does not answer: {error}")
     else:
-        complain(f"{place.name} was killed")
+        warn(f"{place.name} was killed")
     return FAILED

@@ -287,3 +287,16 @@ def test_a_process_of_the_run_that_sends_past_the_fence_is_reported_once_to_be_s
         running.events += running.judge.graph([one], running.now)
     (found,) = [event for event in running.events if isinstance(event, Found)]
     assert (found.found.code, found.process) == ("TF852", "slam")
+
+
+@pytest.mark.parametrize(("static", "fenced", "kept"), [(True, None, True), (True, True, False), (False, None, False)])
+def test_when_a_stranger_has_left_its_latched_edges_stay_with_listeners(
+    *, static: bool, fenced: bool | None, kept: bool
+) -> None:
+    running = History(GuardPolicy(mode="strict" if fenced else "watch")).clear()
+    rogue = running.joins("/rogue", static=static)
+    rogue.fenced = fenced
+    running.repeat(rogue, "base lidar" if static else "map odom", 5)
+    running.leaves(rogue)
+    (over,) = running.wait(5.0).over()
+    assert ("listeners keep" in over) == kept

@@ -21,8 +21,15 @@ PLAN = Plan(
     (
         PlanEdge("link", "lens", "static", "front", "/front/front", LENS, None, SourceLine("r.yaml", 1)),
         PlanEdge("lens", "optical", "static", "front", "/front/front", OPTICAL, None, SourceLine("r.yaml", 1)),
+        PlanEdge("base", "arm", "static", "arm", "/arm", Pose((1.0, 0.0, 0.0)), None, SourceLine("r.yaml", 2)),
+        PlanEdge("arm", "tool", "static", "arm", "/arm", Pose(), None, SourceLine("r.yaml", 3)),
+        PlanEdge("base", "laser", "static", "static", "/static", Pose((1.0, 0.0, 0.0)), None, SourceLine("r.yaml", 4)),
     ),
-    (PlanProcess("front", "run", nodes=("/front/front",), drives=(DRIVEN,)),),
+    (
+        PlanProcess("front", "run", nodes=("/front/front",), drives=(DRIVEN,)),
+        PlanProcess("arm", "run", nodes=("/arm",)),
+        PlanProcess("static", "static", nodes=("/static",)),
+    ),
 )
 GID = b"g" * 16
 
@@ -126,3 +133,27 @@ def test_without_an_id_or_below_another_parent_nothing_is_compared() -> None:
     guard.hears(("link", "lens", moved(LENS, 0.1)), gid=None)
     guard.hears(("other", "lens", moved(LENS, 0.1)))
     assert guard.says() == []
+
+
+@pytest.mark.parametrize(
+    ("node", "names", "metres", "codes"),
+    [
+        ("/arm", "base arm", 0.0, []),
+        ("/arm", "base arm", 0.0009, []),
+        ("/arm", "base arm", 1.0, ["TF846"]),
+        ("/arm", "arm tool", 1.0, []),  # the robot says nothing of where it is
+        ("/static", "base laser", 1.0, []),  # who reads the plan sends what it says
+    ],
+)
+def test_a_fixed_frame_of_another_owner_is_where_the_robot_declares_it(
+    node: str, names: str, metres: float, codes: list[str]
+) -> None:
+    guard = Guard()
+    guard.knows(node)
+    parent, child = names.split()
+    declared = next(edge.pose for edge in PLAN.edges if edge.child == child)
+    guard.hears((parent, child, moved(declared, metres)))
+    found = guard.says()
+    assert [one.code for one in found] == codes
+    for one in found:
+        expect(one, "TF846", "arm in base", "/arm", "1 m")

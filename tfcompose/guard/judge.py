@@ -112,6 +112,11 @@ class Judge:
         self._verdicts.judge(verdict, message, now)
         return verdict.admitted
 
+    @property
+    def compared(self) -> frozenset[str]:
+        """The frames whose poses it compares with the plan's."""
+        return self._sent.frames
+
     def name_of(self, gid: bytes | None) -> str:
         """Return the publisher's node, or all that it may be; empty while that is not known."""
         return " or ".join(self._senders.nodes(gid, static=False)) if gid is not None else ""

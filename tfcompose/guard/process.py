@@ -39,7 +39,6 @@ from tfcompose.variables import (
     RUN_ID,
     SETTLE,
 )
-from tfcompose.verdict.drivers import expected_of
 from tfcompose.verdict.ownership import MOST_UNDECLARED
 
 if TYPE_CHECKING:
@@ -78,7 +77,7 @@ class TopicWatch:
     ) -> None:
         self.data = TFTopics(node, topics, private, deep=True)
         self._clock = SimClock(node) if judge.clocks.simulated else None
-        self._reader = MessageReader(frozenset(expected_of(judge.plan)))
+        self._reader = MessageReader(judge.compared)
         strict = judge.plan.guard.mode == "strict"
         profile = PROFILE_VARIABLES[0] if strict and private is None else ""
         marks = RunMarks(RUN_ID, os.environ[RUN_ID], PROCESS, profile) if RUN_ID in os.environ else None

@@ -90,7 +90,7 @@ class Cases:
         self._start = start
         self._drives = drives_of(plan)
         self._reported: dict[Group, tuple[float, float]] = {}
-        self._ended: dict[Group, list[Violation]] = {}
+        self._ended: dict[Group, list[tuple[Violation, bool]]] = {}
         started = [process for process in plan.processes if process.kind not in {"external", "guard"}]
         self._started = {process.name for process in started}
         self._nodes = {node for process in started for node in process.nodes}
@@ -231,8 +231,10 @@ class Cases:
         ended = [key for key, case in self.open.items() if case.reported and self._has_ended(case, now)]
         self.changes += len(ended)
         for key in ended:
-            one = self.open.pop(key).violation
-            self._ended.setdefault((one.code, one.who, True), []).append(one)
+            case = self.open.pop(key)
+            one = case.violation
+            kept = one.static and not one.is_of_stamps and not self._senders.was_held_back(case.gid)
+            self._ended.setdefault((one.code, one.who, True), []).append((one, kept))
         due = [group for group in self._ended if self._is_due(group, now)]
         return [Recovered(text) for group in due for text in _over(self._ended.pop(group))]
 
@@ -242,11 +244,11 @@ class Cases:
         return now - case.last > OVER_S
 
 
-def _over(ended: list[Violation]) -> list[str]:
-    """Return in words that these of one kind and node are over."""
+def _over(ended: list[tuple[Violation, bool]]) -> list[str]:
+    """Return in words that these of one kind and node are over, each with whether listeners keep what was latched."""
     if len(ended) <= OVER_IN_LINES:
-        return [one.over() for one in ended]
-    return [ended[0].over(len(ended) - 1)]
+        return [one.over(kept=kept) for one, kept in ended]
+    return [ended[0][0].over(len(ended) - 1, kept=any(kept for _, kept in ended))]
 
 
 @dataclass(frozen=True, slots=True)

@@ -280,6 +280,11 @@ class Senders(Publishers):
         one = self.present.get(gid) if gid is not None else None
         return one.fenced if one else None
 
+    def was_held_back(self, gid: bytes | None) -> bool:
+        """Return whether what one that may have left sent reached nobody, for all that is known."""
+        one = self.known.get(gid) if gid is not None else None
+        return bool(one and one.fenced)
+
     @property
     def mark(self) -> tuple[int, int]:
         """What changes when there is more to remember."""

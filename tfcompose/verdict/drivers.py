@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING
 from tfcompose.findings import Finding, Note, finding
 from tfcompose.geometry import Offset, Pose, norm, offset_of
 from tfcompose.text import counted
-from tfcompose.verdict.publishers import compared
+from tfcompose.verdict.publishers import SAME_POSE, compared, pose_differs
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from tfcompose.findings import Span
     from tfcompose.live.publishers import Message, Publishers
-    from tfcompose.plan import Driven, Plan, PlanEdge
+    from tfcompose.plan import Driven, Plan, PlanEdge, PlanProcess
 
     Value = bool | int | float | str
 
@@ -39,6 +39,29 @@ def drives_of(plan: Plan) -> dict[str, tuple[Driven, ...]]:
 
 
 # Poses.
+
+
+def is_fixed(edge: PlanEdge, owner: PlanProcess) -> bool:
+    """Return whether the plan says where a fixed frame is that this process owns, and no preset does.
+
+    Another owner's pose is the identity where the robot says none.
+    """
+    if edge.kind != "static" or any(driven.publishes for driven in owner.drives):
+        return False
+    return owner.kind == "static" or edge.pose != Pose()
+
+
+def fixed_of(plan: Plan) -> dict[str, PlanEdge]:
+    """Return the fixed edges with a pose that others than tfcompose's own publisher own, by their child."""
+    known, owners = expected_of(plan), {process.name: process for process in plan.processes}
+    return {
+        edge.child: edge
+        for edge in plan.edges
+        if edge.child not in known
+        and edge.owner in owners
+        and owners[edge.owner].kind != "static"
+        and is_fixed(edge, owners[edge.owner])
+    }
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,11 +85,14 @@ def expected_of(plan: Plan) -> dict[str, Expected]:
     }
 
 
+def is_pose(sent: Pose) -> bool:
+    """Return whether tf2 takes the pose."""
+    return all(map(isfinite, (*sent.xyz, *sent.quat_xyzw))) and abs(norm(sent.quat_xyzw) - 1) < UNIT_WITHIN
+
+
 def is_off(expected: Expected, sent: Pose) -> bool:
     """Return whether a pose is farther from the preset's than a calibration explains; False for what tf2 drops."""
-    if not all(map(isfinite, (*sent.xyz, *sent.quat_xyzw))) or abs(norm(sent.quat_xyzw) - 1) >= UNIT_WITHIN:
-        return False
-    return offset_of(expected.edge.pose, sent).beyond(NOMINAL if expected.nominal else EXACT)
+    return is_pose(sent) and offset_of(expected.edge.pose, sent).beyond(NOMINAL if expected.nominal else EXACT)
 
 
 def driver_pose_differs(node: str, off: Sequence[tuple[Expected, Pose]], place: Span | None = None) -> Finding:
@@ -93,23 +119,32 @@ def _row(values: tuple[float, ...]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SentPose:
-    """What a publisher sent of an expected frame."""
+    """What a publisher sent of a frame that a driver is expected to send, or another owner, as the plan says."""
 
-    expected: Expected
+    expected: Expected | PlanEdge
     pose: Pose
     gid: bytes
     static: bool
 
+    @property
+    def edge(self) -> PlanEdge:
+        """The planned edge."""
+        return _edge_of(self.expected)
+
+
+def _edge_of(expected: Expected | PlanEdge) -> PlanEdge:
+    return expected.edge if isinstance(expected, Expected) else expected
+
 
 class SentPoses:
-    """The poses of frames that drivers publish, message by message.
+    """The poses of frames that drivers and other owners publish, message by message.
 
     A publisher is compared once for each frame, where the rmw says who sent a message.
     """
 
     def __init__(self, plan: Plan, publishers: Publishers) -> None:
         self._publishers = publishers
-        self._expected = expected_of(plan)
+        self._expected: dict[str, Expected | PlanEdge] = {**fixed_of(plan), **expected_of(plan)}
         self._received: set[tuple[bytes, str]] = set()
         self._waiting: list[SentPose] = []
 
@@ -122,24 +157,37 @@ class SentPoses:
             if (
                 expected is None
                 or key in self._received
-                or parent != expected.edge.parent
+                or parent != _edge_of(expected).parent
                 or len(self._received) >= _MOST
             ):
                 continue
             self._received.add(key)
             self._waiting.append(SentPose(expected, pose, message.gid, message.static))
 
+    @property
+    def frames(self) -> frozenset[str]:
+        """The frames whose poses are compared."""
+        return frozenset(self._expected)
+
     def judge(self) -> Iterator[Finding]:
-        """Yield what drivers sent otherwise than their presets say, once for each driver and sensor."""
+        """Yield what was sent otherwise than presets or the plan say, once for each publisher and sensor."""
         wrong: dict[tuple[str, str], list[tuple[Expected, Pose]]] = {}
+        elsewhere: dict[str, list[tuple[PlanEdge, str, Pose]]] = {}
         waiting = []
         for sent in self._waiting:
             nodes = self._publishers.nodes(sent.gid, static=sent.static)
             if not nodes:
                 waiting.append(sent)
-            elif nodes == (sent.expected.edge.node,) and is_off(sent.expected, sent.pose):
-                wrong.setdefault((nodes[0], sent.expected.driven.sensor), []).append((sent.expected, sent.pose))
+            elif nodes != (sent.edge.node,):
+                continue
+            elif isinstance(sent.expected, Expected):
+                if is_off(sent.expected, sent.pose):
+                    wrong.setdefault((nodes[0], sent.expected.driven.sensor), []).append((sent.expected, sent.pose))
+            elif is_pose(sent.pose) and offset_of(sent.edge.pose, sent.pose).beyond(SAME_POSE):
+                elsewhere.setdefault(nodes[0], []).append((sent.edge, sent.edge.parent, sent.pose))
         self._waiting = waiting
+        for node, poses in elsewhere.items():
+            yield pose_differs(poses, node)
         for (node, _), off in wrong.items():
             yield driver_pose_differs(node, off)
 

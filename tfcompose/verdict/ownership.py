@@ -105,12 +105,13 @@ class Violation:
         """Whether it is about stamps, and over as soon as these are right."""
         return self.code in _OF_STAMPS
 
-    def over(self, more: int = 0) -> str:
-        """Return the sentence that it, and so many ``more`` of its kind, have ended."""
+    def over(self, more: int = 0, *, kept: bool = False) -> str:
+        """Return the sentence that it and so many ``more`` have ended; listeners may have ``kept`` what was latched."""
         named = f"{self.name} and {more} more edges" if more else self.name
         if self.is_of_stamps:
             return f"{self.who} stamps {named} as it should again"
-        return f"{named} {'are' if more else 'is'} no longer published by {self.who}"
+        rest = "; listeners keep what it latched until they get another value, or start again" if kept else ""
+        return f"{named} {'are' if more else 'is'} no longer published by {self.who}{rest}"
 
 
 def code_of(edge: PlanEdge, parent: str, *, static: bool, owner: bool, sure: bool) -> str:

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 #: A listener keeps the last 100 messages on /tf_static, one of each publisher.
 MOST_STATIC = 100
 LISTED_AT_MOST = 12
+#: What two poses may be apart and count as the same.
+SAME_POSE = Offset(1e-3, math.radians(0.1))
 #: A micrometre, a millidegree.
 _SAME = Offset(1e-6, 2e-5)
 #: One that sends so long after the other began has not only replaced it.

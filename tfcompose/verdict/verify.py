@@ -9,7 +9,6 @@ may be calibrated: they are compared as far as the preset says how well it knows
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -21,9 +20,9 @@ from tfcompose.plan import SLOW_BELOW
 from tfcompose.plan.stock import stand_ins
 from tfcompose.plan.topics import parts_of
 from tfcompose.text import listed
-from tfcompose.verdict.drivers import Expected, driver_pose_differs, drives_of, expected_of, is_off
+from tfcompose.verdict.drivers import Expected, driver_pose_differs, drives_of, expected_of, is_fixed, is_off
 from tfcompose.verdict.ownership import SELF, Violation, code_of, may_be_owners, relays_of, sensor_of, violation_finding
-from tfcompose.verdict.publishers import flooded, pose_differs
+from tfcompose.verdict.publishers import SAME_POSE, flooded, pose_differs
 from tfcompose.verdict.rates import left, never_received, silent, slow
 from tfcompose.verdict.tree import rejected_transforms
 
@@ -38,8 +37,6 @@ if TYPE_CHECKING:
     Topics = tuple[str, str]
     Group = Sequence["Difference"]
 
-#: What two poses may be apart and count as the same.
-DEFAULT_TOLERANCE = Offset(1e-3, math.radians(0.1))
 #: A rate is judged from so many messages on.
 FEWEST = 4
 #: How long a publisher may stay without a name before it is judged all the same.
@@ -68,7 +65,7 @@ class Difference:
     over: bool = False
 
 
-def differences(state: TreeState, plan: Plan, tolerance: Offset = DEFAULT_TOLERANCE) -> list[Difference]:
+def differences(state: TreeState, plan: Plan, tolerance: Offset = SAME_POSE) -> list[Difference]:
     """Return what differs from the plan: edge by edge in its order, then what is not in it."""
     comparison = _Comparison(state, plan, tolerance)
     planned = [one for edge in plan.edges for one in comparison.of_planned(edge)]
@@ -188,10 +185,7 @@ class _Comparison:
                 return Offset(off.xyz_m, 0.0)
             return Offset(0.0, off.rot_rad) if edge.joint.type == "prismatic" else None
         owner = self.plan.process(edge.owner)
-        if edge.kind != "static" or any(driven.publishes for driven in owner.drives):
-            return None
-        # Another owner's pose is the identity where the robot says none.
-        return off if owner.kind == "static" or edge.pose != Pose() else None
+        return off if is_fixed(edge, owner) else None
 
 
 def _times(edge: PlanEdge, one: EdgeState, *, simulated: bool) -> Iterator[Difference]:

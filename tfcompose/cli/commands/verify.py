@@ -114,7 +114,7 @@ def tolerance(text: str) -> Offset:
         ArgumentTypeError: if it is neither.
     """
     from tfcompose.geometry import Offset
-    from tfcompose.verdict.verify import DEFAULT_TOLERANCE
+    from tfcompose.verdict.publishers import SAME_POSE
 
     given: dict[bool, float] = {}
     for part in text.split(","):
@@ -122,4 +122,4 @@ def tolerance(text: str) -> Offset:
         if match is None or match[2] not in _UNITS or (match[2] in _ANGLES) in given:
             raise ArgumentTypeError(f"{text} is not a tolerance, such as 2mm or 2mm,0.5deg")
         given[match[2] in _ANGLES] = float(match[1]) * _UNITS[match[2]]
-    return Offset(given.get(False, DEFAULT_TOLERANCE.xyz_m), given.get(True, DEFAULT_TOLERANCE.rot_rad))
+    return Offset(given.get(False, SAME_POSE.xyz_m), given.get(True, SAME_POSE.rot_rad))

@@ -430,3 +430,40 @@ def test_the_page_of_a_preset_has_its_values_its_switch_and_its_source(capsys: p
     page = capsys.readouterr().out
     assert "there is none" in page
     assert "odom → NAME_camera_link" in page
+
+
+def test_a_driver_of_several_processes_is_started_as_all_of_them() -> None:
+    driver = {"host": "roof", "restart": "on-failure", "params": {"rpm": 300.0}}
+    robot = robot_of("velodyne/vlp16", 'ros: {"namespace": "r1"}\n', driver=driver, options={"scan": True})
+    plan = {one["name"]: one for one in json.loads({f.path: f.text for f in emit(robot)}["plan.json"])["processes"]}
+    assert {name: one["nodes"] for name, one in plan.items() if name.startswith("s_")} == {
+        "s_transform": ["/r1/s/velodyne_transform_node"],
+        "s_laserscan": ["/r1/s/velodyne_laserscan_node"],
+    }
+    assert plan["s_transform"]["argv"] == ["${launch:velodyne_pointcloud/velodyne_transform_node-VLP16-launch.py}"]
+    assert plan["s_transform"]["namespace"] == "r1/s"
+    assert plan["s_laserscan"]["argv"][0] == "${executable:velodyne_laserscan/velodyne_laserscan_node}"
+    assert {one["host"] for name, one in plan.items() if name in {"s", "s_transform", "s_laserscan"}} == {"roof"}
+    names = {process.name for process in robot_of("velodyne/vlp16").processes}
+    assert {"s", "s_transform"} <= names
+    assert "s_laserscan" not in names
+    for alone in ("none", {"external": True}, {"run": {"package": "mine", "executable": "lidar"}}):
+        assert not any(one.name.startswith("s_") for one in robot_of("velodyne/vlp16", driver=alone).processes)
+    (wrong,) = compiled("velodyne/vlp16", 'processes: {"s_transform": {"external": true}}\n').errors
+    expect(wrong, "TF502", "s_transform")
+
+
+def test_hdl32e_gives_the_cloud_its_calibration() -> None:
+    robot = robot_of("velodyne/hdl32e", options={"calibration": "/maps/32.yaml"})
+    (transform,) = (process for process in robot.processes if process.name == "s_transform")
+    assert (transform.executable, transform.params["calibration"]) == ("velodyne_transform_node", "/maps/32.yaml")
+
+
+@pytest.mark.parametrize(("release", "key"), [("v2", "camera.i_enable_imu"), ("v3", "pipeline_gen.i_enable_imu")])
+def test_an_oak_without_its_imu_has_it_switched_off(release: str, key: str) -> None:
+    for imu in (True, False):
+        robot = robot_of("oak/oak-d", options={"imu": imu, "release": release})
+        driver = driver_of(robot)
+        assert {name: value for name, value in driver.params.items() if "imu" in name} == {key: imu}
+        assert any(word.startswith("params_file:=") for word in driver.argv)
+        assert ("s_imu_frame" in robot.frames) is imu

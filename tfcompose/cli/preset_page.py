@@ -8,7 +8,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.geometry import IDENTITY_XYZW
-from tfcompose.language.preset import Chosen
+from tfcompose.language.preset import Chosen, FurtherProcess
 from tfcompose.numbers import clean_quat, clean_rpy, number
 from tfcompose.resolve.poses import rotation_of
 from tfcompose.resolve.presets import filled, node_preset, node_preset_names
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from tfcompose.language.bodies import Shape
     from tfcompose.language.node_preset import ClaimSpec
-    from tfcompose.language.preset import Option, PresetDriver, PresetFrame, PresetSpec
+    from tfcompose.language.preset import Option, PresetDriver, PresetFrame, PresetProcess, PresetSpec
     from tfcompose.resolve import Library
 
 
@@ -128,11 +128,18 @@ def _shape(shape: Shape) -> dict[str, Any]:
     return {"sphere": {"radius": shape.sphere.radius}} if shape.sphere else {"box": list(shape.box or ())}
 
 
+def _process(process: PresetProcess, preset: PresetSpec) -> dict[str, Any]:
+    fields = _shown(process, preset, ("package", "executable", "launch", "lifecycle", "params", "args"))
+    fields["node"] = "/" + "/".join(_named(part, preset) for part in (process.namespace, process.node) if part)
+    if isinstance(process, FurtherProcess) and process.when:
+        fields["when"] = process.when
+    return fields
+
+
 def _driver(driver: PresetDriver, preset: PresetSpec) -> dict[str, Any]:
-    keys = ("package", "executable", "launch", "lifecycle", "versions", "params", "args", "naming", "on", "about")
     published = any(frame.driver for frame in preset.frames.values())
-    fields = _shown(driver, preset, keys)
-    fields["node"] = "/" + "/".join(_named(part, preset) for part in (driver.namespace, driver.node) if part)
+    fields = _process(driver, preset) | _shown(driver, preset, ("versions", "naming", "on", "about"))
+    fields["also"] = {f"{NAME}_{suffix}": _process(one, preset) for suffix, one in driver.also.items()}
     fields["tf"] = driver.tf if published else "tfcompose"
     fields["off"] = _plain(driver.off, preset) if published else None
     fields["claims"] = [_shown(claim, preset, ("parent", "child", "off", "about")) for claim in driver.claims]
@@ -203,12 +210,16 @@ def _body_text(body: dict[str, Any]) -> str:
     return f"{_pairs(body['shape'])} at {_value(body['xyz'])} in {body['frame']}{mass}"
 
 
+def _started(process: dict[str, Any]) -> str:
+    state = ", and makes it active" if "lifecycle" in process else ""
+    when = f" ({_pairs(process['when'])})" if "when" in process else ""
+    program = process.get("executable") or process.get("launch")
+    return f"{process['package']} {program} as {process['node']}{state}{when}"
+
+
 def _driver_text(preset: dict[str, Any]) -> str:
     driver = preset["driver"]
-    state = ", and makes it active" if "lifecycle" in driver else ""
-    rows = [
-        ("starts", f"{driver['package']} {driver.get('executable') or driver.get('launch')} as {driver['node']}{state}")
-    ]
+    rows = [("starts", _started(one)) for one in (driver, *driver["also"].values())]
     rows += [(word, driver[key]) for word, key in (("versions", "versions"), ("note", "about")) if key in driver]
     rows += [("names", _pairs(driver["naming"]))] if "naming" in driver else []
     inside = [frame["name"] for frame in preset["frames"] if frame["driver"]]

@@ -102,8 +102,8 @@ Parameter = Annotated[
 ]
 
 
-class PresetDriver(Spec):
-    """The vendor's driver: what is started, and with what."""
+class PresetProcess(Spec):
+    """A process of the vendor's driver: what is started, and with what."""
 
     package: Text = key(..., "its package", "realsense2_camera")
     executable: Text | None = key(None, "a node, which takes a parameter file", "realsense2_camera_node")
@@ -111,9 +111,23 @@ class PresetDriver(Spec):
     node: Text = key(..., "the name of the node that publishes", "{name}")
     namespace: Text = key("", "the namespace of that node")
     lifecycle: Literal["active"] | None = key(None, "a lifecycle node, which does nothing until it is active")
-    versions: Text = key("", "the versions that were read", "4.55 to 4.57")
     params: dict[str, Parameter] = key({}, "parameters of the node; left out where they hold an empty {prefix}")
     args: dict[str, Parameter] = key({}, "arguments of the launch file")
+
+
+class FurtherProcess(PresetProcess):
+    """A process that the driver needs besides: it publishes no frames."""
+
+    when: Parameters = key({}, _WHEN, {"streams": "depth"})
+
+
+class PresetDriver(PresetProcess):
+    """The vendor's driver; its first process is the one that publishes frames."""
+
+    also: dict[Text, FurtherProcess] = key(
+        {}, "its further processes, each by what its name adds to the sensor's, after a _"
+    )
+    versions: Text = key("", "the versions that were read", "4.55 to 4.57")
     naming: dict[str, Text] = key(
         {}, "the parameters, or arguments, that name frames", {"base_frame_id": "{name}_link"}
     )
@@ -174,11 +188,19 @@ def wrong_names(preset: PresetSpec) -> Iterator[Refusal]:
     """Yield what the preset names and does not have: frames, options and their values; its frames are one tree."""
     yield from _frames(preset)
     yield from _options(preset)
-    driver = preset.driver
-    if driver and (driver.executable is None) == (driver.launch is None):
-        yield Refusal("TF606", ("driver",), "give either executable or launch", on_key=True)
-    if driver and driver.args and not driver.launch:
-        yield Refusal("TF606", ("driver", "args"), "a node takes params; args are a launch file's", on_key=True)
+    for path, process in _processes(preset):
+        if (process.executable is None) == (process.launch is None):
+            yield Refusal("TF606", path, "give either executable or launch", on_key=True)
+        if process.args and not process.launch:
+            yield Refusal("TF606", (*path, "args"), "a node takes params; args are a launch file's", on_key=True)
+
+
+def _processes(preset: PresetSpec) -> Iterator[tuple[Path, PresetProcess]]:
+    """Yield the processes of the driver, and where they are."""
+    if preset.driver:
+        yield ("driver",), preset.driver
+        for name, process in preset.driver.also.items():
+            yield ("driver", "also", name), process
 
 
 def _frames(preset: PresetSpec) -> Iterator[Refusal]:
@@ -231,13 +253,10 @@ def _options(preset: PresetSpec) -> Iterator[Refusal]:
     for path, condition in _conditions(preset):
         for name, wanted in condition.items():
             yield from _condition(preset, (*path, name), wanted)
-    driver = preset.driver
-    for section in ("params", "args") if driver else ():
-        for name, value in getattr(driver, section).items():
-            if isinstance(value, Chosen) and value.option and value.option not in preset.options:
-                at = ("driver", section, name)
-                advice = did_you_mean(value.option, preset.options)
-                yield Refusal("TF606", at, f"{preset.model} has no option {value.option}", advice)
+    for at, value in _chosen(preset):
+        if value.option and value.option not in preset.options:
+            advice = did_you_mean(value.option, preset.options)
+            yield Refusal("TF606", at, f"{preset.model} has no option {value.option}", advice)
 
 
 def _condition(preset: PresetSpec, path: Path, wanted: Any) -> Iterator[Refusal]:
@@ -260,8 +279,17 @@ def _conditions(preset: PresetSpec) -> Iterator[tuple[Path, dict[str, Any]]]:
         yield ("frames", name, "when"), frame.when
     for name, topic in preset.topics.items():
         yield ("topics", name, "when"), topic.when
-    driver = preset.driver
-    for section in ("params", "args") if driver else ():
-        for name, value in getattr(driver, section).items():
-            if isinstance(value, Chosen) and value.when:
-                yield ("driver", section, name, "when"), value.when
+    for name, process in preset.driver.also.items() if preset.driver else ():
+        yield ("driver", "also", name, "when"), process.when
+    for at, value in _chosen(preset):
+        if value.when:
+            yield (*at, "when"), value.when
+
+
+def _chosen(preset: PresetSpec) -> Iterator[tuple[Path, Chosen]]:
+    """Yield the parameters and arguments that depend on options, and where they are."""
+    for path, process in _processes(preset):
+        for section, table in (("params", process.params), ("args", process.args)):
+            for name, value in table.items():
+                if isinstance(value, Chosen):
+                    yield (*path, section, name), value

@@ -17,6 +17,8 @@ from tfcompose.resolve.processes import full_name, how, namespace_of, program
 from tfcompose.urdf.inertia import of_primitives
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from tfcompose.findings import Span
     from tfcompose.language import Validated
     from tfcompose.language.preset import DriverClaim, PresetDriver, PresetFrame
@@ -112,7 +114,7 @@ class _Mounting:
         process, found = driver_process(sensor, self.drafts.validated)
         self.drafts.found += found
         if process:
-            self.drafts.drivers.append(process)
+            self.drafts.drivers += [process, *further_processes(sensor, self.drafts.validated)]
         elif found:
             return STATIC
         if sensor.tf == DRIVER:
@@ -195,6 +197,8 @@ def _has_driven_frames(sensor: Sensor) -> bool:
     return any(frame.driver for frame in sensor.preset.frames.values())
 
 
+#: What a driver's further processes have in common with its first.
+_INHERITED = frozenset({"env", "cwd", "host", "log_level", "restart", "max_restarts", "stop"})
 #: In an argument, the file that holds the parameters of a process.
 PARAMS_FILE = "${params_file}"
 
@@ -236,6 +240,31 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
     elif driver:
         process = replace(process, package=driver.package, executable=driver.executable)
     return process, [*_given_parameters(sensor, computed, source), *_unreached(sensor, spec, source)]
+
+
+def further_processes(sensor: Sensor, validated: Validated) -> Iterator[Process]:
+    """Yield the further processes of a sensor's driver, where that is started as its preset says."""
+    driver, declared = sensor.preset.driver, sensor.spec.driver
+    spec, source = validated.spec, validated.source
+    if driver is None or (declared and (declared.process or declared.run or declared.external or declared.simulate)):
+        return
+    at: Path = ("sensors", sensor.name)
+    above = namespace_of(declared, spec.ros.namespace)
+    inherited = {key: value for key, value in how(declared, above).items() if key in _INHERITED} if declared else {}
+    fill = _Filler(sensor, settings_of(spec.ros).frame_prefix)
+    for suffix, one in driver.also.items():
+        if not sensor.holds(one.when):
+            continue
+        namespace = full_name(above, sensor.named(one.namespace)).strip("/")
+        name, place = f"{sensor.name}_{suffix}", source.at_key(at)
+        full = full_name(f"/{namespace}", sensor.named(one.node))
+        node = Node(full, place, (*at, "driver", "also", suffix), fill.table(one.params), one.lifecycle)
+        process = Process(name, "run", at=place, ros_nodes=(node,), argv=tuple(arguments(fill.table(one.args))))
+        process = replace(process, **inherited)
+        if one.launch:
+            yield replace(process, launch=f"{one.package}/{one.launch}", namespace=namespace)
+        else:
+            yield replace(process, package=one.package, executable=one.executable)
 
 
 def driver_node(sensor: Sensor, spec: RobotSpec) -> str:

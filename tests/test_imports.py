@@ -71,6 +71,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 #: Packages from elsewhere, and the only parts that may import them.
 ONLY_IN: dict[str, set[str]] = {
     "yaml": {"load"},
+    "markdown_it": {"cli"},
     "pydantic": {"language"},
     "pydantic_core": {"language", "units"},
     "numpy": {"publishers", "ros", "tf2", "urdf"},  # urdf: what trimesh gives are its arrays
@@ -236,7 +237,8 @@ def test_help_loads_the_commands_and_nothing_of_their_work(bare: set[str]) -> No
     assert not foreign(loaded, bare)
     assert parts_in(loaded) == {"cli", "geometry", "render", "signals", "text"}
     assert {name for name in loaded if name.startswith("tfcompose.cli.") and ".commands" not in name} == {
-        f"tfcompose.cli.{name}" for name in ("command_parser", "options", "parser", "schemas", "terminal")
+        f"tfcompose.cli.{name}"
+        for name in ("command_parser", "documentation", "options", "parser", "schemas", "terminal")
     }
     assert "dataclasses" not in loaded
 

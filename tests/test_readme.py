@@ -1,4 +1,4 @@
-"""The README says what the code says."""
+"""The README and the topics say what the code says."""
 
 import re
 import subprocess
@@ -10,17 +10,60 @@ import pytest
 
 from tests.benchmarks import results
 from tests.support import processes
+from tests.support.cli import tfcompose_in
 from tests.support.tables import for_each
 from tfcompose.catalogue import CATALOGUE
 from tfcompose.cli.compiling import library
-from tfcompose.cli.parser import COMMANDS, parser_of, summary_of
+from tfcompose.cli.documentation import FOLDER, TOPICS, topic
+from tfcompose.cli.parser import COMMANDS, parser_of
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = {file.stem: file.read_text("utf-8") for file in FOLDER.glob("*.md")}
+EVERYTHING = "\n".join((README, *PAGES.values()))
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+def blocks(language: str, text: str = README) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+def test_it_is_one_read() -> None:
+    assert len(README.encode()) < 15_000
+
+
+def test_its_table_of_topics_is_that_of_the_code() -> None:
+    section = README.partition("| topic | |\n")[2].partition("\n\n")[0]
+    assert dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", section, re.MULTILINE)) == TOPICS
+
+
+def test_every_page_is_a_topic_or_that_of_a_command_and_begins_with_its_title() -> None:
+    assert PAGES.keys() >= TOPICS.keys()
+    assert PAGES.keys() <= TOPICS.keys() | COMMANDS.keys()
+    for name, text in PAGES.items():
+        assert re.match(r"# \S.*\n\n", text), name
+        assert "](#" not in text, f"{name} has a link into the README"
+
+
+def test_every_command_and_topic_that_is_named_is_there() -> None:
+    for text in (README, *PAGES.values()):
+        named = set(re.findall(r"(?:^\$ |`)tfcompose ([a-z]+)\b", text, re.MULTILINE))
+        assert named <= COMMANDS.keys()
+        assert set(re.findall(r"tfcompose help ([a-z]+)", text)) <= TOPICS.keys() | COMMANDS.keys()
+
+
+def test_help_prints_topics_and_commands_and_all_of_them_as_html(tmp_path: Path) -> None:
+    for word in (*TOPICS, *COMMANDS):
+        done = tfcompose_in(tmp_path, "help", word)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert PAGES.get(word, "")[:40] in done.stdout
+    assert all(code in tfcompose_in(tmp_path, "help", "codes").stdout for code in CATALOGUE)
+    near = tfcompose_in(tmp_path, "help", "calibraton")
+    assert (near.returncode, "calibration?" in near.stderr) == (2, True)
+    assert tfcompose_in(tmp_path, "help", "--html", "docs.html").returncode == 0
+    page = (tmp_path / "docs.html").read_text("utf-8")
+    assert all(f'id="topic-{word}"' in page for word in TOPICS)
+    assert all(f'id="command-{name}"' in page for name in COMMANDS)
+    assert not re.search(r'<\w+ [^>]*(src|href)="(?!#)', page), "it needs no other file"
 
 
 def run(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -39,8 +82,14 @@ def test_its_robot_has_no_findings(rover: Path) -> None:
     assert (done.returncode, "[TF" in done.stdout) == (0, False)
 
 
+def test_its_two_robots_have_no_findings(rover: Path) -> None:
+    (rover / "two.yaml").write_text(blocks("yaml")[1], encoding="utf-8")
+    done = run("lint", "two.yaml", "--fail-on", "warning", cwd=rover)
+    assert (done.returncode, "[TF" in done.stdout) == (0, False), done.stdout
+
+
 def test_its_robot_gives_the_edges_and_owners_that_up_prints(rover: Path) -> None:
-    done = run("tree", "rover.yaml", cwd=rover)
+    done = run("tree", "rover.yaml", "-p", "demo", cwd=rover)
     owners = Counter(words[2] for words in map(str.split, _edges(done.stdout)))
     printed = re.findall(r"live  (\S+) \(\S+\): (\d+ edges|\S+ → \S+)  ", blocks("console")[0])
     assert {owner: int(edges.split()[0]) if "edges" in edges else 1 for owner, edges in printed} == owners
@@ -52,7 +101,8 @@ def _edges(tree: str) -> list[str]:
 
 
 def test_its_lint_output_is_what_lint_prints(rover: Path) -> None:
-    shown = blocks("console")[1].removeprefix("$ tfcompose lint rover.yaml\n")
+    (block,) = (one for one in blocks("console") if one.startswith("$ tfcompose lint"))
+    shown = block.removeprefix("$ tfcompose lint rover.yaml\n")
     broken = blocks("yaml")[0].replace("owner: base_drive", "owner: base_driv").replace("15 deg}  ", "15 degr} ", 1)
     (rover / "rover.yaml").write_text(broken, encoding="utf-8")
     printed = run("lint", "rover.yaml", cwd=rover).stdout
@@ -60,19 +110,13 @@ def test_its_lint_output_is_what_lint_prints(rover: Path) -> None:
 
 
 def test_its_calibrated_robot_is_linted_and_explained_as_printed(tmp_path: Path) -> None:
-    section = README.partition("## Calibration files\n")[2].partition("\n## ")[0]
-    robot, measured = re.findall(r"^```yaml\n(.*?)^```", section, re.MULTILINE | re.DOTALL)
+    robot, measured = blocks("yaml", PAGES["calibration"])
     (tmp_path / "cell.yaml").write_text(robot, encoding="utf-8")
     (tmp_path / "camera.calib").write_text(measured, encoding="utf-8")
     done = run("lint", "cell.yaml", "--fail-on", "warning", cwd=tmp_path)
     assert (done.returncode, "[TF" in done.stdout) == (0, False)
-    command, _, printed = re.findall(r"^```console\n(.*?)^```", section, re.MULTILINE | re.DOTALL)[0].partition("\n")
+    command, _, printed = blocks("console", PAGES["calibration"])[0].partition("\n")
     assert run(*command.removeprefix("$ tfcompose ").split(), cwd=tmp_path).stdout == printed
-
-
-def test_its_table_of_commands_is_that_of_the_command_line() -> None:
-    rows = dict(re.findall(r"^\| `tfcompose (\w+)` \| (.*) \|$", README, re.MULTILINE))
-    assert rows == {name: summary_of(name) for name in COMMANDS}
 
 
 @for_each(COMMANDS)
@@ -84,18 +128,21 @@ def test_each_command_says_what_it_does_and_what_its_arguments_are(command: str)
         assert action.help, f"{command} {action.dest} has no help"
 
 
+def test_its_first_commands_are_those_that_init_names(tmp_path: Path) -> None:
+    (block,) = (one for one in blocks("console") if one.startswith("$ tfcompose init"))
+    assert tfcompose_in(tmp_path, "init").stdout == block.partition("\n")[2]
+
+
 def test_its_codes_are_known() -> None:
-    assert set(re.findall(r"TF\d{3}", README)) <= set(CATALOGUE)
+    assert set(re.findall(r"TF\d{3}", EVERYTHING)) <= set(CATALOGUE)
 
 
-def test_its_presets_are_those_that_come_with_it() -> None:
+def test_the_presets_that_the_pages_name_are_there() -> None:
     names = library().names
-    vendors = re.search(r"^Vendors: ([^.]*)\.$", README, re.MULTILINE)
-    assert vendors
-    assert re.findall(r"`([^`]+)`", vendors[1]) == sorted({name.partition("/")[0] for name in names})
-    shown = re.search(r"^A sensor's preset is (.*)$", README, re.MULTILINE)
+    shown = re.search(r"^A sensor's preset is (.*)$", PAGES["presets"], re.MULTILINE)
     assert shown
     assert set(re.findall(r"`([a-z0-9]+/[a-z0-9-]+)`", shown[1])) <= set(names)
+    assert all(f"| {name.partition('/')[0]} |" in topic("presets") for name in names)
 
 
 def test_it_has_exactly_the_two_commands_that_ci_takes_out_of_it() -> None:
@@ -106,12 +153,13 @@ def test_it_has_exactly_the_two_commands_that_ci_takes_out_of_it() -> None:
 
 
 def test_its_figures_are_those_that_benchmarks_wrote() -> None:
-    assert results.rewritten(README) == README, "python -m tests.benchmarks.results --write"
+    for text in (README, *PAGES.values()):
+        assert results.rewritten(text) == text, "python -m tests.benchmarks.results --write"
 
 
 def test_every_file_of_figures_is_printed_and_says_where_it_is_from() -> None:
     files = {file.stem for file in results.FOLDER.glob("*.json")}
-    assert files == results.named(README)
+    assert files == results.named(EVERYTHING)
     for name in files:
         found = results.recorded(name)
         assert (ROOT / "tests" / "benchmarks" / f"bench_{name}.py").is_file()
@@ -128,14 +176,13 @@ SET = {"8 MB", "1 MB", "100 ms"}
 
 
 def test_no_other_figure_is_printed() -> None:
-    prose = re.sub(r"^```.*?^```", "", README, flags=re.MULTILINE | re.DOTALL)
-    recorded = "".join(str(results.recorded(name)["rows"]) for name in results.named(README))
+    prose = re.sub(r"^```.*?^```", "", EVERYTHING, flags=re.MULTILINE | re.DOTALL)
+    recorded = "".join(str(results.recorded(name)["rows"]) for name in results.named(EVERYTHING))
     assert [figure for figure in re.findall(FIGURE, prose) if figure not in SET and figure not in recorded] == []
 
 
 def test_its_python_programs_run_and_give_what_they_say() -> None:
-    section = README.partition("## The buffer in Python\n")[2].partition("\n## ")[0]
-    imports, program = re.findall(r"^```python\n(.*?)^```", section, re.MULTILINE | re.DOTALL)
+    imports, program = blocks("python", PAGES["python"])[:2]
     after = "print(round(pose.xyz[0], 9), stamp_ns, xyz.shape, quat_xyzw.shape, round(points[0, 0], 9))"
     done = processes.run([sys.executable, "-c", imports + program + after], check=True)
     assert done.stdout == "4.7 9000000000 (80, 3) (80, 4) 3.7\n"

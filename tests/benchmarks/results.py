@@ -1,7 +1,7 @@
-"""The figures that the README prints: each from a file that a benchmark wrote.
+"""The figures that the README and the topics print: each from a file that a benchmark wrote.
 
 ``python -m tests.benchmarks.bench_buffer --record`` measures and writes ``results/buffer.json``: the rows as they are
-printed, and with what machine, when, under what load and by which command they came to be. A table in the README stands
+printed, and with what machine, when, under what load and by which command they came to be. A table on a page stands
 below a line ``<!-- figures: buffer joints -->`` that names its files; ``python -m tests.benchmarks.results --write``
 writes all tables anew.
 """
@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
-README = ROOT / "README.md"
+PAGES = (ROOT / "README.md", *sorted((ROOT / "tfcompose" / "topics").glob("*.md")))
 FOLDER = Path(__file__).with_name("results")
 #: A row's name, and its cells.
 Rows = dict[str, list[str]]
@@ -86,12 +86,13 @@ def named(text: str) -> set[str]:
 
 
 def main() -> None:
-    """Write the README's tables, or print them."""
-    text = rewritten(README.read_text("utf-8"))
-    if "--write" in sys.argv:
-        README.write_text(text, encoding="utf-8")
-    else:
-        sys.stdout.write("".join(found[0] + "\n" for found in _TABLE.finditer(text)))
+    """Write the tables of all pages, or print them."""
+    for page in PAGES:
+        text = rewritten(page.read_text("utf-8"))
+        if "--write" in sys.argv:
+            page.write_text(text, encoding="utf-8")
+        else:
+            sys.stdout.write("".join(found[0] + "\n" for found in _TABLE.finditer(text)))
 
 
 if __name__ == "__main__":

@@ -93,14 +93,6 @@ def test_a_finding_of_a_rule_is_at_most_as_severe_as_the_catalogue_says() -> Non
             assert not [one for one in found if one.severity == "error" != CATALOGUE[one.code].severity], spec
 
 
-def test_the_table_in_the_readme_is_what_explain_prints() -> None:
-    _, _, rest = (ROOT / "README.md").read_text("utf-8").partition("<!-- codes -->\n")
-    shown, mark, _ = rest.partition("<!-- /codes -->")
-    assert mark
-    printed = processes.run([sys.executable, "-m", "tfcompose", "explain", "--table"], check=True, cwd=ROOT)
-    assert shown.strip("\n") == printed.stdout.strip("\n"), "python -m tfcompose explain --table"
-
-
 def test_a_table_has_the_codes_of_its_family() -> None:
     assert re.findall(r"^\| (TF\d{3}) ", table("names"), re.MULTILINE) == [
         code for code in CATALOGUE if code.startswith("TF5")

@@ -65,7 +65,8 @@ def test_help_groups_every_command_once_and_help_of_a_command_is_its_page(tmp_pa
     text = tfcompose_in(tmp_path, "help").stdout
     assert sum(map(len, GROUPS.values())) == len(COMMANDS)
     assert all(text.count(f"  {summary_of(name)}\n") == 1 for name in COMMANDS)
-    assert tfcompose_in(tmp_path, "help", "lint").stdout == tfcompose_in(tmp_path, "lint", "--help").stdout
+    options = tfcompose_in(tmp_path, "lint", "--help").stdout
+    assert tfcompose_in(tmp_path, "help", "lint").stdout.startswith(options)
     assert tfcompose_in(tmp_path, "help", "nothing").returncode == 2
     assert tfcompose_in(tmp_path, "-V").stdout == tfcompose_in(tmp_path, "--version").stdout
 

@@ -30,6 +30,7 @@ from tfcompose.cli.commands import (
     init,
     lint,
     logs,
+    manual,
     monitor,
     pose,
     presets,
@@ -73,7 +74,7 @@ GROUPS: dict[str, dict[str, Command]] = {
     },
     "Look": {"doctor": doctor, "monitor": monitor, "echo": echo, "verify": verify},
     "Ship": {"export": export},
-    "Help": {"completion": completion},
+    "Help": {"help": manual, "completion": completion},
 }
 COMMANDS: dict[str, Command] = {name: command for group in GROUPS.values() for name, command in group.items()}
 
@@ -105,9 +106,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def _main(words: list[str]) -> int:
     command = words[0] if words else ""
-    if command == "help" and words[1:]:
-        return _run(words[1], ["--help"]) if words[1] in COMMANDS else _unknown(words[1])
-    if command in {"-h", "--help", "help"}:
+    if command in {"-h", "--help"} or words == ["help"]:
         sys.stdout.write(help_text())
         return 0
     if command in {"-V", "--version"}:
@@ -153,6 +152,11 @@ def summary_of(name: str) -> str:
 
 def help_text() -> str:
     """Return what ``tfcompose --help`` prints."""
+    from textwrap import fill
+
+    from tfcompose.cli.documentation import TOPICS
+
+    topics = fill(", ".join(TOPICS), 76, initial_indent="  ", subsequent_indent="  ")
     width = max(map(len, COMMANDS))
     groups = (
         f"{title}:\n" + "".join(f"  {name:<{width}}  {summary_of(name)}\n" for name in commands)
@@ -163,7 +167,8 @@ def help_text() -> str:
         "One YAML file says which frames a robot has and who publishes each TF edge.\n"
         "tfcompose checks it, builds it, starts it, and names any node that publishes\n"
         "an edge owned by another.\n\n" + "\n".join(groups) + "\noptions:\n  -V, --version  print the version\n"
-        "  -h, --help     print this help; after a command, or as help COMMAND: its options\n"
+        "  -h, --help     print this help; after a command: its options\n\n"
+        f"topics, for tfcompose help TOPIC:\n{topics}\n"
     )
 
 

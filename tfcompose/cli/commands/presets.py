@@ -25,7 +25,10 @@ if TYPE_CHECKING:
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument(
-        "name", nargs="?", metavar="NAME", help="a preset, or a vendor, package or kind to list only those"
+        "name",
+        nargs="?",
+        metavar="NAME",
+        help="a preset; or a vendor, package, kind or part of a name to list only those",
     )
     parser.add_argument(
         "--preset-path", action="append", default=[], metavar="DIR", help="search this folder first; repeatable"
@@ -74,7 +77,8 @@ def _list(only: str | None, known: Library, form: str) -> int:
     ]
     rows += preset_page.node_rows()
     words = sorted({word for row in rows for word in _words(row)})
-    rows = [row for row in rows if not only or only in _words(row)]
+    exact = [row for row in rows if not only or only in _words(row)]
+    rows = exact or [row for row in rows if only and any(only.lower() in word for word in _words(row))]
     if not rows:
         warn(f"no preset, vendor or kind {only}; {did_you_mean(only or '', words, 'tfcompose presets lists them')}")
         return 1

@@ -1,0 +1,46 @@
+"""Explain a topic or a command, or write the whole documentation as one HTML file.
+
+Print the page of a topic, such as language or guard, or the options of a command and what there is to say about it.
+Without a word, list commands and topics.
+"""
+
+from __future__ import annotations
+
+import difflib
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.terminal import UNREADABLE, fail
+
+if TYPE_CHECKING:
+    from argparse import ArgumentParser, Namespace
+
+
+def arguments(parser: ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("word", nargs="?", metavar="TOPIC|COMMAND", help="what to explain")
+    parser.add_argument("--html", metavar="FILE", help="write all topics and commands to FILE, as one page")
+
+
+def run(arguments: Namespace) -> int:
+    """Print the page or write the file; exit code 2 where there is no such topic."""
+    import pydoc
+    from pathlib import Path
+
+    from tfcompose.cli.documentation import TOPICS, html, page
+
+    if arguments.html:
+        try:
+            Path(arguments.html).write_text(html(arguments.commands), "utf-8")
+        except ModuleNotFoundError:
+            fail("--html needs the package markdown-it-py: pip install 'tfcompose[docs]'", UNREADABLE)
+        except OSError as error:
+            fail(f"{arguments.html} cannot be written: {error.strerror}", UNREADABLE)
+        print(f"wrote {arguments.html}")
+        return 0
+    text = page(arguments.word, arguments.commands)
+    if text is None:
+        near = difflib.get_close_matches(arguments.word, [*TOPICS, *arguments.commands], 1)
+        advice = f"did you mean {near[0]}?" if near else f"the topics are {', '.join(TOPICS)}"
+        fail(f"no topic or command {arguments.word}; {advice}", UNREADABLE)
+    pydoc.pager(text)
+    return 0

@@ -1,8 +1,7 @@
-"""What the processes of a run tell each other: messages as lines of JSON.
+"""Messages between the processes of a run, as lines of JSON.
 
-The guard tells the launcher events on a pipe, and is told orders on another; its log is for people. Other commands send
-requests to the launcher's control socket and are answered, or told notices, which are also what a person at ``up``
-reads.
+The guard sends events to the launcher on a pipe, and takes orders on another; its log is for people. Other commands
+send requests to the launcher's control socket and get answers, or the notices that a person at ``up`` reads too.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from tfcompose.findings import Finding  # noqa: TC001 (messages are read by thes
 from tfcompose.plan import LifecycleState, ProcessKind  # noqa: TC001
 from tfcompose.plan.codec import OMITTED, TaggedUnion, decode
 
-# Events: what the guard tells the launcher.
+# Events: from the guard to the launcher.
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +109,7 @@ GuardEvent = (
 GUARD_EVENTS = TaggedUnion[GuardEvent]("event", get_args(GuardEvent))
 
 
-# Orders: what the launcher tells the guard.
+# Orders: from the launcher to the guard.
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +148,7 @@ GuardOrder = Absent | Present | Gate
 GUARD_ORDERS = TaggedUnion[GuardOrder]("order", get_args(GuardOrder))
 
 
-# Notices: what the launcher tells a person, and whoever listens at its control socket.
+# Notices: from the launcher to a person, and to clients of its control socket.
 
 #: supervisord's names, and EXPECTED for an external process.
 StateName = Literal["STOPPED", "STARTING", "RUNNING", "BACKOFF", "STOPPING", "EXITED", "FATAL", "EXPECTED"]
@@ -205,7 +204,7 @@ class AllStarted:
 
 @dataclass(frozen=True, slots=True)
 class StartRow:
-    """When a process was started and ready, in seconds after the start; None: somebody else started it."""
+    """When a process was started and ready, in seconds after the start; None: it is external."""
 
     process: str
     started: float | None
@@ -335,7 +334,7 @@ class StatusRequest:
 
 @dataclass(frozen=True, slots=True)
 class EventsRequest:
-    """From now on, the notices: first those that were told already. Answered by these alone."""
+    """From now on, the notices: first those that were sent already. Answered by these alone."""
 
     do: Literal["events"] = "events"
 

@@ -50,7 +50,7 @@ class Own:
 
     @property
     def ros_args(self) -> list[str]:
-        """What its node is told: what is on the command line, which comes first, and the plan's remappings."""
+        """The ROS arguments of its node: what is on the command line, which comes first, and the plan's remappings."""
         return [*self.given, *(word for old, new in self.process.remap.items() for word in ("-r", f"{old}:={new}"))]
 
     @property
@@ -136,7 +136,7 @@ def _unfit(message: str, file: str) -> RejectedError:
 def wait_for_go(stop: Stop) -> bool:
     """Wait, where the launcher holds this process, until it is let go on; return whether it is, or is to end.
 
-    ``up`` checks before the start whether somebody publishes an edge already; its publishers load Python and rclpy
+    ``up`` checks before the start whether an edge is published already; its publishers load Python and rclpy
     then, and join ROS only when the launcher says so.
     """
     if HOLD_FD in os.environ:

@@ -18,6 +18,6 @@ SETTLE = "TFCOMPOSE_SETTLE_S"
 JOINS = "TFCOMPOSE_GUARD_JOINS"
 #: Set for a guard where the processes of its run are fenced off by remapping.
 REMAPPED = "TFCOMPOSE_REMAPPED"
-#: The descriptor from which a publisher that is held before it joins ROS is told to go on, by ``GO``.
+#: The descriptor from which a publisher that is held before it joins ROS reads the word to go on, ``GO``.
 HOLD_FD = "TFCOMPOSE_HOLD_FD"
 GO = b"go\n"

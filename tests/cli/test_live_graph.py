@@ -35,7 +35,7 @@ def test_each_edge_has_its_publisher_its_kind_and_its_rate(observer: TreeObserve
     moving, fixed, second = arrows["odom", "base"], arrows["base", "lidar"], arrows["mast", "lidar"]
     assert (moving.owner, moving.kind, moving.detail, moving.pose) == ("/drive", "dynamic", "1.0 Hz", "")
     assert (fixed.owner, fixed.kind, fixed.detail) == ("/static", "static", "")
-    assert second.owner == "somebody"
+    assert second.owner == "unknown"
 
 
 def test_poses_stand_below_and_a_rotation_that_is_none_is_reported(observer: TreeObserver) -> None:

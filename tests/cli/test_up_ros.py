@@ -318,7 +318,7 @@ def test_without_ros_it_says_in_one_sentence_what_to_install_and_writes_nothing(
     stubs.mkdir()
     (stubs / "sitecustomize.py").write_text(WITHOUT_ROS)
     robot = up(ROVER, **first_on_the_path(stubs))
-    assert robot.ends() == 1
+    assert robot.ends() == 2
     assert [line.split()[0] for line in robot.text.splitlines()] == ["error[TF901]", "help:"]
     assert not any((tmp_path / "runtime").iterdir())
     assert sorted(path.name for path in tmp_path.iterdir()) == ["output0.txt", "rover.yaml", "runtime", "stubs"]

@@ -184,7 +184,7 @@ def test_each_process_is_a_service_on_the_hosts_network_that_waits_as_the_plan_s
     assert "healthcheck" in services["static"], "who waits for healthy waits for ever without it"
     assert (services["slam"]["restart"], services["drive"]["restart"]) == ("on-failure:3", "always")
     assert (services["drive"]["stop_signal"], services["drive"]["stop_grace_period"]) == ("SIGTERM", "2000ms")
-    assert any("other is expected" in line for line in output)
+    assert any("other is external" in line for line in output)
 
 
 @pytest.mark.parametrize("profiles", [(), ("demo",)])

@@ -45,7 +45,7 @@ def check(robot: Robot, rules: Iterable[Rule] = RULES.values()) -> list[Finding]
     """Return what the rules find, in no particular order.
 
     Left out is what merely follows from a value that was refused already, what only this variant of the robot has no
-    use for, and warnings about parts that somebody else wrote: ``lint`` of their files reports them.
+    use for, and warnings about parts from a URDF: ``lint`` of their files reports them.
     """
     found: list[Finding] = []
     for rule in rules:

@@ -64,7 +64,7 @@ def joint_without_limits(robot: Robot) -> Iterator[Finding]:
     """A revolute or prismatic joint has no position limits.
 
     URDF requires limits for these types, and readers refuse the whole robot without them. A joint that turns without
-    limits is ``continuous``. In a URDF that somebody else wrote, limits with effort and velocity only are a warning:
+    limits is ``continuous``. In an existing URDF, limits with effort and velocity only are a warning:
     readers take lower and upper as 0, so planners and simulators hold the joint there.
     """
     for edge in robot.edges:

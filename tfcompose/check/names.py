@@ -33,7 +33,7 @@ def bad_frame_name(robot: Robot) -> Iterator[Finding]:
     something sooner or later. Use letters, digits and ``_``, and a slash only between a prefix and a name. No part of a
     node's name begins with a digit. Hyphens, dots, colons and non-ASCII letters, as in ``base_link-base_fixed_joint``,
     are warnings: URDF and TF accept them, but parameters and topics that are named after the frame or joint cannot
-    have them. In a URDF that somebody else wrote, every name that can be looked up is only a warning.
+    have them. In an existing URDF, every name that can be looked up is only a warning.
     """
     names: dict[str, Span] = dict(robot.frames)
     for edge in robot.edges:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from tfcompose.ipc import Notice
     from tfcompose.plan import Plan
 
-#: Colours that are told apart on dark and light terminals; a process keeps its own by its place in the plan.
+#: Colours that differ on dark and light terminals; a process keeps its own by its place in the plan.
 COLOURS = tuple(f"\033[{code}m" for code in (36, 35, 34, 32, 33, 96, 95, 94))
 #: Whose lines the launcher's own are.
 LAUNCHER = "tfcompose"
@@ -134,8 +134,8 @@ class Console:
             text = f"started {notice.process} (pid {notice.pid})"
         elif notice.state == "EXPECTED":
             nodes = ", ".join(self._nodes.get(notice.process, ()))
-            who = self._hosts.get(notice.process, "somebody else")
-            text = f"expecting {notice.process} ({nodes}): {who} starts it"
+            host = self._hosts.get(notice.process)
+            text = f"expecting {notice.process} ({nodes}): {f'{host} starts it' if host else 'it is started elsewhere'}"
         elif notice.detail:
             text += f": {notice.detail}"
         self._say(text)

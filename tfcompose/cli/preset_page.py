@@ -310,7 +310,7 @@ def node_text(preset: dict[str, Any]) -> str:
         lines = [f"  {role:<{width}}  {_role_text(frame)}" for role, frame in preset["frames"].items()]
         parts.append("frames\n" + "\n".join(lines))
     if preset["set"]:
-        parts.append(f"told as well\n  {_parameters(preset['set'])}")
+        parts.append(f"also set\n  {_parameters(preset['set'])}")
     if preset["hint"]:
         parts.append(f"note\n  {preset['hint']}")
     sources = [" ".join(str(part) for part in fact.values()) for fact in preset["source"]]

@@ -14,7 +14,7 @@ MOST_BYTES = 16_000_000
 #: The name of standard input.
 STDIN = "-"
 
-#: Pipes that the shell has opened. One with a name would be waited for until somebody writes to it.
+#: Pipes that the shell has opened. One with a name would block until it is written to.
 _OPEN_ALREADY = ("/dev/fd/", "/dev/stdin", "/proc/")
 
 

@@ -137,7 +137,7 @@ def notices(
     ``output`` is where the caller prints them: once nobody reads it any more, the notices end, even if none comes.
 
     Raises:
-        OSError: if it cannot be heard; TimeoutError if the time is over; BrokenPipeError if nobody reads.
+        OSError: if it cannot be reached; TimeoutError if the time is over; BrokenPipeError if nobody reads.
     """
     end = None if timeout_s is None else time.monotonic() + timeout_s
     with connect(place) as connection:

@@ -121,7 +121,7 @@ def _marked(text: str) -> str:
 
 
 def has_reader(stream: TextIO) -> bool:
-    """Return whether somebody can still read what is written there; ``tfcompose logs -f | head -1`` ends that."""
+    """Return whether what is written there can still be read; ``tfcompose logs -f | head -1`` ends that."""
     return _first_ready(stream, None, 0) != stream
 
 

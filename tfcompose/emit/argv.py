@@ -1,4 +1,4 @@
-"""The words that start a process, with what ROS nodes are told by arguments, and the parameter files of nodes."""
+"""The words that start a process, with the ROS arguments of nodes, and the nodes' parameter files."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> 
 
 
 def _is_node(process: Process, *, owns: bool) -> bool:
-    """Whether a plain command is surely a ROS node: it owns an edge, or is told what only nodes are.
+    """Whether a plain command is surely a ROS node: it owns an edge, or has settings that only nodes have.
 
     What follows a text that a shell reads, or a launch file, does not reach the program.
     """
@@ -149,7 +149,7 @@ _PLAIN = re.compile(r"[A-Za-z0-9_.+-]+")
 
 
 def _text(value: Any) -> str:
-    """Return the value as JSON that is YAML as well; a word of somebody's parameter file as it stood there."""
+    """Return the value as JSON that is YAML as well; a word of a parameter file as it was there."""
     if isinstance(value, AsInFile) and _PLAIN.fullmatch(value):
         return str(value)
     if isinstance(value, list):

@@ -91,7 +91,7 @@ def gaps_of(plan: Plan) -> list[str]:
         gaps.append("the fence is one of remappings; what a sender latched before its last message ends with the guard")
     for process in plan.processes:
         if process.kind == "external":
-            gaps.append(f"{process.name} is expected, not started: somebody else does")
+            gaps.append(f"{process.name} is external, and not started")
         if process.required:
             gaps.append(f"{process.name} is required: its end does not end the others here")
     return gaps

@@ -1,4 +1,4 @@
-"""Sensors in somebody else's robot: chains of fixed frames whose names and poses are those of a preset.
+"""Sensors in a URDF: chains of fixed frames whose names and poses are those of a preset.
 
 A preset is recognised by frames inside of it: by one at least whose position, which is not 0, is the vendor's. Where
 several presets fit equally well, a generic one is taken, or the one whose name is in the sensor's; else none is, with a

@@ -100,7 +100,7 @@ class _Generator(GenerateJsonSchema):
         return {"enum": list(schema["expected"])}
 
     def tagged_union_schema(self, schema: Any) -> dict[str, Any]:
-        """Return the schema of forms that are told apart by what stands there, not by a key."""
+        """Return the schema of forms that differ by their value, not by a key."""
         made = super().tagged_union_schema(schema)
         return {"anyOf": made["oneOf"]} if "oneOf" in made else made
 

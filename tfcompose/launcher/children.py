@@ -311,7 +311,7 @@ class GuardPipes:
             os.close(fd)
 
     def order(self, order: GuardOrder) -> None:
-        """Tell the guard; one that is stuck hears nothing."""
+        """Send the guard an order; one that is stuck gets nothing."""
         with contextlib.suppress(OSError):
             os.write(self._orders, GUARD_ORDERS.line(order).encode())
 

@@ -1,6 +1,6 @@
 """What can happen to the process machine, and what it decides: values only.
 
-What the guard tells and what other commands request are events too; they are in ``tfcompose.ipc``.
+What the guard reports and what other commands request are events too; they are in ``tfcompose.ipc``.
 """
 
 from __future__ import annotations
@@ -128,14 +128,14 @@ class Kill:
 
 @dataclass(frozen=True, slots=True)
 class Notify:
-    """Tell the person, and whoever listens."""
+    """Send a notice to the person, and to clients of the control socket."""
 
     notice: Notice
 
 
 @dataclass(frozen=True, slots=True)
 class NotifyLate:
-    """Tell that a process is not ready in time, with the last lines of its log."""
+    """Report that a process is not ready in time, with the last lines of its log."""
 
     name: str
     found: Finding
@@ -143,7 +143,7 @@ class NotifyLate:
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """Tell the guard."""
+    """Send the guard an order."""
 
     order: GuardOrder
 

@@ -40,7 +40,7 @@ def command_of(argv: Sequence[str], base: Mapping[str, str]) -> Command | int:
     except KeyError:
         return _fail(f"the plan {file} has no process {name}", 2)
     if process.kind == "external":
-        return _fail(f"{name} is started by somebody else", 2)
+        return _fail(f"{name} is external, and started elsewhere", 2)
     # What is sent in a partition is known to be ours by the launcher's run; topics of each process's own need none.
     plan = replace(plan, guard=replace(plan.guard, fence="remap"))
     commands, found = commands_of(plan, [process], file, base, child_environment)

@@ -1,4 +1,4 @@
-"""How a strict plan's processes are fenced off, so that only the guard hears what they send on TF.
+"""How a strict plan's processes are fenced off, so that only the guard receives what they send on TF.
 
 Where their rmw is Fast DDS, a profile file moves their writers into a DDS partition. Elsewhere, or
 where the plan says so, their TF topics are remapped to topics of their own: then their listeners are moved too, and

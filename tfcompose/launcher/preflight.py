@@ -287,7 +287,7 @@ def _launch_command(
         "remap": process.remap,
         "sim_time": ros.clock == "sim",
     }
-    # Without being told, ros2 launch keeps what its nodes say to files of its own.
+    # By default ros2 launch writes its nodes' output to files of its own.
     more = {LAUNCH: json.dumps(given, sort_keys=True), _OUTPUT: env.get(_OUTPUT) or "both"}
     return (ros2, "launch", "--noninteractive", str(_WRAPPER)), more
 

@@ -1,6 +1,6 @@
 """The kernel's processes: who descends from whom, what a run left behind, and what groups of them use.
 
-They are read from /proc, not with psutil: a process is told from a later one of the same number by when it began in
+They are read from /proc, not with psutil: a process differs from a later one of the same number by when it began, in
 clock ticks since the machine's start, which holds in every process and whatever is done to the system's clock.
 """
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from tfcompose.plan import Plan
 
-#: Where systemd makes a folder for each user who is logged in, also for services and cron, which are not told of it.
+#: Where systemd makes a folder for each user who is logged in, also for services and cron, which lack the variable.
 USERS = Path("/run/user")
 #: How the folder of a plan's copy begins.
 _PLAN = "plan-"

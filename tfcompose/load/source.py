@@ -124,7 +124,7 @@ def path_named(named: str, at: Span) -> str:
 
 _COMMENT = re.compile(r"#\s*tfcompose:\s*allow\b(?P<codes>[\sA-Z0-9,]*?)(?:\bbecause\b(?P<reason>[^#]*))?(?:#.*)?$")
 _XML = re.compile(r"\s*tfcompose:\s*allow\b(?P<codes>[\sA-Z0-9,]*?)(?:\bbecause\b(?P<reason>.*))?\s*", re.DOTALL)
-#: What begins with ``<``, as one piece; tags that open, and comments, are told apart.
+#: What begins with ``<``, as one piece; tags that open, and comments, are distinguished.
 _MARKUP = re.compile(
     r"<!--(?P<comment>.*?)-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>"
     r"|(?P<tag><[^\s<>\"'/!?](?:[^<>\"']|\"[^\"]*\"|'[^']*')*>)|<",

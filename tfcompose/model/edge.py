@@ -1,4 +1,4 @@
-"""An edge of the tree, the joint that moves it and what that can bear, and a pose that was measured."""
+"""An edge of the tree, the joint that moves it with its limits, and a pose that was measured."""
 
 from __future__ import annotations
 

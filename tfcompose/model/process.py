@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class AsInFile(str):
-    """A parameter as it stands without quotes in somebody's parameter file: what it is, is for ROS to say."""
+    """A parameter as it is without quotes in a parameter file: ROS decides what it is."""
 
     __slots__ = ()
 

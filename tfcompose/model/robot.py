@@ -186,7 +186,7 @@ class Robot:
         return may_be_refused(name, self.broken, chain(self.frames, (process.name for process in self.processes)))
 
     def is_foreign(self, at: Span | None) -> bool:
-        """Return whether the place is in a file that somebody else wrote, a URDF: advice speaks of XML there."""
+        """Return whether the place is in a URDF, or what xacro made: advice speaks of XML there."""
         return at is not None and at.file in self.foreign
 
     def parent_edge(self, child: str) -> Edge | None:

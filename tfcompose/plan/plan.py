@@ -318,7 +318,7 @@ class GuardPolicy:
 
 @dataclass(frozen=True, slots=True)
 class PlanClaim:
-    """An edge that a node publishes by default and somebody else owns; ``switch`` stops it, empty: nothing does."""
+    """An edge that a node publishes by default and another process owns; ``switch`` stops it, empty: nothing does."""
 
     node: str
     parent: str

@@ -1,4 +1,4 @@
-"""The robot's description: latched, and told apart from what others publish under the same name."""
+"""The robot's description: latched, and compared with what others publish under the same name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What nodes publish by themselves: switched off where somebody else owns the edge, and given the frames' names.
+"""What nodes publish by themselves: switched off where another process owns the edge, under the names of its frames.
 
 A claim that cannot be settled by parameters of a process that tfcompose starts is a finding, with the exact switch.
 """

@@ -1,7 +1,7 @@
 """Edges as the user gave them: frames, links with a parent, joints and parts; each with its owner.
 
 The numbers of poses and limits are kept as they were written too: a pose keeps a unit quaternion, and forgets whether
-somebody wrote 90, 1.57 or 90 deg. The rules about units and slips of the pen need to know.
+90, 1.57 or 90 deg was written. The rules about units and slips of the pen need to know.
 """
 
 from __future__ import annotations

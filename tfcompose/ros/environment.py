@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from tfcompose.plan import RosSettings
 
-#: The profile of tfcompose's own processes, and the one where they hear this machine alone; the files say what for.
+#: The profile of tfcompose's own processes, and the one for this machine alone; the files say what for.
 FASTDDS_PROFILE = Path(__file__).with_name("fastdds.xml")
 FASTDDS_PROFILE_LOCALHOST = Path(__file__).with_name("fastdds_localhost.xml")
 

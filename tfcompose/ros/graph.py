@@ -130,7 +130,7 @@ _OF_EACH_NODE = frozenset(
 
 
 def is_offered(node: Node, service: str) -> bool:
-    """Return whether ``node`` has discovered somebody who offers the service, and not only who asks for it."""
+    """Return whether ``node`` has discovered a server of the service, and not only clients."""
     return bool(node.count_services(service))
 
 

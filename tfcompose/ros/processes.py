@@ -33,7 +33,7 @@ def ros_processes() -> Iterator[tuple[int, str, dict[str, str]]]:
                 continue
             environment = (entry / "environ").read_bytes()
             command = (entry / "cmdline").read_bytes()
-        except OSError:  # somebody else's, or it has just ended
+        except OSError:  # another user's, or it has just ended
             continue
         yield int(entry.name), _shown(command), settings_in(environment)
 

@@ -1,4 +1,4 @@
-"""Listening to TF in a node: one that somebody else spins, or one of its own with a thread."""
+"""Listening to TF in a node: one that the program spins, or one of its own with a thread."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ class ThreadListener:
                     self._on_message(received.data, static)
 
     def _follow(self) -> None:
-        """Set the node's clock to the simulated time, so that whoever watches it hears of jumps."""
+        """Set the node's clock to the simulated time, so that its watchers are notified of jumps."""
         now_ns = self._clock.now_ns() if self._clock else None
         if now_ns is not None:
             clock: Any = self.node.get_clock()

@@ -78,7 +78,7 @@ _MISSPELT = 0.8
 def unknown_words(root: Element) -> Iterator[Finding]:
     """Yield a finding for each element and attribute that URDF does not have: an error where a known one is misspelt.
 
-    Others may be somebody's extension, and are warnings; directly below <robot> they are accepted.
+    Others may be an extension, and are warnings; directly below <robot> they are accepted.
     """
     waiting = [root]
     while waiting:

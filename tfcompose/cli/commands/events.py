@@ -25,7 +25,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Print events until the robot ends; exit code 0, 1 where none runs, or it is heard no more before it ends."""
+    """Print events until the robot ends; exit code 0, 1 where none runs, or the connection is lost before it ends."""
     from tfcompose.cli.console import Console
     from tfcompose.cli.runs import chosen_run, notices
     from tfcompose.ipc import Ended, notice_line

@@ -152,7 +152,7 @@ def _arrow(one: EdgeState, *, poses: bool) -> Arrow:
 
     stream = one.stream
     rate = "" if stream.static or one.timing.rate is None else f"{one.timing.rate:.1f} Hz"
-    owner = printable(one.publisher) or "somebody"
+    owner = printable(one.publisher) or "unknown"
     below = _pose(stream.pose) if poses else ""
     kind: Kind = "static" if stream.static else "dynamic"
     return Arrow(printable(stream.parent), printable(stream.child), kind, owner, rate, below)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from tfcompose.cli.tables import LiveLines
     from tfcompose.live.edges import TreeObserver
 
-#: Of the running tree the last 5 to 10 s are told.
+#: Of the running tree the last 5 to 10 s are shown.
 WINDOW_S = 5.0
 
 

@@ -137,7 +137,7 @@ def _row(branch: Branch, *, plan: Plan | None) -> tuple[str, ...]:
         return (name, planned.kind, "", "", "", f"missing: owner {planned.owner} ({planned.node})")
     one = branch.observed[0]
     others = [
-        f"also {printable(other.name)} from {printable(other.publisher) or 'somebody'}" for other in branch.observed[1:]
+        f"also {printable(other.name)} from {printable(other.publisher) or 'unknown'}" for other in branch.observed[1:]
     ]
     remarks = [_status(branch, plan)] if plan else []
     rate = "" if one.stream.static else f"{one.timing.rate:.1f} Hz" if one.timing.rate is not None else "–"

@@ -61,7 +61,7 @@ def run(arguments: Namespace) -> int:
     refuse_live_bag(arguments)
     plan, places = _running_plan(arguments) or expected_plan(arguments.file or DEFAULT_FILE, arguments)
     observers = {topics: TreeObserver(settle_s=0.0 if arguments.bag else SETTLE_S) for topics in parts_of(plan)}
-    # Programs are told of each edge that it is missing; a robot without edges misses none.
+    # Programs get each missing edge; a robot without edges misses none.
     may_be_silent = arguments.format != "text" or not plan.edges
     begun = time.monotonic()
     if arguments.bag:

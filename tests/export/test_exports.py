@@ -21,6 +21,7 @@ from tfcompose.export.launch import launch
 from tfcompose.export.supervisors import Machine, compose, systemd
 from tfcompose.plan import Plan, PlanProcess, StopRule
 from tfcompose.plan.file import read_plan
+from tfcompose.plan.stock import stand_ins, static_names
 
 ROBOT = (Path(__file__).parents[2] / "robots" / "autonomous_robot.yaml").read_text("utf-8")
 
@@ -353,6 +354,36 @@ def test_a_stock_state_publisher_passes_on_as_many_joint_states_as_ours(
     assert given == expected | ({"ignore_timestamp": True} if "ignore" in joints else {})
 
 
+def test_stock_nodes_send_where_ours_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = DRIVEN.replace("namespace: r1,", "namespace: r1, isolate: topics,")
+    plan, actions = launched(text, tmp_path, monkeypatch)
+    remap = [*plan.process("static").remap.items()]
+    assert ("/tf_static", "/r1/tf_static") in remap
+    stock = [one for one in actions if getattr(one, "package", "") in {"robot_state_publisher", "tf2_ros"}]
+    assert len(stock) > 1
+    assert all(one.remappings == remap and one.namespace == "r1" for one in stock)
+
+
+def test_without_a_joint_in_the_urdf_our_own_publisher_is_started(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = "tfcompose: 1\nrobot: r\nframes: {map: {}, base_link: {parent: map, xyz: [1, 0, 0]}}\n"
+    _, actions = launched(text, tmp_path, monkeypatch)
+    assert [one.name for one in actions if one.kind == "ExecuteProcess"] == ["static"]
+    assert sent(actions) == {}
+
+
+def test_stock_nodes_stand_in_for_our_own_publishers_alone() -> None:
+    plan = compiled_plan(DRIVEN)
+    others = stand_ins(plan)
+    assert set(others) == {edge.child for edge in plan.edges if edge.owner == "static"}
+    assert others["dock"] == {"/r1/robot_state_publisher", "/r1/static_dock"}
+    edges = tuple(replace(edge, child=edge.child.replace("lidar", "do/ck")) for edge in plan.edges)
+    edges = tuple(replace(edge, child=edge.child.replace("dock", "do_ck")) for edge in edges)
+    names = static_names(replace(plan, edges=edges))
+    assert len(set(names.values())) == len(names) > 1, "no two nodes have one name"
+
+
 TIMED = """
 tfcompose: 1
 robot: delayed
@@ -366,6 +397,15 @@ processes:
   last: {run: [last], after: {filter: ready, usb: ready}}
   other: {run: [other], after: {usb: started}}
 """
+
+
+def test_whom_launch_does_not_wait_for_is_reported_and_a_time_is_waited_for() -> None:
+    _, gaps = launch(compiled_plan(TIMED), Machine(".."), built(TIMED)["robot.urdf"])
+    waits = {line.split()[0]: words_of(line) for line in gaps if "does not wait" in line}
+    assert set(waits) == {"filter", "other"}
+    assert "camera" in waits["filter"]
+    assert "usb" in waits["other"]
+    assert not [line for line in gaps if "started again" in line], "nobody restarts"
 
 
 def test_who_waits_for_a_time_is_started_so_much_later(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -72,6 +72,13 @@ def test_of_several_publishers_the_newest_counts_and_all_are_shown() -> None:
     assert between(observer, "odom", "base").frames == ("odom", "base"), "who has left does not count"
 
 
+def test_two_trees_are_named_by_their_roots() -> None:
+    edges = observed("odom base", "base laser", "map dock", "dock lamp").edges(4 * SECOND)
+    reason = str(chain_between(edges, "laser", "lamp"))
+    assert "begins at odom" in reason
+    assert "at map" in reason
+
+
 def test_what_tf2_refuses_is_no_edge() -> None:
     observer = observed("odom base")
     add(observer, "map odom", length=0.0)

@@ -303,6 +303,42 @@ def test_the_velocity_of_what_goes_in_a_circle_is_that_of_the_book() -> None:
     assert back.angular == pytest.approx((0.0, 0.0, -0.5), abs=1e-9)
 
 
+def test_the_velocity_of_a_point_on_what_rotates_about_any_axis_is_the_cross_product() -> None:
+    omega, drift, arm = np.array([0.3, -0.7, 0.4]), np.array([0.5, 0.2, -0.1]), np.array([0.3, -0.2, 0.5])
+    buffer = Buffer()
+    for stamp_ns in range(S, 2 * S + 1, 10_000_000):
+        seconds = stamp_ns / 1e9
+        x, y, z, w = Rotation.from_rotvec(omega * seconds).as_quat().tolist()
+        place = (drift * seconds).tolist()
+        buffer.set("odom", "base", Pose((place[0], place[1], place[2]), (x, y, z, w)), stamp_ns, static=False)
+    linear, angular = buffer.lookup_velocity("base", "odom", 1_500_000_000, 10_000_000, "odom", arm.tolist(), "base")
+    assert angular == pytest.approx(tuple(omega), abs=1e-6)
+    moved = drift + np.cross(omega, Rotation.from_rotvec(1.5 * omega).apply(arm))
+    assert linear == pytest.approx(tuple(moved), abs=1e-6)
+
+
+def test_tools_print_how_long_and_how_new_what_is_kept_is() -> None:
+    buffer = rover()
+    buffer.set("odom", "base", Pose(), 4 * S, static=False, authority="ekf")
+    yaml = buffer.all_frames_as_yaml()
+    for line in (
+        "most_recent_transform: 4.000000",
+        "oldest_transform: 1.000000",
+        "buffer_length: 3.000",
+        "rate: 1.000",
+    ):
+        assert f"  {line}\n" in yaml
+    assert "  broadcaster: 'ekf'\n" in yaml
+    dot = buffer._allFramesAsDot()
+    for part in (
+        "Average rate: 1.000 Hz",
+        "Most recent transform: 4.000000",
+        "Buffer length: 3.000 sec",
+        "Broadcaster: ekf",
+    ):
+        assert part in dot
+
+
 def test_a_velocity_is_a_mean_around_the_time_and_at_the_newest_one_up_to_it() -> None:
     buffer = Buffer()
     for second, x in ((1, 0.0), (2, 1.0), (3, 3.0), (4, 3.0)):

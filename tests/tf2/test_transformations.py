@@ -73,6 +73,10 @@ def test_matrices_are_made_and_taken_apart() -> None:
     assert np.allclose(both, shift @ rotated)
     assert tf.translation_from_matrix(both).tolist() == [1, 2, 3]
     assert away(tf.quaternion_from_matrix(both), Rotation.from_rotvec((0, 0, 0.7))) < 1e-12
+    for angle in (-3.1, -0.7, 0.7, 3.1):
+        quat = tf.quaternion_from_matrix(tf.rotation_matrix(angle, (1, -2, 3)))
+        assert quat[3] >= 0
+        assert away(quat, Rotation.from_rotvec(angle * np.array([1, -2, 3]) / np.sqrt(14))) < 1e-12
     assert away(tf.quaternion_about_axis(0.7, (0, 0, 5)), Rotation.from_rotvec((0, 0, 0.7))) < 1e-12
     assert np.allclose(tf.concatenate_matrices(tf.inverse_matrix(both), both), tf.identity_matrix())
     assert np.allclose(tf.rotation_matrix(0.7, (0, 0, 1), (1, 2, 3)) @ (1, 2, 3, 1), (1, 2, 3, 1)), "its point stays"

@@ -268,3 +268,15 @@ def test_a_folder_that_was_removed_is_named_as_the_reason(tmp_path: Path, comman
     done = processes.run(["/bin/sh", "-c", words], cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert re.fullmatch(r"tfcompose: .*\bcurrent folder\b.*\n", done.stderr)
+
+
+def test_arguments_of_a_xacro_file_are_given_to_lint_as_to_import(folder: Path) -> None:
+    text = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="$(arg name)_link"/></robot>'
+    (folder / "r.xacro").write_text(text)
+    (folder / "robot.yaml").write_text(GOOD)
+    assert "error[TF106]" in tfcompose("lint", "r.xacro", cwd=folder).stdout
+    assert tfcompose("lint", "r.xacro", "name:=ur5e", cwd=folder).returncode == 0
+    unknown = tfcompose("lint", "r.xacro", "name:=ur5e", "nmae:=ur5e", cwd=folder)
+    assert (unknown.returncode, unknown.stdout.count("error[TF106]")) == (1, 1)
+    assert tfcompose("lint", "robot.yaml", "name:=ur5e", cwd=folder).returncode == 2
+    assert tfcompose("lint", "r.xacro", ":=ur5e", cwd=folder).returncode == 2

@@ -25,7 +25,7 @@ BAD: dict[str, tuple[bytes, str, tuple[int, int], int]] = {  # text, code, place
     "latin-1": ("tfcompose: 1\nrobot: k\xe4se\n".encode("latin-1"), "TF001", (2, 9), 2),
     "a list": (b"- tfcompose: 1\n", "TF002", (1, 1), 1),
     "a tab": (b"tfcompose: 1\nlinks:\n\tbase_link: {}\n", "TF002", (3, 1), 1),
-    "a bracket open": (b"tfcompose: 1\nrobot: [r\nlinks: {}\n", "TF002", (3, 6), 1),
+    "a bracket open": (b"tfcompose: 1\nrobot: [r\nlinks: {}\n", "TF002", (2, 8), 1),
     "two documents": (GOOD.encode() + b"---\na: 1\n", "TF002", (4, 1), 1),
     "aliases, 10 MB": (nested_aliases().encode(), "TF008", (1, 1), 1),
     "aliases, small": (small_bomb().encode(), "TF008", (8, 7), 1),

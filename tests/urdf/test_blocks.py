@@ -51,6 +51,12 @@ EXPECTED = """<ros2_control name="base" type="system" rw_rate="100" is_async="tr
 <param name="initial_value">false</param></command_interface></gpio></ros2_control>"""
 
 
+def test_a_rate_of_zero_is_that_of_all_as_ros2_control_reads_it() -> None:
+    """Source: ros2_control's component_parser, which takes 0 for the controller manager's rate."""
+    for tree in urdfs(HARDWARE.replace("rw_rate: 100", "rw_rate: 0")):
+        assert [one.get("rw_rate") for one in tree.iter("ros2_control")] == ["0"]
+
+
 def same(one: ET.Element, other: ET.Element) -> bool:
     texts = [(element.text or "").strip() for element in (one, other)]
     return (

@@ -136,17 +136,22 @@ def inertia_off_from_shape(robot: Robot) -> Iterator[Finding]:
 _KDL_READERS = frozenset({"robot_state_publisher", "moveit_ros_move_group"})
 
 
-@rule("TF712")
+@rule("TF712", of_urdf=True)
 def root_link_with_inertia(robot: Robot) -> Iterator[Finding]:
-    """The root link has an inertia, and one of the robot's processes reads the description with KDL.
+    """The root link has an inertia, which programs that read the URDF with KDL ignore.
 
     KDL does not support an inertia on the root: it warns at each start, and ignores the mass in dynamics. Add a root
     without a body: ``base: base_footprint`` with ``base_link: {parent: base_footprint}``. Where nothing uses KDL
     (tfcompose does not), an inertia on the root is right and not reported; ``robot.urdf``, for the stock
-    robot_state_publisher, is written without it.
+    robot_state_publisher, is written without it. A URDF is taken to be read by that node, which uses KDL.
     """
     root = robot.links.get(robot.base or "")
     if root is None or root.inertial is None:
+        return
+    if robot.is_foreign(root.at):
+        message = f"root link {root.name} has an inertia, which robot_state_publisher ignores"
+        advice = f"add a root without a body: a link such as base_footprint, and a fixed joint from it to {root.name}"
+        yield finding("TF712", message, root.at, help=advice)
         return
     for process in robot.processes:
         if process.package in _KDL_READERS and not process.describes:  # what tfcompose starts gets a root without one

@@ -26,7 +26,7 @@ _ROUND_LIMITS_DEG = _ROUND_DEG | {150.0, 165.0, 170.0, 175.0, 180.0, 185.0, 190.
 _FULL_CIRCLE_RAD = 6.29
 
 
-@rule("TF410")
+@rule("TF410", of_urdf=True)
 def degrees_as_radians(robot: Robot) -> Iterator[Finding]:
     """An angle without a unit is probably meant in degrees.
 
@@ -45,7 +45,9 @@ def degrees_as_radians(robot: Robot) -> Iterator[Finding]:
                 size in _ROUND_LIMITS_DEG if is_limit else size in _ROUND_DEG or size > _FULL_CIRCLE_RAD
             ):
                 message = f"{value.entry}: {value.key} is {number:g} rad, {number / math.tau:.3g} turns"
-                yield finding("TF410", message, value.place(index), help=f"if degrees are meant, write {number:g} deg")
+                at = value.place(index)
+                meant = f"{math.radians(number):.17g}" if robot.is_foreign(at) else f"{number:g} deg"
+                yield finding("TF410", message, at, help=f"if degrees are meant, write {meant}")
 
 
 #: 1.5708 is good enough: it is 0.0002 degrees off, and no mount is that accurate.
@@ -54,7 +56,7 @@ _QUARTERS = {1: "pi/2", 2: "pi", 3: "3*pi/2", 4: "2*pi"}
 _MOST_DECIMALS = 6
 
 
-@rule("TF411")
+@rule("TF411", of_urdf=True)
 def rounded_right_angle(robot: Robot) -> Iterator[Finding]:
     """An angle is π/2 or π with too few digits.
 
@@ -73,8 +75,11 @@ def rounded_right_angle(robot: Robot) -> Iterator[Finding]:
             off = math.degrees(abs(number - quarters * math.pi / 2))
             listed = ", ".join(dict.fromkeys(f"{n:g}" for n, _ in rounded))
             message = f"{value.entry}: {value.key} has {listed}, {off:.2g} deg off {quarters * 90} deg"
+            at = value.place(first)
             advice = f'write {quarters * 90} deg, or "${{{sign}{_QUARTERS[abs(quarters)]}}}"'
-            yield finding("TF411", message, value.place(first), help=advice)
+            if robot.is_foreign(at):
+                advice = f"write {quarters * math.pi / 2!r}"
+            yield finding("TF411", message, at, help=advice)
 
 
 def _is_rounded(number: float) -> bool:
@@ -176,7 +181,7 @@ _LARGEST_M = 100.0
 _TIMES = 3
 
 
-@rule("TF414", follows="pose")
+@rule("TF414", of_urdf=True, follows="pose")
 def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
     """A position or a body is far larger than the robot, and probably in millimetres.
 
@@ -189,7 +194,8 @@ def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
         largest = max((max(shape.size) for shape in (*link.visuals, *link.collisions)), default=0.0)
         if largest > _LARGEST_M:
             message = f"the body of {link.name} is {largest:g} m long"
-            yield finding("TF414", message, link.at, help=f"if millimetres are meant, write {largest:g} mm")
+            meant = f"{largest / 1000:g}" if robot.is_foreign(link.at) else f"{largest:g} mm"
+            yield finding("TF414", message, link.at, help=f"if millimetres are meant, write {meant}")
     body = max((size for size in sizes if size <= _LARGEST_M), default=0.0)
     below = placed(robot, moving=True)
     mounts = [norm(edge.pose.xyz) for edge in robot.edges if edge.given and edge.child in below and any(edge.pose.xyz)]
@@ -208,8 +214,10 @@ def far_from_the_robot(robot: Robot) -> Iterator[Finding]:
         if child in below and distance > limit:
             message = f"{value.entry} is {distance:g} m away; the rest of the robot is within {limit:.3g} m"
             farthest = max(range(len(value.numbers)), key=lambda index: abs(value.numbers[index]))
-            advice = f"a bare number is in metres; if millimetres are meant, write {value.numbers[farthest]:g} mm"
-            yield finding("TF414", message, value.place(farthest), help=advice)
+            at, number = value.place(farthest), value.numbers[farthest]
+            meant = f"{number / 1000:g}" if robot.is_foreign(at) else f"{number:g} mm"
+            advice = f"a bare number is in metres; if millimetres are meant, write {meant}"
+            yield finding("TF414", message, at, help=advice)
 
 
 #: The least and the greatest x, y, z.

@@ -6,6 +6,8 @@ import re
 from argparse import ArgumentTypeError
 from typing import TYPE_CHECKING
 
+from tfcompose.cli.terminal import UNREADABLE, fail
+
 if TYPE_CHECKING:
     from argparse import ArgumentParser
 
@@ -31,6 +33,18 @@ def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> Non
         "--set", action="append", default=[], metavar="PATH=VALUE", dest="settings",
         help="set one value, applied last: sensors.camera.tf=driver; repeatable",
     )  # fmt: skip
+
+
+def pairs(words: list[str], between: str) -> dict[str, str]:
+    """Return words such as NAME:=VALUE, or NAME=VALUE, by name.
+
+    Raises:
+        SystemExit: after saying that one is not such a word.
+    """
+    wrong = next((word for word in words if not word.partition(between)[0] or between not in word), None)
+    if wrong is not None:
+        fail(f"{wrong} is not NAME{between}VALUE", UNREADABLE)
+    return {name: value for name, _, value in (word.partition(between) for word in words)}
 
 
 def add_frames(parser: ArgumentParser) -> None:

@@ -170,8 +170,8 @@ class HardwareSpec(Checked):
     plugin: Text = key(..., "the class that drives it", "mock_components/GenericSystem")
     type: Literal["system", "actuator", "sensor"] = key("system", "which kind of component it is")
     params: XmlParameters = key({}, "the plugin's parameters", {"device": "/dev/ttyUSB0"})
-    rw_rate: Annotated[int, Strict(), Field(ge=1, le=100_000), Integral] | None = key(
-        None, "how many times a second it is read and written; default: as all", 100
+    rw_rate: Annotated[int, Strict(), Field(ge=0, le=100_000), Integral] | None = key(
+        None, "how many times a second it is read and written; default, and 0: as all", 100
     )
     is_async: Boolean | None = key(None, "true: it is read and written in a thread of its own")
     joints: dict[str, ComponentSpec] = key(

@@ -371,6 +371,9 @@ def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Finding:
         example = expression[0] if expression else "${x}"
         message = f"{example} is not in quotes, and stands in a list or mapping in brackets"
         advice = f'write "{example}"'
+    elif began and "parsing a flow" in message and _is_left_open(lines[began.line :], began.column):
+        mark, bracket = began, lines[began.line][began.column]
+        message, advice = f"{bracket} is not closed", f"close it with {_CLOSING[bracket]}"
     line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
     notes = []
     if began and mark and began.line != mark.line:
@@ -382,6 +385,23 @@ def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Finding:
 _GLUED = re.compile(r"([\w/.-]+)\s*(:)?\s*([{\[].*)")
 
 _EXPRESSION = re.compile(r"\$\{[^{}\"']*\}")
+
+
+_CLOSING = {"{": "}", "[": "]"}
+#: Texts in quotes, comments and expressions, in which brackets are none; and brackets.
+_TOKEN = re.compile(r"""\"(?:[^"\\]|\\.)*\"|'[^']*'|(?<![^\s])#[^\n]*|\$\{[^{}\n]*\}|[][{}]""")
+
+
+def _is_left_open(lines: list[str], column: int) -> bool:
+    """Return whether there is a bracket at a column of the first line that is closed nowhere."""
+    if not lines or lines[0][column : column + 1] not in _CLOSING:
+        return False
+    depth = 0
+    for token in _TOKEN.finditer("\n".join([lines[0][column:], *lines[1:]])):
+        depth += (token[0] in _CLOSING) - (token[0] in _CLOSING.values())
+        if not depth:
+            return False
+    return True
 
 
 def no_yaml(text: str, file: str) -> Finding:

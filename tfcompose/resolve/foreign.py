@@ -78,7 +78,8 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
     digest = hashlib.sha256(text.encode()).hexdigest()
     found = [one for one in (*converted.of_elements, *converted.of_blocks) if one.severity == "error"]
     found += converted.of_files
-    own = _with_base(replace(robot, ros=part.settings, processes=_own(part), source_data={"urdf": digest}))
+    robot = replace(robot, source_numbers=(), source_data={"urdf": digest})  # its numbers are judged where it is linted
+    own = _with_base(replace(robot, ros=part.settings, processes=_own(part)))
     if part.declared.is_alone and part.spec.ros.state_publisher == "stock":
         own, refused = with_stock(own)
         found += refused

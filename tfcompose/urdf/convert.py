@@ -6,6 +6,7 @@ import html
 import math
 import re
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, finding
@@ -28,6 +29,7 @@ from tfcompose.model import (
     Robot,
     SafetyController,
     Shape,
+    SourceNumbers,
     colour_name,
 )
 from tfcompose.urdf.blocks import REFERRING, unknown_references
@@ -107,9 +109,44 @@ def robot_of(root: Element, file: str, find: Finder, included: Collection[str] =
         base=None,
         blocks=tuple(_blocks(root)),
         foreign=frozenset({file, *included}),
+        source_numbers=tuple(_source_numbers(root)),
     )
     of_blocks = tuple(replace(one, severity="warning") for one in unknown)
     return Converted(robot, (*values.found, *unknown_words(root)), of_blocks, tuple(bodies.found))
+
+
+def _source_numbers(root: Element) -> Iterator[SourceNumbers]:
+    """Yield the numbers of the origins of joints and bodies, and of the limits of joints."""
+    for joint in root.all("joint"):
+        path = ("joints", joint.attributes.get("name", ""))
+        yield from _numbers_of(joint.first("origin"), path, ("xyz", "rpy"))
+        for one in _numbers_of(joint.first("limit"), path, ("lower", "upper")):
+            yield replace(one, path=(*path, "limit"))
+    for link in root.all("link"):
+        for body in link.children:
+            path = ("links", link.attributes.get("name", ""))
+            for one in _numbers_of(body.first("origin"), path, ("xyz", "rpy")):
+                yield replace(one, path=(*path, body.tag, one.key))
+
+
+def _numbers_of(element: Element | None, path: tuple[str, str], names: tuple[str, ...]) -> Iterator[SourceNumbers]:
+    """Yield the numbers of an element's attributes; what is no number is a finding already."""
+    if element is None:
+        return
+    for name in names:
+        words = element.attributes.get(name, "").split()
+        try:
+            numbers = tuple(map(float, words))
+        except ValueError:
+            continue
+        if numbers and all(abs(number) <= HUGE for number in numbers):
+            place = partial(_value_place, element, name)
+            yield SourceNumbers((*path, name), numbers, (False,) * len(numbers), place)
+
+
+def _value_place(element: Element, name: str, _index: int) -> Span:
+    """Return the place of an attribute's value: with xacro its numbers may stand nowhere."""
+    return element.at_value(name)
 
 
 def _by_name(elements: list[Element], values: Values, severity: Severity = "error") -> dict[str, Element]:

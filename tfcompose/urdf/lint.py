@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.check import RULES, apply, check, unused_allows
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 _RULES = tuple(rule for rule in RULES.values() if rule.of_urdf)
 
 
-def lint_urdf(file: str, packages: Packages) -> list[Finding]:
+def lint_urdf(file: str, packages: Packages, arguments: Mapping[str, str] | None = None) -> list[Finding]:
     """Return what is wrong with the file, by place. A xacro file is expanded; places are where elements are written."""
     try:
-        document = read_urdf(file, packages)
+        document = read_urdf(file, packages, arguments)
     except RejectedError as error:
         return list(error.findings)
     return document.findings()
@@ -52,7 +52,9 @@ class Document:
 
     def findings(self) -> list[Finding]:
         """Return what is wrong with it, by place, but for what its comments allow."""
-        found = dict.fromkeys([*self.converted.found, *check(with_hardware(self.robot), _RULES)])
+        roots = self.robot.roots()
+        robot = replace(with_hardware(self.robot), base=roots[0] if len(roots) == 1 else None)
+        found = dict.fromkeys([*self.converted.found, *check(robot, _RULES)])
         kept, used = apply(found, self.allows)
         return sorted([*kept, *unused_allows(self.allows, used)], key=lambda one: one.sort_key)
 

@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tfcompose.cli.options import pairs
 from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, reject
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def run(arguments: Namespace) -> int:
     from tfcompose.urdf.lint import read_urdf
     from tfcompose.urdf.packages import Packages
 
-    given, packages = _pairs(arguments.args, ":="), _pairs(arguments.packages, "=")
+    given, packages = pairs(arguments.args, ":="), pairs(arguments.packages, "=")
     _check_use(arguments)
     try:
         named = {name: (str(Path(folder).absolute()), Span(folder)) for name, folder in packages.items()}
@@ -65,18 +66,6 @@ def run(arguments: Namespace) -> int:
         fail("nothing was written: a robot file cannot express all of the source; --keep-going writes it anyway")
     _write(text, arguments.output)
     return FAILED if errors or more_errors else 0
-
-
-def _pairs(words: list[str], between: str) -> dict[str, str]:
-    """Return words such as NAME:=VALUE, or NAME=VALUE, by name.
-
-    Raises:
-        SystemExit: after saying that one is not such a word.
-    """
-    wrong = next((word for word in words if not word.partition(between)[0] or between not in word), None)
-    if wrong is not None:
-        fail(f"{wrong} is not NAME{between}VALUE", UNREADABLE)
-    return {name: value for name, _, value in (word.partition(between) for word in words)}
 
 
 def _check_use(arguments: Namespace) -> None:

@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose import __version__
-from tfcompose.cli.options import DEFAULT_FILE, add_format, add_variant
+from tfcompose.cli.options import DEFAULT_FILE, add_format, add_variant, pairs
 from tfcompose.cli.terminal import UNREADABLE, can_redraw, exit_code_of, fail, has_reader, print_findings
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from tfcompose.cli.fixing import Fixer
     from tfcompose.findings import Finding
@@ -46,7 +46,8 @@ def arguments(parser: ArgumentParser) -> None:
         nargs="*",
         metavar="FILE",
         default=[],
-        help="robot files, folders of them, .urdf and .xacro files, or - for standard input; default: robot.yaml",
+        help="robot files, folders of them, .urdf and .xacro files, with NAME:=VALUE for arguments of xacro, or - for "
+        "standard input; default: robot.yaml",
     )
     parser.add_argument(
         "--urdf", action="append", default=[], metavar="FILE", dest="urdfs",
@@ -94,6 +95,9 @@ def run(arguments: Namespace) -> int:
     """Lint the files; exit code 0, 1 with findings that count, 2 where a file cannot be read."""
     from tfcompose.cli.reading import STDIN, read_text
 
+    words = [word for word in arguments.files if ":=" in word]
+    arguments.files = [word for word in arguments.files if word not in words]
+    arguments.given = pairs(words, ":=")
     if (arguments.fix or arguments.diff or arguments.watch) and STDIN in arguments.files:
         fail("standard input cannot be fixed or watched: name a file", UNREADABLE)
     return _watch(arguments) if arguments.watch else _lint(arguments, read_text)
@@ -107,6 +111,8 @@ def _lint(arguments: Namespace, read: Callable[[str], str]) -> int:
     files = _files(arguments)
     urdfs = dict.fromkeys([*arguments.urdfs, *(file for file in files if file.endswith(URDF_ENDINGS))])
     robots = [file for file in files if file not in urdfs]
+    if arguments.given and not urdfs:
+        fail(f"{next(iter(arguments.given))}:=…: only xacro files take arguments", UNREADABLE)
 
     def lint(file: str, read: Callable[[str], str]) -> list[Finding]:
         return _selected(lint_file(file, presets, arguments, read), arguments)
@@ -120,7 +126,7 @@ def _lint(arguments: Namespace, read: Callable[[str], str]) -> int:
         is_changed = bool(arguments.diff and fixer.texts)
     else:
         cases = {file: lint(file, read) for file in robots}
-    cases |= {file: _selected(_lint_urdf(file), arguments) for file in urdfs}
+    cases |= {file: _selected(_lint_urdf(file, arguments.given), arguments) for file in urdfs}
     found = [one for case in cases.values() for one in case]
     _print(cases, arguments, len(robots) + len(urdfs))
     if exit_code_of(found) == UNREADABLE:
@@ -194,13 +200,13 @@ def _failing(arguments: Namespace) -> frozenset[str]:
     return frozenset({"error"} if arguments.fail_on == "error" else {"error", "warning"})
 
 
-def _lint_urdf(file: str) -> list[Finding]:
-    """Return what is wrong with a URDF or xacro file."""
+def _lint_urdf(file: str, given: Mapping[str, str]) -> list[Finding]:
+    """Return what is wrong with a URDF or xacro file, of which these arguments are given."""
     from tfcompose.cli.compiling import disk
     from tfcompose.urdf.lint import lint_urdf
     from tfcompose.urdf.packages import Packages
 
-    return lint_urdf(file, Packages(disk(), advice="source the workspace's setup file"))
+    return lint_urdf(file, Packages(disk(), advice="source the workspace's setup file"), given)
 
 
 def _fix(fixer: Fixer, arguments: Namespace) -> dict[str, list[Finding]]:

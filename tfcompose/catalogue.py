@@ -239,6 +239,7 @@ CATALOGUE: dict[str, Code] = {
         Code("TF851", "key_without_effect", "processes", "warning"),
         Code("TF852", "past_the_fence", "guard", "error"),
         Code("TF853", "too_much_tf", "guard", "error"),
+        Code("TF854", "other_robot", "guard", "error"),
         # ROS, plans, bags, extras
         Code("TF901", "no_ros", "environment", "error"),
         Code("TF902", "bad_plan", "environment", "error"),

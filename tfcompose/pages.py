@@ -432,6 +432,13 @@ delays a strict robot: further ones are not reported one by one, and strict hold
 judged all the same; messages with ever other edges are read for a tenth of the guard's time, and some are skipped.
 doctor, verify, monitor and the live tree keep ten thousand edges of each publisher, and say how much more came. Such a
 node usually invents a frame for each object or each message: let it use the same frames again, or end it.""",
+    "TF854": """Another robot runs in this ROS domain, on the same TF topics.
+
+tfcompose started it: its processes carry the name of its run. What they publish is one finding, with how many edges,
+and not one for each edge. It is a warning where all of them are frames that this robot does not have; where both have a
+frame of the same name, tf2 takes whatever came last. Give one of them a domain of its own, ros: {domain_id: N}, or TF
+topics of its own, ros: {namespace: NAME, isolate: topics}; two robots that belong together are parts of one robot file.
+""",
     "TF901": """ROS 2 is missing, or cannot be used.
 
 pip install 'tfcompose[ros]' brings it on x86-64 Linux; elsewhere source your distribution's setup file.""",

@@ -254,7 +254,8 @@ def test_the_same_edges_by_another_robots_name_are_refused(up: Callable[..., Up]
     assert second.ends() == 1
     assert f"rover (pid {first.popen.pid}, since " in second.text
     assert second.text.index("isolate: topics") < second.text.index("started guard")
-    assert re.search(r"error\[TF807\] .* another /(drive|tfcompose_static)\b", second.text)
+    assert re.search(r"error\[TF854\] (rover|other)@\d+ \(pid \d+, since [0-9:]+\) runs in this domain", second.text)
+    assert "isolate: topics" in second.text
     assert re.findall(r"started (\w+)", second.text) == ["guard"]
     assert first.popen.poll() is None
 
@@ -270,10 +271,10 @@ def test_two_that_start_the_same_edges_at_the_same_time_do_not_both_run_unreport
         return [one for one in both if one.popen.poll() is not None]
 
     def know() -> bool:
-        return all("another /" in one.text for one in both)
+        return all("error[TF854]" in one.text for one in both)
 
     assert until(lambda: ended() or know()), [one.text for one in both]
-    assert know() or all("another /" in one.text for one in ended()), [one.text for one in both]
+    assert know() or all("error[TF854]" in one.text for one in ended()), [one.text for one in both]
 
 
 def test_of_two_that_do_not_observe_before_the_start_and_have_the_same_edges_both_report_it_or_one_ends(
@@ -283,8 +284,8 @@ def test_of_two_that_do_not_observe_before_the_start_and_have_the_same_edges_bot
     both = [up(ROVER, "--settle", "0"), up(None, "other.yaml", "--settle", "0")]
 
     def end_well() -> bool:
-        refused = any("error[TF807]" in one.text and one.popen.poll() == 1 for one in both)
-        return refused or all("error[TF80" in one.text for one in both)
+        refused = any("error[TF854]" in one.text and one.popen.poll() == 1 for one in both)
+        return refused or all("error[TF854]" in one.text for one in both)
 
     assert until(end_well), [one.text for one in both]
 

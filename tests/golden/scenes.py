@@ -47,7 +47,7 @@ from tfcompose.ipc import Alive, Clear, Found, GateShut, Live, ProcessRequest
 from tfcompose.language import set_value
 from tfcompose.launcher.events import Exited, StartFailed, TimeUp
 from tfcompose.launcher.preflight import commands_of
-from tfcompose.live.publishers import Message, Publisher, Senders
+from tfcompose.live.publishers import Message, OtherRun, Publisher, Senders
 from tfcompose.live.state import NO_NODE, MovingJoint, RosProcess, StampedData, Topic, TreeState
 from tfcompose.model import Robot
 from tfcompose.model.body import Asset
@@ -262,6 +262,11 @@ def _strangers() -> Iterator[guarded.History]:
     yield _sent("/flood", ", ".join(f"f{number} f{number + 1}" for number in range(2000)))
     yield _sent(NO_NODE, "map odom")
     yield _sent(NO_NODE, "map odom", settle_s=9)
+    for edges in ("map odom, odom cart", "cart wheel"):
+        neighbouring = _running()
+        neighbour = neighbouring.joins("/other/slam")
+        neighbour.run = OtherRun("other@0", 4711, "14:03:27")
+        yield neighbouring.repeat(neighbour, edges, 20)
     stops = GuardPolicy(on_violation="stop-offender")
     yield _sent("/slam", "odom base", guard=stops, processes=(PlanProcess("slam", "run", nodes=("/slam",)),))
     for switch in ("enable_odom_tf: false", ""):

@@ -7,8 +7,8 @@ import pytest
 from tests.support.findings import expect
 from tests.support.guard_history import EDGES, FIXED, PROCESSES, SETTLE_S, TICK_S, History, edge
 from tfcompose.guard.judge import Judge
-from tfcompose.ipc import Found, Live, Recovered, Taken
-from tfcompose.live.publishers import Publisher
+from tfcompose.ipc import Clear, Found, Live, Recovered, Taken
+from tfcompose.live.publishers import OtherRun, Publisher
 from tfcompose.live.state import NAMELESS, NO_NODE
 from tfcompose.live.topics import Identity, RunMarks
 from tfcompose.plan import GuardPolicy, Plan, RosSettings
@@ -300,3 +300,52 @@ def test_when_a_stranger_has_left_its_latched_edges_stay_with_listeners(
     running.leaves(rogue)
     (over,) = running.wait(5.0).over()
     assert ("listeners keep" in over) == kept
+
+
+OTHER = OtherRun("other@0", 4711, "14:03:27")
+
+
+def test_what_another_robot_publishes_is_one_finding_that_names_it_and_the_ways_out() -> None:
+    running = History().clear()
+    slam, wheels = running.joins("/other/slam"), running.joins("/other/wheels")
+    slam.run = wheels.run = OTHER
+    for _ in range(20):
+        running.send(wheels, "cart left_wheel, cart right_wheel").send(slam, "map odom, odom cart").wait(0.1)
+    found = running.found()
+    assert {one.code for one in found} == {"TF854"}
+    assert len(found) <= 2, "a warning of its own frames, and an error of those that both have"
+    expect(found[-1], "TF854", "other@0", "pid 4711", "domain_id", "isolate: topics", "both robots have odom")
+    running.leaves(slam)
+    running.leaves(wheels)
+    assert any("other@0" in over for over in running.wait(10.0).over())
+
+
+def test_another_robot_with_frames_of_its_own_is_warned_of_and_keeps_nobody_from_starting() -> None:
+    running = History()
+    wheels = running.joins("/other/wheels")
+    wheels.run = OTHER
+    running.repeat(wheels, "cart left_wheel, cart right_wheel", 20)
+    assert Clear() in running.events
+    assert [(one.code, one.severity) for one in running.found()] == [("TF854", "warning")]
+
+
+def test_another_robot_that_has_an_edge_of_the_plan_keeps_it_from_starting() -> None:
+    running = History()
+    slam = running.joins("/other/slam")
+    slam.run = OTHER
+    running.repeat(slam, "map odom", 5)
+    (event,) = running.all(Taken)
+    assert isinstance(event, Taken)
+    expect(event.found, "TF854", "other@0", "odom")
+
+
+def test_the_environment_of_another_robots_process_says_whose_run_it_is() -> None:
+    marks = RunMarks("RUN", "rover@0:1", "P", launcher="L")
+    other = {"RUN": "other@0:7", "L": "4711:100", "P": "slam"}
+    found = marks.identify([other]).run
+    assert found is not None
+    assert (found.name, found.pid) == ("other@0", 4711)
+    own: list[dict[str, str]] = [other | {"RUN": "rover@0:1"}]
+    unsure: list[list[dict[str, str]] | None] = [[other, {}], [other | {"L": ""}], own, [{}], [], None]
+    for environments in unsure:
+        assert marks.identify(environments).run is None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from tfcompose.geometry import Pose
 from tfcompose.guard.judge import Judge, JudgeMemory
 from tfcompose.ipc import Clear, Found, GuardEvent, Recovered, Taken
-from tfcompose.live.publishers import Message
+from tfcompose.live.publishers import Message, OtherRun
 from tfcompose.live.publishers import Publisher as TFPublisher
 from tfcompose.plan import GuardPolicy, Plan, PlanClaim, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.plan.codec import decode, encode
@@ -66,6 +66,7 @@ class Publisher:
     ours: bool | None = None
     process: str = ""
     fenced: bool | None = None
+    run: OtherRun | None = None
 
 
 @dataclass
@@ -144,7 +145,14 @@ class History:
     def check(self) -> History:
         writers = [
             TFPublisher(
-                p.gid, p.node, p.static, latched=not p.volatile, ours=p.ours, process=p.process, fenced=p.fenced
+                p.gid,
+                p.node,
+                p.static,
+                latched=not p.volatile,
+                ours=p.ours,
+                process=p.process,
+                fenced=p.fenced,
+                run=p.run,
             )
             for p in self.graph
         ]

@@ -18,6 +18,7 @@ ELSEWHERE = {
     "TF850": "guard/test_guard_faults_ros.py",
     "TF852": "guard/test_liars_ros.py",
     "TF853": "guard/test_liars_ros.py",
+    "TF854": "cli/test_up_ros.py",
 }
 
 

@@ -33,6 +33,7 @@ from tfcompose.ros.tf_codec import number_of_transforms
 from tfcompose.text import counted
 from tfcompose.variables import (
     JOINS,
+    LAUNCHER,
     ORDERS_FD,
     PROCESS,
     REMAPPED,
@@ -80,7 +81,7 @@ class TopicWatch:
         self._reader = MessageReader(judge.compared)
         strict = judge.plan.guard.mode == "strict"
         profile = PROFILE_VARIABLES[0] if strict and private is None else ""
-        marks = RunMarks(RUN_ID, os.environ[RUN_ID], PROCESS, profile) if RUN_ID in os.environ else None
+        marks = RunMarks(RUN_ID, os.environ[RUN_ID], PROCESS, profile, LAUNCHER) if RUN_ID in os.environ else None
         self._graph = TFGraph(node, topics, None if private is None else tuple(private.values()), ours=marks)
         feedback = None if private is None else Feedback(node, private, self.data.own)
         self.relay = Relay(node, self._graph, judge.plan, self.data.own, feedback) if strict else None

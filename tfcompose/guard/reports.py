@@ -14,7 +14,14 @@ from tfcompose.live.publishers import FEWEST_GAPS, NAMELESS_S, UNCOUNTED
 from tfcompose.live.state import NAMELESS
 from tfcompose.plan.topics import GLOBAL
 from tfcompose.verdict.drivers import drives_of
-from tfcompose.verdict.ownership import Violation, misnamed_help, sensor_of, taken_finding, violation_finding
+from tfcompose.verdict.ownership import (
+    Violation,
+    misnamed_help,
+    other_robot_finding,
+    sensor_of,
+    taken_finding,
+    violation_finding,
+)
 from tfcompose.verdict.publishers import (
     best_effort_publisher,
     flood,
@@ -62,6 +69,9 @@ _FATE = {
 FATE_S = 0.3
 #: Violations that ``stop-offender`` ends: who commits them breaks the tree.
 _STOPPED_FOR = frozenset({"TF801", "TF802", "TF803", "TF820"})
+
+#: All that another robot publishes is one finding.
+OTHER_ROBOT = "TF854"
 
 Key = tuple[str, str, str, str]
 #: Code and node, and whether it is about the end.
@@ -122,16 +132,28 @@ class Cases:
         """Report new cases, those of one kind and node in one finding."""
         grouped: dict[Group, list[Case]] = {}
         for case in self._ripe(now):
-            grouped.setdefault((case.violation.code, case.violation.who, False), []).append(case)
+            grouped.setdefault((*self._group(case), False), []).append(case)
         events: list[GuardEvent] = []
         for group, cases in grouped.items():
             if not self._is_due(group, now):
                 continue
             self.changes += 1
-            events.append(self._event(cases, now))
+            if group[0] != OTHER_ROBOT or not self._is_reported(group[1], now, cases):
+                events.append(self._event(cases, now))
             for case in cases:
                 case.reported = True
         return events
+
+    def _group(self, case: Case) -> tuple[str, str]:
+        """Return with what a case is reported: its code and node, or the robot whose run the publisher is of."""
+        run = self._senders.run(case.gid)
+        return (OTHER_ROBOT, run.name) if run else (case.violation.code, case.violation.who)
+
+    def _is_reported(self, robot: str, now: float, cases: list[Case]) -> bool:
+        """Return whether it was reported that the robot runs here, with edges that are as wrong as these."""
+        severe = any(case.violation.edge for case in cases) or any(self._was_first(case, now) for case in cases)
+        known = [one for one in self.open.values() if one.reported and self._group(one) == (OTHER_ROBOT, robot)]
+        return any(not severe or one.violation.edge for one in known)
 
     def _ripe(self, now: float) -> Iterator[Case]:
         """Yield the cases to report: those of which nothing more comes to be known.
@@ -163,9 +185,12 @@ class Cases:
 
     def _event(self, cases: list[Case], now: float) -> GuardEvent:
         violations = [case.violation for case in cases]
-        where = self._senders.where(cases[0].gid)
+        where, run = self._senders.where(cases[0].gid), self._senders.run(cases[0].gid)
         if any(self._was_first(case, now) for case in cases):
-            return Taken(taken_finding(violations, where))
+            found = other_robot_finding(violations, run, self._plan) if run else taken_finding(violations, where)
+            return Taken(found)
+        if run:
+            return Found(other_robot_finding(violations, run, self._plan))
         driven = sensor_of(violations[0], self._drives)
         found = violation_finding(violations, self._plan, where, driven)
         if advice := misnamed_help(violations, self._plan, self._senders.process(cases[0].gid)):
@@ -234,9 +259,9 @@ class Cases:
             case = self.open.pop(key)
             one = case.violation
             kept = one.static and not one.is_of_stamps and not self._senders.was_held_back(case.gid)
-            self._ended.setdefault((one.code, one.who, True), []).append((one, kept))
+            self._ended.setdefault((*self._group(case), True), []).append((one, kept))
         due = [group for group in self._ended if self._is_due(group, now)]
-        return [Recovered(text) for group in due for text in _over(self._ended.pop(group))]
+        return [Recovered(text) for group in due for text in _over(group, self._ended.pop(group))]
 
     def _has_ended(self, case: Case, now: float) -> bool:
         if self._senders.is_present(case.gid) and not case.violation.is_of_stamps:
@@ -244,8 +269,11 @@ class Cases:
         return now - case.last > OVER_S
 
 
-def _over(ended: list[tuple[Violation, bool]]) -> list[str]:
-    """Return in words that these of one kind and node are over, each with whether listeners keep what was latched."""
+def _over(group: Group, ended: list[tuple[Violation, bool]]) -> list[str]:
+    """Return in words that these of one group are over, each with whether listeners keep what was latched."""
+    if group[0] == OTHER_ROBOT:
+        kept = any(kept for _, kept in ended)
+        return [ended[0][0].over(len(ended) - 1, kept=kept, who=group[1])]
     if len(ended) <= OVER_IN_LINES:
         return [one.over(kept=kept) for one, kept in ended]
     return [ended[0][0].over(len(ended) - 1, kept=any(kept for _, kept in ended))]

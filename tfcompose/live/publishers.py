@@ -97,6 +97,15 @@ UNCOUNTED = 2**64 - 1
 
 
 @dataclass(frozen=True, slots=True)
+class OtherRun:
+    """A run of another robot: its name, ROBOT@DOMAIN, its launcher's process, and since when: 14:03:27, local time."""
+
+    name: str
+    pid: int
+    since: str
+
+
+@dataclass(frozen=True, slots=True)
 class Publisher:
     """A publisher on a TF topic, as the graph shows it.
 
@@ -113,6 +122,7 @@ class Publisher:
         fenced: whether it sends behind the fence of a strict plan; None: there is no fence.
         others: further nodes of which it may be one.
         process: the plan's process that it is of, where that was seen.
+        run: the run of another robot that it is of, where that was seen.
     """
 
     gid: bytes
@@ -127,6 +137,7 @@ class Publisher:
     fenced: bool | None = None
     others: tuple[str, ...] = ()
     process: str = ""
+    run: OtherRun | None = None
 
     @property
     def nodes(self) -> tuple[str, ...]:
@@ -279,6 +290,11 @@ class Senders(Publishers):
         """Whether what the publisher may not send reaches nobody in a strict plan; None: that is not known."""
         one = self.present.get(gid) if gid is not None else None
         return one.fenced if one else None
+
+    def run(self, gid: bytes | None) -> OtherRun | None:
+        """Return the run of another robot that the publisher is of, by its environment; None: no such is known."""
+        one = self.known.get(gid) if gid is not None else None
+        return one.run if one else None
 
     def was_held_back(self, gid: bytes | None) -> bool:
         """Return whether what one that may have left sent reached nobody, for all that is known."""

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
 from hashlib import blake2b
 from typing import TYPE_CHECKING
 
-from tfcompose.live.publishers import PARTICIPANT, Publisher, forget_oldest
+from tfcompose.live.publishers import PARTICIPANT, OtherRun, Publisher, forget_oldest
 from tfcompose.live.state import NO_NODE
 from tfcompose.plan.topics import GLOBAL, is_fence
 from tfcompose.ros.graph import BARE_DDS, UNKNOWN_NODE, ids_say_who, own_gid, writers, writers_unmapped
 from tfcompose.ros.node import PublicTFReader, TFSubscription
-from tfcompose.ros.processes import environments, origin
+from tfcompose.ros.processes import began_at, environments, origin
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -83,17 +84,21 @@ class Identity:
         ours: whether it is of one's own run.
         process: the plan's process that it is of.
         fenced: whether it was started with its profile of the fence; None too where it is of another run.
+        run: the run of another robot that it is of.
     """
 
     ours: bool | None = None
     process: str = ""
     fenced: bool | None = None
+    run: OtherRun | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class RunMarks:
-    """What the environments of one's own run say: ``variable`` holds ``run``, ``process`` the plan's process.
+    """What the environments of runs say: ``variable`` holds one's own ``run``, ``process`` the plan's process.
 
+    ``launcher`` holds a run's launcher: its process number, and when it began, in clock ticks since the start of the
+    machine.
     ``profile`` names the profile file that fences the process off; empty: there is no such fence.
     """
 
@@ -101,6 +106,7 @@ class RunMarks:
     run: str
     process: str
     profile: str = ""
+    launcher: str = ""
 
     def identify(self, found: Sequence[Mapping[str, str]] | None) -> Identity:
         """Return whose process it is of which one of these is the environment; None: nobody can say."""
@@ -108,10 +114,19 @@ class RunMarks:
             return Identity()
         own = [one for one in found if one.get(self.variable) == self.run]
         if len(own) != 1:
-            return Identity(ours=bool(own))
+            others = [one for one in found if one.get(self.variable)]
+            return Identity(ours=bool(own), run=self._other(others[0]) if len(found) == len(others) == 1 else None)
         process = own[0].get(self.process, "")
         fenced = is_fence(own[0].get(self.profile, ""), process) if self.profile and process else None
         return Identity(ours=True, process=process, fenced=fenced)
+
+    def _other(self, environment: Mapping[str, str]) -> OtherRun | None:
+        """Return the run that this is the environment of, unless it is one's own."""
+        run, (pid, _, ticks) = environment[self.variable], environment.get(self.launcher, "").partition(":")
+        if run == self.run or not (pid + ticks).isdecimal():
+            return None
+        since = time.strftime("%H:%M:%S", time.localtime(began_at(int(ticks))))
+        return OtherRun(run.partition(":")[0], int(pid), since)
 
 
 class TFGraph:
@@ -234,6 +249,7 @@ class TFGraph:
             known.ours,
             fenced if fenced is not None else False if one.gid in self._public else known.fenced,
             process=known.process,
+            run=known.run,
         )
 
     def _own_gid(self) -> bytes:

@@ -8,6 +8,7 @@ Of other users' processes, and other systems than Linux, nothing is known. This 
 from __future__ import annotations
 
 import os
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -74,6 +75,11 @@ def environments(gid: bytes, own_gid: bytes) -> list[dict[str, str]] | None:
         return [_environment(pid) for pid in _candidates(gid) if _command(pid)]
     except PermissionError:
         return None
+
+
+def began_at(ticks: int) -> float:
+    """Return when a process began, in seconds since 1970, of clock ticks since the machine's start."""
+    return time.time() - time.clock_gettime(time.CLOCK_BOOTTIME) + ticks / os.sysconf("SC_CLK_TCK")
 
 
 def _is_known(gid: bytes, own_gid: bytes) -> bool:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, Note, finding
 from tfcompose.live.state import NAMELESS, NO_NODE
-from tfcompose.text import counted
+from tfcompose.text import counted, listed
 from tfcompose.tree import loop_closed_by
 from tfcompose.verdict import publishers, stamps, tree
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from tfcompose.catalogue import Severity
     from tfcompose.findings import Span
-    from tfcompose.live.publishers import Senders
+    from tfcompose.live.publishers import OtherRun, Senders
     from tfcompose.plan import Driven, Plan, PlanEdge
 
 LOOP, SELF, TWO_PUBLISHERS = "TF820", "TF821", "TF822"
@@ -105,13 +105,16 @@ class Violation:
         """Whether it is about stamps, and over as soon as these are right."""
         return self.code in _OF_STAMPS
 
-    def over(self, more: int = 0, *, kept: bool = False) -> str:
-        """Return the sentence that it and so many ``more`` have ended; listeners may have ``kept`` what was latched."""
+    def over(self, more: int = 0, *, kept: bool = False, who: str = "") -> str:
+        """Return the sentence that it and so many ``more`` have ended; listeners may have ``kept`` what was latched.
+
+        ``who`` is named instead of the node, where it is given.
+        """
         named = f"{self.name} and {more} more edges" if more else self.name
         if self.is_of_stamps:
             return f"{self.who} stamps {named} as it should again"
         rest = "; listeners keep what it latched until they get another value, or start again" if kept else ""
-        return f"{named} {'are' if more else 'is'} no longer published by {self.who}{rest}"
+        return f"{named} {'are' if more else 'is'} no longer published by {who or self.who}{rest}"
 
 
 def code_of(edge: PlanEdge, parent: str, *, static: bool, owner: bool, sure: bool) -> str:
@@ -173,6 +176,21 @@ def taken_finding(found: Sequence[Violation], where: str = "") -> Finding:
         owner = f"processes: {{NAME: {{external: true, node: {first.nodes[0]}}}}}"
         advice += f", or let it own the edge: {owner}, and owner: NAME at the edge"
     return finding("TF807", message, None, help=advice, notes=notes)
+
+
+def other_robot_finding(found: Sequence[Violation], run: OtherRun, plan: Plan) -> Finding:
+    """Return the finding for all that another robot publishes here, whatever is wrong with each edge."""
+    mild = all(one.edge is None and one.code in {"TF803", TWO_PUBLISHERS} for one in found)
+    children = list(dict.fromkeys(one.child for one in found))
+    message = f"{run.name} (pid {run.pid}, since {run.since}) runs in this domain: it publishes {listed(children)}"
+    nodes = dict.fromkeys(node for one in found for node in one.nodes)
+    both = [one.child for one in found if one.edge is not None]
+    notes = [Note(f"its nodes are {listed(nodes)}")] if nodes else []
+    notes += [Note(f"both robots have {listed(dict.fromkeys(both))}")] if both else []
+    advice = f"end it: tfcompose down --robot {run.name}; or keep them apart: ros: {{domain_id: N}}, or "
+    advice += "ros: {namespace: NAME, isolate: topics}"
+    severity: Severity = "warning" if mild and plan.guard.unknown_edges == "warn" else "error"
+    return finding("TF854", message, None, notes=notes, help=advice, severity=severity)
 
 
 def misnamed_help(found: Sequence[Violation], plan: Plan, process: str) -> str:

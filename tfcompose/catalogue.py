@@ -108,6 +108,7 @@ CATALOGUE: dict[str, Code] = {
         Code("TF315", "joint_outside_description", "ownership", "error"),
         Code("TF316", "shared_frame_in_description", "ownership", "error"),
         Code("TF317", "stock_publisher_publishes_too", "ownership", "error"),
+        Code("TF318", "frame_without_prefix", "ownership", "error"),
         Code("TF330", "node_publishes_too", "ownership", "error"),
         Code("TF331", "claim_not_declared", "ownership", "warning"),
         Code("TF332", "owner_not_known_to_publish", "ownership", "warning"),

@@ -26,7 +26,7 @@ processes:
     run: {package: robot_localization, executable: ekf_node, args: ["--to=${frame(map)}"]}
     params: {odom_frame: "${frame(odom)}", list: ["${frame(map)}", "a ${frame(base_link)} b"]}
     remap: {odometry: odom}
-rules: {TF306: off}
+rules: {TF306: off, TF318: off}
 guard: {allow: [{parent: camera_link, child: "tag:*"}, {parent: "*", child: thing}]}
 """
 

@@ -281,6 +281,15 @@ def test_a_file_that_is_missing_or_of_no_known_format_is_a_finding(
     assert code in [one.code for one in found]
 
 
+def test_a_node_that_is_listed_alone_does_not_rename_the_others() -> None:
+    """ros2_control_node has controller_manager besides the controllers that are listed."""
+    listed = process_of(f"{EXE}, nodes: {{drive: {{params: {{rate: 5}}}}}}")
+    assert not [word for word in listed.argv if word.startswith("__node")]
+    assert "__ns:=/r1" in listed.argv
+    assert listed.nodes == ("/r1/drive",)
+    assert "__node:=drive" in process_of(f"{EXE}, node: drive").argv
+
+
 ROS2 = {
     "run: [ros2, run, p, e]": "run: {package: p, executable: e}",
     "run: [ros2, run, p, e, --fast, now]": "run: {package: p, executable: e, args: [--fast, now]}",

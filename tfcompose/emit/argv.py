@@ -96,8 +96,11 @@ def _launch_time_params(params: dict[str, Any], above: str = "") -> Iterator[tup
 
 
 def _names(process: Process, robot: Robot) -> list[str]:
-    """Return what gives the node its name and namespace; several nodes have names of their own."""
-    if len(process.nodes) > 1:
+    """Return what gives the node its name and namespace; those that are listed as several have names of their own.
+
+    A name on the command line would rename every node of the process, also those that are not listed.
+    """
+    if len(process.nodes) > 1 or process.ros_nodes[0].path[2:3] == ("nodes",):
         return ["-r", f"__ns:=/{robot.ros.namespace if process.namespace is None else process.namespace}"]
     namespace, _, node = process.node.rpartition("/")
     return ["-r", f"__node:={node}", "-r", f"__ns:={namespace or '/'}"]

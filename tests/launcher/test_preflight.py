@@ -60,7 +60,7 @@ UNSTARTABLE: dict[str, tuple[PlanProcess, bool, str, list[str]]] = {
         lidar("${executable:sllidar_ros2/slidar_node}"),
         True,
         "TF810",
-        ["sllidar_ros2/slidar_node of lidar", "sllidar_node?", "PREFIX/lib/sllidar_ros2/slidar_node", "PATH: "],
+        ["sllidar_ros2/slidar_node of lidar", "sllidar_node?", "PREFIX/lib/sllidar_ros2/slidar_node", "PATH"],
     ),
     "not installed": (lidar("${executable:nope/no_such_node}"), True, "TF810", ["package nope"]),
     "nothing sourced": (lidar("${executable:nope/no_node}"), False, "TF810", ["setup file", "AMENT_PREFIX_PATH"]),
@@ -90,7 +90,7 @@ def test_all_that_is_missing_is_one_finding_that_names_the_folders_searched_once
     words = {"laser": "${executable:sllidar_ros2/sllidar_node}", "slam": "${executable:slam_toolbox/slam}", "a": "no_a"}
     _, (found,) = inspect(tmp_path, *(PlanProcess(name, "run", argv=(word,)) for name, word in words.items()))
     missing = "sllidar_ros2/sllidar_node of laser, slam_toolbox/slam of slam, no_a of a"
-    expect(found, "TF810", "3 executables", missing, "AMENT_PREFIX_PATH", f": {os.environ['PATH']}", "setup file")
+    expect(found, "TF810", "3 executables", missing, "AMENT_PREFIX_PATH", "folders of PATH", "setup file")
     assert len(found.notes) == 2
 
 

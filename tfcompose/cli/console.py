@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections import deque
+from dataclasses import replace
 from functools import singledispatchmethod
 from typing import TYPE_CHECKING, Protocol
 
@@ -39,6 +41,8 @@ LAUNCHER = "tfcompose"
 #: A longer name before a line does not move all lines to the right.
 WIDEST_NAME = 24
 NAMED_AT_MOST = 4
+#: Of so many last lines of a process it is known that they were printed; findings quote fewer.
+QUOTED_AT_MOST = 40
 #: States that need no line of their own: the edges say more.
 UNREPORTED = frozenset({"STARTING", "STOPPED"})
 
@@ -94,6 +98,8 @@ class Console:
         self._width = prefix_width([*names, LAUNCHER])
         self._colours = {name: COLOURS[index % len(COLOURS)] for index, name in enumerate(names)}
         self._nodes = {process.name: process.nodes for process in plan.processes}
+        #: The last lines of each process, as findings quote them: what was printed is not printed again.
+        self._printed: dict[str, deque[str]] = {}
         self._hosts = {process.name: f"host {process.host}" for process in plan.processes if process.host}
 
     def __call__(self, notice: Notice) -> None:
@@ -124,6 +130,8 @@ class Console:
     @_write.register
     def _(self, notice: LogLine) -> None:
         self._line(notice.process, notice.text, self._colours.get(notice.process, ""), log=True)
+        last = self._printed.setdefault(notice.process, deque(maxlen=QUOTED_AT_MOST))
+        last.append(f"{notice.process}: {notice.text}")
 
     @_write.register
     def _(self, notice: ProcessState) -> None:
@@ -183,7 +191,8 @@ class Console:
 
     @_write.register
     def _(self, notice: FindingShown) -> None:
-        for line in render_text([notice.found], line_of, colour=self._colour).splitlines():
+        notes = tuple(one for one in notice.found.notes if not self._is_printed(one.message))
+        for line in render_text([replace(notice.found, notes=notes)], line_of, colour=self._colour).splitlines():
             self._say(line)
 
     @_write.register
@@ -201,8 +210,13 @@ class Console:
             return
         first, *rest = notice.because or ("",)
         for line in rest:
-            self._say(f"   {line}")
+            if not self._is_printed(line):
+                self._say(f"   {line}")
         self._say(self._paint(f"ended with exit code {notice.exit_code}{f': {first}' if first else ''}", RED))
+
+    def _is_printed(self, quoted: str) -> bool:
+        """Return whether a line that a finding quotes is among the last ones that its process printed."""
+        return any(quoted in lines for lines in self._printed.values())
 
     def _say(self, text: str) -> None:
         self._line(LAUNCHER, text, BOLD)

@@ -198,7 +198,7 @@ def not_found(missing: Sequence[NotFound]) -> Finding:
     if len(missing) == 1:
         message = f"the executable {what} was not found"
     places = dict.fromkeys(place for one in missing for place in one.places)
-    paths = dict.fromkeys(f"looked in the PATH: {one.path}" for one in missing if one.path)
+    paths = ["looked in the folders of PATH"] if any(one.path for one in missing) else []
     advice = dict.fromkeys(one.advice for one in missing if one.advice)
     return finding("TF810", message, None, notes=[Note(note) for note in (*places, *paths)], help="; ".join(advice))
 

@@ -32,7 +32,7 @@ def static(own: Own, stop: Stop) -> None:
         publisher = TFPublisher(node, static=True)
         if edges:
             publisher.publish(encode(edges))
-        say(f"{counted(len(edges), 'edge')} on /tf_static")
+        say(f"{counted(len(edges), 'edge')} on /tf_static" if edges else "the description; no edge is fixed")
         ready()
         if _joints_of(own) in {
             process.name for process in own.plan.processes if process.kind in ("joints", "external")

@@ -48,8 +48,18 @@ def run(arguments: Namespace) -> int:
     from tfcompose.render.tree import tree
 
     robot = compiled_robot(arguments.file or DEFAULT_FILE, arguments).with_final_names()
-    sys.stdout.write(_planned_json(robot) if arguments.format == "json" else tree(robot))
+    sys.stdout.write(_planned_json(robot) if arguments.format == "json" else _fitted(tree(robot)))
     return 0
+
+
+def _fitted(text: str) -> str:
+    """Return the text with each line cut to the width of the terminal; into a file or a pipe it stays as it is."""
+    from tfcompose.cli.tables import shortened
+
+    columns = table_width(sys.stdout)
+    if columns is None:
+        return text
+    return "".join(f"{shortened(line, columns - 1, at_end=True)}\n" for line in text.splitlines())
 
 
 def _planned_json(robot: Robot) -> str:

@@ -1,0 +1,54 @@
+"""What ``up`` prints of a process that fails: its last lines once, and the cause at the end."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.support.cli import tfcompose_in
+from tfcompose.cli.commands import tree
+from tfcompose.cli.console import Console
+from tfcompose.findings import Note, finding
+from tfcompose.ipc import Ended, FindingShown, LogLine
+from tfcompose.plan import Plan, PlanProcess, RosSettings
+
+PLAN = Plan("rover", "", None, RosSettings(), (), (PlanProcess("drive", "run"),))
+FAILED = finding("TF808", "drive ended with exit code 1", None, notes=[Note("drive: boom"), Note("it ran for 2 s")])
+ROBOTS = Path(__file__).parents[2] / "robots"
+
+
+class Printed:
+    """Keeps what is written."""
+
+    def __init__(self) -> None:
+        self.text = ""
+
+    def write(self, text: str, *, log: bool = False) -> None:
+        del log
+        self.text += text
+
+
+def test_lines_that_were_printed_are_not_quoted_again() -> None:
+    output = Printed()
+    console = Console(PLAN, output, colour=False)
+    for notice in (LogLine("drive", "stderr", "boom"), FindingShown(FAILED), Ended(1, ("drive ended", "drive: boom"))):
+        console(notice)
+    assert output.text.count("boom") == 1
+    assert "it ran for 2 s" in output.text
+    assert output.text.count("drive ended") == 2
+
+
+def test_lines_that_were_not_printed_are_quoted() -> None:
+    output = Printed()
+    Console(PLAN, output, colour=False)(FindingShown(FAILED))
+    assert output.text.count("boom") == 1
+
+
+def test_a_tree_on_a_terminal_does_not_wrap_and_in_a_pipe_is_in_full(monkeypatch: pytest.MonkeyPatch) -> None:
+    full = tfcompose_in(ROBOTS, "tree", "autonomous_robot.yaml").stdout.splitlines()
+    monkeypatch.setattr(tree, "table_width", lambda _stream: 80)
+    fitted = tfcompose_in(ROBOTS, "tree", "autonomous_robot.yaml").stdout.splitlines()
+    assert max(map(len, full)) > 80 > max(map(len, fitted))
+    assert all(
+        short.removesuffix("…") == line[: len(short.removesuffix("…"))]
+        for short, line in zip(fitted, full, strict=True)
+    )

@@ -129,4 +129,4 @@ def test_who_joins_the_fence_on_purpose_is_held_back(robot: Robot, rogue: Callab
     listener = PlainListener()
     assert OTHER_X not in listener.until("odom", OWNER_X, 40)
     assert "extra" not in listener.heard
-    assert "listeners get it" not in robot.output_after(after)
+    assert "listeners receive it" not in robot.output_after(after)

@@ -313,7 +313,7 @@ def test_the_policy_stop_offender_stops_the_plans_own_offender_and_no_stranger(
     (tmp_path / "lie").touch()
     robot.says("error[TF801]", "map → odom", "/traitor;", "slam (/slam)", notes=("traitor is stopped",))
     robot.says("over", "map → odom", "/traitor")
-    assert robot.count("is stopped for it") == 1
+    assert robot.count("traitor is stopped") == 1
     assert robot.popen.poll() is None
 
     def children() -> list[list[str]]:

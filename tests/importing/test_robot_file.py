@@ -234,6 +234,33 @@ def test_a_value_a_little_off_the_presets_is_kept_and_one_further_off_is_no_matc
     assert sensor["frames"] == {"d435i_color_frame": {"xyz": [0, 0.0155, 0]}}
 
 
+def test_a_mesh_can_say_which_model_a_sensor_is(tmp_path: Path) -> None:
+    for mesh, preset in (("vlp16_base.dae", "velodyne/vlp16"), ("VLP-32C.stl", "velodyne/vlp32c"), ("puck.dae", "")):
+        body = f'<visual><geometry><mesh filename="package://x/meshes/{mesh}"/></geometry></visual>'
+        base = fixed("roof_base_link").replace(
+            '<link name="roof_base_link"/>', f'<link name="roof_base_link">{body}</link>'
+        )
+        urdf = f"{HEAD}{base}{fixed('roof', 'roof_base_link', 'xyz=' + chr(34) + '0 0 0.0377' + chr(34))}</robot>"
+        assert body in urdf
+        text = imported(urdf, tmp_path)
+        sensors = data(text).get("sensors", {})
+        assert [one["preset"] for one in sensors.values()] == ([preset] if preset else [])
+        assert bool(preset) or "sensors: {roof: {preset: …" in " ".join(text.replace("#", "").split())
+
+
+def test_rotations_rounded_as_people_round_them_are_those_of_the_preset(tmp_path: Path) -> None:
+    frames = fixed("camera_link") + fixed("camera_rgb_frame", "camera_link", 'xyz="0.003 0.011 0.009"')
+    frames += fixed("camera_rgb_optical_frame", "camera_rgb_frame", 'rpy="-1.57 0 -1.57"')
+    (sensor,) = data(imported(f"{HEAD}{frames}</robot>", tmp_path))["sensors"].values()
+    assert sensor["preset"] == "robotis/pi-camera"
+    assert sensor["frames"] == {"camera_rgb_optical_frame": {"rpy": [-1.57, 0, -1.57]}}
+
+
+def test_numbers_have_no_digits_that_computing_left_behind(tmp_path: Path) -> None:
+    mast = fixed("mast", origin='xyz="0.010267499999999999 0.30000000000000004 1.23456789012345"')
+    assert "[0.0102675, 0.3, 1.23456789012345]" in imported(f"{HEAD}{mast}</robot>", tmp_path)
+
+
 def test_no_sensors_leaves_frames_frames(tmp_path: Path) -> None:
     assert "sensors" not in data(imported(d435(tmp_path, name="d435i"), tmp_path, "--no-sensors"))
 

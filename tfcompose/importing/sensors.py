@@ -1,14 +1,15 @@
 """Sensors in a URDF: chains of fixed frames whose names and poses are those of a preset.
 
 A preset is recognised by frames inside of it: by one at least whose position, which is not 0, is the vendor's. Where
-several presets fit equally well, a generic one is taken, or the one whose name is in the sensor's; else none is, with a
-note.
+several presets fit equally well, a generic one is taken, or the one whose name is in the sensor's or in a mesh's; else
+none is, and a note asks which it is.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
+import posixpath
 import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -25,8 +26,8 @@ if TYPE_CHECKING:
     from tfcompose.model import Edge, Robot
     from tfcompose.resolve.presets import Library
 
-#: As near (m, rad) as a pose must be to a preset's to be taken for it.
-NEAR = 1e-6
+#: As near as a pose must be to a preset's to be taken for it: rotations are often written with -1.57.
+NEAR, NEAR_RAD = 1e-6, 2e-3
 #: As near as it must be to be left to the preset.
 EQUAL = 1e-13
 #: Every camera has frames that are turned as optical ones are: that alone names no vendor.
@@ -100,31 +101,42 @@ def recognised(robot: Robot, library: Library, reserved: frozenset[str]) -> tupl
         if frames & taken or any(sensor.name == fit.sensor.name for sensor in sensors):
             continue
         rivals = [one for one in fits if one.quality[:2] == fit.quality[:2] and one.sensor.mount == fit.sensor.mount]
-        chosen = _chosen(rivals, fit)
+        chosen = _chosen(rivals, fit, robot)
         taken |= frames
         if chosen:
             sensors.append(chosen)
         else:
             several = ", ".join(dict.fromkeys(one.sensor.preset for one in rivals))
-            undecided[fit.sensor.mount.child] = f"its frames fit several sensors equally well: {several}"
+            entry = f"sensors: {{{fit.sensor.name}: {{preset: …, parent: {fit.sensor.mount.parent}}}}}"
+            undecided[fit.sensor.mount.child] = (
+                f"which of these is it? its frames fit several sensors equally well: {several}; then write {entry}, "
+                "with its pose, in the place of these frames"
+            )
     order = [edge.child for edge in robot.edges]
     return sorted(sensors, key=lambda one: order.index(one.mount.child)), undecided
 
 
-def _chosen(rivals: list[_Fit], best: _Fit) -> Recognised | None:
+def _chosen(rivals: list[_Fit], best: _Fit, robot: Robot) -> Recognised | None:
     if len({one.sensor.preset for one in rivals}) == 1:
         return best.sensor
     generic = [one.sensor for one in rivals if one.sensor.preset.startswith(f"{GENERIC}/")]
-    named = sorted((one.sensor for one in rivals if _names_model(one.sensor)), key=lambda one: -len(one.preset))
+    named = sorted((one.sensor for one in rivals if _names_model(one.sensor, robot)), key=lambda one: -len(one.preset))
     if named:  # of d435 and d435i, both in a name, the longer one
         return named[0]
     return generic[0] if generic else None
 
 
-def _names_model(sensor: Recognised) -> bool:
-    """Whether the sensor's name contains the model's."""
-    name = re.sub("[^a-z0-9]", "", sensor.name.lower())
-    return re.sub("[^a-z0-9]", "", sensor.preset.partition("/")[2].lower()) in name
+def _names_model(sensor: Recognised, robot: Robot) -> bool:
+    """Whether the model's name is in the sensor's, or in that of a mesh on its frames."""
+    links = [robot.links[edge.child] for edge in sensor.edges if edge.child in robot.links]
+    shapes = [shape for link in links for shape in (*link.visuals, *link.collisions)]
+    files = [posixpath.basename(shape.mesh.uri) for shape in shapes if shape.mesh]
+    model = _squeezed(sensor.preset.partition("/")[2])
+    return any(model in _squeezed(text) for text in (sensor.name, *files))
+
+
+def _squeezed(text: str) -> str:
+    return re.sub("[^a-z0-9]", "", text.lower())
 
 
 @dataclass(slots=True)
@@ -192,7 +204,7 @@ class _Search:
         unknown = frame.xyz is None and rotation is None
         nominal = Pose(frame.xyz or edge.pose.xyz, rotation or (edge.pose if unknown else Pose()).quat_xyzw)
         far, twist = math.dist(nominal.xyz, edge.pose.xyz), angle_between(nominal.quat_xyzw, edge.pose.quat_xyzw)
-        if far > NEAR or twist > NEAR:
+        if far > NEAR or twist > NEAR_RAD:
             return None
         rotates = rotation is not None and rotation != Pose().quat_xyzw
         tells = (frame.xyz is not None and any(frame.xyz)) or (preset.vendor == GENERIC and rotates)

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 
 WIDTH = 120
 
+#: So many digits people write at most; what computing leaves behind is below this part of a number.
+_DIGITS, _LEFT_BEHIND = 12, 4e-16
+
 #: What needs no quotes: a name, a path, an address.
 _PLAIN = re.compile(r"(?:[a-z]+://)?[A-Za-z_][A-Za-z0-9_./+-]*")
 #: What readers of other versions of YAML take for something else than a text.
@@ -74,8 +77,14 @@ def flow(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, (int, float)):
-        return number(float(value))
+        return number(_as_people_write(float(value)))
     return text(value)
+
+
+def _as_people_write(value: float) -> float:
+    """Return the number without what computing left in its last digits: 0.010267499999999999 was 0.0102675."""
+    near = float(f"{value:.{_DIGITS}g}")
+    return near if abs(near - value) <= _LEFT_BEHIND * abs(value) else value
 
 
 def text(value: str) -> str:

@@ -51,6 +51,7 @@ _HABITS: dict[str, tuple[tuple[str, str], ...]] = {
             (("run", "a ROS node is run: {package: slam_toolbox, executable: async_slam_toolbox_node}"),),
         ),
         ("launch launch_file", (("run", "a launch file is run: {launch: slam_toolbox/online_async_launch.py}"),)),
+        ("preset", (("node", "the preset of a node is node: {preset: slam_toolbox}"),)),
         ("type model", (("preset", "which sensor it is says preset: realsense/d435i; tfcompose presets lists them"),)),
     )
     for word in words.split()

@@ -138,7 +138,10 @@ class _Work:
             claimant.computed[key] = value
         elif given != value:
             message = f"{key} of {claimant.process.name} is {given!r}, but in the tree it is {value!r}"
-            self.found.append(finding("TF333", message, self._at(claimant, key), help="remove it: tfcompose writes it"))
+            advice = "remove it: tfcompose writes it"
+            if not claimant.takes_parameters:
+                advice = f"set {key}: {_shown(value)} where {claimant.process.name} is started, and here"
+            self.found.append(finding("TF333", message, self._at(claimant, key), help=advice))
 
     def _is_own(self, claimant: Claimant, claim: ClaimSpec) -> bool:
         edge = self._edge(*claimant.ends(claim))
@@ -280,6 +283,10 @@ class Claimant:
         if process.kind != "run":
             return False
         return process.takes_ros_arguments or "${params_file}" in " ".join(process.argv)
+
+
+def _shown(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 _HOLE = re.compile(r"\{(\w+)\}")

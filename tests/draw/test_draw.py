@@ -6,7 +6,8 @@ import random
 import re
 from collections import Counter
 from dataclasses import replace
-from typing import Any
+from itertools import pairwise
+from typing import Any, get_args
 from xml.etree import ElementTree as ET
 
 import pydot
@@ -17,7 +18,8 @@ from PIL import Image
 
 from tests.support.tables import for_each
 from tfcompose.draw import Arrow, Graph, Group
-from tfcompose.draw.graph import Kind
+from tfcompose.draw.graph import Kind, collapsed
+from tfcompose.draw.layout import Direction
 from tfcompose.draw.markup import dot, mermaid
 from tfcompose.draw.pdf import pdf
 from tfcompose.draw.picture import Box, Drawing, Text, draw
@@ -25,6 +27,7 @@ from tfcompose.draw.png import png
 from tfcompose.draw.style import STYLES, width_of
 from tfcompose.draw.svg import svg
 
+DIRECTIONS = get_args(Direction)
 SVG = "{http://www.w3.org/2000/svg}"
 KINDS: tuple[Kind, ...] = ("static", "joint", "dynamic")
 ODD = (
@@ -107,7 +110,11 @@ def around(shape: Box | Text) -> tuple[float, float, float, float]:
 
 @for_each(FAMILY)
 def test_no_boxes_and_no_texts_overlap_and_all_is_on_the_paper(seed: int, frames: int, *, poses: bool) -> None:
-    drawing = draw(tree(seed, frames, poses=poses))
+    for direction in DIRECTIONS:
+        nothing_overlaps(draw(tree(seed, frames, poses=poses), direction), frames)
+
+
+def nothing_overlaps(drawing: Drawing, frames: int) -> None:
     texts = [around(shape) for shape in drawing.shapes if isinstance(shape, Text)]
     boxes = [around(box) for box in boxes_of(drawing, "box", "root")]
     assert len(boxes) == frames
@@ -127,7 +134,11 @@ def test_the_area_of_a_group_holds_its_frames_entirely_and_crosses_no_box(
     seed: int, frames: int, *, poses: bool
 ) -> None:
     graph = tree(seed, frames, poses=poses)
-    drawing = draw(graph)
+    for direction in DIRECTIONS:
+        areas_hold_their_frames(graph, draw(graph, direction))
+
+
+def areas_hold_their_frames(graph: Graph, drawing: Drawing) -> None:
     areas = [around(box) for box in boxes_of(drawing, "group")]
     boxes = {name: around(box) for name, box in zip(_names(drawing), boxes_of(drawing, "box", "root"), strict=True)}
     for box in boxes.values():
@@ -136,6 +147,48 @@ def test_the_area_of_a_group_holds_its_frames_entirely_and_crosses_no_box(
             assert inside or not overlaps(box, area)
     for frame in (frame for group in graph.groups for frame in group.frames):
         assert any(overlaps(boxes[frame], area) for area in areas)
+
+
+def chain(frames: int) -> Graph:
+    names = tuple(f"link_{index}_of_an_arm" for index in range(frames))
+    arrows = tuple(Arrow(parent, child, "joint", "joints", pose="xyz 0.1 0 0") for parent, child in pairwise(names))
+    return Graph("arm", names, arrows)
+
+
+def test_a_long_chain_goes_down_by_itself_and_others_to_the_right() -> None:
+    down, right = draw(chain(13)), draw(chain(13), "right")
+    assert down == draw(chain(13), "down")
+    assert down.width < right.width / 2
+    assert max(down.width, down.height) < 2 * min(down.width, down.height)
+    assert draw(chain(4)) == draw(chain(4), "right")
+    assert "rankdir=TB" in dot(chain(4), is_down=True)
+    assert mermaid(chain(4), is_down=True).startswith("flowchart TD")
+
+
+def test_downwards_a_child_is_below_its_parent_and_to_its_right() -> None:
+    graph = tree(3, 40)
+    drawing = draw(graph, "down")
+    boxes = {name: around(box) for name, box in zip(_names(drawing), boxes_of(drawing, "box", "root"), strict=True)}
+    assert all(boxes[one.parent][0] < boxes[one.child][0] for one in graph.arrows)
+    assert all(boxes[one.parent][3] < boxes[one.child][1] for one in graph.arrows)
+
+
+def test_a_collapsed_sensor_is_its_mount_and_what_leads_to_other_frames() -> None:
+    edges = ("base cam", "cam lens", "lens optical", "cam imu", "lens filter", "base laser")
+    pairs = [edge.split() for edge in edges]
+    arrows = tuple(Arrow(a, b, "static", "static", "5 Hz" if b == "cam" else "") for a, b in pairs)
+    frames = ("base", "cam", "lens", "optical", "imu", "filter", "laser")
+    groups = (Group("camera", ("cam", "lens", "optical", "imu")), Group("laser", ("laser",)))
+    graph = collapsed(Graph("robot", frames, arrows, groups))
+    assert graph.frames == ("base", "cam", "lens", "filter", "laser")
+    assert [(one.parent, one.child, one.detail) for one in graph.arrows] == [
+        ("base", "cam", "5 Hz +2"),
+        ("cam", "lens", ""),
+        ("lens", "filter", ""),
+        ("base", "laser", ""),
+    ]
+    assert [group.frames for group in graph.groups] == [("cam", "lens"), ("laser",)]
+    nothing_overlaps(draw(graph), len(graph.frames))
 
 
 def _names(drawing: Drawing) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
@@ -58,6 +58,32 @@ class Graph:
     def all_owners(self) -> list[str]:
         """Return every owner once: those that were given, then those that only edges name."""
         return list(dict.fromkeys((*self.owners, *(arrow.owner for arrow in self.arrows))))
+
+
+def collapsed(graph: Graph) -> Graph:
+    """Return the graph with each group as the frames that others need: where it begins, and what leads to others."""
+    up = {arrow.child: arrow for arrow in reversed(graph.arrows) if not arrow.alternative}
+    inside = {frame: group for group in graph.groups for frame in group.frames}
+    first = {frame for frame, group in inside.items() if frame not in up or inside.get(up[frame].parent) != group}
+    needed = set(first)
+    for arrow in graph.arrows:
+        frame = arrow.parent
+        while frame in inside and inside.get(arrow.child) != inside[frame] and frame not in needed:
+            needed.add(frame)
+            frame = up[frame].parent
+    gone = inside.keys() - needed
+    beneath = {
+        frame: sum(one in gone for one in inside[frame].frames) for frame in first if len(inside[frame].frames) > 1
+    }
+    arrows = tuple(
+        replace(arrow, detail=f"{arrow.detail} +{beneath[arrow.child]}".strip()) if beneath.get(arrow.child) else arrow
+        for arrow in graph.arrows
+        if arrow.child not in gone and arrow.parent not in gone
+    )
+    groups = tuple(replace(group, frames=tuple(one for one in group.frames if one in needed)) for group in graph.groups)
+    return replace(
+        graph, frames=tuple(frame for frame in graph.frames if frame not in gone), arrows=arrows, groups=groups
+    )
 
 
 @dataclass(frozen=True, slots=True)

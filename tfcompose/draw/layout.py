@@ -1,7 +1,8 @@
 """The position of each frame: a tree from left to right, a row for each leaf, a parent in the middle of its children.
 
-The rows of two subtrees that do not contain one another are apart, and a child begins to the right of its parent, so no
-two boxes overlap. The cost grows with the number of frames.
+Or, downwards, a row for each frame, below its parent and a little to its right: what is long, such as an arm, then fits
+a page. The rows of two subtrees that do not contain one another are apart, and a child begins to the right of its
+parent, or below it, so no two boxes overlap. The cost grows with the number of frames.
 
 A group's rectangle is drawn around its own frames, and around their descendants where those are in between.
 """
@@ -9,7 +10,7 @@ A group's rectangle is drawn around its own frames, and around their descendants
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from tfcompose.draw.style import STYLES, shortened, width_of
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tfcompose.draw.graph import Forest, Graph
+
+Direction = Literal["auto", "right", "down"]
 
 NAME_SIZE, MORE_SIZE, LABEL_SIZE = STYLES["name"].size, STYLES["more"].size, STYLES["label"].size
 BOX_HEIGHT, POSE_HEIGHT = 24.0, 14.0
@@ -26,6 +29,8 @@ BETWEEN = 8.0  # between a name and its detail
 LABEL_STRIP = 16.0
 TREE_GAP = 10.0
 NEAREST, FARTHEST, STEEPNESS = 28.0, 100.0, 0.08  # from a parent to its children: more for a wide fan
+INDENT = 28.0  # downwards, from a parent's left edge to its children's
+WIDEST, WIDEST_RATIO = 1600.0, 3.0  # a picture is drawn downwards if it is wider, also in relation to its height
 PAD = 8.0  # between a text and its box, and between a group and its frames
 
 
@@ -62,21 +67,27 @@ class Area:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """All places, the groups' areas (outer ones first), and the size of it all."""
+    """All places, the groups' areas (outer ones first), the size of it all, and whether it goes down."""
 
     places: dict[str, Place]
     areas: tuple[Area, ...]
     width: float
     height: float
+    is_down: bool = False
 
 
-def layout(graph: Graph, forest: Forest) -> Layout:
-    """Return the position of everything, from (0, 0)."""
+def layout(graph: Graph, forest: Forest, direction: Direction = "auto") -> Layout:
+    """Return the position of everything, from (0, 0); ``auto`` goes to the right, unless that is too wide."""
+    if direction == "auto":
+        wide = layout(graph, forest, "right")
+        is_too_wide = wide.width > max(WIDEST, WIDEST_RATIO * wide.height)
+        return layout(graph, forest, "down") if is_too_wide else wide
     places = {frame: _box(forest, frame) for frame in forest.order}
-    bands, height = _rows(forest, places)
-    _columns(forest, places)
+    is_down = direction == "down"
+    bands, height = _rows(forest, places, is_down=is_down)
+    (_indented if is_down else _columns)(forest, places)
     areas, width = _areas(graph, forest, places, bands)
-    return Layout(places, areas, width, height)
+    return Layout(places, areas, width, height, is_down)
 
 
 def _box(forest: Forest, frame: str) -> Place:
@@ -92,7 +103,7 @@ def _box(forest: Forest, frame: str) -> Place:
     return Place(0.0, 0.0, width + BADGE_WIDTH, BOX_HEIGHT + POSE_HEIGHT)
 
 
-def _rows(forest: Forest, places: dict[str, Place]) -> tuple[dict[str, tuple[float, float]], float]:
+def _rows(forest: Forest, places: dict[str, Place], *, is_down: bool) -> tuple[dict[str, tuple[float, float]], float]:
     """Give each frame its y; return the top and bottom of each group, by the frame where it begins, and the height."""
     bands: dict[str, tuple[float, float]] = {}
     row = max((place.height for place in places.values()), default=0.0)
@@ -102,8 +113,9 @@ def _rows(forest: Forest, places: dict[str, Place]) -> tuple[dict[str, tuple[flo
         frame, done = waiting.pop()
         if done:
             place, children = places[frame], forest.children[frame]
-            place.y = round((places[children[0]].y + places[children[-1]].y) / 2) if children else y + row / 2
-            y += 0.0 if children else row + ROW_GAP
+            if not is_down:
+                place.y = round((places[children[0]].y + places[children[-1]].y) / 2) if children else y + row / 2
+                y += 0.0 if children else row + ROW_GAP
             if frame in bands:
                 bands[frame] = (bands[frame][0], y - ROW_GAP + PAD)
                 y += PAD
@@ -113,6 +125,9 @@ def _rows(forest: Forest, places: dict[str, Place]) -> tuple[dict[str, tuple[flo
         if forest.enters(frame):
             bands[frame] = (y, y)
             y += LABEL_STRIP + PAD / 2
+        if is_down:
+            places[frame].y = y + places[frame].height / 2
+            y += places[frame].height + ROW_GAP
         waiting.append((frame, True))
         waiting += [(child, False) for child in reversed(forest.children[frame])]
     return bands, max(0.0, y - ROW_GAP)
@@ -130,6 +145,15 @@ def _columns(forest: Forest, places: dict[str, Place]) -> None:
         gap += PAD if any(forest.enters(child) for child in children) else 0.0
         for child in children:
             places[child].x = round(place.right) + gap
+
+
+def _indented(forest: Forest, places: dict[str, Place]) -> None:
+    for frame in forest.order:
+        place = places[frame]
+        if frame not in forest.up and forest.enters(frame):
+            place.x = PAD
+        for child in forest.children[frame]:
+            places[child].x = place.x + INDENT + (PAD if forest.enters(child) else 0.0)
 
 
 def _areas(

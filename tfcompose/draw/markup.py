@@ -17,16 +17,16 @@ if TYPE_CHECKING:
 _DOT_LINES = {"static": "solid", "joint": "dashed", "dynamic": "dashed", "alternative": "dotted"}
 
 
-def dot(graph: Graph) -> str:
+def dot(graph: Graph, *, is_down: bool = False) -> str:
     """Return the graph in the DOT language: frames by their names, groups as clusters, owners as colours."""
-    return "".join(f"{line}\n" for line in _dot_lines(graph))
+    return "".join(f"{line}\n" for line in _dot_lines(graph, "TB" if is_down else "LR"))
 
 
-def _dot_lines(graph: Graph) -> Iterator[str]:
+def _dot_lines(graph: Graph, direction: str) -> Iterator[str]:
     owners = {name: index for index, name in enumerate(graph.all_owners())}
     above = {arrow.child: arrow for arrow in reversed(graph.arrows) if not arrow.alternative}
     yield f"digraph {_dot_quoted(graph.title)} {{"
-    yield "  rankdir=LR; ranksep=0.4; nodesep=0.12;"
+    yield f"  rankdir={direction}; ranksep=0.4; nodesep=0.12;"
     yield '  node [shape=box, style="rounded,filled", fillcolor=white, fontname=Helvetica, fontsize=11, height=0.3];'
     yield "  edge [fontname=Helvetica, fontsize=9, arrowsize=0.6];"
     for frame in graph.all_frames():
@@ -64,17 +64,17 @@ def _dot_quoted(*rows: str) -> str:
 _MERMAID_MEANT = re.compile(r"[^\w ,.:/+()°·→-]")
 
 
-def mermaid(graph: Graph) -> str:
+def mermaid(graph: Graph, *, is_down: bool = False) -> str:
     """Return the graph as a Mermaid flowchart: moving edges are dotted, groups are subgraphs, owners have colours."""
-    return "".join(f"{line}\n" for line in _mermaid_lines(graph))
+    return "".join(f"{line}\n" for line in _mermaid_lines(graph, "TD" if is_down else "LR"))
 
 
-def _mermaid_lines(graph: Graph) -> Iterator[str]:
+def _mermaid_lines(graph: Graph, direction: str) -> Iterator[str]:
     owners = {name: index for index, name in enumerate(graph.all_owners())}
     above = {arrow.child: arrow for arrow in reversed(graph.arrows) if not arrow.alternative}
     numbers = {frame: f"f{index}" for index, frame in enumerate(graph.all_frames())}
     grouped = {frame for group in graph.groups for frame in group.frames}
-    yield "flowchart LR"
+    yield f"flowchart {direction}"
     for frame, number in numbers.items():
         if frame not in grouped:
             yield f"  {_mermaid_node(frame, number, above.get(frame), owners)}"

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Union
 
 from tfcompose.draw.graph import forest_of
-from tfcompose.draw.layout import BADGE_WIDTH, BETWEEN, LABEL_STRIP, PAD, POSE_HEIGHT, layout
+from tfcompose.draw.layout import BADGE_WIDTH, BETWEEN, INDENT, LABEL_STRIP, PAD, POSE_HEIGHT, layout
 from tfcompose.draw.style import STYLES, colour_of, shortened, width_of
 from tfcompose.text import counted
 
 if TYPE_CHECKING:
     from tfcompose.draw.graph import Arrow, Forest, Graph
-    from tfcompose.draw.layout import Area, Layout, Place
+    from tfcompose.draw.layout import Area, Direction, Layout, Place
 
 Point = tuple[float, float]
 
@@ -68,6 +68,12 @@ def _level(start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
     return start, (bend, start[1]), (bend, end[1]), end
 
 
+def _falling(start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
+    """Return the curve that leaves downwards and arrives horizontally."""
+    corner = (start[0], end[1])
+    return start, corner, corner, end
+
+
 def _sagging(start: Point, end: Point) -> tuple[Point, Point, Point, Point]:
     """Return the curve that leaves and arrives from below, and sags more the farther it goes."""
     sag = 26.0 + 0.08 * (abs(end[0] - start[0]) + abs(end[1] - start[1]))
@@ -99,10 +105,10 @@ class Drawing:
     shapes: tuple[Shape, ...]
 
 
-def draw(graph: Graph) -> Drawing:
+def draw(graph: Graph, direction: Direction = "auto") -> Drawing:
     """Return the drawing of the graph: groups at the back, then edges, then frames, and the legend on top."""
     forest = forest_of(graph)
-    places = layout(graph, forest)
+    places = layout(graph, forest, direction)
     owners = {name: index for index, name in enumerate(graph.all_owners())}
     head, width, top = _legend(graph, owners, places.width, MARGIN)
     pen = _Pen(graph, forest, places, owners, MARGIN, top)
@@ -140,7 +146,8 @@ class _Pen:
         curves = []
         for arrow in self.forest.extra:
             parent, child = self.layout.places[arrow.parent], self.layout.places[arrow.child]
-            curves.append(self._edge(arrow) if parent.right < child.x else self._back(arrow))
+            is_forward = not self.layout.is_down and parent.right < child.x
+            curves.append(self._edge(arrow) if is_forward else self._back(arrow))
         return curves
 
     def tree(self) -> list[Shape]:
@@ -155,8 +162,11 @@ class _Pen:
 
     def _edge(self, arrow: Arrow) -> Curve:
         parent, child = self.layout.places[arrow.parent], self.layout.places[arrow.child]
-        start = (parent.right + self.left, parent.y + self.top)
-        return self._curve(arrow, _level(start, (child.x + self.left, child.y + self.top)))
+        end = (child.x + self.left, child.y + self.top)
+        if self.layout.is_down:
+            start = (parent.x + INDENT / 2 + self.left, parent.bottom + self.top)
+            return self._curve(arrow, _falling(start, end))
+        return self._curve(arrow, _level((parent.right + self.left, parent.y + self.top), end))
 
     def _back(self, arrow: Arrow) -> Curve:
         parent, child = self.layout.places[arrow.parent], self.layout.places[arrow.child]

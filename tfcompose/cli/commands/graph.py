@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from tfcompose.draw import Arrow, Graph
     from tfcompose.draw.graph import Kind
+    from tfcompose.draw.layout import Direction
     from tfcompose.live.edges import EdgeState, TreeObserver
     from tfcompose.plan import Plan
 
@@ -48,6 +49,15 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--poses", action="store_true", help="show each frame's pose in its parent, in metres and degrees"
     )
+    parser.add_argument(
+        "--direction", choices=("auto", "right", "down"), default="auto",
+        help="where children are; default: auto, which is right unless that is too wide for a page",
+    )  # fmt: skip
+    parser.add_argument(
+        "--collapse",
+        action="store_true",
+        help="draw of each sensor only its mount and what leads to other frames",
+    )
 
 
 def run(arguments: Namespace) -> int:
@@ -64,8 +74,12 @@ def run(arguments: Namespace) -> int:
         graph = graph_of(robot.with_final_names(), poses=arguments.poses)
     from tfcompose.cli.writing import replace_file
 
+    if arguments.collapse:
+        from tfcompose.draw.graph import collapsed
+
+        graph = collapsed(graph)
     try:
-        replace_file(path, picture(graph, path.suffix.lower()))
+        replace_file(path, picture(graph, path.suffix.lower(), arguments.direction))
     except OSError as error:
         fail(f"{path} was not written: {error.strerror}", UNREADABLE)
     print(f"wrote {path}")
@@ -89,19 +103,19 @@ def _check_output(path: Path) -> None:
         fail(f"PNG needs the package pypdfium2: {advice}", UNREADABLE)
 
 
-def picture(graph: Graph, ending: str) -> bytes:
+def picture(graph: Graph, ending: str, direction: Direction = "auto") -> bytes:
     """Return the graph as a file with this ending; only what it needs is loaded."""
     if ending == ".mmd":
         from tfcompose.draw.markup import mermaid
 
-        return mermaid(graph).encode()
+        return mermaid(graph, is_down=direction == "down").encode()
     if ending in {".dot", ".gv"}:
         from tfcompose.draw.markup import dot
 
-        return dot(graph).encode()
+        return dot(graph, is_down=direction == "down").encode()
     from tfcompose.draw.picture import draw
 
-    drawing = draw(graph)
+    drawing = draw(graph, direction)
     if ending == ".pdf":
         from tfcompose.draw.pdf import pdf
 

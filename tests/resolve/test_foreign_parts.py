@@ -457,3 +457,25 @@ def test_what_cannot_be_a_part_is_reported_with_its_place(  # noqa: PLR0913, PLR
     assert " object at 0x" not in errors[0].message
     assert advice in errors[0].help
     assert errors[0].span.file.endswith(place)
+
+
+def test_a_file_of_the_robot_is_named_in_arguments_of_xacro_and_parameters_of_a_macro(
+    cell: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "config").mkdir()
+    (tmp_path / "config/arm.yaml").write_text("reach: 0.75\n", "utf-8")
+    (tmp_path / "third/arm/loads.xacro").write_text(
+        '<robot name="l" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arg name="kit" default=""/>'
+        '<xacro:macro name="tool" params="kit prefix"><link name="${prefix}_base"/><link name="${prefix}_tool"/>'
+        '<joint name="${prefix}_reach" type="fixed"><parent link="${prefix}_base"/><child link="${prefix}_tool"/>'
+        "<origin xyz=\"${xacro.load_yaml(kit)['reach']} 0 0\"/></joint></xacro:macro>"
+        '<xacro:tool kit="$(arg kit)" prefix="p"/></robot>',
+        "utf-8",
+    )
+    part = 'a: {xacro: third/arm/loads.xacro, args: {kit: "${file(config/arm.yaml)}"}, parent: table}'
+    robot = sound(cell(part))
+    assert robot.parent_edge("p_tool").pose.xyz == (0.75, 0, 0)
+    (missing,) = cell(part.replace("arm.yaml", "amr.yaml")).errors
+    assert (missing.code, missing.span.file.endswith("cell.yaml")) == ("TF019", True)
+    (frame,) = cell(part.replace("file(config/arm.yaml)", "frame(table)")).errors
+    assert frame.code == "TF105"

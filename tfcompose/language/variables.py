@@ -66,12 +66,20 @@ def _filled(value: Any, path: Path, variables: _Variables) -> Any:
 LATER = re.compile(r"\$\{\s*(?:(?:frame|file)\([^(){}]*\)|params_file|build_dir)\s*\}")
 
 
+#: What a xacro file is told: a file beside the robot file, which xacro would look for beside its own.
+OF_FILES = re.compile(r"\$\{\s*file\(\s*([^(){}]*?)\s*\)\s*\}")
+
+
 #: A block may hold what is for another program to fill in.
 _LITERALLY = """what others fill in: ${dollar}{…}, with vars: {dollar: "$"}"""
 
 
 def _is_of_a_process(path: Path) -> bool:
     return path[0] == "processes" or (path[0] == "sensors" and path[2:3] == ("driver",))
+
+
+def _is_for_xacro(path: Path) -> bool:
+    return path[0] == "parts" and path[2:3] in {("args",), ("params",)}
 
 
 class _NothingNewError(ExpressionError):
@@ -120,7 +128,8 @@ class _Variables:
 
     def fill(self, text: str, path: Path) -> Any:
         try:
-            return fill(text, self.lookup, LATER if _is_of_a_process(path) else None)
+            later = LATER if _is_of_a_process(path) else OF_FILES if _is_for_xacro(path) else None
+            return fill(text, self.lookup, later)
         except ExpressionError as error:
             self._refuse(error, path)
             return text

@@ -5,11 +5,13 @@ from __future__ import annotations
 import hashlib
 import re
 from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 from tfcompose.findings import Finding, RejectedError, Span, finding
 from tfcompose.geometry import rpy_from_quat
 from tfcompose.language.robot import Origin
+from tfcompose.language.variables import OF_FILES
 from tfcompose.load import path_named
 from tfcompose.model import BUILT_IN, Node, Process, Robot
 from tfcompose.resolve.isolation import topics_below
@@ -24,9 +26,10 @@ from tfcompose.urdf.xacro import Use, macros_in
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from tfcompose.load import Path
     from tfcompose.plan import RosSettings
     from tfcompose.resolve.part import PartEntry
-    from tfcompose.urdf.packages import Packages
+    from tfcompose.urdf.packages import Disk, Packages
     from tfcompose.urdf.xacro import Expansion
 
 _PACKAGE = re.compile(r"(?:package://|\$\(find(?:-pkg-share)?\s+)([A-Za-z][A-Za-z0-9_.-]*)\)?/(.+)")
@@ -106,10 +109,25 @@ def _expanded(part: PartEntry, file: str, at: Span, packages: Packages) -> Expan
     disk, spec = packages.disk, part.declared
     if disk is None:
         raise RejectedError([finding("TF001", f"{file}: files cannot be read here", at)])
-    return disk.expand(file, packages, spec.args, _use(part, file, packages))
+    args = {name: _with_files(value, (*part.at, "args", name), part, disk) for name, value in spec.args.items()}
+    return disk.expand(file, packages, args, _use(part, file, packages, disk))
 
 
-def _use(part: PartEntry, file: str, packages: Packages) -> Use:
+def _with_files(value: Any, path: Path, part: PartEntry, disk: Disk) -> Any:
+    """Return a value with the absolute path of each ``${file(PATH)}``, which is relative to the robot file."""
+    at = part.source.at(path)
+
+    def absolute(call: re.Match[str]) -> str:
+        place = path_named(call[1], at)
+        if not (disk.is_file(place) or disk.is_folder(place)):
+            message, advice = f"{call[0]}: {place} does not exist", "a path is relative to the file that writes it"
+            raise RejectedError([finding("TF019", message, at, help=advice)])
+        return str(FilePath(place).absolute())
+
+    return OF_FILES.sub(absolute, value) if isinstance(value, str) else value
+
+
+def _use(part: PartEntry, file: str, packages: Packages, disk: Disk) -> Use:
     """Return how the part uses the file: as a whole, or a call of its macro."""
     spec, at = part.declared, part.at
     if spec.macro is None:
@@ -122,7 +140,7 @@ def _use(part: PartEntry, file: str, packages: Packages) -> Use:
             _refuse_broken(name, value, part.source.at((*at, "params", name)))
         block = _block(value)
         if block is None:
-            words[name] = _word(value)
+            words[name] = _word(_with_files(value, (*at, "params", name), part, disk))
         else:
             blocks.append(block)
     named = {name: part.source.at_key((*at, "params", name)) for name in spec.params}

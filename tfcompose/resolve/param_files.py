@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, RejectedError, finding, nearest
+from tfcompose.language.variables import OF_FILES
 from tfcompose.load import path_named
 from tfcompose.load.params import NodeParams, ParamsFile, Word, load_params
 from tfcompose.model import AsInFile
@@ -57,7 +58,8 @@ class _Work:
 
     def _params_in(self, file: str, at: Span, node: Node, process: Process) -> dict[str, Any]:
         """Return what a file says to the node; a file that says nothing to it is a finding."""
-        path = path_named(file, at)
+        call = OF_FILES.fullmatch(file)
+        path = path_named(call[1] if call else file, at)
         loaded = self._load(path, at)
         if loaded is None:
             return {}

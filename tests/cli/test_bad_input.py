@@ -280,3 +280,12 @@ def test_arguments_of_a_xacro_file_are_given_to_lint_as_to_import(folder: Path) 
     assert (unknown.returncode, unknown.stdout.count("error[TF106]")) == (1, 1)
     assert tfcompose("lint", "robot.yaml", "name:=ur5e", cwd=folder).returncode == 2
     assert tfcompose("lint", "r.xacro", ":=ur5e", cwd=folder).returncode == 2
+
+
+def test_a_file_name_moves_no_terminals_cursor(folder: Path) -> None:
+    name = "a\x1b[31m.yaml"
+    (folder / name).write_text(GOOD.replace("base_link", "base link"))
+    for words in (["lint", name], ["lint", name, "--format", "github"], ["import", name], ["tree", f"{name}.yaml"]):
+        done = tfcompose(*words, cwd=folder)
+        assert done.returncode in {1, 2}, words
+        assert "\x1b" not in done.stdout + done.stderr, words

@@ -31,8 +31,9 @@ _COLOUR = re.compile(r"\033\[[0-9;:]*m")
 
 
 def warn(message: str) -> None:
-    """Print one sentence to stderr."""
-    sys.stderr.write(f"tfcompose: {message}\n")
+    """Print one sentence to stderr; names in it come from files and the command line."""
+    text = "\n".join(map(printable, message.split("\n")))
+    sys.stderr.write(f"tfcompose: {text}\n")
 
 
 def fail(message: str, code: int = FAILED) -> NoReturn:

@@ -56,7 +56,7 @@ def _annotation(found: Finding) -> str:
     notes = [f"{note.span}: {note.message}" if note.span else note.message for note in found.notes]
     lines = [found.message, *notes, *([f"help: {found.help}"] if found.help else [])]
     message = "\n".join(map(visible, lines))
-    listed = ",".join(f"{name}={_escaped_property(str(value))}" for name, value in properties.items())
+    listed = ",".join(f"{name}={_escaped_property(visible(str(value)))}" for name, value in properties.items())
     return f"::{found.severity} {listed}::{_escaped(message)}\n"
 
 

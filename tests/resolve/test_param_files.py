@@ -55,6 +55,12 @@ def test_what_the_file_says_to_the_node_is_taken_in_its_order_and_inline_paramet
     assert "nested" not in output  # robot1/planner below robot1 is /robot1/robot1/planner
 
 
+def test_a_file_may_be_named_as_everywhere_else() -> None:
+    assert source_text('{file: "${file(p.yaml)}"}') == source_text("{file: p.yaml}")
+    (missing,) = compiled('{file: "${file(q.yaml)}"}').errors
+    assert (missing.code, "q.yaml" in str(missing.span), "${" in str(missing.span)) == ("TF001", True, False)
+
+
 def test_a_name_in_the_file_is_below_the_namespace_of_the_process() -> None:
     file = "planner: {ros__parameters: {near: 1}}\n/robot1/planner: {ros__parameters: {far: 1}}\n"
     params = yaml.safe_load(source_text("{file: front.yaml}, namespace: front", front=file))

@@ -10,9 +10,11 @@ import pytest
 
 from tests.support.robots import ROVER
 from tfcompose.cli import main
+from tfcompose.cli.commands import monitor
 from tfcompose.cli.runs import chosen_run, run_of_domain, warn_of_other_domains
+from tfcompose.geometry import Pose
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDir, runtime_dir_of
-from tfcompose.plan import Plan, RosSettings
+from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.plan.file import write_plan
 
 PLAN = Plan("rover", "sha256:0", None, RosSettings(), (), ())
@@ -127,3 +129,24 @@ def test_two_files_with_one_robots_name_do_not_share_a_folder_silently(
     (tmp_path / "b.yaml").unlink()
     assert main(["build", "a.yaml"]) == 0
     assert capsys.readouterr().err == ""
+
+
+def test_monitor_takes_the_topics_of_the_robot_in_the_domain(
+    runs: Run, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert monitor._namespace_here() == ""
+    edges = [("odom", "base", "drive"), ("odom2", "base2", "drive2")]
+    remaps = {"drive": {"/tf": "/robot1/tf"}, "drive2": {"/tf": "/robot2/tf"}}
+    planned = tuple(
+        PlanEdge(a, b, "dynamic", owner, f"/{owner}", Pose(), 10.0, SourceLine("r.yaml", 1)) for a, b, owner in edges
+    )
+    processes = tuple(PlanProcess(name, "external", remap=remap) for name, remap in remaps.items())
+    one = replace(PLAN, edges=planned[:1], processes=processes[:1])
+    place = runs("rover", 67)
+    monkeypatch.setattr("tfcompose.cli.runs.plan_of_run", lambda _: one)
+    assert monitor._namespace_here() == "/robot1"
+    assert place.name in capsys.readouterr().err
+    monkeypatch.setattr("tfcompose.cli.runs.plan_of_run", lambda _: replace(PLAN, edges=planned, processes=processes))
+    with pytest.raises(SystemExit):
+        monitor._namespace_here()
+    assert "--namespace /robot1 or --namespace /robot2" in capsys.readouterr().err

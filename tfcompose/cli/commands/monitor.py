@@ -14,7 +14,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_bag, add_for, add_format, add_namespace, positive
-from tfcompose.cli.terminal import UNREADABLE, can_redraw, coloured, fail, table_width
+from tfcompose.cli.terminal import UNREADABLE, can_redraw, coloured, fail, table_width, warn
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -51,6 +51,8 @@ def run(arguments: Namespace) -> int:
     if arguments.a and not arguments.b:
         fail("the edges between two frames are shown: give both, A and B", UNREADABLE)
     arguments.frames = [name.removeprefix("/") for name in (arguments.a, arguments.b) if name]
+    if not arguments.namespace and not arguments.bag:
+        arguments.namespace = _namespace_here()
     topics = topics_below(arguments.namespace)
     covers_all = arguments.bag or arguments.duration
     observer = TreeObserver(0.0 if covers_all else WINDOW_S, 0.0 if arguments.bag else SETTLE_S)
@@ -61,6 +63,25 @@ def run(arguments: Namespace) -> int:
     show = None if arguments.duration and not lines else partial(_show, arguments, observer, lines)
     observe("tfcompose_monitor", {topics: observer}, duration_s=arguments.duration, every_s=arguments.every, show=show)
     return _show(arguments, observer, lines) if arguments.duration else 0
+
+
+def _namespace_here() -> str:
+    """Return the namespace of the TF topics of the robot that runs in this ROS domain; empty for the global ones.
+
+    Raises:
+        SystemExit: after naming the namespaces, if it has several and none of them is global.
+    """
+    from tfcompose.cli.runs import run_of_domain
+    from tfcompose.plan.topics import GLOBAL, namespace_options, parts_of
+
+    running = run_of_domain()
+    pairs = list(parts_of(running[1])) if running else []
+    if running is None or not pairs or GLOBAL in pairs:
+        return ""
+    if len(pairs) > 1:
+        fail(f"{running[0].name} has several trees: {namespace_options(moving for moving, _ in pairs)}", UNREADABLE)
+    warn(f"{running[0].name} runs here, on {pairs[0][0]}")
+    return pairs[0][0].rpartition("/")[0]
 
 
 def _show(arguments: Namespace, observer: TreeObserver, live: LiveLines | None) -> int:

@@ -71,7 +71,7 @@ def test_a_node_is_named_with_its_process_and_the_owner_is_not(
     heard = PlainListener().until("odom", OWNER_X)
     assert set(heard) <= {OWNER_X, OTHER_X}
     if robot.guard != "watch":
-        robot.says("not behind the fence", after=after)
+        robot.says("cannot be held back", after=after)
     robot.stop(one)
     robot.says("over", "map → odom", after=after)
     assert accused(robot, after) == {one.pid}
@@ -89,7 +89,7 @@ def test_a_program_of_another_dds_is_named_as_what_it_is_and_no_node_is_accused(
     robot.says(f"[{code}]", f"{parent} → {child}", "a DDS program that is no ROS node", after=after)
     PlainListener().until(child, OTHER_X)
     if robot.guard != "watch":
-        robot.says("not behind the fence", after=after)
+        robot.says("cannot be held back", after=after)
     robot.stop(one)
     assert accused(robot, after) == set()
     robot.says("over", f"{parent} → {child}", after=after)

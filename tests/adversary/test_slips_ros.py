@@ -108,7 +108,7 @@ def test_a_child_of_another_dds_is_named_as_what_it_is_and_listeners_get_it(robo
     robot.says("TF803", "odom → foreign", "a DDS program that is no ROS node")
     PlainListener().until("foreign", PLAIN_X)
     if robot.guard != "watch":
-        robot.says("not behind the fence")
+        robot.says("cannot be held back")
 
 
 def test_a_child_in_another_domain_is_nobodys(robot: Robot) -> None:

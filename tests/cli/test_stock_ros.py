@@ -61,8 +61,11 @@ with Stop() as stop, open_node("robot_state_publisher", "", args=sys.argv[at + 1
     kinds = {{"fixed": [], "moving": [], "floating": []}}
     for joint in ET.fromstring(text).findall("joint"):
         kind = joint.get("type") if joint.get("type") in kinds else "moving"
-        kinds[kind].append([prefix + joint.find(end).get("link") for end in ("parent", "child")])
-    still = [Transform(0, parent, child, (0, 0, 0), (0, 0, 0, 1)) for parent, child in kinds["fixed"]]
+        ends = [prefix + joint.find(end).get("link") for end in ("parent", "child")]
+        origin = joint.find("origin").get if joint.find("origin") is not None else lambda key, other: other
+        xyz, rpy = (tuple(map(float, origin(key, "0 0 0").split())) for key in ("xyz", "rpy"))
+        kinds[kind].append([*ends, xyz, quat_from_rpy(*rpy)])
+    still = [Transform(0, *fixed) for fixed in kinds["fixed"]]
     fixed, moving = TFPublisher(node, static=True), TFPublisher(node, static=False)
     fixed.publish(encode(still))
     states = Subscription(node, JointState, "joint_states", JOINT_STATES)
@@ -70,8 +73,8 @@ with Stop() as stop, open_node("robot_state_publisher", "", args=sys.argv[at + 1
         wait(node, [states], None, stop)
         for received in states.take():
             stamp = deserialize_message(received.data, JointState).header.stamp
-            at_zero = (stamp.sec * 10**9 + stamp.nanosec, (0, 0, 0), (0, 0, 0, 1))
-            moving.publish(encode([Transform(at_zero[0], *ends, *at_zero[1:]) for ends in kinds["moving"]]))
+            stamp_ns = stamp.sec * 10**9 + stamp.nanosec
+            moving.publish(encode([Transform(stamp_ns, *at_zero) for at_zero in kinds["moving"]]))
 """
 
 

@@ -218,7 +218,7 @@ def test_another_description_changes_nothing_and_is_reported_with_its_publisher(
     start: Callable[..., Any], listeners: Listeners, write: Callable[..., Any], name: Literal["static", "joints"]
 ) -> None:
     process = start(f"tfcompose.publishers.{name}", write([], PlanProcess(name, name)), name)
-    process.until_says("edges on")
+    process.until_says("edge")
     same = latch(listeners.node, "/rover/robot_description", "<robot name='rover'/>")
     other = latch(listeners.node, "/rover/robot_description", "<robot name='stranger'/>")
     process.until_says("/test/ears publishes another /rover/robot_description: ")
@@ -232,7 +232,7 @@ def test_another_description_changes_nothing_and_is_reported_with_its_publisher(
 def test_the_description_is_latched(
     start: Callable[..., Any], listeners: Listeners, write: Callable[..., Any], name: Literal["static", "joints"]
 ) -> None:
-    start(f"tfcompose.publishers.{name}", write([], PlanProcess(name, name)), name).until_says("edges on")
+    start(f"tfcompose.publishers.{name}", write([], PlanProcess(name, name)), name).until_says("edge")
     subscription = Subscription(listeners.node, String, "/rover/robot_description", LATCHED)
     (received,) = take(listeners.node, subscription, 1)
     assert deserialize_message(received.data, String).data == "<robot name='rover'/>"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -76,3 +77,16 @@ def test_up_ends_as_the_build_does(text: str | None, code: int, tmp_path: Path) 
     ]
     assert {(one.returncode, one.stdout) for one in ends} == {(code, "")}
     assert ends[0].stderr == ends[1].stderr != ""
+
+
+@pytest.mark.parametrize("hook", ["after_in_child", "after_in_parent"])
+def test_an_interrupt_while_the_build_is_forked_ends_both_and_nothing_is_printed(hook: str, tmp_path: Path) -> None:
+    """Python prints what a hook of a fork raises, and goes on."""
+    (tmp_path / "robot.yaml").write_text(ROVER, "utf-8")
+    send = f"import os; os.register_at_fork({hook}=lambda: os.kill(os.getpid(), 2))"
+    (tmp_path / "sitecustomize.py").write_text(send, "utf-8")
+    path = os.pathsep.join([str(tmp_path), *sys.path])
+    command = [sys.executable, "-m", "tfcompose", "up"]
+    ended = processes.run(command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": path})
+    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "")
+    assert not (tmp_path / "build" / "rover" / "plan.json").exists()

@@ -15,6 +15,7 @@ from tfcompose.signals import take_interrupt
 
 if TYPE_CHECKING:
     from argparse import Namespace
+    from collections.abc import Iterable
     from types import TracebackType
 
     from typing_extensions import Self
@@ -31,10 +32,16 @@ class BuildProcess:
         self._pipe, answer = os.pipe()
         sys.stdout.flush()
         sys.stderr.flush()
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])  # what Python does after a fork prints errors
         self._pid = os.fork()
         if self._pid == 0:
-            os._exit(_build(arguments, answer))
+            os._exit(_build(arguments, answer, mask))
         os.close(answer)
+        try:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        except KeyboardInterrupt:
+            self._interrupt()
+            raise
 
     def __enter__(self) -> Self:
         return self
@@ -43,8 +50,11 @@ class BuildProcess:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self._pid:
-            os.kill(self._pid, signal.SIGINT)
-            self._exit_code()
+            self._interrupt()
+
+    def _interrupt(self) -> None:
+        os.kill(self._pid, signal.SIGINT)
+        self._exit_code()
 
     def plan_file(self) -> Path:
         """Wait for the end of the build, and return the file of its plan.
@@ -71,10 +81,14 @@ class BuildProcess:
         return code
 
 
-def _build(arguments: Namespace, answer: int) -> int:
-    """Build and return the exit code; write the plan's file, or the number of an operating system's error."""
+def _build(arguments: Namespace, answer: int, mask: Iterable[int]) -> int:
+    """Build and return the exit code; write the plan's file, or the number of an operating system's error.
+
+    ``mask`` is the mask of signals of before the fork.
+    """
     code = FAILED
     try:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         os.setpgid(0, 0)
         for number in (signal.SIGTTOU, signal.SIGTTIN):  # a terminal may stop other groups that write to it, or read
             signal.signal(number, signal.SIG_IGN)

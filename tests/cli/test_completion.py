@@ -42,6 +42,12 @@ def test_a_word_is_completed(line: str, tmp_path: Path, monkeypatch: pytest.Monk
     assert (done.returncode, set(done.stdout.split())) == (0, CASES[line])
 
 
+@pytest.mark.parametrize("at", [-3, 0, 99])
+def test_a_place_outside_of_the_line_has_nothing(at: int, tmp_path: Path) -> None:
+    done = tfcompose_in(tmp_path, "completion", "--at", at, "--", "tfcompose", "nothing")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
 def test_bash_completes_with_the_script(tmp_path: Path) -> None:
     program = tmp_path / "tfcompose"
     program.write_text(f'#!/bin/sh\nexec {sys.executable} -m tfcompose "$@"\n', "utf-8")
@@ -75,6 +81,6 @@ def test_the_option_or_command_that_is_near_is_named_and_a_far_one_is_not(tmp_pa
     for words, near in (("up --detached", "--detach?"), ("lnt", "lint?"), ("lint --fromat=json", "--format?")):
         done = tfcompose_in(tmp_path, *words.split())
         assert (done.returncode, near in done.stderr) == (2, True), done.stderr
-    for words in ("version", "up --xyzzy"):
+    for words in ("version", "up --xyzzy", "export launch -o", "lint --select XX1", "graph --direction up"):
         done = tfcompose_in(tmp_path, *words.split())
         assert (done.returncode, "did you mean" in done.stderr) == (2, False), done.stderr

@@ -76,6 +76,12 @@ def test_diff_prints_what_fix_would_write_and_writes_nothing(folder: Path) -> No
     assert tfcompose_in(folder, "lint", "--diff", "warned.yaml").returncode == 0
 
 
+@pytest.mark.parametrize("option", ["--diff", "--watch"])
+def test_what_is_for_people_is_not_mixed_with_what_programs_read(option: str, folder: Path) -> None:
+    done = tfcompose_in(folder, "lint", "fixable.yaml", option, "--format", "json")
+    assert (done.returncode, done.stdout) == (2, "")
+
+
 def test_junit_has_a_case_for_each_file(folder: Path) -> None:
     done = tfcompose_in(folder, "lint", "--format", "junit", "warned.yaml", "wrong.yaml")
     cases = {case.get("name"): case.find("failure") for case in ET.fromstring(done.stdout).iter("testcase")}  # noqa: S314 (our own)

@@ -347,11 +347,10 @@ from tfcompose.ros.typesupport import tf_message_type
 from rclpy.signals import SignalHandlerOptions
 signal.signal(signal.SIGTERM, lambda *_: sys.exit())
 rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-node, taken = rclpy.create_node("plain_listener"), []
+node, numbers = rclpy.create_node("plain_listener"), iter(range(1, 10**9))
 def take(data):
-    if not taken:
+    if next(numbers) == 500:  # it has found who sends so many, not only others
         print("hears", flush=True)
-    taken[:] = [data]
 node.create_subscription(tf_message_type(), "/tf", take, QoSProfile(depth=100), raw=True)
 rclpy.spin(node)
 """
@@ -389,8 +388,7 @@ def test_a_rogue_at_1_khz_is_named_once_and_costs_the_guard_little_more_than_a_p
         before_s, before_bytes = [sum(each.cpu_times()[:2]) for each in both], both[0].memory_info().rss
         time.sleep(4)
         guard_s, listener_s = (sum(each.cpu_times()[:2]) - s for each, s in zip(both, before_s, strict=True))
-        # a strict guard listens to what is fenced off and, since it says what listeners receive, to what is not
-        assert guard_s < (3 if "strict" in guard else 2) * listener_s
+        assert guard_s < 2 * listener_s
         assert both[0].memory_info().rss < 1.1 * before_bytes
         before, silent = silent, robot.count("fell silent")
         return silent == before

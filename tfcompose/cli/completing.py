@@ -22,6 +22,8 @@ YAML = (".yaml", ".yml")
 
 def candidates(commands: Mapping[str, Command], words: Sequence[str], at: int) -> list[str]:
     """Return what ``words[at]`` can be; ``words`` begins with the program's name, and the word may be half written."""
+    if at < 1:
+        return []
     word, before = (words[at] if at < len(words) else ""), list(words[1:at])
     if not before:
         return _beginning(word, [*commands, "--help", "--version"])

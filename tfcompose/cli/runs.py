@@ -278,6 +278,15 @@ def run_of_domain() -> tuple[RuntimeDir, Plan] | None:
     return (found[0], plan) if plan else None
 
 
+def plan_of_domain() -> Plan | None:
+    """Return the plan of the one robot that runs in this shell's ROS domain, after saying so; None if there is none."""
+    running = run_of_domain()
+    if running is None:
+        return None
+    warn(f"{running[0].name} runs here, so its edges are expected")
+    return running[1]
+
+
 def warn_of_leftovers(place: RuntimeDir, run_id: str) -> None:
     """Complain about processes of earlier runs that are still there."""
     found = [one for one in leftovers(f"{place.name}:") if one.run != run_id and one.launcher is None]

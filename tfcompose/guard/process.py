@@ -117,10 +117,11 @@ class TopicWatch:
     def step(self) -> None:
         """Take what has come, and from time to time the graph."""
         taken = list(self._taken())
-        self._graph.hear_public()
         now = time.monotonic()
         strangers = {each.received.gid for each in taken} - self._known.keys()
         self._known |= dict.fromkeys(strangers)
+        if strangers or now >= self._due:
+            self._graph.hear_public()
         if strangers:  # who sends once and goes is in the graph for a moment only
             self._ask_graph(now)
         if self._clock:

@@ -264,5 +264,5 @@ def pose_differs(off: Sequence[tuple[PlanEdge, str, Pose]], publisher: str, plac
         for one, above, sent in others[:LISTED_AT_MOST]
     ]
     notes += [] if place else [Note(f"{edge.name} is declared in {edge.source[0]}:{edge.source[1]}")]
-    advice = "was it changed after the start? tfcompose restart; else correct the one that is wrong"
+    advice = "was it changed after the start? tfcompose up restarts what differs; else correct the one that is wrong"
     return finding("TF846", f"{message}: {compared(edge.pose, pose)}", place, notes=notes, help=advice)

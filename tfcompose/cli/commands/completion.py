@@ -52,7 +52,8 @@ def run(arguments: Namespace) -> int:
     if arguments.at is not None:
         from tfcompose.cli.completing import candidates
 
-        print(*candidates(arguments.commands, arguments.words, arguments.at), sep="\n")
+        for one in candidates(arguments.commands, arguments.words, arguments.at):
+            print(one)
         return 0
     shell = arguments.words[0] if arguments.words else "bash"
     if shell not in SCRIPTS or len(arguments.words) > 1:

@@ -14,7 +14,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_for, add_format, add_variant, namespace
-from tfcompose.cli.terminal import UNREADABLE, exit_code_of, fail, print_findings, printable, warn
+from tfcompose.cli.terminal import UNREADABLE, exit_code_of, fail, print_findings, printable
 from tfcompose.text import counted
 
 if TYPE_CHECKING:
@@ -100,18 +100,13 @@ def _plan(arguments: Namespace) -> Plan | None:
         SystemExit: after saying what is wrong.
     """
     from tfcompose.cli.plans import expected_plan
-    from tfcompose.cli.runs import run_of_domain
+    from tfcompose.cli.runs import plan_of_domain
 
     if arguments.file is not None:
         return expected_plan(arguments.file, arguments)[0]
     if arguments.profiles or arguments.overlays or arguments.settings:
         fail("--profile, --overlay and --set need a robot file", UNREADABLE)
-    running = run_of_domain()
-    if running is None:
-        return None
-    place, plan = running
-    warn(f"{place.name} runs here, so its edges are expected")
-    return plan
+    return plan_of_domain()
 
 
 def _expected(plan: Plan | None, below: str | None) -> dict[tuple[str, str], Plan | None]:

@@ -100,6 +100,8 @@ def run(arguments: Namespace) -> int:
     arguments.given = pairs(words, ":=")
     if (arguments.fix or arguments.diff or arguments.watch) and STDIN in arguments.files:
         fail("standard input cannot be fixed or watched: name a file", UNREADABLE)
+    if (arguments.diff or arguments.watch) and arguments.format != "text":
+        fail("--diff and --watch are for people: leave out --format", UNREADABLE)
     return _watch(arguments) if arguments.watch else _lint(arguments, read_text)
 
 
@@ -251,7 +253,7 @@ def _is_robot(file: Path) -> bool:
 
 
 def _print(cases: dict[str, list[Finding]], arguments: Namespace, files: int) -> None:
-    """Print the findings of each file; what --diff prints for programs goes without."""
+    """Print the findings of each file; beside a difference, to stderr."""
     form, found = arguments.format, [one for case in cases.values() for one in case]
     if form == "text":
         from tfcompose.render.text import summary

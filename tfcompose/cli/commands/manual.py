@@ -6,7 +6,6 @@ Without a word, list commands and topics.
 
 from __future__ import annotations
 
-import difflib
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.terminal import UNREADABLE, fail
@@ -27,6 +26,7 @@ def run(arguments: Namespace) -> int:
     from pathlib import Path
 
     from tfcompose.cli.documentation import TOPICS, html, page
+    from tfcompose.findings import did_you_mean
 
     if arguments.html:
         try:
@@ -39,8 +39,7 @@ def run(arguments: Namespace) -> int:
         return 0
     text = page(arguments.word, arguments.commands)
     if text is None:
-        near = difflib.get_close_matches(arguments.word, [*TOPICS, *arguments.commands], 1)
-        advice = f"did you mean {near[0]}?" if near else f"the topics are {', '.join(TOPICS)}"
+        advice = did_you_mean(arguments.word, [*TOPICS, *arguments.commands], f"the topics are {', '.join(TOPICS)}")
         fail(f"no topic or command {arguments.word}; {advice}", UNREADABLE)
     pydoc.pager(text)
     return 0

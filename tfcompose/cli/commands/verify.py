@@ -16,7 +16,7 @@ from argparse import ArgumentTypeError
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import DEFAULT_FILE, add_bag, add_for, add_format, add_variant
-from tfcompose.cli.terminal import print_findings, warn
+from tfcompose.cli.terminal import print_findings
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -74,16 +74,12 @@ def run(arguments: Namespace) -> int:
 
 def _running_plan(arguments: Namespace) -> tuple[Plan, dict[str, Span]] | None:
     """Return the plan of the robot that runs in this ROS domain, without places; None if a file or a bag is given."""
-    from tfcompose.cli.runs import run_of_domain
+    from tfcompose.cli.runs import plan_of_domain
 
     if arguments.file or arguments.bag or arguments.profiles or arguments.overlays or arguments.settings:
         return None
-    running = run_of_domain()
-    if running is None:
-        return None
-    place, plan = running
-    warn(f"{place.name} runs here, so its edges are expected")
-    return plan, {}
+    plan = plan_of_domain()
+    return (plan, {}) if plan else None
 
 
 def _report(arguments: Namespace, plan: Plan, verdicts: list[Verdict], seconds: float) -> int:

@@ -159,7 +159,3 @@ def test_a_file_that_is_nested_too_deep_is_refused_and_does_not_end_the_interpre
     with pytest.raises(RejectedError) as rejected:
         load_params(deep, "deep.yaml")
     assert [one.code for one in rejected.value.findings] == ["TF008"]
-
-
-def test_a_file_may_be_named_as_in_other_places() -> None:
-    assert source_text('{file: "${file(p.yaml)}"}') == source_text("{file: p.yaml}")

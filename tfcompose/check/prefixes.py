@@ -45,24 +45,24 @@ def frame_without_prefix(robot: Robot) -> Iterator[Finding]:
             continue
         given: set[str] = set()
         for node in process.ros_nodes:
-            names = dict(_leaves(node.params))
-            given |= names.keys()
-            wrong = {key: value for key, value in names.items() if "frame" in key and _lacks_prefix(value, robot)}
+            params = node.flat_params
+            given |= {_own_name(key) for key in params}
+            wrong = {
+                key: value
+                for key, value in params.items()
+                if "frame" in _own_name(key) and key not in node.contradicting and _lacks_prefix(value, robot)
+            }
             if wrong:
                 yield _without_prefix(process, wrong, robot)
-        usual = _DEFAULTS.get(process.executable or "", {})
+        usual = {} if robot.excuses(process.name) else _DEFAULTS.get(process.executable or "", {})
         left = {key: frame for key, frame in usual.items() if key not in given and _lacks_prefix(frame, robot)}
         if left:
             yield replace(_without_prefix(process, left, robot), severity="warning")
 
 
-def _leaves(params: dict[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield each parameter by the last part of its name."""
-    for key, value in params.items():
-        if isinstance(value, dict):
-            yield from _leaves(value)
-        else:
-            yield key.rpartition(".")[2], value
+def _own_name(parameter: str) -> str:
+    """Return the last part of a parameter's full name."""
+    return parameter.rpartition(".")[2]
 
 
 def _lacks_prefix(value: Any, robot: Robot) -> bool:

@@ -18,8 +18,10 @@ if TYPE_CHECKING:
     from tfcompose.model import Edge, Process, Robot
 
 _STATIC_PUBLISHER, _STATE_PUBLISHER = "static_transform_publisher", "robot_state_publisher"
-#: A link or child link in a description.
+#: The child of a joint in a description.
 _CHILD = re.compile(r"<child\s+link\s*=\s*[\"']([^\"']+)[\"']")
+#: The sections whose entries can name an owner.
+_WITH_OWNERS = frozenset({"frames", "links", "joints", "sensors", "parts"})
 #: How many words the forms without options have: a position, angles or a quaternion, and the two frames.
 _WITH_ANGLES, _WITH_QUATERNION = 8, 9
 
@@ -57,12 +59,14 @@ def _of_static_publisher(process: Process, robot: Robot) -> Iterator[Finding]:
     known = {robot.final(frame): frame for frame in robot.frames}
     parent, child = (known.get(name, name) for name in names)
     edge = robot.parent_edge(child)
-    if edge is not None and edge.owner != process.name:
-        yield _publishes_too(process, f"{parent} → {child}", edge)
-    elif edge is None and not robot.excuses(child):
+    if robot.excuses(child):
+        return
+    if edge is None:
         message = f"{process.name} publishes {parent} → {child}, which is not declared"
         advice = f"replace it by frames: {{{child}: {{parent: {parent}, xyz: […], rpy: […]}}}}"
         yield finding("TF317", message, process.at, help=advice, severity="warning")
+    elif edge.owner != process.name:
+        yield _publishes_too(process, f"{parent} → {child}", edge)
 
 
 def _own_arguments(process: Process) -> list[str]:
@@ -95,13 +99,15 @@ def _of_state_publisher(process: Process, robot: Robot) -> Iterator[Finding]:
     described = process.params.get("robot_description")
     text = described if isinstance(described, str) and "<robot" in described else None
     mine = {edge.child for edge in robot.edges if edge.owner == process.name}
-    if text is None and mine:
+    refused = any(section in _WITH_OWNERS for section, _ in robot.broken)  # its own edge may be among them
+    if text is None and (mine or refused or robot.excuses(process.name)):
         return
     children = {*_CHILD.findall(text)} if text is not None else robot.described()
     prefix = process.params.get("frame_prefix", "")
     known = {robot.final(frame): frame for frame in robot.frames}
     sent = {known.get(f"{prefix}{name}" if text is not None else robot.final(name)) for name in children}
-    edges = [edge for edge in robot.edges if edge.child in sent - mine and edge.owner in {STATIC, JOINTS}]
+    others = [edge for edge in robot.edges if edge.child in sent - mine and edge.owner in {STATIC, JOINTS}]
+    edges = [edge for edge in others if not robot.excuses(edge.child)]
     if edges:
         yield _publishes_too(process, with_more(edges[0].name, len(edges) - 1), edges[0], sure=text is not None)
 

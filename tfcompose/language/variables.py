@@ -66,7 +66,7 @@ def _filled(value: Any, path: Path, variables: _Variables) -> Any:
 LATER = re.compile(r"\$\{\s*(?:(?:frame|file)\([^(){}]*\)|params_file|build_dir)\s*\}")
 
 
-#: What a xacro file is told: a file beside the robot file, which xacro would look for beside its own.
+#: In what a xacro file is given: a file beside the robot file, which xacro would look for beside its own.
 OF_FILES = re.compile(r"\$\{\s*file\(\s*([^(){}]*?)\s*\)\s*\}")
 
 

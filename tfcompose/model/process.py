@@ -30,7 +30,8 @@ class AsInFile(str):
 class Node:
     """One ROS node of a process, by its full name; ``lifecycle`` is the state that it is brought into.
 
-    ``path`` leads to the mapping that holds its ``params``.
+    ``path`` leads to the mapping that holds its ``params``; ``contradicting`` are those, by their full names, that are
+    known to contradict the tree.
     """
 
     name: str
@@ -38,6 +39,28 @@ class Node:
     path: tuple[str | int, ...] = ()
     params: dict[str, Any] = field(default_factory=dict)
     lifecycle: LifecycleState | None = None
+    contradicting: frozenset[str] = frozenset()
+
+    @property
+    def flat_params(self) -> dict[str, Any]:
+        """The parameters by their full names, with dots."""
+        return _flat(self.params)
+
+
+def _flat(params: dict[str, Any], above: str = "") -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in params.items():
+        found |= _flat(value, f"{above}{key}.") if isinstance(value, dict) else {f"{above}{key}": _meant(value)}
+    return found
+
+
+def _meant(value: Any) -> Any:
+    """Return a word of a parameter file as ROS reads it, as far as switches and names need it: true, false, or text."""
+    if not isinstance(value, AsInFile):
+        return value
+    return {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}.get(
+        value.lower(), str(value)
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, RejectedError, Span, did_you_mean, finding
-from tfcompose.model import BUILT_IN, AsInFile, Claim, Edge, Node, Process
+from tfcompose.model import BUILT_IN, Claim, Edge, Node, Process
 from tfcompose.plan import switch_text
 from tfcompose.resolve.presets import node_preset, node_preset_names
 
@@ -47,10 +47,7 @@ class _Work:
         claimants = [self._node(process, node) for node in process.ros_nodes]
         if all(one is not None for one in claimants):
             self.known.add(process.name)
-        nodes = (
-            replace(node, params=node.params | one.computed) if one and one.takes_parameters else node
-            for node, one in zip(process.ros_nodes, claimants, strict=True)
-        )
+        nodes = (one.settled() if one else node for node, one in zip(process.ros_nodes, claimants, strict=True))
         return replace(process, ros_nodes=tuple(nodes))
 
     def edge(self, edge: Edge) -> Edge:
@@ -86,7 +83,7 @@ class _Work:
             return None
         claims = (*(preset.publishes if preset else ()), *by_hand)
         roles = Roles(self.robot, process.name, preset, claims)
-        claimant = Claimant(process, node, claims, preset, roles, flat(node.params))
+        claimant = Claimant(process, node, claims, preset, roles, node.flat_params)
         self._set_names(claimant)
         for claim in self._of_one(claimant) if preset and preset.one_of else claims:
             self._settle(claimant, claim)
@@ -137,6 +134,7 @@ class _Work:
         if given is None:
             claimant.computed[key] = value
         elif given != value:
+            claimant.contradicting.add(key)
             message = f"{key} of {claimant.process.name} is {given!r}, but in the tree it is {value!r}"
             advice = "remove it: tfcompose writes it"
             if not claimant.takes_parameters:
@@ -235,23 +233,6 @@ class _Work:
         return self.source.at((*claimant.node.path, "params", *key.split(".")))
 
 
-def flat(params: dict[str, Any], above: str = "") -> dict[str, Any]:
-    """Return nested parameters by their full names, with dots."""
-    found: dict[str, Any] = {}
-    for key, value in params.items():
-        found |= flat(value, f"{above}{key}.") if isinstance(value, dict) else {f"{above}{key}": _meant(value)}
-    return found
-
-
-def _meant(value: Any) -> Any:
-    """Return a word of a parameter file as ROS reads it, as far as switches and names need it: true, false, or text."""
-    if not isinstance(value, AsInFile):
-        return value
-    return {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}.get(
-        value.lower(), str(value)
-    )
-
-
 @dataclass(slots=True)
 class Claimant:
     """One node that may publish TF: what is known of it, the parameters a user gave it, and those tfcompose adds."""
@@ -263,6 +244,12 @@ class Claimant:
     roles: Roles
     given: dict[str, Any]
     computed: dict[str, Any] = field(default_factory=dict)
+    contradicting: set[str] = field(default_factory=set)
+
+    def settled(self) -> Node:
+        """Return the node with the parameters that tfcompose adds, where they reach it."""
+        node = replace(self.node, contradicting=frozenset(self.contradicting))
+        return replace(node, params=node.params | self.computed) if self.takes_parameters else node
 
     def ends(self, claim: ClaimSpec) -> tuple[str, str]:
         """Return the frames that the claim is about, parent and child."""

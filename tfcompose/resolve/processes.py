@@ -17,7 +17,7 @@ from tfcompose.resolve.poses import pose_of
 from tfcompose.resolve.presets import node_preset, node_preset_names
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
 
     from tfcompose.findings import Span
     from tfcompose.language import Validated
@@ -131,13 +131,16 @@ def unknown_names(
     return found
 
 
-def unnamed_nodes(edges: tuple[Edge, ...], processes: list[Process], spec: RobotSpec) -> Iterator[Finding]:
-    """Yield a finding for each owner that is a launch file, if no node in it is named."""
+def unnamed_nodes(
+    edges: tuple[Edge, ...], processes: list[Process], spec: RobotSpec, broken: Collection[tuple[str, str]]
+) -> Iterator[Finding]:
+    """Yield a finding for each owner that is a launch file, if no node in it is named, nor refused in ``broken``."""
     owned = {edge.owner: edge for edge in reversed(edges)}
     for process in processes:
         edge, declared = owned.get(process.name), spec.processes.get(process.name)
         is_launch = process.launch is not None or process.argv[:2] == ROS2_LAUNCH
-        if edge and declared and is_launch and declared.node is None and not declared.nodes:
+        is_read = ("processes", process.name) not in broken
+        if edge and declared and is_launch and is_read and declared.node is None and not declared.nodes:
             message = f"{process.name} is a launch file, and the node in it that publishes {edge.name} is not named"
             advice = f"processes: {{{process.name}: {{node: NAME}}}}"
             yield finding("TF332", message, edge.owner_at or edge.at, help=advice)

@@ -103,7 +103,7 @@ class _Work:
         edges = solver.solve()
         own += drafts.drivers
         self.found += [*drafts.found, *bodies.found, *solver.found, *self._wrong_names(own)]
-        self.found += unnamed_nodes(edges, own, self.spec)
+        self.found += unnamed_nodes(edges, own, self.spec, self.broken)
         robot = self._take(with_positions(self._robot(drafts, edges, self._everybody(own)), self.spec, self.source))
         if any(names_files(node.params) for process in own for node in process.ros_nodes):
             robot = self._take(with_param_files(robot, self.source, self.read))
@@ -128,7 +128,7 @@ class _Work:
         return Packages(self.disk, places)
 
     def _join_parts(self, packages: Packages) -> None:
-        """Resolve the parts; few robots have any, and what joins them is loaded only then."""
+        """Resolve the parts, and note what was refused in them."""
         if not self.spec.parts:
             return
         parts = self.holder or Parts(self.library, self.read, self.disk, resolve, (self.source.file,), self.collected)
@@ -171,7 +171,7 @@ class _Work:
         return self.library.over(folders)
 
     def _measured(self, drafts: Drafts) -> list[Draft]:
-        """Return the edges with the poses of calibrations; what reads those is loaded only where there are some."""
+        """Return the edges with the poses of calibrations."""
         if not _has_calibrations(self.spec):
             return drafts.edges
         measured, refused = calibrated(drafts.edges, drafts.frames, self.spec, self.source, self.read)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from graphlib import CycleError, TopologicalSorter
 from typing import TYPE_CHECKING
 
 from tfcompose.check.rule import rule
@@ -20,19 +22,14 @@ def start_order_loop(robot: Robot) -> Iterator[Finding]:
     None of them would ever start. Remove one of the entries under ``after``.
     """
     waiting = {process.name: process for process in robot.processes}
-    open_ends = {name: sum(other in waiting for other in process.after) for name, process in waiting.items()}
-    free = [name for name, count in open_ends.items() if not count]
-    followers: dict[str, list[str]] = {}
-    for name, process in waiting.items():
-        for other in process.after:
-            followers.setdefault(other, []).append(name)
-    while free:
-        done = free.pop()
-        del waiting[done]
-        for name in followers.get(done, ()):
-            open_ends[name] -= 1
-            if not open_ends[name]:
-                free.append(name)
+    order = TopologicalSorter({name: waiting.keys() & process.after.keys() for name, process in waiting.items()})
+    with suppress(CycleError):
+        order.prepare()
+    while order.is_active():
+        free = order.get_ready()
+        order.done(*free)
+        for name in free:
+            del waiting[name]
     names = list(waiting)
     if names:
         notes = [Note(f"{name} is defined here", waiting[name].at) for name in names[1:]]

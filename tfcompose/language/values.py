@@ -180,7 +180,7 @@ TopicName = Annotated[
     Text,
     Matches(
         r"~?/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*",
-        "a topic's name: letters, digits, _ and /",
+        "the name of a topic or a service: letters, digits, _ and /",
     ),
 ]
 Texts = tuple[Text, ...]

@@ -91,9 +91,8 @@ def _answered(
             message = _exchanged(channel, request)
             while "find" in message:
                 folder = packages.folder(message["find"], file)
-                message = _exchanged(
-                    channel, folder and str(Path(folder).absolute())
-                )  # it is relative to including files
+                absolute = folder and str(Path(folder).absolute())  # the process takes files from other folders
+                message = _exchanged(channel, absolute)
             answer = message
         except (OSError, json.JSONDecodeError):
             pass  # the process's end says why
@@ -101,6 +100,7 @@ def _answered(
             process.kill()
             raise
         finally:
+            process.wait()
             watchdog.cancel()
     return answer, process.returncode
 

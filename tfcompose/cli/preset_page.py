@@ -8,7 +8,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.geometry import IDENTITY_XYZW
-from tfcompose.language.preset import Chosen, FurtherProcess
+from tfcompose.language.preset import Chosen, FurtherProcess, PresetOptics
 from tfcompose.numbers import clean_quat, clean_rpy, number
 from tfcompose.resolve.poses import rotation_of
 from tfcompose.resolve.presets import filled, node_preset, node_preset_names
@@ -44,6 +44,7 @@ def facts(name: str, library: Library) -> dict[str, Any]:
         "options": {key: _option(option) for key, option in preset.options.items()},
         "frames": [_frame(key, frame, preset) for key, frame in preset.frames.items()],
         "body": _body(preset),
+        "optics": [{"stream": stream} | _optics(optics, preset) for stream, optics in preset.optics.items()],
         "driver": _driver(preset.driver, preset) if preset.driver else None,
         "topics": [
             {"topic": topic} | _shown(fields, preset, ("type", "frame", "hard_coded", "rate", "when"))
@@ -62,11 +63,14 @@ def text(preset: dict[str, Any]) -> str:
     parts.append(f"frames of a sensor {NAME}\n" + _tree(preset))
     if preset["body"]:
         parts.append(f"body\n  {_body_text(preset['body'])}")
+    if preset["optics"]:
+        parts.append("optics\n" + _table([_optics_text(one) for one in preset["optics"]]))
     parts.append("driver\n" + (_driver_text(preset) if preset["driver"] else "  none known"))
     if preset["topics"]:
         parts.append("messages\n" + _table([_topic(topic) for topic in preset["topics"]]))
-    if preset["source"]:
-        parts.append("source\n" + "\n".join(_source(fact) for fact in preset["source"]))
+    sources = [_source(fact) for fact in preset["source"]] + _optics_sources(preset["optics"])
+    if sources:
+        parts.append("source\n" + "\n".join(sources))
     return "\n\n".join(parts) + "\n"
 
 
@@ -126,6 +130,13 @@ def _shape(shape: Shape) -> dict[str, Any]:
     if shape.cylinder:
         return {"cylinder": {"radius": shape.cylinder.radius, "length": shape.cylinder.length}}
     return {"sphere": {"radius": shape.sphere.radius}} if shape.sphere else {"box": list(shape.box or ())}
+
+
+def _optics(optics: PresetOptics, preset: PresetSpec) -> dict[str, Any]:
+    """Return what is known of the stream, in SI; its frame is there always."""
+    keys = tuple(key for key in PresetOptics.model_fields if key != "source")
+    sources = [{"of": list(one.of), "where": one.where, "quality": one.quality} for one in optics.source or ()]
+    return _shown(optics, preset, keys) | ({"source": sources} if sources else {})
 
 
 def _process(process: PresetProcess, preset: PresetSpec) -> dict[str, Any]:
@@ -239,6 +250,41 @@ def _topic(topic: dict[str, Any]) -> tuple[str, ...]:
     frame = f"in {topic['frame']}" + (", which no parameter changes" if topic.get("hard_coded") else "")
     when = f"with {_pairs(topic['when'])}" if "when" in topic else ""
     return topic["topic"], topic["type"], rate, frame, when
+
+
+def _degrees(sector: Sequence[float]) -> str:
+    """Return a sector in degrees: its whole angle where it is symmetric, else from where to where."""
+    start, end = (round(math.degrees(angle), 3) for angle in sector)
+    return f"{number(2 * end)} deg" if start == -end else f"{number(start)} to {number(end)} deg"
+
+
+def _optics_text(optics: dict[str, Any]) -> tuple[str, ...]:
+    parts = [f"{word} {_degrees(optics[word])}" for word in ("horizontal", "vertical") if word in optics]
+    if "diagonal" in optics:
+        parts.append(f"diagonal {number(round(math.degrees(optics['diagonal']), 3))} deg")
+    parts += [optics["projection"]] if "projection" in optics else []
+    parts += ["along -z"] if "backward" in optics else []
+    parts += [f"{' x '.join(map(str, optics['resolution']))} px"] if "resolution" in optics else []
+    parts += [f"{optics[word]} {word}" for word in ("channels", "samples") if word in optics]
+    if "near" in optics or "far" in optics:
+        near, far = (number(optics[word]) if word in optics else "?" for word in ("near", "far"))
+        parts.append(f"{near} to {far} m")
+    parts += [f"up to {number(optics['rate'])} Hz"] if "rate" in optics else []
+    parts += [f"{optics['shutter']} shutter"] if "shutter" in optics else []
+    parts += [f"baseline {number(optics['baseline'])} m"] if "baseline" in optics else []
+    parts += ["active"] if "active" in optics else []
+    when = f"with {_pairs(optics['when'])}" if "when" in optics else ""
+    return optics["stream"], f"in {optics['frame']}", when, ", ".join(parts) or "unknown"
+
+
+def _optics_sources(streams: Sequence[dict[str, Any]]) -> list[str]:
+    """Return where the values of the optics are from: each document once, with what it is and what it gives."""
+    given: dict[tuple[str, str], list[str]] = {}
+    for optics in streams:
+        for one in optics.get("source", ()):
+            keys = given.setdefault((one["where"], one["quality"]), [])
+            keys.append(f"{optics['stream']} {', '.join(one['of'])}")
+    return [f"  {where} ({quality.replace('_', ' ')}): {'; '.join(keys)}" for (where, quality), keys in given.items()]
 
 
 def _source(fact: dict[str, Any]) -> str:

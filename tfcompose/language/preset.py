@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Discriminator, Tag
 from tfcompose.findings import did_you_mean
 from tfcompose.language.bodies import Shape
 from tfcompose.language.node_preset import Fact
+from tfcompose.language.optics import OpticsSpec
 from tfcompose.language.pose import Rotated
 from tfcompose.language.reading import Refusal
 from tfcompose.language.spec import Spec, key
@@ -75,6 +76,13 @@ class Body(Spec):
     frame: Text = key(..., "the frame that it is on", "{name}_link")
     shape: Shape = key(..., "its shape", {"box": [0.025, 0.09, 0.025]})
     mass: Mass | None = key(None, "where the vendor's is credible; the inertia is computed", "72 g")
+
+
+class PresetOptics(OpticsSpec):
+    """What one stream sees. It is there where its frame is."""
+
+    frame: Text = key(..., "the frame that it is in", "{name}_depth_optical_frame")
+    when: Parameters = key({}, _WHEN, {"streams": "depth"})
 
 
 class Chosen(Spec):
@@ -175,6 +183,7 @@ class PresetSpec(Spec):
     options: dict[str, Option] = key({}, "the choices that the user has")
     frames: dict[str, PresetFrame] = key({}, "the frames by name")
     body: Body | None = key(None, "the sensor's body")
+    optics: dict[str, PresetOptics] = key({}, "what each stream sees")
     driver: PresetDriver | None = key(None, "the vendor's driver")
     topics: dict[str, Topic] = key({}, "what the driver publishes; below its node where the name begins with ~/")
     source: tuple[Fact, ...] = key((), "where the figures are from")
@@ -236,6 +245,8 @@ def _named_frames(preset: PresetSpec) -> Iterator[tuple[Path, str]]:
         yield ("body", "frame"), preset.body.frame
     for name, frame_name in (preset.driver.naming if preset.driver else {}).items():
         yield ("driver", "naming", name), frame_name
+    for name, optics in preset.optics.items():
+        yield ("optics", name, "frame"), optics.frame
     for name, topic in preset.topics.items():
         if not topic.hard_coded:
             yield ("topics", name, "frame"), topic.frame
@@ -277,6 +288,8 @@ def _condition(preset: PresetSpec, path: Path, wanted: Any) -> Iterator[Refusal]
 def _conditions(preset: PresetSpec) -> Iterator[tuple[Path, dict[str, Any]]]:
     for name, frame in preset.frames.items():
         yield ("frames", name, "when"), frame.when
+    for name, optics in preset.optics.items():
+        yield ("optics", name, "when"), optics.when
     for name, topic in preset.topics.items():
         yield ("topics", name, "when"), topic.when
     for name, process in preset.driver.also.items() if preset.driver else ():

@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
 from pydantic_core import PydanticCustomError
 
 from tfcompose.language.bodies import LinkSpec
+from tfcompose.language.optics import OpticsSpec
 from tfcompose.language.pose import EdgeKeys, MountKeys, Parents, Posed, Rotated
 from tfcompose.language.process import Driver, ProcessSpec
 from tfcompose.language.spec import Checked, Spec, below, inherited, key, measure_of, several
@@ -229,6 +230,9 @@ class SensorSpec(MountKeys):
     )
     frames: dict[str, FrameOverride] = key(
         {}, "this unit's own values and names of frames", {"camera_imu_frame": {"xyz": [0, 0.01, 0]}}
+    )
+    optics: dict[str, OpticsSpec] = key(
+        {}, "what its streams see, over what the preset says", {"depth": {"horizontal": "75 deg", "far": "4 m"}}
     )
 
 

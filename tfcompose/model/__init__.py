@@ -19,6 +19,7 @@ from tfcompose.model.edge import (
     SafetyController,
 )
 from tfcompose.model.hardware import Block, Component, Hardware, Interface
+from tfcompose.model.optics import Optics, OpticsKind, OpticsSource, Projection, Shutter
 from tfcompose.model.process import BUILT_IN, GUARD, JOINTS, ROS2_LAUNCH, SHELL, STATIC, AsInFile, Claim, Node, Process
 from tfcompose.model.robot import OPTICAL_ENDINGS, MountedSensor, Part, Robot, SourceNumbers, is_optical, may_be_refused
 
@@ -50,12 +51,17 @@ __all__ = [
     "Material",
     "MountedSensor",
     "Node",
+    "Optics",
+    "OpticsKind",
+    "OpticsSource",
     "Part",
     "Process",
+    "Projection",
     "ReferencePositions",
     "Robot",
     "SafetyController",
     "Shape",
+    "Shutter",
     "SourceNumbers",
     "colour_name",
     "is_optical",

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tfcompose.model.body import Link
     from tfcompose.model.edge import Edge
     from tfcompose.model.hardware import Block, Hardware
+    from tfcompose.model.optics import Optics
     from tfcompose.model.process import Claim, Process
 
 #: How names of optical frames end: REP-103's suffix, the spelling of newer ZED wrappers, a link's, and a short one.
@@ -37,7 +38,7 @@ class MountedSensor:
     driver from publishing frames (None: there are none), ``publishes`` says that it may, ``by_default`` that it does
     where no parameter says so. ``claims`` are the edges outside the sensor that it publishes by default and does not
     own, each with the parameters that keep it from that. ``serial_option`` is the preset's option for a serial number,
-    empty where it has none.
+    empty where it has none. ``optics`` says what each of its streams sees, as far as that is known.
     """
 
     name: str
@@ -55,6 +56,7 @@ class MountedSensor:
     serial_option: str = ""
     serial: str | None = None
     tf_at: Span | None = None
+    optics: tuple[Optics, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

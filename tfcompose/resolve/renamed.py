@@ -164,6 +164,7 @@ def _sensor(sensor: MountedSensor, names: Names) -> MountedSensor:
         frames=tuple(map(names.frame, sensor.frames)),
         driver_frames=tuple(map(names.frame, sensor.driver_frames)),
         driver=names.process(sensor.driver) if sensor.driver else "",
+        optics=tuple(replace(one, frame=names.frame(one.frame)) for one in sensor.optics),
     )
 
 

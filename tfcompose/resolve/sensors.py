@@ -11,6 +11,7 @@ from tfcompose.language.preset import Chosen
 from tfcompose.model import BUILT_IN, STATIC, Edge, Link, MountedSensor, Node, Process
 from tfcompose.plan import switch_text
 from tfcompose.resolve.isolation import settings_of
+from tfcompose.resolve.optics import optics_of
 from tfcompose.resolve.poses import Draft, rotation_of
 from tfcompose.resolve.presets import DRIVER, TFCOMPOSE
 from tfcompose.resolve.processes import full_name, how, namespace_of, program
@@ -140,6 +141,9 @@ class _Mounting:
         named = declared.driver.process if declared.driver else None
         own = sensor.name if any(process.name == sensor.name for process in self.drafts.drivers) else ""
         serial = next((option for option in ("serial", "serial_number") if option in preset.options), "")
+        inside = (sensor.named(preset.mount), *sensor.frames())
+        optics, wrong = optics_of(sensor, inside, self.renamed, self.drafts.source)
+        self.drafts.found += wrong
         return MountedSensor(
             sensor.name,
             declared.preset,
@@ -156,6 +160,7 @@ class _Mounting:
             serial,
             sensor.options.get(serial) if serial else None,
             self.place("tf"),
+            optics,
         )
 
     def check_overrides(self, mount: str) -> None:

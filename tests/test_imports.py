@@ -70,7 +70,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 
 #: Packages from elsewhere, and the only parts that may import them.
 ONLY_IN: dict[str, set[str]] = {
-    "yaml": {"load"},
+    "yaml": {"load", "export"},
     "markdown_it": {"cli"},
     "pydantic": {"language"},
     "pydantic_core": {"language", "units"},

@@ -217,6 +217,19 @@ def test_a_health_check_has_ross_environment_also_where_only_the_entry_point_sou
         assert (done.stdout.strip("\n"), done.stderr) == (output, "")
 
 
+def test_a_host_is_a_profile_and_nobody_waits_for_a_service_of_another() -> None:
+    text = DRIVEN.replace("drive:\n", "drive:\n    host: rear\n", 1).replace(
+        "processes:", "processes:\n  static: {host: brain}"
+    )
+    plan = compiled_plan(text)
+    (file,), gaps = compose(plan, Machine(".."))
+    services = yaml.safe_load(file.text)["services"]
+    profiles = {name: service.get("profiles") for name, service in services.items()}
+    assert (profiles["drive"], profiles["static"], profiles["slam"]) == (["rear"], ["brain"], ["brain"])
+    assert set(services["slam"]["depends_on"]) == {"static"}, "compose refuses one in a profile that is not started"
+    assert len([line for line in gaps if "slam" in line and "rear" in line]) == 1
+
+
 def test_a_folder_that_a_container_does_not_have_is_reported() -> None:
     plan = compiled_plan(DRIVEN)
     there = {"drive": "${build_dir}/x", "slam": "${build_dir}/../.."}

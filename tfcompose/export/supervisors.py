@@ -1,6 +1,6 @@
-"""A plan for supervisors of others: units for systemd, and services for docker compose, one for each process.
+"""A plan for other supervisors: a unit for systemd, or a service for docker compose, for each process.
 
-What they share comes first: names, what starts first, and how each process is started again.
+What they and ``kubernetes`` share comes first: names, the order of starts, restarts, probes and the YAML of the files.
 """
 
 from __future__ import annotations
@@ -10,11 +10,12 @@ from dataclasses import dataclass, field
 from itertools import count
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.emit.argv import mapping
+import yaml
+
 from tfcompose.files import File
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from tfcompose.plan import Plan, PlanProcess
 
@@ -46,14 +47,14 @@ def plain_name(name: str) -> str:
     return _NO_NAME.sub("-", name)
 
 
-def plain_names(plan: Plan) -> dict[str, str]:
+def plain_names(plan: Plan, plain_of: Callable[[str], str] = plain_name) -> dict[str, str]:
     """Return the plain name of each process, by its own: no two are the same, and one that is plain stays."""
     processes = [process.name for process in plan.processes]
-    names = {name: name for name in processes if plain_name(name) == name}
+    names = {name: name for name in processes if plain_of(name) == name}
     taken = set(names)
     for name in processes:
         if name not in names:
-            plain = plain_name(name)
+            plain = plain_of(name)
             names[name] = next(one for n in count(1) if (one := f"{plain}-{n}" if n > 1 else plain) not in taken)
             taken.add(names[name])
     return names
@@ -95,6 +96,62 @@ def gaps_of(plan: Plan) -> list[str]:
         if process.required:
             gaps.append(f"{process.name} is required: its end does not end the others here")
     return gaps
+
+
+#: A probe does not come through the image's entry point, which sources the setup file for the process itself.
+_SOURCED = 'setup=/opt/ros/${ROS_DISTRO:-jazzy}/setup.sh; [ ! -f "$setup" ] || . "$setup"; exec "$@"'
+
+
+def probe_of(plan: Plan, process: PlanProcess) -> list[str]:
+    """Return the command that succeeds in a container while the first edge of the process is live; it has to own one.
+
+    It looks at one edge, and not at all of them, because each look is a process that joins the robot's domain.
+    """
+    edge = plan.edges_of(process.name)[0]
+    words = ["python3", "-m", "tfcompose", "echo", edge.parent, edge.child, "--once", "--timeout", "5"]
+    namespace = process.topics[0].removesuffix("/tf")
+    return ["sh", "-c", _SOURCED, "sh", *words, *(["--namespace", namespace] if namespace else [])]
+
+
+def outside_of(plan: Plan, folder: str) -> list[str]:
+    """Return what processes need that is not in a container, which has the plan's folder alone, a sentence each."""
+    gaps = []
+    for process in plan.started:
+        named = (*process.argv, *process.env.values(), process.cwd or "")
+        outside = [word for word in named if "${build_dir}/.." in word]
+        gaps += [f"{process.name} needs {word}, which is outside of {folder}: add a volume" for word in outside]
+    return gaps
+
+
+class _Dumper(yaml.SafeDumper):
+    """Quotes each string that some reader of YAML, 1.1 or 1.2, could take for something else."""
+
+    def ignore_aliases(self, data: object) -> bool:
+        """Write what stands twice twice."""
+        del data
+        return True
+
+    def increase_indent(self, flow: bool = False, indentless: bool = False) -> None:  # noqa: FBT001, FBT002 (PyYAML's)
+        """Indent lists below their keys."""
+        del indentless
+        super().increase_indent(flow, indentless=False)
+
+
+#: What no YAML takes for a number, a date, a truth value or null.
+_UNQUOTED = re.compile(r"(?!(?:y|n|yes|no|on|off|true|false|null|inf|nan)\Z)[A-Za-z/][A-Za-z0-9_./-]*", re.IGNORECASE)
+
+
+def _string(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    style = "|" if "\n" in text else None if _UNQUOTED.fullmatch(text) else '"'
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style)
+
+
+_Dumper.add_representer(str, _string)
+
+
+def yaml_text(value: Mapping[str, Any]) -> str:
+    """Return the value as YAML in blocks, its keys in their order."""
+    return yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=1000)
 
 
 #: Sources files, then becomes the command; bash, because ROS's setup files are bash's.
@@ -209,37 +266,46 @@ def _quoted(word: str) -> str:
 #: Where the plan's folder is inside a container.
 INSIDE = "/robot"
 IMAGE = "${TFCOMPOSE_IMAGE:?set it to an image with ROS 2 Jazzy and tfcompose}"
-#: A health check does not come through the image's entry point, which sources the setup file for the process itself.
-_SOURCED = 'setup=/opt/ros/${ROS_DISTRO:-jazzy}/setup.sh; [ ! -f "$setup" ] || . "$setup"; exec "$@"'
 _MET = {"started": "service_started", "ready": "service_healthy", "done": "service_completed_successfully"}
 
 
 def compose(plan: Plan, machine: Machine) -> tuple[tuple[File, ...], list[str]]:
     """Return the compose file, and what it does not keep of the plan.
 
-    A process that owns edges is healthy while the first of them is live; ``after: ready`` waits for that.
+    A process that owns edges is healthy while the first of them is live; ``after: ready`` waits for that. One that
+    runs on a host is in the profile of that name, and waits only for what is on the same host.
     """
     names = plain_names(plan)
     services = {names[process.name]: _compose_service(plan, process, machine, names) for process in plan.started}
-    lines = [f"name: {plain_name(plan.robot)}", "services:", *mapping(services, "  ")]
     gaps = gaps_of(plan)
     for process in plan.started:
         for name, what in process.after.items():
-            if what == "ready" and plan.process(name).kind != "external" and not plan.edges_of(name):
+            other = plan.process(name)
+            if what == "ready" and other.kind != "external" and not plan.edges_of(name):
                 gaps.append(f"{process.name} waits until {name} was started: compose cannot see that it is ready")
-        named = (*process.argv, *process.env.values(), process.cwd or "")
-        outside = [word for word in named if "${build_dir}/.." in word]
-        gaps += [f"{process.name} needs {word}, which is outside of {INSIDE}: add a volume" for word in outside]
-    return (File("compose.yaml", "\n".join([*lines, ""])),), gaps
+            if other.kind != "external" and _profile(plan, other) not in (None, _profile(plan, process)):
+                gaps.append(f"{process.name} does not wait for {name}, which is on {other.host}")
+    text = yaml_text({"name": plain_name(plan.robot), "services": services})
+    return (File("compose.yaml", text),), gaps + outside_of(plan, INSIDE)
+
+
+def _profile(plan: Plan, process: PlanProcess) -> str | None:
+    """Return the profile that a service is in: its host, unless the plan is one host's share already."""
+    return plain_name(process.host) if process.host and plan.host is None else None
 
 
 def _compose_service(plan: Plan, process: PlanProcess, machine: Machine, names: Mapping[str, str]) -> dict[str, Any]:
     """Return the service of a process; ``names`` are those of all services, by process."""
-    edges = plan.edges_of(process.name)
-    waits = after(plan, process)
+    profile = _profile(plan, process)
+    waits = {
+        name: what
+        for name, what in after(plan, process).items()
+        if _profile(plan, plan.process(name)) in (None, profile)
+    }
     stop_s = STOP_S if process.stop.timeout_s is None else process.stop.timeout_s
     domain = "${ROS_DOMAIN_ID:-0}" if plan.ros.domain_id is None else str(plan.ros.domain_id)
     service: dict[str, Any] = {
+        **({"profiles": [profile]} if profile else {}),
         "image": machine.image or IMAGE,
         "network_mode": "host",
         "ipc": "host",
@@ -257,10 +323,8 @@ def _compose_service(plan: Plan, process: PlanProcess, machine: Machine, names: 
             names[name]: {"condition": _MET[what if what != "ready" or plan.edges_of(name) else "started"]}
             for name, what in waits.items()
         }
-    if edges:
-        words = ["python3", "-m", "tfcompose", "echo", edges[0].parent, edges[0].child, "--once", "--timeout", "5"]
-        words += _namespace(process)
-        test = ["CMD", *(_kept(word) for word in ("sh", "-c", _SOURCED, "sh", *words))]
+    if plan.edges_of(process.name):
+        test = ["CMD", *map(_kept, probe_of(plan, process))]
         service["healthcheck"] = {"test": test, "interval": "10s", "timeout": "8s", "start_period": "30s", "retries": 3}
     return service
 
@@ -268,12 +332,6 @@ def _compose_service(plan: Plan, process: PlanProcess, machine: Machine, names: 
 def _discovery(plan: Plan) -> dict[str, str]:
     """Return what the health check needs; the process itself has it from the plan."""
     return {"ROS_AUTOMATIC_DISCOVERY_RANGE": plan.ros.discovery.upper()} if plan.ros.discovery else {}
-
-
-def _namespace(process: PlanProcess) -> list[str]:
-    """Return what tells the health check where a robot's own topics are."""
-    namespace = process.topics[0].removesuffix("/tf")
-    return ["--namespace", namespace] if namespace else []
 
 
 def _restart(process: PlanProcess) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import stat
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,7 +24,6 @@ from tfcompose.launcher.events import NewPlan
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.readiness import is_ready, unmet_in_words, waits_for
 from tfcompose.launcher.stopping import refusal
-from tfcompose.plan import SourceLine
 from tfcompose.plan.file import read_plan
 
 if TYPE_CHECKING:
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
     from tfcompose.launcher.events import Event
     from tfcompose.launcher.preflight import Environment
     from tfcompose.launcher.state import State, Tracked
-    from tfcompose.plan import Plan, PlanProcess
+    from tfcompose.plan import Plan
 
 
 #: A larger plan is not read.
@@ -169,30 +168,12 @@ def change(old: Plan, old_folder: Path, new: Plan, new_folder: Path) -> Change:
         other = before.get(process.name)
         if other is None:
             continue
-        same = (
-            process == other
-            and (old.ros, _fence(old)) == (new.ros, _fence(new))
-            and _data(old, other, old_folder) == _data(new, process, new_folder)
+        same = old.started_with(other) == new.started_with(process) and (
+            _bytes(old_folder, other.params_file) == _bytes(new_folder, process.params_file)
         )
         if not same or (described and process.kind in ("static", "joints")):
             changed.add(process.name)
     return Change(frozenset(changed), _held(old, new))
-
-
-def _data(plan: Plan, process: PlanProcess, folder: Path) -> tuple[object, ...]:
-    """Return what the process reads besides its own entry; an edge's place in the file does not matter."""
-    edges = plan.edges if process.kind == "guard" else plan.edges_of(process.name)
-    policy = plan.guard if process.kind == "guard" else None
-    return (
-        tuple(replace(edge, source=SourceLine("", 0)) for edge in edges),
-        policy,
-        _bytes(folder, process.params_file),
-    )
-
-
-def _fence(plan: Plan) -> tuple[str, str] | None:
-    """Return behind which fence the plan's processes send, if there is one: it is put up when they start."""
-    return (plan.robot, plan.guard.fence) if plan.guard.mode == "strict" else None
 
 
 def _bytes(folder: Path, name: str | None) -> bytes | None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
@@ -398,6 +398,14 @@ class Plan:
     def edges_of(self, owner: str) -> tuple[PlanEdge, ...]:
         """Return the edges that the process publishes, in the plan's order."""
         return tuple(edge for edge in self.edges if edge.owner == owner)
+
+    def started_with(self, process: PlanProcess) -> tuple[Any, ...]:
+        """Return all of the plan that decides how the process runs; an edge's place in the robot file does not."""
+        guards = process.kind == "guard"
+        edges = self.edges if guards else self.edges_of(process.name)
+        fence = (self.robot, self.guard.fence) if self.guard.mode == "strict" else None
+        anywhere = tuple(replace(edge, source=SourceLine("", 0)) for edge in edges)
+        return process, self.ros, fence, anywhere, self.guard if guards else None
 
 
 def _name_end(host: str | None) -> str:

@@ -1,8 +1,8 @@
-"""Export the plan for systemd, docker compose or ros2 launch.
+"""Export the plan for systemd, docker compose, Kubernetes or ros2 launch.
 
 Write a built plan, or a robot that is built first, for systemd (a unit per process and a target), docker compose (a
-service per process) or ros2 launch (a launch file with stock nodes for fixed edges and joints). What the other launcher
-cannot do is listed.
+service per process), Kubernetes (a ConfigMap and a workload per process, with a kustomization) or ros2 launch (a launch
+file with stock nodes for fixed edges and joints). What the other launcher cannot do is listed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tfcompose.files import File
     from tfcompose.plan import Plan
 
-KINDS = ("systemd", "compose", "launch")
+KINDS = ("systemd", "compose", "k8s", "launch")
 #: What ROS's setup files set, and what people set for ROS: units start without a shell that has it.
 ROS_VARIABLES = (
     "AMENT_PREFIX_PATH", "CYCLONEDDS_URI", "FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE",
@@ -42,7 +42,10 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--host", metavar="NAME", help="export only this host's share; '': processes without a host; default: all"
     )
-    parser.add_argument("--at", metavar="DIR", help="systemd: the plan's folder on the robot; default: as here")
+    parser.add_argument(
+        "--at", metavar="DIR",
+        help="the plan's folder on the robot; default: systemd: as here; k8s: none, a ConfigMap holds the plan",
+    )  # fmt: skip
     parser.add_argument(
         "--python", metavar="FILE", default=sys.executable, help="systemd: Python on the robot; default: this one"
     )
@@ -51,8 +54,9 @@ def arguments(parser: ArgumentParser) -> None:
         help="systemd: source it first, as /opt/ros/jazzy/setup.bash; repeatable; default: this shell's variables",
     )  # fmt: skip
     parser.add_argument(
-        "--image", default="", metavar="NAME", help="compose: the image; default: $TFCOMPOSE_IMAGE at start"
-    )
+        "--image", default="", metavar="NAME",
+        help="compose: the image; default: $TFCOMPOSE_IMAGE at start; k8s: required",
+    )  # fmt: skip
 
 
 def run(arguments: Namespace) -> int:
@@ -111,8 +115,27 @@ def _exported(plan: Plan, file: Path, folder: Path, arguments: Namespace) -> tup
         from tfcompose.export.supervisors import compose
 
         return compose(plan, Machine(relative, image=arguments.image))
+    if arguments.kind == "k8s":
+        return _for_kubernetes(plan, file.parent, arguments)
     from tfcompose.export.supervisors import systemd
 
     own = {} if arguments.setup else {name: os.environ[name] for name in ROS_VARIABLES if os.environ.get(name)}
     at = Path(arguments.at or file.parent).absolute().as_posix()
     return systemd(plan, Machine(at, arguments.python, tuple(arguments.setup), own))
+
+
+def _for_kubernetes(plan: Plan, folder: Path, arguments: Namespace) -> tuple[tuple[File, ...], list[str]]:
+    """Return the manifests, with the files of the built folder that the pods read."""
+    from tfcompose.cli.reading import read_text
+    from tfcompose.export.kubernetes import MOST_BYTES, Cluster, files_of, kubernetes
+
+    if not arguments.image:
+        fail("name the image of the pods, with ROS 2 Jazzy and tfcompose: --image NAME", UNREADABLE)
+    paths = dict.fromkeys(path for process in plan.started for path in files_of(plan, process))
+    texts = {path: read_text(str(folder / path)) for path in paths}
+    size = sum(len(text.encode()) for text in texts.values())
+    if size > MOST_BYTES and not arguments.at:
+        fail(
+            f"a ConfigMap takes 1 MB, and the plan has {size / 1e6:.1f}: copy it to each node, add --at DIR", UNREADABLE
+        )
+    return kubernetes(plan, Cluster(arguments.image, arguments.at or ""), texts)

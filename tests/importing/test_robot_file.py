@@ -44,7 +44,7 @@ def test_angles_are_emitted_in_degrees_where_that_is_exact(tmp_path: Path) -> No
 def test_a_rotation_is_emitted_with_the_angles_of_the_source(tmp_path: Path) -> None:
     tool = fixed("tool", origin='rpy="-1.5708 1.5708 0.1"')
     text = imported(f"{HEAD}{tool}</robot>", tmp_path)
-    assert data(text)["frames"]["tool"] == {"parent": "base_link", "rpy": [-1.5708, 1.5708, 0.1]}
+    assert data(text)["frames"]["tool"] == {"parent": "base_link", "rpy": [-1.5708, 1.5708, 0.1], "joint": "tool_joint"}
 
 
 def test_what_cannot_be_taken_is_reported_at_its_place(tmp_path: Path) -> None:
@@ -57,8 +57,22 @@ def test_what_cannot_be_taken_is_reported_at_its_place(tmp_path: Path) -> None:
     assert any(line.startswith("# left out: ") and line.endswith("material grey") for line in lines)
 
 
-def test_a_frame_keeps_the_name_of_its_joint_in_a_comment(tmp_path: Path) -> None:
-    assert "  # joint mast_fix\n  mast: " in imported(f"{HEAD}{fixed('mast', name='mast_fix')}</robot>", tmp_path)
+BODY = '<visual><geometry><sphere radius="1"/></geometry></visual>'
+
+
+@pytest.mark.parametrize("body", ["", BODY], ids=["frame", "link"])
+def test_a_fixed_joint_keeps_its_name(body: str, tmp_path: Path) -> None:
+    """Where it is not the one that build gives; what is fixed stands at its child, with a body and without."""
+    names = ("mast_fix", "base_link_to_top")
+    masts = "".join(fixed(child, name=name) for child, name in zip(("mast", "top"), names, strict=True))
+    masts = re.sub('<link name="(.*?)"/>', rf'<link name="\1">{body}</link>', masts)
+    output = data(imported(f"{HEAD}{masts}</robot>", tmp_path))
+    entries = output["links" if body else "frames"]
+    assert (entries["mast"]["parent"], entries["mast"]["joint"]) == ("base_link", "mast_fix")
+    assert "joint" not in entries["top"]
+    assert "joints" not in output
+    urdf = built(tmp_path / "robot.yaml")
+    assert all(f'<joint name="{name}" type="fixed">' in urdf for name in names)
 
 
 def test_names_with_other_characters_are_taken_and_lint_no_longer_refuses_them(tmp_path: Path) -> None:
@@ -96,11 +110,12 @@ def test_a_link_with_a_name_longer_than_a_line_is_a_link(tmp_path: Path) -> None
     assert data(text)["links"] == {"base_link": {}, "a" * 150: {}}
 
 
-def test_a_joint_that_a_block_names_stays_a_joint(tmp_path: Path) -> None:
+def test_a_block_still_finds_the_fixed_joint_that_it_names(tmp_path: Path) -> None:
     block = '<gazebo reference="mast_fix"><preserveFixedJoint>true</preserveFixedJoint></gazebo>'
     output = data(imported(f"{HEAD}{fixed('mast', name='mast_fix')}{block}</robot>", tmp_path))
-    assert output["joints"]["mast_fix"]["type"] == "fixed"
-    assert "frames" not in output
+    assert output["frames"]["mast"]["joint"] == "mast_fix"
+    assert list(output["xml"]) == ["gazebo_1"]
+    built(tmp_path / "robot.yaml")
 
 
 def test_a_free_joint_gets_an_owner_to_be_named(tmp_path: Path) -> None:
@@ -248,12 +263,64 @@ def test_a_mesh_can_say_which_model_a_sensor_is(tmp_path: Path) -> None:
         assert bool(preset) or "sensors: {roof: {preset: …" in " ".join(text.replace("#", "").split())
 
 
+def with_mesh(urdf: str, link: str, file: str) -> str:
+    body = f'<visual><geometry><mesh filename="package://x/meshes/{file}"/></geometry></visual>'
+    assert f'<link name="{link}"/>' in urdf
+    return urdf.replace(f'<link name="{link}"/>', f'<link name="{link}">{body}</link>')
+
+
+def words(text: str) -> str:
+    """Return the text in one line, comments too."""
+    return " ".join(text.replace("#", "").split())
+
+
+def test_a_sensor_is_recognised_under_other_names_if_its_model_is_named(tmp_path: Path) -> None:
+    """As in Clearpath's descriptions: the frames are lidar3d_0_link and lidar3d_0_laser, the mesh is VLP16_base_1."""
+    lidar = fixed("lidar3d_0_link") + fixed("lidar3d_0_laser", "lidar3d_0_link", 'xyz="0 0 0.0377"')
+    urdf = f"{HEAD}{lidar}</robot>"
+    named = with_mesh(urdf, "lidar3d_0_link", "VLP16_base_1.dae")
+    (sensor,) = data(imported(named, tmp_path))["sensors"].values()
+    assert sensor["preset"] == "velodyne/vlp16"
+    names = {name: one["name"] for name, one in sensor["frames"].items()}
+    assert names == {"lidar3d_0_base_link": "lidar3d_0_link", "lidar3d_0": "lidar3d_0_laser"}
+    assert '<child link="lidar3d_0_laser"/>' in built(tmp_path / "robot.yaml")
+    assert "sensors" not in data(imported(urdf, tmp_path))
+    text = imported(named.replace("0.0377", "0.05"), tmp_path)
+    assert "sensors" not in data(text)
+    assert "sensors: {lidar3d_0: {preset: velodyne/vlp16," in words(text)
+
+
+def test_a_mesh_of_another_model_makes_it_a_question(tmp_path: Path) -> None:
+    """The ZED X One GS of zed_description 0.1.2 has the frames of the ZED X One 4K."""
+    spec = {"preset": "zed/zedx-one-4k", "parent": "base_link", "driver": "none"}
+    urdf = urdf_of({"tfcompose": 1, "robot": "r", "links": {"base_link": {}}, "sensors": {"zed": spec}}, tmp_path)
+    assert data(imported(urdf, tmp_path))["sensors"] == {"zed": spec}
+    text = imported(with_mesh(urdf, "zed_camera_link", "zedxonegs.stl"), tmp_path)
+    assert "sensors" not in data(text)
+    assert "preset: zed/zedx-one-gs" in words(text)
+
+
+def test_a_sensor_of_which_there_is_no_more_than_a_name_is_one_question(tmp_path: Path) -> None:
+    """At the frame that is named most exactly, and at none above or below it, nor around a sensor that is known."""
+    bracket = fixed("oakd_bracket") + fixed("oakd_link", "oakd_bracket") + fixed("oakd_imu_frame", "oakd_link")
+    text = imported(with_mesh(f"{HEAD}{bracket}{fixed('rplidar_link')}</robot>", "oakd_link", "oakd_pro.dae"), tmp_path)
+    assert text.count("# is it ") == 2
+    assert "sensors: {oakd: {preset: oak/oak-d-pro, parent: oakd_bracket}}" in words(text)
+    assert "rplidar/a1, rplidar/a2" in words(text)
+    known = fixed("vlp16_mast") + fixed("vlp16_base_link", "vlp16_mast")
+    known += fixed("vlp16", "vlp16_base_link", 'xyz="0 0 0.0377"')
+    text = imported(f"{HEAD}{known}</robot>", tmp_path)
+    assert list(data(text)["sensors"]) == ["vlp16"]
+    assert "# is it " not in text
+
+
 def test_rotations_rounded_as_people_round_them_are_those_of_the_preset(tmp_path: Path) -> None:
     frames = fixed("camera_link") + fixed("camera_rgb_frame", "camera_link", 'xyz="0.003 0.011 0.009"')
     frames += fixed("camera_rgb_optical_frame", "camera_rgb_frame", 'rpy="-1.57 0 -1.57"')
     (sensor,) = data(imported(f"{HEAD}{frames}</robot>", tmp_path))["sensors"].values()
     assert sensor["preset"] == "robotis/pi-camera"
-    assert sensor["frames"] == {"camera_rgb_optical_frame": {"rpy": [-1.57, 0, -1.57]}}
+    assert sensor["frames"]["camera_rgb_optical_frame"]["rpy"] == [-1.57, 0, -1.57]
+    assert "rpy" not in sensor["frames"]["camera_rgb_frame"]
 
 
 def test_numbers_have_no_digits_that_computing_left_behind(tmp_path: Path) -> None:

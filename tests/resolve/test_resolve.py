@@ -297,6 +297,17 @@ def test_an_edge_with_several_parents_hangs_on_the_first_and_names_the_others_ev
     assert differences(robot, more) == ["switch base_link → tool: or on rack → no other parent"]
 
 
+def test_a_fixed_edge_has_the_name_of_a_joint_where_one_is_given() -> None:
+    """The other edges of a sensor are named by build."""
+    inside = "joint: c_fix, frames: {c_color_frame: {joint: lens_fix}}, driver: none"
+    robot = robot_of(f"frames: {{tip: {{parent: base_link, joint: tip_fix}}}}\n{CAMERA % inside}")
+    named = {edge.child: edge.joint_name for edge in robot.edges if edge.joint_name}
+    assert named == {"tip": "tip_fix", "c_bottom_screw_frame": "c_fix", "c_color_frame": "lens_fix"}
+    urdf = next(one.text for one in emit(robot) if one.path == "robot.urdf")
+    assert all(f'<joint name="{name}" type="fixed">' in urdf for name in named.values())
+    assert '<joint name="c_bottom_screw_frame_to_c_link" type="fixed">' in urdf
+
+
 @pytest.mark.parametrize("parents", ["[]", "[base_link, base_link]", "[base_link, 3]"])
 def test_a_list_of_parents_has_different_names(parents: str) -> None:
     found = compiled(TOOL.replace("[base_link, rack]", parents)).found

@@ -136,11 +136,8 @@ def _colour(shape: Any, tag: str, colours: dict[str, Any]) -> Any:
 
 def _joint(joint: Any) -> dict[str, Any]:
     kind = joint.get("type")
-    output = {"parent": joint.find("parent").get("link"), "type": kind, "pose": _pose(joint)}
-    if kind == "fixed":
-        return output
-    output["name"] = joint.get("name")
-    if kind == "floating":
+    output = {"parent": joint.find("parent").get("link"), "type": kind, "pose": _pose(joint), "name": joint.get("name")}
+    if kind in {"fixed", "floating"}:
         return output
     axis = np.array(_numbers(joint.find("axis"), "xyz", "1 0 0"))
     output["axis"] = axis / np.linalg.norm(axis)

@@ -38,16 +38,14 @@ MOVER = "mover"
 class Imported:
     """A robot on its way into a robot file.
 
-    ``name`` is its name there, ``target`` where that file will be. ``reserved`` are words that raw blocks use: joints
-    of these names stay joints. ``notes`` say of each entry what of it is left out, and why. ``rpy`` has the angles
-    (rad) by which the source has rotations; ``packages`` are folders of packages, as the robot file is to name them;
-    ``rules`` are the levels of findings that the source gives reason for.
+    ``name`` is its name there, ``target`` where that file will be. ``notes`` say of each entry what of it is left out,
+    and why. ``rpy`` has the angles (rad) by which the source has rotations; ``packages`` are folders of packages, as
+    the robot file is to name them; ``rules`` are the levels of findings that the source gives reason for.
     """
 
     robot: Robot
     name: str
     target: Target
-    reserved: frozenset[str] = frozenset()
     sensors: tuple[Recognised, ...] = ()
     notes: Mapping[Entry, Iterable[str]] = field(default_factory=dict)
     rpy: Mapping[Quaternion, Vector] = field(default_factory=dict)
@@ -68,7 +66,7 @@ class _Writer:
         self.values = Values(imported.rpy, imported.robot, imported.target)
         self.notes: dict[Entry, list[str]] = {at: list(notes) for at, notes in imported.notes.items()}
         self.brought = {edge.child for sensor in imported.sensors for edge in sensor.edges}
-        self.bare = [edge for edge in self.robot.edges if self._is_bare(edge)]
+        self.fixed = self._fixed()
 
     def lines(self, head: Iterable[str]) -> list[str]:
         imported, robot, links, joints = self.imported, self.robot, self._links(), self._joints()
@@ -81,7 +79,7 @@ class _Writer:
             "joints": joints,
             "ros2_control": {one.name: _hardware(one) for one in robot.hardware},
             "xml": {block.name: dedented(block.text) for block in robot.blocks},
-            "frames": {edge.child: self._frame(edge) for edge in self.bare},
+            "frames": {child: self._mount(edge) for child, edge in self.fixed.items() if not self._has_body(child)},
             "sensors": {sensor.name: self._sensor(sensor) for sensor in imported.sensors},
             "processes": self._processes(),
             "rules": dict(imported.rules),
@@ -111,12 +109,18 @@ class _Writer:
         if notes:
             self.notes.setdefault((title, name), []).extend(notes)
 
-    def _is_bare(self, edge: Edge) -> bool:
-        """Whether the edge can be a frame's: it does not move, has no body, and nothing names its joint."""
-        link = self.robot.links.get(edge.child)
-        body = link and (link.visuals or link.collisions or link.inertial)
-        free = edge.joint or edge.free or edge.child in self.brought
-        return not (body or free or link is None or edge.joint_name in self.imported.reserved)
+    def _fixed(self) -> dict[str, Edge]:
+        """Return the edges that do not move and are no sensor's, by child; of several to one child, the first."""
+        fixed: dict[str, Edge] = {}
+        for edge in self.robot.edges:
+            moves = edge.joint or edge.free
+            if not moves and edge.child not in self.brought and edge.child in self.robot.links:
+                fixed.setdefault(edge.child, edge)
+        return fixed
+
+    def _has_body(self, name: str) -> bool:
+        link = self.robot.links[name]
+        return bool(link.visuals or link.collisions or link.inertial)
 
     def _base(self) -> str | None:
         """Return the base, if it is not what a robot file without one has."""
@@ -129,53 +133,50 @@ class _Writer:
         return None if root == usual else root
 
     def _links(self) -> dict[str, Any]:
-        frames = {edge.child for edge in self.bare}
         bodies_of_presets = {sensor.body for sensor in self.imported.sensors}
         entries = {}
         for name, link in self.robot.links.items():
-            body = self.values.link(link)
-            if name in frames or (name in self.brought and name not in bodies_of_presets and not body):
-                self._note("frames" if name in frames else "links", name, *self.notes.pop(("links", name), ()))
+            edge, has_body = self.fixed.get(name), self._has_body(name)
+            is_frame = edge is not None and not has_body
+            if is_frame or (name in self.brought and name not in bodies_of_presets and not has_body):
+                self._note("frames" if is_frame else "links", name, *self.notes.pop(("links", name), ()))
                 continue
-            entries[name] = body
+            entries[name] = (self._mount(edge, "links") if edge else {}) | self.values.link(link)
         return entries
 
     def _joints(self) -> dict[str, Any]:
         return {
             edge.joint_name: self.values.joint(edge, MOVER if edge.free else None)
             for edge in self.robot.edges
-            if not self._is_bare(edge) and edge.child not in self.brought
+            if self.fixed.get(edge.child) is not edge and edge.child not in self.brought
         }
 
-    def _frame(self, edge: Edge) -> dict[str, Any]:
-        self._note("frames", edge.child, *self.notes.pop(("joints", edge.joint_name), ()))
-        self._note_joint_names([edge], "frames", edge.child)
-        return {"parent": edge.parent, **self.values.pose(edge.pose)}
-
-    def _note_joint_names(self, edges: Iterable[Edge], title: str, name: str) -> None:
-        """Note the names of joints that are not what ``build`` will call them."""
-        own = [edge.joint_name for edge in edges if edge.joint_name not in {"", f"{edge.parent}_to_{edge.child}"}]
-        if own:
-            self._note(title, name, f"joints {', '.join(own)}" if len(own) > 1 else f"joint {own[0]}")
+    def _mount(self, edge: Edge, title: str = "frames") -> dict[str, Any]:
+        """Return the keys of a fixed edge, which stand at its child."""
+        self._note(title, edge.child, *self.notes.pop(("joints", edge.joint_name), ()))
+        return {"parent": edge.parent, **self.values.pose(edge.pose), **_joint_name(edge)}
 
     def _sensor(self, sensor: Recognised) -> dict[str, Any]:
         frames: dict[str, Any] = {}
+        mount = sensor.mount.child
+        if mount in sensor.names:
+            frames[sensor.names[mount]] = {"name": mount}
         for edge in sensor.inside:
-            values: dict[str, Any] = {}
+            values: dict[str, Any] = {"name": edge.child} if edge.child in sensor.names else {}
             if edge.child in sensor.own_xyz:
                 values["xyz"] = list(edge.pose.xyz)
             if edge.child in sensor.own_rotation:
                 quat_xyzw = edge.pose.quat_xyzw
                 values["rpy"] = rotation(quat_xyzw, self.imported.rpy.get(quat_xyzw)) or [0, 0, 0]
+            values |= _joint_name(edge)
             if values:
-                frames[edge.child] = values
+                frames[sensor.names.get(edge.child, edge.child)] = values
         for edge in sensor.edges:
             self._note("sensors", sensor.name, *self.notes.pop(("joints", edge.joint_name), ()))
-            if not self.values.link(self.robot.links[edge.child]):
+            if not self._has_body(edge.child):
                 self._note("sensors", sensor.name, *self.notes.pop(("links", edge.child), ()))
-        self._note_joint_names(sensor.edges, "sensors", sensor.name)
         keys: dict[str, Any] = {"preset": sensor.preset, "parent": sensor.mount.parent}
-        keys |= self.values.pose(sensor.mount.pose)
+        keys |= self.values.pose(sensor.mount.pose) | _joint_name(sensor.mount)
         keys |= {"options": sensor.options} if sensor.options else {}
         return keys | ({"driver": "none"} if sensor.driven else {}) | ({"frames": frames} if frames else {})
 
@@ -186,6 +187,11 @@ class _Writer:
         several = ", ".join(free)
         self._note("processes", MOVER, f"the source does not say which process publishes {several}: name it here")
         return {MOVER: {"external": True}}
+
+
+def _joint_name(edge: Edge) -> dict[str, str]:
+    """Return the name of the joint that a fixed edge is, where it is not what ``build`` calls it."""
+    return {"joint": edge.joint_name} if edge.joint_name not in {"", f"{edge.parent}_to_{edge.child}"} else {}
 
 
 def _texts(value: Any) -> list[str]:
@@ -256,8 +262,7 @@ def imported(
     """
     robot, unused = without_unused_blocks(with_hardware(document.robot))
     robot, renamed = with_material_names(robot)
-    reserved = frozenset(word for block in robot.blocks for word in re.findall(r"[^\s<>\"'=]+", block.text))
-    sensors, undecided = recognised(robot, library, reserved) if library else ([], {})
+    sensors, undecided = recognised(robot, library) if library else ([], {})
     notes = omitted(document)
     for mount, note in undecided.items():
         notes.setdefault(("frames", mount), []).append(note)
@@ -265,7 +270,7 @@ def imported(
     other_name = [f"called {robot.name} in the source"] if name != robot.name else []
     notes.setdefault(("", ""), []).extend([*renamed, *unused, *other_name])
     folders = {package: target.from_folder(folder) for package, folder in packages.items()}
-    return Imported(robot, name, target, reserved, tuple(sensors), notes, angles(document.root), folders)
+    return Imported(robot, name, target, tuple(sensors), notes, angles(document.root), folders)
 
 
 def _robot_name(name: str) -> str:

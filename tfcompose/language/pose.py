@@ -212,3 +212,6 @@ class MountKeys(EdgeKeys):
     calibration: Calibration | None = key(
         None, "a file with the measured pose; the pose beside it is the nominal one", "calibration/hand_eye.yaml"
     )
+    joint: Text | None = key(
+        None, "the name of the fixed joint in URDF; default: PARENT_to_CHILD", "camera_mount_joint"
+    )

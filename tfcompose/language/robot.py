@@ -213,6 +213,7 @@ class FrameOverride(Rotated):
     xyz: Xyz | None = key(None, "position in the parent", [0, 0.0148, 0])
     parent: Text | None = key(None, "the frame of this sensor that this unit's driver makes its parent", "camera_link")
     name: Text | None = key(None, "another name for this frame", "front_lens")
+    joint: Text | None = key(None, "the name of its joint in URDF; default: PARENT_to_CHILD", "camera_color_joint")
 
 
 class SensorSpec(MountKeys):

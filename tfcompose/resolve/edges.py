@@ -72,7 +72,7 @@ class Drafts:
         for name, frame in self.spec.frames.items():
             self.frames.setdefault(name, self.source.at_key(("frames", name)))
             if frame.parent is not None:
-                self.add(("frames", name), frame.parent, name, frame)
+                self.add(("frames", name), frame.parent, name, frame, joint_name=frame.joint)
 
     def add_links(self) -> None:
         """Take the bodies; one with a parent has a fixed edge."""
@@ -81,7 +81,7 @@ class Drafts:
             self.frames.setdefault(name, at)
             self.links[name] = self.bodies.link(name, link)
             if link.parent is not None:
-                self.add(("links", name), link.parent, name, link)
+                self.add(("links", name), link.parent, name, link, joint_name=link.joint)
 
     def add_joints(self) -> None:
         """Take the edges between bodies."""
@@ -113,10 +113,11 @@ class Drafts:
             self.frames.setdefault(name, place)
         for name, link in robot.links.items():
             self.links.setdefault(name, link)
-        if part.declared.parent is not None and part.root is not None:
-            switched = len(part.declared.parent) > 1  # then the part's owner is who carries it about
-            owner = part.declared.owner if switched else STATIC
-            self.add(at, part.declared.parent, part.root, part.declared, owner=owner, part=part.name)
+        keys = part.declared
+        if keys.parent is not None and part.root is not None:
+            switched = len(keys.parent) > 1  # then the part's owner is who carries it about
+            owner = keys.owner if switched else STATIC
+            self.add(at, keys.parent, part.root, keys, joint_name=keys.joint, owner=owner, part=part.name)
         self.edges += [Draft(edge, part=part.name) for edge in robot.edges]
         self.sensors += robot.sensors
         return True
@@ -152,15 +153,13 @@ class Drafts:
         keys: EdgeKeys,
         *,
         joint: Joint | None = None,
-        joint_name: str = "",
+        joint_name: str | None = None,
         sensor: Sensor | None = None,
         owner: str | None = None,
         part: str | None = None,
     ) -> None:
         """Take the edge that is written at a place; a sensor's and a part's is its mount."""
-        named_at = joint.at if joint else self.source.at_key(at) if joint_name else None
-        if named_at:
-            self.joints[joint_name] = named_at
+        named_at = self.named_joint(joint_name, at) if joint_name else None
         free = joint if joint and joint.type in FREE else None
         joint = None if free else joint
         owner = owner or keys.owner or (JOINTS if joint else STATIC)
@@ -175,9 +174,9 @@ class Drafts:
             rate=keys.rate,
             joint=joint,
             free=free,
-            joint_name=joint_name,
+            joint_name=joint_name or "",
             joint_at=named_at,
-            child_at=self.source.at((*at, "child")) if joint_name else None,
+            child_at=self.source.at((*at, "child")) if at[0] == "joints" else None,
             owner_at=self.source.at((*at, "owner")) if keys.owner else None,
             sensor=sensor.name if sensor else None,
             rate_at=self.source.at((*at, "rate")) if keys.rate else None,
@@ -187,6 +186,15 @@ class Drafts:
         relative_at = self.source.at((*at, "relative_to")) if keys.relative_to else None
         place_at = self.source.at((*at, "place")) if place else None
         self.edges.append(Draft(edge, keys.relative_to, relative_at, place, place_at, at, part))
+
+    def named_joint(self, name: str, at: Path) -> Span:
+        """Take the name of the joint that an entry is, or whose key ``joint`` it is; return its place."""
+        place = self.source.at_key(at) if at[0] == "joints" else self.source.at((*at, "joint"))
+        if name in self.joints:
+            notes = [Note("the other one", self.joints[name])]
+            self.found.append(finding("TF502", f"two joints are called {name}", place, notes=notes, help="rename one"))
+        self.joints.setdefault(name, place)
+        return place
 
     def _kind(self, owner: str, keys: EdgeKeys, joint: Joint | None) -> EdgeKind:
         if owner == STATIC:

@@ -46,7 +46,8 @@ class _Mounting:
         drafts, sensor = self.drafts, self.sensor
         mount = self.renamed(sensor.named(sensor.preset.mount))
         drafts.frames.setdefault(mount, self.place())
-        drafts.add(("sensors", sensor.name), sensor.spec.parent, mount, sensor.spec, sensor=sensor)
+        keys, at = sensor.spec, ("sensors", sensor.name)
+        drafts.add(at, keys.parent, mount, keys, joint_name=keys.joint, sensor=sensor)
         publisher = self.publisher()
         for name, frame in sensor.frames().items():
             self.add_frame(name, frame, publisher)
@@ -75,10 +76,13 @@ class _Mounting:
         kind = "dynamic" if frame.driver == "dynamic" and owner != STATIC else "static"
         self.drafts.frames.setdefault(final, self.place())
         nominal = frame.nominal and not (own and (own.xyz or rotation_of(own, name)))
+        joint = own.joint if own else None
+        at: Path = ("sensors", self.sensor.name, "frames", name)
         edge = Edge(
             parent=self.renamed(parent), child=final, kind="dynamic" if kind == "dynamic" else "static", owner=owner,
             pose=pose, at=self.place(), given=False, sensor=self.sensor.name, nominal=nominal,
-            other_axes=frame.other_axes, pose_known=not missing,
+            other_axes=frame.other_axes, pose_known=not missing, joint_name=joint or "",
+            joint_at=self.drafts.named_joint(joint, at) if joint else None,
         )  # fmt: skip
         self.drafts.edges.append(Draft(edge))
 
@@ -178,8 +182,8 @@ class _Mounting:
                 message = f"{sensor.name} has no frame {own.parent}"
                 self.drafts.found.append(finding("TF203", message, source.at((*at, name, "parent")), help=advice))
         mounted = sensor.spec.frames.get(original)
-        if mounted and (mounted.xyz or mounted.parent or rotation_of(mounted)):
-            advice = f"its pose is that of {sensor.name}"
+        if mounted and (mounted.xyz or mounted.parent or mounted.joint or rotation_of(mounted)):
+            advice = f"its pose and joint are those of {sensor.name}"
             message = f"{mount} is the mount, and has no pose inside"
             self.drafts.found.append(finding("TF106", message, source.at_key((*at, original)), help=advice))
         if mount in sensor.frames():

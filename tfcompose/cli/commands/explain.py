@@ -129,9 +129,8 @@ def _given_values(edge: Edge, sources: Sequence[Source]) -> Iterator[tuple[Sourc
 
 def _entries(edge: Edge, source: Source) -> Iterator[Path]:
     """Yield where the edge may be given; in a part without the prefix that its names have in the robot."""
-    name = edge.joint_name or edge.sensor or edge.child
-    sections = ("joints",) if edge.joint_name else ("sensors",) if edge.sensor else ("frames", "links", "parts")
-    for section in sections:
+    named = {"joints": edge.joint_name, "sensors": edge.sensor} if edge.sensor else {"joints": edge.joint_name}
+    for section, name in (named | dict.fromkeys(("frames", "links", "parts"), edge.child)).items():
         entries = source.data.get(section)
         if not isinstance(entries, dict):
             continue

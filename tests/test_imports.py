@@ -73,6 +73,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "numbers",
         "resolve",
         "text",
+        "tree",
         "urdf",
     },
     "cli": {"*"},

@@ -72,6 +72,7 @@ CATALOGUE: dict[str, Code] = {
         Code("TF017", "unknown_rule", "load", "error"),
         Code("TF018", "bad_xml", "load", "error"),
         Code("TF019", "file_not_there", "load", "error"),
+        Code("TF020", "not_imported", "load", "warning"),
         # keys, types, values
         Code("TF101", "unknown_key", "language", "error"),
         Code("TF102", "missing_key", "language", "error"),

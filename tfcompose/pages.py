@@ -69,6 +69,10 @@ The place is where the parser stopped. A URDF is one <robot>; for xacro files th
     "TF019": """A file or folder that ${file(…)} or cwd names does not exist.
 
 Paths are relative to the file that contains them, not to the folder in which tfcompose is started.""",
+    "TF020": """Something of an imported source is not in the robot file.
+
+It is a TODO comment there, with its file and line: what a robot file cannot say, what could not be understood, or what
+only runs elsewhere. Everything else is imported.""",
     "TF101": """A key is not known here.
 
 Probably it is misspelt. Unknown keys are refused, because a key that is silently ignored puts a frame in the wrong

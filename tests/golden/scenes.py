@@ -43,6 +43,8 @@ from tfcompose.emit import emit
 from tfcompose.files import Target
 from tfcompose.findings import Finding, RejectedError, Span, finding
 from tfcompose.geometry import Pose
+from tfcompose.importing.draft import Draft
+from tfcompose.importing.shell import add_script
 from tfcompose.ipc import Alive, Clear, Found, GateShut, Live, ProcessRequest
 from tfcompose.language import set_value
 from tfcompose.launcher.events import Exited, StartFailed, TimeUp
@@ -591,6 +593,14 @@ def recordings() -> Iterator[Finding]:
             yield from _refused(partial(main, ["echo", *words, "--bag", "bag", "--once"]))
 
 
+def imported() -> Iterator[Finding]:
+    """A script of which a robot file cannot say all."""
+    draft = Draft("rover")
+    lines = "sleep 3\nros2 run tf2_ros static_transform_publisher 0 0 0 base_link laser\n"
+    add_script(draft, lines, "start.sh", Target())
+    yield from draft.found
+
+
 SCENES: tuple[Callable[[], Iterator[Finding]], ...] = (
     doctor,
     with_a_plan,
@@ -599,4 +609,5 @@ SCENES: tuple[Callable[[], Iterator[Finding]], ...] = (
     surroundings,
     compiled,
     recordings,
+    imported,
 )

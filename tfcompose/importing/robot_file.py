@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.importing.omitted import angles, omitted, with_material_names, without_unused_blocks
 from tfcompose.importing.sensors import recognised
 from tfcompose.importing.values import Values, rotation
-from tfcompose.importing.yaml_text import comment, dedented, entry, section
+from tfcompose.importing.yaml_text import comment, dedented, entry, section, without_expressions
 from tfcompose.urdf.blocks import with_hardware
 
 if TYPE_CHECKING:
@@ -84,9 +84,8 @@ class _Writer:
             "processes": self._processes(),
             "rules": dict(imported.rules),
         }
-        if any("${" in value for value in _texts(sections)):
-            lines += entry("vars", {"dollar": "$"})
-            sections = _without_expressions(sections)
+        sections, variables = without_expressions(sections)
+        lines += variables
         lines += comment(self._homeless(sections))
         for title, entries in sections.items():
             lines += section(title, entries, {key: self._of(title, key) for key in entries})
@@ -192,24 +191,6 @@ class _Writer:
 def _joint_name(edge: Edge) -> dict[str, str]:
     """Return the name of the joint that a fixed edge is, where it is not what ``build`` calls it."""
     return {"joint": edge.joint_name} if edge.joint_name not in {"", f"{edge.parent}_to_{edge.child}"} else {}
-
-
-def _texts(value: Any) -> list[str]:
-    """Return the texts in which expressions are looked for: in a key none is."""
-    if isinstance(value, dict):
-        return [one for item in value.values() for one in _texts(item)]
-    if isinstance(value, (list, tuple)):
-        return [one for item in value for one in _texts(item)]
-    return [value] if isinstance(value, str) else []
-
-
-def _without_expressions(value: Any) -> Any:
-    """Return the data in which no text is taken for an expression."""
-    if isinstance(value, dict):
-        return {key: _without_expressions(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_without_expressions(item) for item in value]
-    return type(value)(value.replace("${", "${dollar}{")) if isinstance(value, str) else value
 
 
 def _hardware(hardware: Hardware) -> dict[str, Any]:

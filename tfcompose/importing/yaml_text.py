@@ -119,7 +119,8 @@ def dedented(block: str) -> Literal:
 def comment(texts: Iterable[str], depth: int = 0) -> list[str]:
     """Return texts as lines of comment, folded where they are long."""
     before = "  " * depth + "# "
-    return [before + line for one in texts for line in _folded(" ".join(one.split()), WIDTH - len(before))]
+    printed = ("".join(char if char.isprintable() else "?" for char in " ".join(one.split())) for one in texts)
+    return [before + line for one in printed for line in _folded(one, WIDTH - len(before))]
 
 
 def _folded(line: str, width: int) -> list[str]:
@@ -140,3 +141,27 @@ def section(name: str, entries: Mapping[str, Any], notes: Mapping[str, Iterable[
     for key, value in entries.items():
         lines += [*comment(notes.get(key, ()), 1), *entry(key, value, 1)]
     return lines
+
+
+def without_expressions(sections: dict[str, dict[str, Any]]) -> tuple[dict[str, dict[str, Any]], list[str]]:
+    """Return sections in which no text is taken for an expression, and the lines of the variable that they need."""
+    if not any("${" in value for value in _texts(sections)):
+        return sections, []
+    return _escaped(sections), entry("vars", {"dollar": "$"})
+
+
+def _texts(value: Any) -> list[str]:
+    """Return the texts in which expressions are looked for: in a key none is."""
+    if isinstance(value, dict):
+        return [one for item in value.values() for one in _texts(item)]
+    if isinstance(value, (list, tuple)):
+        return [one for item in value for one in _texts(item)]
+    return [value] if isinstance(value, str) else []
+
+
+def _escaped(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _escaped(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_escaped(item) for item in value]
+    return type(value)(value.replace("${", "${dollar}{")) if isinstance(value, str) else value

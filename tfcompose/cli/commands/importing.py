@@ -1,7 +1,8 @@
-"""Convert a URDF or xacro file to a robot file.
+"""Import URDF, xacro, launch files, shell scripts or a running robot.
 
-Write a robot file with the tree, bodies and joints of a URDF or xacro file; building it gives the same URDF. Chains of
-frames that match a preset become sensors; comments hold what a robot file cannot express.
+Write a robot file from a URDF or xacro file, which builds to the same URDF; or from a shell script with ros2 run lines.
+Chains of frames that match a preset become sensors. What a robot file cannot say is a TODO comment with its file and
+line, and a finding.
 """
 
 from __future__ import annotations
@@ -18,15 +19,20 @@ from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, rej
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
+    from tfcompose.compile import Compiled
+    from tfcompose.files import Target
     from tfcompose.findings import Finding
+    from tfcompose.importing.draft import Draft
     from tfcompose.urdf.lint import Document
+    from tfcompose.urdf.packages import Packages
 
+_ENDINGS = frozenset({".urdf", ".xacro", ".sh", ".bash", ".txt", ""})
 _ROBOT = re.compile(r"[a-z][a-z0-9_]*")
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("file", metavar="FILE", help="a .urdf or .xacro file")
+    parser.add_argument("file", metavar="FILE", help="a .urdf or .xacro file, a shell script; -: lines from stdin")
     parser.add_argument("args", nargs="*", metavar="NAME:=VALUE", help="arguments of the xacro file")
     parser.add_argument("-o", "--output", metavar="FILE", help="write the robot file here; default: print it")
     parser.add_argument("--force", action="store_true", help="overwrite an existing file")
@@ -41,21 +47,25 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Import; exit code 0, 1 with errors in the source, 2 after wrong use or where something cannot be read."""
-    from dataclasses import replace
+    from tfcompose.findings import RejectedError
 
-    from tfcompose.cli.compiling import disk
-    from tfcompose.findings import RejectedError, Span
-    from tfcompose.urdf.lint import read_urdf
-    from tfcompose.urdf.packages import Packages
-
-    given, packages = pairs(arguments.args, ":="), pairs(arguments.packages, "=")
     _check_use(arguments)
     try:
-        named = {name: (str(Path(folder).absolute()), Span(folder)) for name, folder in packages.items()}
-        known = Packages(disk(), named, advice="--package {name}=FOLDER, or source the workspace's setup file")
-        document = read_urdf(arguments.file, known, given)
+        if arguments.file.endswith((".urdf", ".xacro")):
+            return _import_urdf(arguments)
+        return _import_bringup(arguments)
     except RejectedError as error:
         reject(error.findings)
+
+
+def _import_urdf(arguments: Namespace) -> int:
+    from dataclasses import replace
+
+    from tfcompose.urdf.lint import read_urdf
+
+    given, packages = pairs(arguments.args, ":="), pairs(arguments.packages, "=")
+    known = _known_packages(packages)
+    document = read_urdf(arguments.file, known, given)
     errors = [one for one in document.findings() if one.severity == "error"]
     print_findings(errors, sys.stderr)
     if errors and not arguments.keep_going:
@@ -68,35 +78,82 @@ def run(arguments: Namespace) -> int:
     return FAILED if errors or more_errors else 0
 
 
+def _import_bringup(arguments: Namespace) -> int:
+    """Import what starts processes: everything that is understood is written, and the rest is named."""
+    from tfcompose.cli.reading import STDIN, read_text
+    from tfcompose.importing.draft import Draft, robot_name
+    from tfcompose.importing.shell import add_script
+
+    text = read_text(arguments.file)
+    name = "stdin" if arguments.file == STDIN else posixpath.basename(arguments.file)
+    wanted = arguments.robot or robot_name(name.partition(".")[0] if name != "stdin" else "robot")
+    draft = Draft(wanted, [f"imported from {name} by tfcompose"])
+    add_script(draft, text, arguments.file if arguments.file != STDIN else "<stdin>", _target(arguments))
+    return _finish(draft, arguments)
+
+
+def _finish(draft: Draft, arguments: Namespace) -> int:
+    """Write a draft, with what ``lint`` finds in it; return the exit code."""
+    from dataclasses import replace
+
+    from tfcompose.importing.draft import text_with_findings
+
+    if draft.is_empty():
+        print_findings(draft.found, sys.stderr)
+        fail("nothing was written: the source starts nothing that a robot file has")
+    text, compiled = text_with_findings(draft, lambda text: _lint(text, arguments))
+    _write(text, arguments.output)
+    print_findings(draft.found, sys.stderr)
+    found = compiled.found if arguments.output else [replace(one, span=None, notes=()) for one in compiled.found]
+    print_findings(found, sys.stderr)
+    return FAILED if compiled.errors else 0
+
+
+def _known_packages(packages: dict[str, str]) -> Packages:
+    from tfcompose.cli.compiling import disk
+    from tfcompose.findings import Span
+    from tfcompose.urdf.packages import Packages
+
+    named = {name: (str(Path(folder).absolute()), Span(folder)) for name, folder in packages.items()}
+    return Packages(disk(), named, advice="--package {name}=FOLDER, or source the workspace's setup file")
+
+
 def _check_use(arguments: Namespace) -> None:
     """Refuse names that cannot be, and a file that is there.
 
     Raises:
         SystemExit: after saying so.
     """
-    if not arguments.file.endswith((".urdf", ".xacro")):
-        fail(f"{arguments.file}: only .urdf and .xacro files can be imported", UNREADABLE)
+    if Path(arguments.file).suffix not in _ENDINGS:
+        fail(f"{arguments.file}: only .urdf, .xacro and shell scripts can be imported", UNREADABLE)
     if arguments.robot and not _ROBOT.fullmatch(arguments.robot):
         fail(f"--robot {arguments.robot}: use lower case letters, digits and _, beginning with a letter", UNREADABLE)
     if arguments.output and Path(arguments.output).exists() and not arguments.force:
         fail(f"{arguments.output} exists already; --force overwrites it", UNREADABLE)
 
 
-def _robot_file(document: Document, arguments: Namespace, packages: dict[str, str]) -> tuple[str, list[Finding]]:
-    """Return the robot file, and the errors that it has where the source has none."""
+def _target(arguments: Namespace) -> Target:
+    from tfcompose.files import Target
+
+    return Target("as-written", posixpath.dirname(arguments.output or "") or ".", Path.cwd().as_posix())
+
+
+def _lint(text: str, arguments: Namespace) -> Compiled:
     from tfcompose.cli.compiling import disk, library
     from tfcompose.cli.reading import read_text
-    from tfcompose.compile import Compiled, compile_robot
-    from tfcompose.files import Target
+    from tfcompose.compile import compile_robot
+
+    return compile_robot(text, arguments.output or "robot.yaml", library(), read=read_text, disk=disk())
+
+
+def _robot_file(document: Document, arguments: Namespace, packages: dict[str, str]) -> tuple[str, list[Finding]]:
+    """Return the robot file, and the errors that it has where the source has none."""
+    from tfcompose.cli.compiling import library
     from tfcompose.importing.robot_file import imported, with_findings
 
-    def lint(text: str) -> Compiled:
-        return compile_robot(text, arguments.output or "robot.yaml", library(), read=read_text, disk=disk())
-
-    target = Target("as-written", posixpath.dirname(arguments.output or "") or ".", Path.cwd().as_posix())
     presets = None if arguments.no_sensors else library()
-    robot = imported(document, target, arguments.robot or "", packages, presets)
-    return with_findings(robot, arguments.file, lint)
+    robot = imported(document, _target(arguments), arguments.robot or "", packages, presets)
+    return with_findings(robot, arguments.file, lambda text: _lint(text, arguments))
 
 
 def _write(text: str, output: str | None) -> None:

@@ -1,0 +1,314 @@
+"""Programs that a script or a launch file starts, as entries of a robot file.
+
+A ``static_transform_publisher`` is a frame, a ``robot_state_publisher`` the part or the links of its description, a
+``joint_state_publisher`` a stand-in for joint states; all others are processes.
+"""
+
+from __future__ import annotations
+
+import posixpath
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.importing.static_transforms import PROGRAM, RefusedError, reader_of, static_transform
+from tfcompose.importing.yaml_text import Bare
+from tfcompose.numbers import number
+from tfcompose.resolve.presets import node_preset, node_preset_names
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from tfcompose.files import Target
+    from tfcompose.findings import Span
+    from tfcompose.importing.draft import Draft
+    from tfcompose.importing.static_transforms import Reader
+
+STATE_PUBLISHER = "robot_state_publisher"
+JOINT_PUBLISHERS = frozenset({"joint_state_publisher", "joint_state_publisher_gui"})
+#: How often joint_state_publisher sends, unless it is told.
+_JOINTS_HZ = 10.0
+#: As what a path begins whose package is not found.
+PACKAGE = "package://"
+#: Words that stand before a program and leave it what it is.
+_BEFORE = frozenset({"exec", "nohup", "time", "stdbuf", "setsid"})
+_TF = ("/tf", "/tf_static")
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """What a robot_state_publisher is given: a xacro ``file`` with ``args``, or the text of a URDF."""
+
+    file: str = ""
+    args: Mapping[str, str] = field(default_factory=dict)
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """A program as the source starts it.
+
+    ``argv`` are its own arguments, or the whole command without a package; ``shell`` says that it is one text for a
+    shell. ``params`` are parameters, and names of files, in order: the last one counts. ``namespace`` is absolute, or
+    None where nothing is said. ``keys`` are further keys of the process, as in a robot file; ``period_s`` is how long
+    after the launch it is started. ``todo`` is what of it could not be taken.
+    """
+
+    at: Span | None
+    package: str | None = None
+    executable: str | None = None
+    argv: tuple[str, ...] = ()
+    shell: bool = False
+    name: str | None = None
+    label: str | None = None
+    namespace: str | None = None
+    params: tuple[Mapping[str, Any] | str, ...] = ()
+    remap: tuple[tuple[str, str], ...] = ()
+    env: Mapping[str, str] = field(default_factory=dict)
+    keys: Mapping[str, Any] = field(default_factory=dict)
+    period_s: float = 0.0
+    reader: Reader | None = None
+    description: Description | None = None
+    todo: tuple[str, ...] = ()
+
+
+def add_program(draft: Draft, program: Program, target: Target) -> str | None:
+    """Add a program to the draft; return the name of its process, or None where it is none.
+
+    A robot_state_publisher is not added here: its description makes links or a part, which ``launched`` does.
+    """
+    program = _split(program)
+    if program.executable == PROGRAM:
+        _add_transform(draft, program)
+        return None
+    if program.executable in JOINT_PUBLISHERS:
+        return _add_joint_publisher(draft, program)
+    return _add_process(draft, program, target)
+
+
+def one_clock(draft: Draft) -> None:
+    """Let the robot's clock be the simulated one where parameters of nodes say so, and none says otherwise."""
+    several = [process["params"] for process in draft.sections["processes"].values() if "params" in process]
+    if {params.get("use_sim_time", True) for params in several} == {True} and any(
+        "use_sim_time" in params for params in several
+    ):
+        draft.sections["ros"]["clock"] = "sim"
+        for process in draft.sections["processes"].values():
+            if process.get("params", {}).pop("use_sim_time", None) and not process["params"]:
+                del process["params"]
+
+
+def where(at: Span | None, what: str = "") -> str:
+    """Return the place of a value as a comment has it."""
+    place = f"{posixpath.basename(at.file)}:{at.line}" if at and at.file else ""
+    return ": ".join(word for word in (place, what) if word)
+
+
+def _split(program: Program) -> Program:
+    """Return the program with what it is a command line of, and with its ROS arguments as keys."""
+    if program.package is None and not program.shell:
+        program = _of_command(program)
+    return _without_ros_arguments(program) if program.package is not None else program
+
+
+def _of_command(program: Program) -> Program:
+    """Return the package's program that a command starts, if it starts one."""
+    words = list(program.argv)
+    while words and words[0] in _BEFORE:
+        words.pop(0)
+    match words:
+        case ["ros2", "run", package, executable, *rest] if not package.startswith("-"):
+            reader: Reader | None = "ros2"
+        case ["rosrun", package, executable, *rest] if not package.startswith("-"):
+            reader = "tf" if package == "tf" else "tf2_ros"
+        case [path, *rest] if posixpath.basename(path) == PROGRAM:
+            package, executable, reader = "tf2_ros", PROGRAM, None
+        case _:
+            return program
+    return replace(program, package=package, executable=executable, argv=tuple(rest), reader=program.reader or reader)
+
+
+def _without_ros_arguments(program: Program) -> Program:
+    """Return the program with what ``--ros-args`` says as its keys; what has no key stays an argument."""
+    own: list[str] = []
+    kept: list[str] = []
+    params, remap = list(program.params), list(program.remap)
+    found: dict[str, Any] = {"name": program.name, "namespace": program.namespace}
+    keys = dict(program.keys)
+    inside = False
+    words = iter(program.argv)
+    for word in words:
+        if not inside or word in {"--ros-args", "--"}:
+            inside = word == "--ros-args" if word in {"--ros-args", "--"} else inside
+            if not inside and word != "--ros-args":
+                own.append(word)
+            continue
+        value = next(words, "") if word in _WITH_VALUE else ""
+        left, _, right = value.partition(":=")
+        if word in {"-r", "--remap"} and right:
+            rule = {"__node": "name", "__name": "name", "__ns": "namespace"}.get(left)
+            found |= {rule: right} if rule else {}
+            remap += [] if rule else [(left, right)]
+        elif word in {"-p", "--param"} and right:
+            params.append({left: _yaml_value(right)})
+        elif word == "--params-file":
+            params.append(value)
+        elif word == "--log-level" and value in _LEVELS:
+            keys["log_level"] = value
+        else:
+            kept += [word, value] if value else [word]
+    argv = (*own, "--ros-args", *kept) if kept else tuple(own)
+    namespace, name = found["namespace"], found["name"]
+    return replace(
+        program, argv=argv, params=tuple(params), remap=tuple(remap), name=name, namespace=namespace, keys=keys
+    )
+
+
+_WITH_VALUE = frozenset({"-r", "--remap", "-p", "--param", "--params-file", "--log-level", "-e", "--enclave"})
+_LEVELS = frozenset({"debug", "info", "warn", "error", "fatal"})
+
+
+def _yaml_value(text: str) -> Any:
+    """Return a parameter of the command line, which ROS reads as YAML."""
+    plain = {"true": True, "false": False}
+    if text.lower() in plain:
+        return plain[text.lower()]
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text[1:-1] if len(text) > 1 and text[0] == text[-1] and text[0] in "'\"" else text
+
+
+def _add_transform(draft: Draft, program: Program) -> None:
+    at = program.at
+    moved = dict(program.remap)
+    reader = program.reader or reader_of(program.argv)
+    try:
+        transform = static_transform(program.argv, reader)
+    except RefusedError as error:
+        draft.todo(f"{PROGRAM} {' '.join(program.argv)}: {error}", at, advice="write the frame by hand")
+        return
+    notes = [where(at, transform.order)]
+    added = draft.frame(transform.parent, transform.child, transform.keys(), at, *notes)
+    entry = ("frames", transform.child)
+    if added and any(moved.get(topic, topic) != topic for topic in _TF):
+        several = ", ".join(f"{old} → {new}" for old, new in moved.items())
+        draft.todo(f"the publisher is remapped: {several}", at, entry, advice="ros: {namespace: …, isolate: topics}")
+    for one in program.todo:
+        draft.todo(one, at, entry)
+
+
+def _add_joint_publisher(draft: Draft, program: Program) -> str:
+    """Add a stand-in for joint states: all joints at 0, as joint_state_publisher has them unless it is told."""
+    params: dict[str, Any] = {}
+    for one in program.params:
+        params |= one if isinstance(one, dict) else {}
+    zeros = {name.partition(".")[2]: value for name, value in params.items() if name.startswith("zeros.")}
+    rate = params.get("rate", _JOINTS_HZ)
+    rate = float(rate) if isinstance(rate, (int, float)) and not isinstance(rate, bool) else _JOINTS_HZ
+    simulate: dict[str, Any] = {"joints": zeros or "zero", "rate": _hertz(rate)}
+    notes = [where(program.at, f"in the place of {program.executable}")]
+    name = draft.process(program.name or program.executable or "joints", {"simulate": simulate}, *notes)
+    entry = ("processes", name)
+    if str(program.executable).endswith("_gui"):
+        draft.note(entry, "it has no sliders: tfcompose view has")
+    left = [key for key in params if key != "rate" and not key.startswith("zeros.") and key != "use_sim_time"]
+    for key in left:
+        draft.todo(f"{program.executable}: the parameter {key}", program.at, entry)
+    for one in (*program.todo, *(f"parameters of {file}" for file in program.params if isinstance(file, str))):
+        draft.todo(one, program.at, entry)
+    return name
+
+
+def _hertz(value: float) -> Any:
+    return Bare(f"{number(value)} Hz")
+
+
+def _add_process(draft: Draft, program: Program, target: Target) -> str:
+    at, todo, advice = program.at, list(program.todo), ""
+    run = _run(program)
+    usual = _usual_name(program.package) if program.package and not program.name else None
+    wanted = program.name or usual or program.label or _plain(program) or "process"
+    name = draft.free_name(wanted)
+    keys: dict[str, Any] = {"run": run}
+    keys |= {"shell": True} if program.shell else {}
+    notes = [where(at)]
+    is_node = program.package is not None and "launch" not in run
+    if program.name and program.name != name:
+        keys["node"] = program.name
+    elif is_node and not program.name and not usual:
+        notes.append(f"the source does not name the node: it is called {name} here")
+    if program.namespace and program.namespace.strip("/"):
+        keys["namespace"] = program.namespace.strip("/")
+    params, left = _params(program.params, target)
+    keys |= {"params": params} if params else {}
+    keys |= {"remap": dict(program.remap)} if program.remap else {}
+    keys |= {"env": dict(program.env)} if program.env else {}
+    keys |= dict(program.keys)
+    draft.process(name, keys, *(note for note in notes if note))
+    for word in _texts((*program.argv, *program.env.values())):
+        if PACKAGE in word:
+            todo.append(f"{word} is in a package that is not found here: write its path")
+            advice = "--package NAME=FOLDER, or source the workspace's setup file"
+    for one in (*todo, *left):
+        draft.todo(one, at, ("processes", name), advice)
+    return name
+
+
+def _usual_name(package: str) -> str | None:
+    """Return how the node of a package calls itself, where that is known."""
+    names = {preset.node for one in node_preset_names() if (preset := node_preset(one)).package == package}
+    return names.pop() if len(names) == 1 else None
+
+
+def _texts(words: Sequence[Any]) -> list[str]:
+    return [word for word in words if isinstance(word, str)]
+
+
+def _run(program: Program) -> Any:
+    """Return what ``run`` says of the program."""
+    if program.shell:
+        return " ".join(program.argv)
+    if program.package is not None:
+        run: dict[str, Any] = {"package": program.package, "executable": program.executable}
+        return run | ({"args": list(program.argv)} if program.argv else {})
+    match program.argv:
+        case ("ros2", "launch", package, file, *words) if (
+            all(":=" in word for word in words) and ":=" not in file and not package.startswith("-")
+        ):
+            run = {"launch": f"{package}/{file}"}
+            return run | ({"args": dict(word.split(":=", 1) for word in words)} if words else {})
+    return list(program.argv)
+
+
+def _plain(program: Program) -> str:
+    """Return the name of what is started, without its folder and ending."""
+    match program.argv:
+        case ("ros2", "launch", _, file, *_) if program.package is None:
+            word = file
+        case ("ros2", verb, *_) if program.package is None:
+            word = f"ros2_{verb}"
+        case _:
+            word = program.executable or (program.argv[0].split()[0] if program.argv and program.argv[0] else "")
+    plain = posixpath.basename(word).partition(".")[0]
+    script = next((one for one in program.argv[1:] if one.endswith(".py")), "")
+    return posixpath.basename(script).removesuffix(".py") if script and plain.startswith("python") else plain
+
+
+def _params(given: Sequence[Mapping[str, Any] | str], target: Target) -> tuple[dict[str, Any], list[str]]:
+    """Return the parameters as a robot file has them, files first, and what cannot be said of them."""
+    files: list[str] = []
+    own: dict[str, Any] = {}
+    left = []
+    for one in given:
+        if not isinstance(one, str):
+            own |= one
+        elif one.startswith(PACKAGE):
+            left.append(f"the parameters of {one}: the package is not found here")
+        else:
+            files.append(target.from_folder(one))
+            if own:
+                left.append(f"{one} is laid over the parameters before it: here they are laid over the file")
+    named: dict[str, Any] = {"file": files[0] if len(files) == 1 else files} if files else {}
+    return named | own, left

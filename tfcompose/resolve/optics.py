@@ -59,16 +59,18 @@ def optics_of(
             place = source.at((*at, "frame"))
             found.append(finding("TF203", f"{sensor.name} has no frame {frame}", place, help=advice))
             continue
+        if frame not in frames or not (own or base is None or sensor.holds(base.when)):
+            continue
         kind = (own.kind if own else None) or (base.kind if base else None) or _KINDS.get(preset.kind)
         if kind is None:
             advice = "kind: camera, lidar, radar or ultrasonic"
             message = f"{preset.kind} sees nothing: the stream {stream} has no kind"
             found.append(finding("TF102", message, source.at_key(at), help=advice))
-        elif frame in frames and (own or base is None or sensor.holds(base.when)):
-            place = source.at_key(at) if own else source.at_key(at[:2])
-            values, sources = _merged(base, own, str(source.at_key(at)))
-            values.setdefault("active", kind != "camera")
-            made.append(Optics(stream, renamed(frame), kind, place, sources=tuple(sources), **values))
+            continue
+        place = source.at_key(at) if own else source.at_key(at[:2])
+        values, sources = _merged(base, own, str(source.at_key(at)))
+        values.setdefault("active", kind != "camera")
+        made.append(Optics(stream, renamed(frame), kind, place, sources=tuple(sources), **values))
     return tuple(made), found
 
 

@@ -6,7 +6,6 @@ was seen read alike. A code is never used again for something else.
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -131,6 +130,8 @@ def without_duplicates(found: Iterable[Finding]) -> list[Finding]:
 
 def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:
     """Return the known word that a person most likely meant by ``word``, or None; 1 is as near as the word itself."""
+    import difflib
+
     found = difflib.get_close_matches(word.lower(), {name.lower(): name for name in known}, n=1, cutoff=cutoff)
     return next((name for name in known if name.lower() == found[0]), None) if found else None
 

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from tfcompose.geometry import Quaternion, Vector
     from tfcompose.importing.omitted import Entry
     from tfcompose.importing.sensors import Recognised
-    from tfcompose.model import Edge, Hardware, Interface, Robot
+    from tfcompose.model import Edge, Robot
+    from tfcompose.model.hardware import Hardware, Interface
     from tfcompose.resolve import Library
     from tfcompose.urdf.lint import Document
 

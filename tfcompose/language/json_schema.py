@@ -32,7 +32,7 @@ def json_schema(language: str, presets: Mapping[str, PresetSpec], nodes: Iterabl
     The schemas of robots know the names and options of ``presets``, and the names of ``nodes``, their presets.
     """
     root = RobotSpec if language == "overlay" else LANGUAGES[language]
-    own = root.model_json_schema(schema_generator=_Generator)
+    own = _with_named_types(root.model_json_schema(schema_generator=_Generator), {one for _, one in walk(root)})
     definitions = own.pop("$defs", {})
     for _, kind in walk(root):
         schema = own if kind is root else definitions[kind.__name__]
@@ -57,6 +57,26 @@ def json_schema(language: str, presets: Mapping[str, PresetSpec], nodes: Iterabl
         own = profile | {"properties": profile["properties"] | {"profiles": own["properties"]["profiles"]}}
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": f"tfcompose {language}, version 1"}
     return head | own | {"$defs": dict(sorted(definitions.items()))}
+
+
+def _with_named_types(schema: dict[str, Any], mappings: Collection[Any]) -> dict[str, Any]:
+    """Return the schema with every type that is no mapping where it is used: beside ``$ref`` editors read nothing."""
+    names = {kind.__name__ for kind in mappings}
+    types = {f"#/$defs/{name}": one for name, one in schema["$defs"].items() if name not in names}
+
+    def inlined(value: Any) -> Any:
+        if isinstance(value, list):
+            return [inlined(item) for item in value]
+        if not isinstance(value, dict):
+            return value
+        other = {key: inlined(item) for key, item in value.items()}
+        if value.get("$ref") not in types:
+            return other
+        return dict(sorted((inlined(types[other.pop("$ref")]) | other).items()))
+
+    inside = {name: one for name, one in schema["$defs"].items() if name in names}
+    made: dict[str, Any] = inlined(schema | {"$defs": inside})
+    return made
 
 
 class _Generator(GenerateJsonSchema):

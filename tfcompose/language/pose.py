@@ -7,6 +7,7 @@ import math
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Discriminator, Tag
+from typing_extensions import TypeAliasType
 
 from tfcompose.geometry import (
     Matrix,
@@ -97,14 +98,23 @@ def _look_form(value: Any) -> str:
     return "[angles]" if isinstance(value, (dict, LookAngles)) else "[direction]"
 
 
-Rpy = Annotated[tuple[Angle, Angle, Angle], InARow(3, "[0, 15 deg, 0]")]
-QuatXyzw = Annotated[tuple[Number, Number, Number, Number], InARow(4, "[0, 0, 0, 1]"), AfterValidator(has_unit_length)]
-RotationMatrix = Annotated[
-    tuple[Numbers, Numbers, Numbers], InARow(3, "[[1, 0, 0], [0, 1, 0], [0, 0, 1]]"), AfterValidator(is_rotation)
-]
-Look = Annotated[
-    Annotated[Direction, Tag("[direction]")] | Annotated[LookAngles, Tag("[angles]")], Discriminator(_look_form)
-]
+Rpy = TypeAliasType("Rpy", Annotated[tuple[Angle, Angle, Angle], InARow(3, "[0, 15 deg, 0]")])
+QuatXyzw = TypeAliasType(
+    "QuatXyzw",
+    Annotated[tuple[Number, Number, Number, Number], InARow(4, "[0, 0, 0, 1]"), AfterValidator(has_unit_length)],
+)
+RotationMatrix = TypeAliasType(
+    "RotationMatrix",
+    Annotated[
+        tuple[Numbers, Numbers, Numbers], InARow(3, "[[1, 0, 0], [0, 1, 0], [0, 0, 1]]"), AfterValidator(is_rotation)
+    ],
+)
+Look = TypeAliasType(
+    "Look",
+    Annotated[
+        Annotated[Direction, Tag("[direction]")] | Annotated[LookAngles, Tag("[angles]")], Discriminator(_look_form)
+    ],
+)
 
 ROTATIONS = frozenset({"rpy", "quat_xyzw", "axis_angle", "matrix", "look"})
 
@@ -161,7 +171,7 @@ def _each_once(names: Texts) -> Texts:
 
 
 #: A parent, or several of which the first is nominal; either way a tuple.
-Parents = Annotated[OneOrMore, AfterValidator(_each_once)]
+Parents = TypeAliasType("Parents", Annotated[OneOrMore, AfterValidator(_each_once)])
 
 
 class EdgeKeys(Posed):
@@ -203,7 +213,7 @@ class CalibrationSpec(Spec):
     )
 
 
-Calibration = Annotated[CalibrationSpec, short("file", CalibrationSpec)]
+Calibration = TypeAliasType("Calibration", Annotated[CalibrationSpec, short("file", CalibrationSpec)])
 
 
 class MountKeys(EdgeKeys):

@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Strict, Tag
 from pydantic_core import PydanticCustomError
+from typing_extensions import TypeAliasType
 
 from tfcompose.language.expressions import inserted
 from tfcompose.language.node_preset import ClaimSpec
@@ -99,13 +100,16 @@ def _command(value: Any) -> Any:
     return {"argv": value if isinstance(value, list) else [value]} if isinstance(value, (list, str)) else value
 
 
-Command = Annotated[
-    Run,
-    BeforeValidator(
-        _command,
-        Annotated[Words, Field(min_length=1)] | Annotated[Text, Field(description="with shell: true")] | Run,
-    ),
-]
+Command = TypeAliasType(
+    "Command",
+    Annotated[
+        Run,
+        BeforeValidator(
+            _command,
+            Annotated[Words, Field(min_length=1)] | Annotated[Text, Field(description="with shell: true")] | Run,
+        ),
+    ],
+)
 
 
 class Circle(Spec):
@@ -194,10 +198,13 @@ class ReadySpec(Checked):
             yield (), refused("TF102", "ready does not say what to wait for", advice, on_key=True)
 
 
-Ready = Annotated[
-    ReadySpec,
-    BeforeValidator(lambda value: {"edges": True} if value == "edges" else value, Literal["edges"] | ReadySpec),
-]
+Ready = TypeAliasType(
+    "Ready",
+    Annotated[
+        ReadySpec,
+        BeforeValidator(lambda value: {"edges": True} if value == "edges" else value, Literal["edges"] | ReadySpec),
+    ],
+)
 
 _PARAMS = "the node's parameters, passed on as they are; file: names parameter files, which the others are merged over"
 _PUBLISHES = "edges that the node publishes by default, and what stops it; a preset knows them"

@@ -8,7 +8,7 @@ import types
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
 from tfcompose.language.json_schema import LANGUAGES
-from tfcompose.language.spec import described, examples_of, fields_of, is_mapping, measure_of, walk
+from tfcompose.language.spec import described, examples_of, fields_of, is_mapping, measure_of, unnamed, walk
 from tfcompose.language.values import InARow
 from tfcompose.units import Measure
 
@@ -92,6 +92,7 @@ def _yaml(value: Any) -> str:
 
 def _type(annotation: Any) -> str:
     """Return a type in words: what it is called, of what it is a list, or its choices."""
+    annotation = unnamed(annotation)
     origin, inner = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         return _annotated(inner[0], inner[1:])
@@ -114,7 +115,7 @@ def _annotated(inner: Any, metadata: tuple[Any, ...]) -> str:
             return "number" if not one.unit else "quantity"
         if isinstance(one, InARow):
             return f"list of {one.count} {_plural(_type(get_args(inner)[0]))}"
-        other = getattr(one, "json_schema_input_type", None)
+        other = unnamed(getattr(one, "json_schema_input_type", None))
         if get_origin(other) in {Union, types.UnionType, Literal}:
             return _type(other)
     return _type(inner)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union, get_
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
+from typing_extensions import TypeAliasType
 
 from tfcompose.units import Measure, refused
 
@@ -97,8 +98,14 @@ def inherited(of: type, name: str) -> Any:
     return dataclasses.field(default=base.default, default_factory=base.default_factory, metadata=base.metadata)
 
 
+def unnamed(annotation: Any) -> Any:
+    """Return what a named type stands for: pydantic makes its schema once, whichever models share it."""
+    return annotation.__value__ if isinstance(annotation, TypeAliasType) else annotation
+
+
 def kinds_of(annotation: Any) -> Iterator[Any]:
     """Yield the types that an annotation allows, without ``None``, ``Annotated`` and unions."""
+    annotation = unnamed(annotation)
     origin = get_origin(annotation)
     if origin is Annotated:
         yield from kinds_of(get_args(annotation)[0])
@@ -147,6 +154,7 @@ def below(annotation: Any, step: str | int) -> Any:
 
 def measure_of(annotation: Any) -> Measure | None:
     """Return the measure of the number, or of the numbers in a row, that an annotation allows, or None."""
+    annotation = unnamed(annotation)
     if get_origin(annotation) is Annotated:
         inner, *more = get_args(annotation)
         return next((one for one in more if isinstance(one, Measure)), None) or measure_of(inner)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, Strict
 from pydantic_core import core_schema
+from typing_extensions import TypeAliasType
 
 from tfcompose.findings import did_you_mean
 from tfcompose.geometry import Vector, norm
@@ -185,8 +186,8 @@ TopicName = Annotated[
 ]
 Texts = tuple[Text, ...]
 #: A list of strings, or one string for a list of one.
-OneOrMore = Annotated[Texts, BeforeValidator(listed, Text | Texts)]
-Xyz = Annotated[tuple[Length, Length, Length], InARow(3, "[0.2, 0, 30 cm]")]
+OneOrMore = TypeAliasType("OneOrMore", Annotated[Texts, BeforeValidator(listed, Text | Texts)])
+Xyz = TypeAliasType("Xyz", Annotated[tuple[Length, Length, Length], InARow(3, "[0.2, 0, 30 cm]")])
 Sizes = Annotated[tuple[Size, Size, Size], InARow(3, "[0.5, 0.4, 0.15]")]
 Numbers = Annotated[tuple[Number, Number, Number], InARow(3, "[0, 0, 1]")]
 Axis = Annotated[Numbers, AfterValidator(_has_direction)]
@@ -200,7 +201,10 @@ Scale = Annotated[
 _ColourPart = Annotated[Number, AfterValidator(_colour_part)]
 _Rgba = Annotated[tuple[_ColourPart, _ColourPart, _ColourPart, _ColourPart], InARow(4, "[0.2, 0.4, 0.8, 1]")]
 #: Red, green, blue and opacity; without opacity, or a name, the colour is opaque.
-Colour = Annotated[
-    _Rgba,
-    BeforeValidator(_with_opacity, Literal[tuple(COLOURS)] | tuple[_ColourPart, _ColourPart, _ColourPart] | _Rgba),
-]
+Colour = TypeAliasType(
+    "Colour",
+    Annotated[
+        _Rgba,
+        BeforeValidator(_with_opacity, Literal[tuple(COLOURS)] | tuple[_ColourPart, _ColourPart, _ColourPart] | _Rgba),
+    ],
+)

@@ -1,7 +1,8 @@
 """The robot: frames, edges, bodies, joints and processes, with every name, pose and owner decided.
 
 A ``Robot`` can hold a wrong robot: two parents, a cycle or two owners are for a rule to report. Lengths are metres,
-angles radians, rates hertz; an edge's pose is the pose of its child in its parent. Must not import ``language``,
+angles radians, rates hertz; an edge's pose is the pose of its child in its parent. What only some robots have stands in
+``hardware``, which is imported by that name. Must not import ``language``,
 ``load``, ``resolve``, ``check``.
 """
 
@@ -18,7 +19,6 @@ from tfcompose.model.edge import (
     ReferencePositions,
     SafetyController,
 )
-from tfcompose.model.hardware import Block, Component, Hardware, Interface
 from tfcompose.model.optics import Optics, OpticsKind, OpticsSource, Projection, Shutter
 from tfcompose.model.process import BUILT_IN, GUARD, JOINTS, ROS2_LAUNCH, SHELL, STATIC, AsInFile, Claim, Node, Process
 from tfcompose.model.robot import OPTICAL_ENDINGS, MountedSensor, Part, Robot, SourceNumbers, is_optical, may_be_refused
@@ -36,15 +36,11 @@ __all__ = [
     "STATIC",
     "AsInFile",
     "Asset",
-    "Block",
     "Calibration",
     "Claim",
-    "Component",
     "Dynamics",
     "Edge",
-    "Hardware",
     "Inertial",
-    "Interface",
     "Joint",
     "Limit",
     "Link",

@@ -4,9 +4,9 @@ What cannot be resolved is a finding, and the robot goes on without it. Must not
 robot is judged when it is there.
 """
 
-from tfcompose.resolve.parts import Collected, Resolved
 from tfcompose.resolve.presets import Library
 from tfcompose.resolve.resolve import resolve
+from tfcompose.resolve.resolved import Collected, Resolved
 from tfcompose.urdf.packages import Disk
 
 __all__ = ["Collected", "Disk", "Library", "Resolved", "resolve"]

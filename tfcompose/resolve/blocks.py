@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, RejectedError, Span
-from tfcompose.model import Block, Component, Hardware, Interface
+from tfcompose.model.hardware import Block, Component, Hardware, Interface
 from tfcompose.urdf.blocks import faults_of, read_block, unexpanded, unknown_joints
 
 if TYPE_CHECKING:

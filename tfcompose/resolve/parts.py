@@ -14,13 +14,12 @@ from tfcompose.language import composed, validate, with_includes
 from tfcompose.load import load, path_named
 from tfcompose.resolve.foreign import foreign
 from tfcompose.resolve.part import PartEntry
+from tfcompose.resolve.resolved import Collected, Resolved
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from tfcompose.findings import Allow
     from tfcompose.language import Validated
-    from tfcompose.load import Source
     from tfcompose.model import Robot
     from tfcompose.resolve.part import Joined
     from tfcompose.resolve.presets import Library
@@ -31,29 +30,6 @@ if TYPE_CHECKING:
 
 #: How many parts a robot may have, those of its parts counted.
 MOST_PARTS = 100
-
-
-@dataclass(slots=True)
-class Collected:
-    """What is collected from all parts of a robot, and from their parts.
-
-    ``allows`` are the comments in their files that silence findings. ``notes`` holds, for each file that is a part, a
-    note for each use that says as which part; ``sources`` are what the robot files among them were resolved from.
-    """
-
-    count: int = 0
-    allows: list[Allow] = field(default_factory=list)
-    notes: dict[str, list[Note]] = field(default_factory=dict)
-    sources: list[Source] = field(default_factory=list)
-
-
-@dataclass(frozen=True, slots=True)
-class Resolved:
-    """The robot, right or wrong, and what was found while resolving it."""
-
-    robot: Robot
-    found: tuple[Finding, ...]
-    collected: Collected = field(default_factory=Collected)
 
 
 @dataclass(slots=True)

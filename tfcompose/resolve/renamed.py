@@ -12,10 +12,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from tfcompose.model import (
-        Block,
         Calibration,
         Edge,
-        Hardware,
         Joint,
         Link,
         MountedSensor,
@@ -24,6 +22,7 @@ if TYPE_CHECKING:
         Robot,
         Shape,
     )
+    from tfcompose.model.hardware import Block, Hardware
     from tfcompose.plan import GuardPolicy
 
 

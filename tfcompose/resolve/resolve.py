@@ -1,4 +1,8 @@
-"""From what the user wrote to a robot in which every name, pose and owner is decided."""
+"""From what the user wrote to a robot in which every name, pose and owner is decided.
+
+What only some robots have is loaded for those: parts, calibrations,
+parameter files, raw URDF, claims, and a stock robot_state_publisher.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +13,9 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.load import path_named
 from tfcompose.model import Edge, Process, Robot, may_be_refused
-from tfcompose.resolve.blocks import with_blocks
 from tfcompose.resolve.bodies import Bodies, with_colours
-from tfcompose.resolve.calibration import calibrated
-from tfcompose.resolve.claims import settled
 from tfcompose.resolve.edges import Drafts, source_numbers
 from tfcompose.resolve.isolation import isolate, settings_of
-from tfcompose.resolve.param_files import with_param_files
-from tfcompose.resolve.parts import Collected, Parts, Resolved
 from tfcompose.resolve.poses import Solver
 from tfcompose.resolve.presets import sensor_of
 from tfcompose.resolve.processes import (
@@ -31,8 +30,8 @@ from tfcompose.resolve.processes import (
     user_process,
     with_positions,
 )
+from tfcompose.resolve.resolved import Collected, Resolved
 from tfcompose.resolve.sensors import add_sensor
-from tfcompose.resolve.stock import with_stock
 from tfcompose.urdf.packages import Packages
 
 if TYPE_CHECKING:
@@ -41,9 +40,10 @@ if TYPE_CHECKING:
     from tfcompose.language import Validated
     from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Source
-    from tfcompose.model import Block
+    from tfcompose.model.hardware import Block
     from tfcompose.plan import GuardPolicy
     from tfcompose.resolve.part import Joined
+    from tfcompose.resolve.parts import Parts
     from tfcompose.resolve.poses import Draft
     from tfcompose.resolve.presets import Library
     from tfcompose.urdf.packages import Disk
@@ -106,14 +106,22 @@ class _Work:
         self.found += unnamed_nodes(edges, own, self.spec, self.broken)
         robot = self._take(with_positions(self._robot(drafts, edges, self._everybody(own)), self.spec, self.source))
         if any(names_files(node.params) for process in own for node in process.ros_nodes):
+            from tfcompose.resolve.param_files import with_param_files
+
             robot = self._take(with_param_files(robot, self.source, self.read))
         if self.spec.ros2_control or self.spec.xml:
+            from tfcompose.resolve.blocks import with_blocks
+
             robot = self._take(with_blocks(robot, self.spec, self.source))
         robot = replace(robot, base=self._base(robot))
         if self.spec.ros.state_publisher == "stock":
+            from tfcompose.resolve.stock import with_stock
+
             robot = self._take(with_stock(robot))
         robot = self._take(isolate(robot, self.spec, self.source, self.disk))
         if has_claims(self.spec):
+            from tfcompose.resolve.claims import settled
+
             robot = self._take(settled(robot, self.spec, self.source))
         self.found += [one for process in robot.processes for one in unreached(process, self.source)]
         return Resolved(robot, (*self.of_parts, *self.found), self.collected)
@@ -131,6 +139,8 @@ class _Work:
         """Resolve the parts, and note what was refused in them."""
         if not self.spec.parts:
             return
+        from tfcompose.resolve.parts import Parts
+
         parts = self.holder or Parts(self.library, self.read, self.disk, resolve, (self.source.file,), self.collected)
         self.joined = parts.join(self.validated, settings_of(self.spec.ros).frame_prefix, packages)
         self.of_parts = parts.found
@@ -174,6 +184,8 @@ class _Work:
         """Return the edges with the poses of calibrations."""
         if not _has_calibrations(self.spec):
             return drafts.edges
+        from tfcompose.resolve.calibration import calibrated
+
         measured, refused = calibrated(drafts.edges, drafts.frames, self.spec, self.source, self.read)
         self.found += refused
         return measured

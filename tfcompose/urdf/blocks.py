@@ -11,14 +11,15 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, Span, did_you_mean, finding, nearest
-from tfcompose.model import Component, Hardware, Interface
+from tfcompose.model.hardware import Component, Hardware, Interface
 from tfcompose.text import listed
 from tfcompose.urdf.read import read_xml
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
 
-    from tfcompose.model import Block, Robot
+    from tfcompose.model import Robot
+    from tfcompose.model.hardware import Block
     from tfcompose.urdf.read import Element
 
 

@@ -17,7 +17,6 @@ from tfcompose.model import (
     MOVING,
     STATIC,
     Asset,
-    Block,
     Dynamics,
     Edge,
     Inertial,
@@ -32,6 +31,7 @@ from tfcompose.model import (
     SourceNumbers,
     colour_name,
 )
+from tfcompose.model.hardware import Block
 from tfcompose.urdf.blocks import REFERRING, unknown_references
 from tfcompose.urdf.inertia import traces
 from tfcompose.urdf.schema import HUGE, JOINT_TYPES, MOMENTS, SIZES, Values, unknown_words, version_of

@@ -25,18 +25,15 @@ if TYPE_CHECKING:
     from tfcompose.files import Target
     from tfcompose.model import (
         Asset,
-        Block,
-        Component,
         Edge,
-        Hardware,
         Inertial,
-        Interface,
         Joint,
         Link,
         Material,
         Robot,
         Shape,
     )
+    from tfcompose.model.hardware import Block, Component, Hardware, Interface
 
 _IDENTITY = Pose()
 #: The value of an attribute, in quotes. Names repeat, in one file and from file to file.

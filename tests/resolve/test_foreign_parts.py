@@ -65,6 +65,20 @@ MACRO = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro">
 </robot>
 """
 
+POLE = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro">
+  <xacro:macro name="pole" params="name parent:=base_link xyz:='-1 0 -0' rpy:='0 0 0' *origin">
+    <link name="${name}"/>
+    <joint name="${name}_joint" type="fixed"><parent link="${parent}"/><child link="${name}"/>
+      <xacro:insert_block name="origin"/></joint>
+  </xacro:macro>
+  <xacro:macro name="leaning" params="name parent">
+    <link name="${name}"/>
+    <joint name="${name}_joint" type="fixed"><parent link="${parent}"/><child link="${name}"/>
+      <origin xyz="0 0 1"/></joint>
+  </xacro:macro>
+</robot>
+"""
+
 HEAD = """
 tfcompose: 1
 robot: cell
@@ -80,7 +94,14 @@ def cell(tmp_path: Path) -> Any:
     package = tmp_path / "third" / "arm"
     package.mkdir(parents=True)
     bare = XACRO.replace("$(arg reach)", "$(arg side)")
-    texts = {"bare.xacro": bare, "arm.urdf": ARM, "slide.xacro": XACRO, "mast.xacro": MACRO, "base.stl": ""}
+    texts = {
+        "bare.xacro": bare,
+        "arm.urdf": ARM,
+        "slide.xacro": XACRO,
+        "mast.xacro": MACRO,
+        "pole.xacro": POLE,
+        "base.stl": "",
+    }
     sizes = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="height" value="0.25"/></robot>'
     for name, text in (texts | {"sizes.xacro": sizes}).items():
         (package / name).write_text(text, encoding="utf-8")
@@ -180,6 +201,32 @@ def test_a_block_of_a_macro_is_a_pose_as_everywhere(cell: Any) -> None:
     found = robot.parent_edge("front_mast").pose
     assert found.xyz == (0.1, 0, 2)
     assert found.rpy == pytest.approx((0, np.pi / 6, 0), abs=1e-15)
+
+
+def test_a_macro_takes_its_parent_and_its_origin_from_the_part(cell: Any) -> None:
+    """Also one that has a parameter for the parent by another name, and defaults with spaces in them."""
+    pose = "parent: table, xyz: [10 cm, 0, 2], look: {down: 30 deg}"
+    robot = sound(cell(f"mast: {{xacro: third/arm/mast.xacro, macro: mast, {pose}, params: {{name: front}}}}"))
+    edge = robot.parent_edge("front_mast")
+    assert (edge.parent, edge.pose.xyz, edge.joint_name) == ("table", (0.1, 0, 2), "front_mast_joint")
+    assert edge.pose.rpy == pytest.approx((0, np.pi / 6, 0), abs=1e-15)
+    prefixed = sound(
+        cell(
+            f"mast: {{xacro: third/arm/mast.xacro, macro: mast, prefix: l_, {pose}, params: {{name: a}}}}",
+            f"other: {{xacro: third/arm/pole.xacro, macro: pole, {pose}, joint: pole_fix, params: {{name: b}}}}",
+        )
+    )
+    assert prefixed.parent_edge("l_a_mast").joint_name == "l_a_mast_joint"
+    assert prefixed.parent_edge("b").joint_name == "pole_fix"
+    assert prefixed.parent_edge("b").pose.xyz == (0.1, 0, 2)
+
+
+def test_a_macro_that_is_not_simply_fixed_to_its_parent_is_given_it_by_hand(cell: Any) -> None:
+    part = "other: {xacro: third/arm/pole.xacro, macro: leaning, parent: table, params: {name: b}}"
+    (found,) = cell(part).errors
+    assert (found.code, found.span.line) == ("TF313", 7)
+    by_hand = "other: {xacro: third/arm/pole.xacro, macro: leaning, params: {name: b, parent: table}}"
+    assert sound(cell(by_hand)).parent_edge("b").pose.xyz == (0, 0, 1)
 
 
 def test_a_package_of_the_robot_is_found_in_xacro_where_everything_is_relative(

@@ -268,7 +268,11 @@ class PartSpec(MountKeys):
     urdf: Text | None = key(None, f"a URDF file: {_WHERE}", "package://ur_description/urdf/ur5e.urdf")
     xacro: Text | None = key(None, f"a xacro file: {_WHERE}", "$(find ur_description)/urdf/ur.urdf.xacro")
     args: Parameters = key({}, "arguments of the xacro file", {"name": "ur", "ur_type": "ur5e"})
-    macro: Text | None = key(None, "the macro of the xacro file to call", "hokuyo_ust10")
+    macro: Text | None = key(
+        None,
+        "the macro of the xacro file to call; its parent and origin may be those of the part",
+        "hokuyo_ust10",
+    )
     params: dict[str, MacroParameter] = key(
         {},
         "the macro's parameters; a pose, or a string that begins with <, for one that takes a block",

@@ -9,7 +9,7 @@ from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 from tfcompose.findings import Finding, RejectedError, Span, finding
-from tfcompose.geometry import rpy_from_quat
+from tfcompose.geometry import Pose, rpy_from_quat
 from tfcompose.language.robot import Origin
 from tfcompose.language.variables import OF_FILES
 from tfcompose.load import path_named
@@ -24,7 +24,7 @@ from tfcompose.urdf.read import read_expansion, read_xml
 from tfcompose.urdf.xacro import Use, macros_in
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from tfcompose.load import Path
     from tfcompose.plan import RosSettings
@@ -62,11 +62,12 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
     at = part.source.at((*part.at, key))
     file = _address(spec.urdf or spec.xacro or "", at, packages)
     files: tuple[str, ...] = (file,)
+    bolted = _bolted(part, read(file)) if spec.macro is not None else {}
     if spec.urdf is not None:
         text = read(file)
         root = read_xml(text, file)
     else:
-        expansion = _expanded(part, file, at, packages)
+        expansion = _expanded(part, file, at, packages, bolted)
         text, files = expansion.text, tuple(dict.fromkeys((file, *expansion.files)))
         root = read_expansion(expansion, file, read)
     converted = robot_of(root, file, packages.asset, files)
@@ -76,6 +77,8 @@ def foreign(part: PartEntry, packages: Packages, read: Callable[[str], str]) -> 
         advice = f"it defines macros; call one with xacro: and macro: {', '.join(macros)}" if macros else ""
         raise RejectedError([finding("TF206", f"{file} has no links", at, help=advice)])
     robot = with_hardware(robot)
+    if bolted:
+        robot = _loose(robot, bolted, part)
     parents = {edge.parent for edge in robot.edges}
     implied = frozenset(parents - robot.frames.keys()) if spec.macro is not None else frozenset[str]()
     digest = hashlib.sha256(text.encode()).hexdigest()
@@ -105,12 +108,12 @@ def _address(named: str, at: Span, packages: Packages) -> str:
     return f"{folder}/{found[2]}"
 
 
-def _expanded(part: PartEntry, file: str, at: Span, packages: Packages) -> Expansion:
+def _expanded(part: PartEntry, file: str, at: Span, packages: Packages, bolted: Mapping[str, str]) -> Expansion:
     disk, spec = packages.disk, part.declared
     if disk is None:
         raise RejectedError([finding("TF001", f"{file}: files cannot be read here", at)])
     args = {name: _with_files(value, (*part.at, "args", name), part, disk) for name, value in spec.args.items()}
-    return disk.expand(file, packages, args, _use(part, file, packages, disk))
+    return disk.expand(file, packages, args, _use(part, file, packages, disk, bolted))
 
 
 def _with_files(value: Any, path: Path, part: PartEntry, disk: Disk) -> Any:
@@ -127,14 +130,60 @@ def _with_files(value: Any, path: Path, part: PartEntry, disk: Disk) -> Any:
     return OF_FILES.sub(absolute, value) if isinstance(value, str) else value
 
 
-def _use(part: PartEntry, file: str, packages: Packages, disk: Disk) -> Use:
+#: What macros call the link that they bolt themselves to, and the block with their pose in it.
+_PARENTS, _ORIGIN = ("parent_link", "parent", "parent_frame", "connected_to"), "origin"
+
+
+#: A macro's parameter as it is declared, and its default.
+_PARAMETER = re.compile(r"(\*{0,2}[A-Za-z_]\w*)(?:\s*:?=\s*('[^']*'|\S+))?")
+
+
+def _bolted(part: PartEntry, text: str) -> dict[str, str]:
+    """Return what a macro is given that takes a parent, and perhaps an origin, where ``parent`` stands at the part.
+
+    The origin is none: the part's own keys say where it is.
+    """
+    spec = part.declared
+    defaults = dict(_PARAMETER.findall(macros_in(text).get(spec.macro or "", "")))
+    wanted = [name for name in _PARENTS if name in defaults and defaults[name] != "''"]
+    if spec.parent is None or not wanted or spec.params.keys() & {*_PARENTS, _ORIGIN}:
+        return {}
+    bolted = {wanted[0]: spec.parent[0]}
+    return bolted | ({_ORIGIN: "<origin/>"} if f"*{_ORIGIN}" in defaults else {})
+
+
+def _loose(robot: Robot, bolted: Mapping[str, str], part: PartEntry) -> Robot:
+    """Return what a macro made without the joint by which it hangs on its parent: the part's mount edge is that.
+
+    Raises:
+        RejectedError: if there are several such joints, or one that moves or is somewhere else.
+    """
+    parent = next(iter(bolted.values()))
+    joints = [edge for edge in robot.edges if edge.parent == parent and parent not in robot.frames]
+    if not joints:
+        return robot
+    edge = joints[0]
+    if joints[1:] or edge.kind != "static" or edge.pose != Pose():
+        what = "several joints" if joints[1:] else f"the joint {edge.joint_name}, which is not simply fixed there"
+        advice = (
+            f"leave parent out, and give the macro its parent and pose: params: {{{next(iter(bolted))}: {parent}, …}}"
+        )
+        message = f"the macro {part.declared.macro} hangs on {parent} by {what}"
+        raise RejectedError([finding("TF313", message, part.source.at((*part.at, "parent")), help=advice)])
+    if part.declared.joint is None:
+        part.declared = part.declared.model_copy(update={"joint": f"{part.prefix}{edge.joint_name}"})
+    return replace(robot, edges=tuple(one for one in robot.edges if one is not edge))
+
+
+def _use(part: PartEntry, file: str, packages: Packages, disk: Disk, bolted: Mapping[str, str]) -> Use:
     """Return how the part uses the file: as a whole, or a call of its macro."""
     spec, at = part.declared, part.at
     if spec.macro is None:
         return Use(part.source.at((*at, "xacro")))
     places = (part.source.at((*at, "include", index)) for index in range(len(spec.include)))
     files = (*(_address(one, place, packages) for one, place in zip(spec.include, places, strict=True)), file)
-    words, blocks = {}, []
+    words: dict[str, str] = {name: value for name, value in bolted.items() if name != _ORIGIN}
+    blocks = [bolted[_ORIGIN]] if _ORIGIN in bolted else []
     for name, value in spec.params.items():
         if _is_markup(value):
             _refuse_broken(name, value, part.source.at((*at, "params", name)))

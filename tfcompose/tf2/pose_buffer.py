@@ -279,7 +279,6 @@ class PoseBuffer:
     def _new_cache(self, child: str, *, static: bool) -> TimeCache:
         """Return the samples of a frame that is new, or fixed from now on, or moving from now on."""
         cache = self._caches[child] = TimeCache(child, static=static)
-        self._mixed.discard(child)
         return cache
 
     def _changed(self, cache: TimeCache) -> None:

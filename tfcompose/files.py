@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import posixpath
 import re
 from dataclasses import dataclass
@@ -104,13 +105,7 @@ def with_absolute_addresses(urdf: str, folder: Path) -> str:
     """
 
     def absolute(found: re.Match[str]) -> str:
-        path = Path(folder, _unescaped(found[3])).resolve()
+        path = Path(folder, html.unescape(found[3])).resolve()
         return f"{found[1]}{found[2]}file://{quote(str(path))}{found[2]}"
 
     return _RELATIVE.sub(absolute, urdf)
-
-
-def _unescaped(text: str) -> str:
-    for entity, character in (("&quot;", '"'), ("&lt;", "<"), ("&gt;", ">"), ("&amp;", "&")):
-        text = text.replace(entity, character)
-    return text

@@ -23,12 +23,25 @@ def test_a_robot_and_its_built_plan_give_the_same_export_and_the_build_stays_com
     assert main(["build"]) == 0
     build = robot / "build" / "rover"
     before = {file.relative_to(build): file.read_bytes() for file in build.rglob("*") if file.is_file()}
-    assert main(["export", kind, "build/rover/plan.json"]) == 0
-    from_plan = {file.name: file.read_bytes() for file in (build / kind).iterdir()}
-    assert main(["export", kind]) == 0
-    assert {file.name: file.read_bytes() for file in (build / kind).iterdir()} == from_plan
+    exports = []
+    for words in (["build/rover/plan.json"], ["build/rover"], []):
+        assert main(["export", kind, *words]) == 0
+        exports.append({file.name: file.read_bytes() for file in (build / kind).iterdir()})
+    assert exports[0] == exports[1] == exports[2]
     assert {name: (build / name).read_bytes() for name in before} == before
     assert Path("params/drive.yaml") in before
+
+
+def test_a_built_folder_is_started_as_its_plan_is(robot: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["build"]) == 0
+    printed = []
+    for file in ("build/rover/plan.json", "build/rover"):
+        capsys.readouterr()
+        assert main(["up", file, "--dry-run"]) == 0
+        printed.append(capsys.readouterr().out)
+    assert printed[0] == printed[1]
+    (robot / "empty").mkdir()
+    assert main(["up", "empty", "--dry-run"]) == 2
 
 
 def test_a_hosts_share_is_exported_without_the_others(robot: Path, capsys: pytest.CaptureFixture[str]) -> None:

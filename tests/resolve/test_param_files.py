@@ -61,6 +61,22 @@ def test_a_file_may_be_named_as_everywhere_else() -> None:
     assert (missing.code, "q.yaml" in str(missing.span), "${" in str(missing.span)) == ("TF001", True, False)
 
 
+@pytest.mark.parametrize(
+    ("params", "places"),
+    [
+        ("{file: sim.yaml}", ["r.yaml:6:62", "sim.yaml:1:39"]),
+        ("{file: p.yaml, use_sim_time: true}", ["r.yaml:6:70"]),
+        ("{file: sim.yaml, use_sim_time: true}", ["r.yaml:6:72"]),
+    ],
+)
+def test_a_parameter_that_contradicts_the_clock_is_found_where_it_is_given(params: str, places: list[str]) -> None:
+    sim = "/**: {ros__parameters: {use_sim_time: true}}"
+    (found,) = (one for one in compiled(params, sim=sim).errors if one.code == "TF335")
+    assert [str(found.span), *(str(note.span) for note in found.notes)] == places
+    over = compiled("{file: sim.yaml, use_sim_time: false}", sim=sim)
+    assert "TF335" not in {one.code for one in over.found}
+
+
 def test_a_name_in_the_file_is_below_the_namespace_of_the_process() -> None:
     file = "planner: {ros__parameters: {near: 1}}\n/robot1/planner: {ros__parameters: {far: 1}}\n"
     params = yaml.safe_load(source_text("{file: front.yaml}, namespace: front", front=file))

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.support.cli import tfcompose_in
-from tests.support.findings import words
+from tests.support.findings import words, words_of
 from tfcompose.check import RULES
 from tfcompose.cli.compiling import disk, library
 from tfcompose.compile import compile_robot
@@ -434,3 +434,9 @@ def test_a_urdf_as_large_as_that_of_10_000_frames_is_read_and_a_larger_one_is_re
     text = large(2, "x" * 6_000_000)
     assert "TF008" not in {one.code for one in lint_text(text)}
     assert [one.code for one in lint_text(large(2, "x" * 16_000_000))] == ["TF008"]
+
+
+def test_a_package_that_is_not_where_it_is_named_is_not_taken_for_a_slip_of_itself() -> None:
+    named = Packages(named={"arm_description": ("nowhere", Span("r.yaml"))})
+    assert "mean" not in words_of(named.not_found("arm_description", None).help)
+    assert "mean" in words_of(named.not_found("arm_descriptoin", None).help)

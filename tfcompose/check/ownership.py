@@ -341,5 +341,9 @@ def clocks_mixed(robot: Robot) -> Iterator[Finding]:
             if value is None or (str(value).lower() in _TRUE) == sim:
                 continue
             message = f"{node.name} has use_sim_time: {str(value).lower()}, but the robot's clock is {robot.ros.clock}"
-            advice = f"remove use_sim_time, or set ros: {{clock: {'wall' if sim else 'sim'}}}"
-            yield finding("TF335", message, node.at, help=advice)
+            at, *inside = node.places.get("use_sim_time", (node.at,))
+            notes = [Note("it is set here", place) for place in inside]
+            way_out = f"write use_sim_time: {str(sim).lower()} beside file: it takes precedence"
+            way_out = way_out if inside else "remove use_sim_time"
+            advice = f"{way_out}; or set ros: {{clock: {'wall' if sim else 'sim'}}}"
+            yield finding("TF335", message, at, help=advice, notes=notes)

@@ -32,6 +32,12 @@ def is_plan(file: str) -> bool:
     return file.endswith(".json")
 
 
+def in_folder(file: str) -> str:
+    """Return the plan in the folder that a command was given, as ``build`` writes one; else the file as it is."""
+    plan = Path(file) / PLAN
+    return str(plan) if plan.is_file() else file
+
+
 def built_plan(file: Path) -> Plan:
     """Return the plan in the file.
 
@@ -63,12 +69,10 @@ def expected_plan(file: str, arguments: Namespace) -> tuple[Plan, dict[str, Span
     Raises:
         SystemExit: after saying what cannot be read, or is wrong.
     """
-    path = Path(file)
-    if path.is_dir() and (path / PLAN).is_file():
-        path /= PLAN
-    if is_plan(path.name):
+    file = in_folder(file)
+    if is_plan(file):
         refuse_variant(arguments)
-        return built_plan(path), {}
+        return built_plan(Path(file)), {}
     from tfcompose.cli.compiling import compiled_robot
     from tfcompose.emit.plan import plan_of
 

@@ -62,12 +62,16 @@ def _filled(value: Any, path: Path, variables: _Variables) -> Any:
     return value | filled if isinstance(value, dict) else [filled.get(index, item) for index, item in enumerate(value)]
 
 
-#: What a process is told, and what is known only when frames are named, or when it is started.
-LATER = re.compile(r"\$\{\s*(?:(?:frame|file)\([^(){}]*\)|params_file|build_dir)\s*\}")
+def _call(functions: str) -> str:
+    return rf"\$\{{\s*({functions})\(\s*([^(){{}}]*?)\s*\)\s*\}}"
 
 
+#: What is known only when frames are named: a function, and its argument.
+CALLS = re.compile(_call("frame|file"))
+#: What a process is told, and what is known then, or when it is started.
+LATER = re.compile(rf"{CALLS.pattern}|\$\{{\s*(?:params_file|build_dir)\s*\}}")
 #: In what a xacro file is given: a file beside the robot file, which xacro would look for beside its own.
-OF_FILES = re.compile(r"\$\{\s*file\(\s*([^(){}]*?)\s*\)\s*\}")
+OF_FILES = re.compile(_call("file"))
 
 
 #: A block may hold what is for another program to fill in.

@@ -23,10 +23,11 @@ PARAMETERS = "ros__parameters"
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """A value as it was written; ``plain`` without quotes."""
+    """A value as it was written, and where; ``plain`` without quotes."""
 
     text: str
     plain: bool
+    at: Span
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +126,7 @@ class _Reader:
                 return self._mapping(node)
             if isinstance(node, yaml.SequenceNode):
                 return [self._value(item) for item in node.value]
-        return Word(node.value, not getattr(node, "style", None))
+        return Word(node.value, not getattr(node, "style", None), _span(self.file, node))
 
     @contextmanager
     def _reading(self, node: yaml.Node) -> Iterator[None]:

@@ -6,6 +6,7 @@ import html
 import re
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
+from xml.sax.saxutils import escape
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -52,6 +53,9 @@ _NAMED = re.compile(r"""<(?:transmission|actuator|ros2_control|sensor|gpio)\b[^>
 #: All that stands between quotes, or between two tags.
 _HELD = re.compile(r"""(=\s*")([^<"]*)(?=")|(=\s*')([^<']*)(?=')|(>)([^<>]*)(?=<)""")
 
+#: Both, since a value may stand in either.
+_QUOTES = {'"': "&quot;", "'": "&#x27;"}
+
 
 @dataclass(frozen=True, slots=True)
 class Block:
@@ -72,7 +76,7 @@ class Block:
         def other(found: re.Match[str]) -> str:
             before, held = (part for part in found.groups() if part is not None)
             name = held.strip()
-            again = names.get(html.unescape(name) if "&" in name else name)
-            return found[0] if again is None else before + held.replace(name, html.escape(again))
+            again = names.get(html.unescape(name))
+            return found[0] if again is None else before + held.replace(name, escape(again, _QUOTES))
 
         return replace(self, text=_HELD.sub(other, self.text))

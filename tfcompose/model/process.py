@@ -16,6 +16,8 @@ SHELL = ("/bin/sh", "-c")
 ROS2_LAUNCH = ("ros2", "launch")
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from tfcompose.findings import Span
     from tfcompose.plan import LifecycleState
 
@@ -31,7 +33,8 @@ class Node:
     """One ROS node of a process, by its full name; ``lifecycle`` is the state that it is brought into.
 
     ``path`` leads to the mapping that holds its ``params``; ``contradicting`` are those, by their full names, that are
-    known to contradict the tree.
+    known to contradict the tree. ``places`` are those of the first level in the robot file; of one that a parameter
+    file gives, where that is named, and then the place in it.
     """
 
     name: str
@@ -40,6 +43,7 @@ class Node:
     params: dict[str, Any] = field(default_factory=dict)
     lifecycle: LifecycleState | None = None
     contradicting: frozenset[str] = frozenset()
+    places: Mapping[str, tuple[Span, ...]] = field(default_factory=dict, compare=False)
 
     @property
     def flat_params(self) -> dict[str, Any]:

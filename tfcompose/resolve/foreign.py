@@ -121,7 +121,7 @@ def _with_files(value: Any, path: Path, part: PartEntry, disk: Disk) -> Any:
     at = part.source.at(path)
 
     def absolute(call: re.Match[str]) -> str:
-        place = path_named(call[1], at)
+        place = path_named(call[2], at)
         if not (disk.is_file(place) or disk.is_folder(place)):
             message, advice = f"{call[0]}: {place} does not exist", "a path is relative to the file that writes it"
             raise RejectedError([finding("TF019", message, at, help=advice)])

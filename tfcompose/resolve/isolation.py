@@ -7,11 +7,11 @@ remapped below the namespace for every process at once.
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, did_you_mean, finding
+from tfcompose.language.variables import CALLS
 from tfcompose.load import path_named
 from tfcompose.plan import RosSettings, known_at_launch
 from tfcompose.plan.codec import narrowed
@@ -68,9 +68,6 @@ def _wrong(robot: Robot, spec: RobotSpec, source: Source) -> list[Finding]:
     return found
 
 
-_HOLE = re.compile(r"\$\{\s*(frame|file)\(\s*([^(){}]*?)\s*\)\s*\}")
-
-
 @dataclass(slots=True)
 class _Filler:
     """Fills in processes; ``found`` is what cannot be."""
@@ -99,7 +96,7 @@ class _Filler:
 
     def _fill(self, value: Any, path: Path) -> Any:
         if isinstance(value, str):
-            return _HOLE.sub(lambda hole: self._meant(hole[1], hole[2], path), value) if "${" in value else value
+            return CALLS.sub(lambda call: self._meant(call[1], call[2], path), value) if "${" in value else value
         if isinstance(value, dict):
             return {key: self._fill(item, (*path, key)) for key, item in value.items()}
         if isinstance(value, (list, tuple)):

@@ -14,17 +14,22 @@ from tfcompose.model import AsInFile
 from tfcompose.resolve.processes import FILE_KEY, full_name, names_files
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Container, Sequence
 
     from tfcompose.findings import Span
     from tfcompose.load import Source
     from tfcompose.model import Node, Process, Robot
 
 
-def with_param_files(robot: Robot, source: Source, read: Callable[[str], str] | None) -> tuple[Robot, list[Finding]]:
-    """Return the robot whose nodes have the parameters of the files that they name, and what is wrong with these."""
+def with_param_files(
+    robot: Robot, own: Container[str], source: Source, read: Callable[[str], str] | None
+) -> tuple[Robot, list[Finding]]:
+    """Return the robot whose nodes have the parameters of the files that they name, and what is wrong with these.
+
+    ``own`` are the processes of the source; those of parts have theirs.
+    """
     work = _Work(source, read, robot.ros.namespace)
-    processes = tuple(work.process(process) for process in robot.processes)
+    processes = tuple(work.process(one) if one.name in own else one for one in robot.processes)
     source_data = robot.source_data | ({"parameter files": work.digests} if work.digests else {})
     return replace(robot, processes=processes, source_data=source_data), work.found
 
@@ -39,27 +44,36 @@ class _Work:
     _known: dict[str, ParamsFile] = field(default_factory=dict)
 
     def process(self, process: Process) -> Process:
-        nodes = tuple(self._node(node, process) if names_files(node.params) else node for node in process.ros_nodes)
-        return replace(process, ros_nodes=nodes)
+        return replace(process, ros_nodes=tuple(self._node(node, process) for node in process.ros_nodes))
 
     def _node(self, node: Node, process: Process) -> Node:
-        named = node.params[FILE_KEY]
-        at = (*node.path, "params", FILE_KEY)
-        files = [(named, at)] if isinstance(named, str) else [(one, (*at, i)) for i, one in enumerate(named)]
         params: dict[str, Any] = {}
-        for file, path in files:
-            place = self.source.at(path)
+        places: dict[str, tuple[Span, ...]] = {}
+        for file, place in self._files_of(node):
             if isinstance(file, str) and file:
-                params = _laid_over(params, self._params_in(file, place, node, process))
+                given = self._params_in(file, place, node, process)
+                places |= {key: (place, value.at) for key, value in given.items() if isinstance(value, Word)}
+                params = _laid_over(params, _words(given))
             else:
                 self.found.append(finding("TF103", "params: file takes the names of files", place))
-        inline = {key: value for key, value in node.params.items() if key != FILE_KEY}
-        return replace(node, params=_laid_over(params, inline))
+        has_files = names_files(node.params)
+        inline = {key: value for key, value in node.params.items() if not (has_files and key == FILE_KEY)}
+        paths = {key: (*node.path, "params", key) for key in inline}
+        places |= {key: (self.source.at_key(path),) for key, path in paths.items() if self.source.has_key(path)}
+        return replace(node, params=_laid_over(params, inline), places=places)
+
+    def _files_of(self, node: Node) -> list[tuple[Any, Span]]:
+        """Return the parameter files that a node names, each with the place of its name."""
+        if not names_files(node.params):
+            return []
+        named, at = node.params[FILE_KEY], (*node.path, "params", FILE_KEY)
+        paths = [(named, at)] if isinstance(named, str) else [(one, (*at, i)) for i, one in enumerate(named)]
+        return [(file, self.source.at(path)) for file, path in paths]
 
     def _params_in(self, file: str, at: Span, node: Node, process: Process) -> dict[str, Any]:
-        """Return what a file says to the node; a file that says nothing to it is a finding."""
+        """Return what a file says to the node, in words; a file that says nothing to it is a finding."""
         call = OF_FILES.fullmatch(file)
-        path = path_named(call[1] if call else file, at)
+        path = path_named(call[2] if call else file, at)
         loaded = self._load(path, at)
         if loaded is None:
             return {}
@@ -69,7 +83,7 @@ class _Work:
             self.found.append(_nothing(path, at, node, process, loaded.nodes))
         params: dict[str, Any] = {}
         for one in meant:
-            params = _laid_over(params, _words(one.params))
+            params = _laid_over(params, one.params)
         return params
 
     def _load(self, path: str, at: Span) -> ParamsFile | None:

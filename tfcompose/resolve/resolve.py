@@ -23,7 +23,6 @@ from tfcompose.resolve.processes import (
     has_claims,
     idle_keys,
     name_clashes,
-    names_files,
     unknown_names,
     unnamed_nodes,
     unreached,
@@ -105,10 +104,11 @@ class _Work:
         self.found += [*drafts.found, *bodies.found, *solver.found, *self._wrong_names(own)]
         self.found += unnamed_nodes(edges, own, self.spec, self.broken)
         robot = self._take(with_positions(self._robot(drafts, edges, self._everybody(own)), self.spec, self.source))
-        if any(names_files(node.params) for process in own for node in process.ros_nodes):
+        if any(node.params for process in own for node in process.ros_nodes):
             from tfcompose.resolve.param_files import with_param_files
 
-            robot = self._take(with_param_files(robot, self.source, self.read))
+            own_names = frozenset(one.name for one in own)
+            robot = self._take(with_param_files(robot, own_names, self.source, self.read))
         if self.spec.ros2_control or self.spec.xml:
             from tfcompose.resolve.blocks import with_blocks
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import html
 import math
 import re
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
+from xml.sax.saxutils import quoteattr
 
 from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, finding
 from tfcompose.geometry import norm
@@ -182,7 +182,7 @@ def _with_namespaces(element: Element, root: Element) -> str:
     raw = element.raw
     spaces = {name: value for name, value in root.attributes.items() if name.startswith("xmlns:")}
     used = [name for name in spaces if re.search(rf"[<\s]{re.escape(name[6:])}:", raw)]
-    more = "".join(f' {name}="{html.escape(spaces[name])}"' for name in used if name not in element.attributes)
+    more = "".join(f" {name}={quoteattr(spaces[name])}" for name in used if name not in element.attributes)
     begin = 1 + len(element.tag)
     return raw[:begin] + more + raw[begin:]
 

@@ -86,7 +86,8 @@ class Packages:
         folders = self.candidates(name)
         searched = f"looked in {', '.join(folders)}" if folders else "AMENT_PREFIX_PATH is empty"
         near = slip_of(name, self.named) or nearest(name, self.named, _NEAR)
-        advice = f"{searched}; {f'did you mean {near}?' if near else self.advice.format(name=name)}"
+        way_out = f"did you mean {near}?" if near else self.advice.format(name=name)
+        advice = f"{searched}; {'correct the folder that it is given' if name in self.named else way_out}"
         return finding("TF724", f"package {name} not found", at, help=advice, severity="warning")
 
     def asset(self, uri: str, at: Span, document: str = "") -> tuple[Asset, Finding | None]:

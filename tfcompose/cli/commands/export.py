@@ -61,9 +61,10 @@ def arguments(parser: ArgumentParser) -> None:
 
 def run(arguments: Namespace) -> int:
     """Write the export; exit code as for ``build``."""
-    from tfcompose.cli.plans import PLAN, built_plan, host_share, is_plan, refuse_variant
+    from tfcompose.cli.plans import PLAN, built_plan, host_share, in_folder, is_plan, refuse_variant
     from tfcompose.launcher.fence import not_remapped
 
+    arguments.file = in_folder(arguments.file)
     if is_plan(arguments.file):
         refuse_variant(arguments)
         file = Path(arguments.file)

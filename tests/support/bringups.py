@@ -16,7 +16,7 @@ from tfcompose.load import load
 def import_of(source: Path, *words: str, code: int | None = 0) -> tuple[str, dict[str, Any]]:
     """Return the robot file that import writes for a source, and its data."""
     out = source.with_name("imported.yaml")
-    got = main(["import", str(source), "-o", str(out), "--force", *words])
+    got = main(["import", str(source), *words, "-o", str(out), "--force"])
     assert code is None or got == code, out.read_text("utf-8") if out.exists() else got
     text = out.read_text("utf-8")
     return text, load(text, str(out)).data
@@ -28,8 +28,8 @@ def compiled(text: str, folder: Path) -> Compiled:
 
 def places(printed: str, code: str) -> list[str]:
     """Return the files and lines of the findings with a code that a command printed."""
-    lines = [line for line in printed.splitlines() if f"[{code}]" in line]
-    return [":".join(Path(line).name.split(":")[:2]) for line in lines]
+    heads = [line.partition(": ")[0] for line in printed.splitlines() if f"[{code}]" in line]
+    return [":".join(Path(head).name.split(":")[:2]) for head in heads]
 
 
 def printed_errors(capsys: pytest.CaptureFixture[str]) -> str:

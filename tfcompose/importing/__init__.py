@@ -1,6 +1,7 @@
 """Turns what robots are described and started by into the text of a robot file, for ``tfcompose import``.
 
 Of a URDF, ``sensors`` recognises presets, ``omitted`` lists what a robot file cannot hold, and ``robot_file`` writes
-the text. Readers of what starts processes (``shell``) fill a ``draft``, in which ``programs`` have their entries.
+the text. Readers of what starts processes (``shell``, ``launch``) fill a ``draft``, in which ``programs`` have their
+entries. Launch files are read by a stand-in of launch's API in a process of its own (``launch_process``).
 Must not import ``cli``, ``emit``, ``plan``.
 """

@@ -36,11 +36,16 @@ _TF = ("/tf", "/tf_static")
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """What a robot_state_publisher is given: a xacro ``file`` with ``args``, or the text of a URDF."""
+    """What a robot_state_publisher is given: a xacro ``file`` with ``args``, or the text of a URDF.
+
+    ``prefix`` is written in front of its frames.
+    """
 
     file: str = ""
     args: Mapping[str, str] = field(default_factory=dict)
     text: str = ""
+    prefix: str = ""
+    at: Span | None = None
 
 
 @dataclass(frozen=True, slots=True)

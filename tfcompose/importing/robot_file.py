@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from tfcompose.files import Target
     from tfcompose.findings import Finding
     from tfcompose.geometry import Quaternion, Vector
+    from tfcompose.importing.draft import Draft
     from tfcompose.importing.omitted import Entry
     from tfcompose.importing.sensors import Recognised
     from tfcompose.model import Edge, Robot
@@ -59,6 +60,17 @@ def robot_file(imported: Imported, head: Iterable[str]) -> str:
     return "\n".join([*_Writer(imported).lines(head), ""])
 
 
+def put_into(draft: Draft, imported: Imported) -> None:
+    """Put what was imported of a description into the draft of a robot that is more than that."""
+    writer = _Writer(imported)
+    for title, entries in writer.sections().items():
+        draft.sections[title].update(entries)
+    for at, notes in writer.notes.items():
+        draft.note(at, *notes)
+    draft.brought |= writer.brought
+    draft.base = draft.base or writer.base()
+
+
 class _Writer:
     """Writes one robot; each section is a mapping, in the order of the source."""
 
@@ -69,12 +81,10 @@ class _Writer:
         self.brought = {edge.child for sensor in imported.sensors for edge in sensor.edges}
         self.fixed = self._fixed()
 
-    def lines(self, head: Iterable[str]) -> list[str]:
+    def sections(self) -> dict[str, dict[str, Any]]:
+        """Return the sections in the order of the language; ``notes`` are complete then."""
         imported, robot, links, joints = self.imported, self.robot, self._links(), self._joints()
-        lines = [*comment(head), *entry("tfcompose", 1), *comment(self._of("", "")), *entry("robot", imported.name)]
-        base = self._base()
-        lines += entry("base", base) if base else []
-        sections: dict[str, dict[str, Any]] = {
+        return {
             "packages": dict(imported.packages),
             "links": links,
             "joints": joints,
@@ -85,6 +95,12 @@ class _Writer:
             "processes": self._processes(),
             "rules": dict(imported.rules),
         }
+
+    def lines(self, head: Iterable[str]) -> list[str]:
+        imported, sections = self.imported, self.sections()
+        lines = [*comment(head), *entry("tfcompose", 1), *comment(self._of("", "")), *entry("robot", imported.name)]
+        base = self.base()
+        lines += entry("base", base) if base else []
         sections, variables = without_expressions(sections)
         lines += variables
         lines += comment(self._homeless(sections))
@@ -122,7 +138,7 @@ class _Writer:
         link = self.robot.links[name]
         return bool(link.visuals or link.collisions or link.inertial)
 
-    def _base(self) -> str | None:
+    def base(self) -> str | None:
         """Return the base, if it is not what a robot file without one has."""
         roots = self.robot.roots()
         root = roots[0] if len(roots) == 1 else None

@@ -26,14 +26,17 @@ if TYPE_CHECKING:
     from tfcompose.urdf.lint import Document
     from tfcompose.urdf.packages import Packages
 
-_ENDINGS = frozenset({".urdf", ".xacro", ".sh", ".bash", ".txt", ""})
+_LAUNCH = (".py", ".xml", ".launch", ".yaml", ".yml")
+_ENDINGS = frozenset({".urdf", ".xacro", ".sh", ".bash", ".txt", "", *_LAUNCH})
 _ROBOT = re.compile(r"[a-z][a-z0-9_]*")
 
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("file", metavar="FILE", help="a .urdf or .xacro file, a shell script; -: lines from stdin")
-    parser.add_argument("args", nargs="*", metavar="NAME:=VALUE", help="arguments of the xacro file")
+    parser.add_argument(
+        "file", metavar="FILE", help="a .urdf, .xacro or launch file, or a shell script; -: lines from stdin"
+    )
+    parser.add_argument("args", nargs="*", metavar="NAME:=VALUE", help="arguments of the xacro or launch file")
     parser.add_argument("-o", "--output", metavar="FILE", help="write the robot file here; default: print it")
     parser.add_argument("--force", action="store_true", help="overwrite an existing file")
     parser.add_argument("--robot", metavar="NAME", help="the robot's name; default: the source's")
@@ -42,6 +45,9 @@ def arguments(parser: ArgumentParser) -> None:
         help="folder of a package that is not installed; repeatable",
     )  # fmt: skip
     parser.add_argument("--no-sensors", action="store_true", help="keep frames as frames, do not match presets")
+    parser.add_argument(
+        "--all-branches", action="store_true", help="of a launch file, take what conditions leave out, too"
+    )
     parser.add_argument("--keep-going", action="store_true", help="write as much as possible of a source with errors")
 
 
@@ -84,12 +90,32 @@ def _import_bringup(arguments: Namespace) -> int:
     from tfcompose.importing.draft import Draft, robot_name
     from tfcompose.importing.shell import add_script
 
-    text = read_text(arguments.file)
     name = "stdin" if arguments.file == STDIN else posixpath.basename(arguments.file)
     wanted = arguments.robot or robot_name(name.partition(".")[0] if name != "stdin" else "robot")
     draft = Draft(wanted, [f"imported from {name} by tfcompose"])
-    add_script(draft, text, arguments.file if arguments.file != STDIN else "<stdin>", _target(arguments))
+    if arguments.file.endswith(_LAUNCH):
+        _add_launch(draft, arguments)
+    else:
+        shown = arguments.file if arguments.file != STDIN else "<stdin>"
+        add_script(draft, read_text(arguments.file), shown, _target(arguments))
     return _finish(draft, arguments)
+
+
+def _add_launch(draft: Draft, arguments: Namespace) -> None:
+    from tfcompose.cli.compiling import library
+    from tfcompose.cli.reading import read_text
+    from tfcompose.importing.descriptions import Workshop, add_descriptions
+    from tfcompose.importing.launch import Launch, add_launch
+
+    read_text(arguments.file)  # refuses what is no text
+    given, packages = pairs(arguments.args, ":="), pairs(arguments.packages, "=")
+    known, target = _known_packages(packages), _target(arguments)
+    prefixes = known.disk.prefixes if known.disk else ()
+    launch = Launch(arguments.file, given, packages, prefixes, arguments.all_branches)
+    folders = {name: str(Path(folder).absolute()) for name, folder in packages.items()}
+    descriptions = add_launch(draft, launch, target)
+    presets = None if arguments.no_sensors else library()
+    add_descriptions(draft, descriptions, Workshop(known, target, presets, folders))
 
 
 def _finish(draft: Draft, arguments: Namespace) -> int:
@@ -125,7 +151,7 @@ def _check_use(arguments: Namespace) -> None:
         SystemExit: after saying so.
     """
     if Path(arguments.file).suffix not in _ENDINGS:
-        fail(f"{arguments.file}: only .urdf, .xacro and shell scripts can be imported", UNREADABLE)
+        fail(f"{arguments.file}: only URDF, xacro and launch files and shell scripts can be imported", UNREADABLE)
     if arguments.robot and not _ROBOT.fullmatch(arguments.robot):
         fail(f"--robot {arguments.robot}: use lower case letters, digits and _, beginning with a letter", UNREADABLE)
     if arguments.output and Path(arguments.output).exists() and not arguments.force:

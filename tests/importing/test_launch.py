@@ -1,0 +1,388 @@
+"""Launch files in Python, XML and YAML, imported."""
+
+import random
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.bringups import compiled, import_of, places, printed_errors
+from tests.support.importing import PRESETS
+from tfcompose.cli import compiling, main
+from tfcompose.geometry import angle_between
+from tfcompose.importing import launch
+
+PYTHON = """
+import os
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchDescription
+from launch.actions import *
+from launch.actions import DeclareLaunchArgument, ExecuteProcess, GroupAction, OpaqueFunction, RegisterEventHandler
+from launch.actions import SetEnvironmentVariable, Shutdown, TimerAction
+from launch.conditions import IfCondition, UnlessCondition
+from launch.event_handlers import OnProcessExit
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, PythonExpression
+from launch_ros.actions import ComposableNodeContainer, LifecycleNode, Node, PushRosNamespace, SetParameter, SetRemap
+from launch_ros.descriptions import ComposableNode, ParameterValue
+from launch_ros.substitutions import FindPackageShare
+
+
+def cameras(context):
+    count = int(LaunchConfiguration("cameras").perform(context))
+    made = {"package": "camera", "executable": "camera"}
+    return [Node(**made, name=f"camera_{i}", parameters=[{"id": i}]) for i in range(count)]
+
+
+def generate_launch_description():
+    own = get_package_share_directory("rover")
+    calibrate = ExecuteProcess(cmd=["python3", os.path.join(own, "calibrate.py")], cwd=own, name="calibrate")
+    return LaunchDescription([
+        DeclareLaunchArgument("cameras", default_value="2", description="how many"),
+        DeclareLaunchArgument("rviz", default_value="false"),
+        SetEnvironmentVariable("LEVEL", "3"),
+        Node(package="tf2_ros", executable="static_transform_publisher", name="mount",
+             arguments=["0.1", "0", "0.3", "0.5", "0", "-0.2", "base_link", "laser"]),
+        OpaqueFunction(function=cameras),
+        Node(package="rviz2", executable="rviz2", condition=IfCondition(LaunchConfiguration("rviz"))),
+        Node(package="teleop", executable="keys", condition=UnlessCondition(LaunchConfiguration("rviz"))),
+        GroupAction([
+            PushRosNamespace("front"),
+            SetParameter("speed", 20),
+            SetRemap("scan", "scan_raw"),
+            Node(package="drive", executable="drive", name="drive", namespace="left", respawn=True,
+                 parameters=[os.path.join(own, "drive.yaml"), {
+                     "wheels": {"count": 4}, "text": "4", "from_argument": LaunchConfiguration("cameras"),
+                     "kept": ParameterValue(LaunchConfiguration("cameras"), value_type=str), "mixed": [1, 2.5],
+                 }],
+                 remappings=[("odom", "odometry")], ros_arguments=["--log-level", "debug"]),
+        ]),
+        LifecycleNode(package="map", executable="server", name="map_server", namespace="", autostart=True),
+        calibrate,
+        RegisterEventHandler(OnProcessExit(target_action=calibrate, on_exit=[
+            Node(package="slam", executable="slam", name="mapper")])),
+        TimerAction(period=5.0, actions=[Node(package="late", executable="late", name="late")]),
+        Node(package="safety", executable="stop", name="stop", on_exit=Shutdown(),
+             arguments=["--rate", PythonExpression(["2 * ", LaunchConfiguration("cameras")])]),
+        ComposableNodeContainer(
+            name="perception", namespace="", package="rclcpp_components", executable="component_container",
+            composable_node_descriptions=[
+                ComposableNode(package="image_proc", plugin="image_proc::RectifyNode", name="rectify")]),
+    ])
+"""
+
+
+@pytest.fixture(autouse=True)
+def _one_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiling, "library", lambda: PRESETS)
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """The folder launch of a package in a source tree."""
+    folder = tmp_path / "rover"
+    (folder / "launch").mkdir(parents=True)
+    (folder / "package.xml").write_text("<package><name>rover</name></package>", encoding="utf-8")
+    (folder / "drive.yaml").write_text("/**: {ros__parameters: {speed: 1.5}}\n", encoding="utf-8")
+    return folder / "launch"
+
+
+def source(folder: Path, name: str, text: str) -> Path:
+    file = folder / name
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def test_each_action_of_a_python_launch_file_has_its_entry(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(package)
+    _, data = import_of(source(package, "rover.launch.py", PYTHON), code=None)
+    assert data["frames"]["laser"] == {"parent": "base_link", "xyz": [0.1, 0, 0.3], "rpy": [-0.2, 0, 0.5]}
+    processes = data["processes"]
+    order = ["camera_0", "camera_1", "keys", "drive", "map_server", "calibrate", "mapper", "late", "stop", "perception"]
+    assert list(processes) == order
+    assert all(process["env"] == {"LEVEL": "3"} for process in processes.values())
+    assert [processes[f"camera_{i}"]["params"] for i in range(2)] == [{"id": 0}, {"id": 1}]
+    drive = processes["drive"]
+    assert drive["params"] == {
+        "speed": 20, "file": "../drive.yaml", "wheels.count": 4, "text": "4", "from_argument": 2, "kept": "2",
+        "mixed": [1, 2.5],
+    }  # fmt: skip
+    assert drive["remap"] == {"scan": "scan_raw", "odom": "odometry"}
+    assert (drive["namespace"], drive["restart"], drive["log_level"]) == ("front/left", "always", "debug")
+    assert processes["map_server"]["lifecycle"] == "active"
+    assert processes["mapper"]["after"] == {"calibrate": "done"}
+    (gate,) = processes["late"]["after"]
+    assert processes[gate]["ready"] == {"time": "5 s"}
+    assert (processes["stop"]["required"], processes["stop"]["run"]["args"]) == (True, ["--rate", "4"])
+    assert processes["calibrate"]["run"] == ["python3", str(package.parent / "calibrate.py")]
+
+
+def test_what_is_not_taken_is_named_with_its_line(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text, _ = import_of(source(package, "rover.launch.py", PYTHON), code=None)
+    lines = PYTHON.splitlines()
+    wanted = ['"cameras", default', '"rviz", default', 'executable="rviz2"', 'plugin="image_proc']
+    found = places(printed_errors(capsys), "TF020")
+    for words in wanted:
+        line = next(number for number, one in enumerate(lines, start=1) if words in one)
+        assert f"rover.launch.py:{line}" in found
+        assert f"rover.launch.py:{line}: " in text
+
+
+def test_arguments_are_given_and_conditions_passed_over(package: Path) -> None:
+    file = source(package, "rover.launch.py", PYTHON)
+    _, data = import_of(file, "cameras:=1", "rviz:=true", code=None)
+    assert "camera_1" not in data["processes"]
+    assert "rviz2" in data["processes"]
+    assert "keys" not in data["processes"]
+    text, data = import_of(file, "--all-branches", code=None)
+    assert {"rviz2", "keys"} <= data["processes"].keys()
+    assert "only if rviz, which does not hold" in text
+
+
+XML = """<launch>
+  <arg name="name" default="front"/>
+  <let name="twice" value="$(var name)_$(var name)"/>
+  <node pkg="tf2_ros" exec="static_transform_publisher" args="--x 1 --yaw 0.5 --frame-id base_link
+    --child-frame-id $(var name)_laser"/>
+  <group>
+    <push_ros_namespace namespace="$(var name)"/>
+    <set_env name="LEVEL" value="3"/>
+    <node pkg="drive" exec="drive" name="drive" if="$(eval '1 &lt; 2')" launch-prefix="gdb -ex run">
+      <param name="rate" value="20"/><param name="text" value="20" type="str"/>
+      <param name="sub"><param name="a" value="1.5"/></param>
+      <param from="$(find-pkg-share rover)/drive.yaml"/>
+      <remap from="odom" to="$(var twice)"/>
+      <env name="MODE" value="x"/>
+    </node>
+  </group>
+  <executable cmd="echo $(env NO_SUCH_NAME 'a b') 'c d'" name="words"/>
+  <timer period="2.0"><node pkg="late" exec="late" name="late"/></timer>
+  <include file="$(dirname)/more.launch.xml"><arg name="name" value="rear"/></include>
+  <bogus/>
+</launch>
+"""
+YAML = """launch:
+- arg: {name: name, default: front}
+- let: {name: twice, value: "$(var name)_$(var name)"}
+- node:
+    pkg: tf2_ros
+    exec: static_transform_publisher
+    args: "--x 1 --yaw 0.5 --frame-id base_link --child-frame-id $(var name)_laser"
+- group:
+  - push_ros_namespace: {namespace: "$(var name)"}
+  - set_env: {name: LEVEL, value: "3"}
+  - node:
+      pkg: drive
+      exec: drive
+      name: drive
+      if: "$(eval '1 < 2')"
+      launch-prefix: gdb -ex run
+      param:
+      - {name: rate, value: 20}
+      - {name: text, value: "20", type: str}
+      - {name: sub, param: [{name: a, value: 1.5}]}
+      - {from: "$(find-pkg-share rover)/drive.yaml"}
+      remap: [{from: odom, to: "$(var twice)"}]
+      env: [{name: MODE, value: x}]
+- executable: {cmd: "echo $(env NO_SUCH_NAME 'a b') 'c d'", name: words}
+- timer: {period: 2.0, children: [{node: {pkg: late, exec: late, name: late}}]}
+- include: {file: $(dirname)/more.launch.xml, arg: [{name: name, value: rear}]}
+- bogus: {}
+"""
+MORE = '<launch><arg name="name"/><node pkg="scan" exec="scan" name="$(var name)_scan"/></launch>'
+
+
+@pytest.mark.parametrize(("name", "text"), [("rover.launch.xml", XML), ("rover.launch.yaml", YAML)])
+def test_xml_and_yaml_say_the_same(
+    name: str, text: str, package: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(package)
+    source(package, "more.launch.xml", MORE)
+    _, data = import_of(source(package, name, text), code=None)
+    assert data["frames"]["front_laser"] == {"parent": "base_link", "xyz": [1, 0, 0], "rpy": [0, 0, 0.5]}
+    processes = data["processes"]
+    assert list(processes) == ["drive", "words", "late", "rear_scan"]
+    assert processes["drive"]["params"] == {"rate": 20, "text": "20", "sub.a": 1.5, "file": "../drive.yaml"}
+    assert processes["drive"]["remap"] == {"odom": "front_front"}
+    assert processes["drive"]["env"] == {"LEVEL": "3", "MODE": "x"}
+    assert processes["drive"]["namespace"] == "front"
+    assert processes["words"]["run"] == ["echo", "a b", "c d"]
+    (gate,) = processes["late"]["after"]
+    assert processes[gate]["ready"] == {"time": "2 s"}
+    lines = text.splitlines()
+    wanted = [number for number, line in enumerate(lines, start=1) if "bogus" in line]
+    assert f"{name}:{wanted[0]}" in places(printed_errors(capsys), "TF020")
+
+
+ROS1 = """<launch>
+  <arg name="height" default="0.1"/>
+  <node pkg="tf" type="static_transform_publisher" name="a" args="0.2 0 $(arg height) 0 0 0 base_link laser 100"/>
+  <node pkg="tf2_ros" type="static_transform_publisher" name="b" args="0.1 0 0.2 0 0 0 1 base_link camera"/>
+  <node pkg="tf2_ros" type="static_transform_publisher" name="c" args="0 0 0 -1.5707963 0 -1.5707963 camera optical"/>
+  <group ns="front"><node pkg="drive" type="drive.py" name="drive" required="true"/></group>
+</launch>
+"""
+
+
+def test_launch_files_of_ros_1_are_read(tmp_path: Path) -> None:
+    text, data = import_of(source(tmp_path, "robot.launch", ROS1), "height:=0.4")
+    assert data["frames"] == {
+        "base_link": {},
+        "laser": {"parent": "base_link", "xyz": [0.2, 0, 0.4]},
+        "camera": {"parent": "base_link", "xyz": [0.1, 0, 0.2]},
+        "optical": {"parent": "camera", "rpy": [-1.5707963, 0, -1.5707963]},
+    }
+    assert data["processes"]["drive"] == {
+        "run": {"package": "drive", "executable": "drive.py"}, "namespace": "front", "required": True,
+    }  # fmt: skip
+    robot = compiled(text, tmp_path).robot
+    assert robot
+
+
+DISPLAY = """
+import os, xacro
+from launch import LaunchDescription
+from launch_ros.actions import Node
+from ament_index_python.packages import get_package_share_directory
+
+def generate_launch_description():
+    folder = get_package_share_directory("rover")
+    made = xacro.process_file(os.path.join(folder, "urdf", "rover.urdf.xacro"), mappings={"height": "0.5"}).toxml()
+    return LaunchDescription([
+        Node(package="robot_state_publisher", executable="robot_state_publisher", name="robot_state_publisher",
+             parameters=[{"robot_description": made, "publish_frequency": 50.0}]),
+        Node(package="joint_state_publisher_gui", executable="joint_state_publisher_gui"),
+        Node(package="tf2_ros", executable="static_transform_publisher",
+             arguments=["--frame-id", "mast", "--child-frame-id", "lamp", "--z", "0.1"]),
+    ])
+"""
+ROVER = """<robot name="rover" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arg name="height" default="1"/>
+<link name="base_link"/><link name="mast"/><link name="wheel"/>
+<joint name="m" type="fixed"><parent link="base_link"/><child link="mast"/><origin xyz="0 0 $(arg height)"/></joint>
+<joint name="w" type="continuous"><parent link="base_link"/><child link="wheel"/></joint></robot>
+"""
+
+
+def test_a_robot_state_publisher_with_a_xacro_file_becomes_a_part(package: Path) -> None:
+    (package.parent / "urdf").mkdir()
+    source(package.parent / "urdf", "rover.urdf.xacro", ROVER)
+    text, data = import_of(source(package, "display.launch.py", DISPLAY), "--package", f"rover={package.parent}")
+    assert data["parts"] == {
+        "rover": {"xacro": "package://rover/urdf/rover.urdf.xacro", "args": {"height": "0.5"}},
+    }  # fmt: skip
+    assert data["processes"]["joint_state_publisher_gui"] == {"simulate": {"joints": "zero", "rate": "10 Hz"}}
+    assert data["processes"]["joints"] == {"params": {"publish_frequency": 50}}
+    robot = compiled(text, package).robot
+    assert robot
+    assert {(edge.name, edge.pose.xyz[2]) for edge in robot.edges} == {
+        ("base_link → mast", 0.5), ("base_link → wheel", 0), ("mast → lamp", 0.1),
+    }  # fmt: skip
+
+
+def test_a_robot_state_publisher_with_a_urdf_becomes_links(package: Path) -> None:
+    urdf = ROVER.replace('<xacro:arg name="height" default="1"/>', "").replace("$(arg height)", "0.5")
+    source(package, "rover.urdf", urdf)
+    reading = 'open(os.path.join(os.path.dirname(__file__), "rover.urdf")).read()'
+    begin = DISPLAY.index("xacro.process_file")
+    end = DISPLAY.index("\n", begin)
+    text, data = import_of(source(package, "display.launch.py", DISPLAY[:begin] + reading + DISPLAY[end:]))
+    assert data["joints"]["w"]["type"] == "continuous"
+    robot = compiled(text, package).robot
+    assert robot
+    assert {edge.name for edge in robot.edges} == {"base_link → mast", "base_link → wheel", "mast → lamp"}
+
+
+HOSTILE = """
+import os, socket, subprocess, shutil
+os.system("touch {mark}")
+subprocess.run(["touch", "{mark}"])
+for call in (lambda: subprocess.Popen(["touch", "{mark}"]), lambda: open("{mark}", "w"), lambda: os.fork(),
+             lambda: os.posix_spawn("/usr/bin/touch", ["touch", "{mark}"], os.environ),
+             lambda: socket.create_connection(("127.0.0.1", {port})), lambda: shutil.rmtree("{folder}")):
+    try:
+        call()
+    except OSError:
+        pass
+from launch import LaunchDescription
+from launch_ros.actions import Node
+def generate_launch_description():
+    return LaunchDescription([Node(package="a", executable="b")])
+"""
+
+
+def test_a_launch_file_that_would_do_harm_is_contained_and_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mark, folder = tmp_path / "mark", tmp_path / "folder"
+    folder.mkdir()
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        text = HOSTILE.format(mark=mark, folder=folder, port=port)
+        import_of(source(tmp_path, "hostile.launch.py", text), code=None)
+        server.settimeout(0)
+        with pytest.raises(BlockingIOError):
+            server.accept()
+    assert not mark.exists()
+    assert folder.is_dir()
+    printed = printed_errors(capsys)
+    assert places(printed, "TF020").count("hostile.launch.py:3") == 1
+    for word in ("os.system", "subprocess.Popen", "os.fork", "os.posix_spawn", "socket.", "open for writing", "rmtree"):
+        assert word in printed
+
+
+@pytest.mark.parametrize("text", ["while True: pass", "x = [0]\nwhile True: x = x * 2", "import os; os.abort()"])
+def test_a_launch_file_without_end_is_ended(
+    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(launch, "_MOST_WALL_S", 3.0)
+    assert main(["import", str(source(tmp_path, "endless.launch.py", text))]) == 1
+    assert "endless.launch.py" in printed_errors(capsys)
+
+
+def test_no_launch_file_makes_a_traceback(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What is left of a file after parts of it were taken out or doubled is imported, or refused."""
+    chance = random.Random(18)
+    for name, text in (("a.launch.py", PYTHON), ("b.launch.xml", XML), ("c.launch.yaml", YAML), ("d.launch", ROS1)):
+        for _ in range(4):
+            lines = text.splitlines(keepends=True)
+            for _ in range(chance.randint(1, 4)):
+                at = chance.randrange(len(lines))
+                lines[at : at + 1] = chance.choice(([], [lines[at]] * 2, [lines[at][: len(lines[at]) // 2]]))
+            code = main(["import", str(source(tmp_path, name, "".join(lines)))])
+            printed = printed_errors(capsys)
+            assert code in {0, 1, 2}
+            assert "Traceback" not in printed, "".join(lines)
+
+
+#: All but the fleet: its export starts tfcompose's own publishers, whose edges stand in the plan alone.
+ROBOTS = sorted(
+    set(Path(__file__).parents[2].glob("robots/*.yaml")) - set(Path(__file__).parents[2].glob("robots/two_*.yaml"))
+)
+
+
+def edges_of(text: str, folder: Path) -> dict[str, Any]:
+    robot = compiled(text, folder).robot
+    assert robot
+    return {edge.name: edge for edge in robot.edges}
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids=[file.stem for file in ROBOTS])
+def test_the_import_of_an_export_is_the_same_robot(robot: Path, tmp_path: Path) -> None:
+    """All that tfcompose's own publishers send is there again, to 1e-9, and every process that launch starts."""
+    words = [sys.executable, "-m", "tfcompose", "export", "launch", str(robot), "-o", str(tmp_path / "out")]
+    done = subprocess.run(words, check=False, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    (file,) = (tmp_path / "out/launch").glob("*.launch.py")
+    text, data = import_of(file, code=None)
+    before, after = edges_of(robot.read_text("utf-8"), robot.parent), edges_of(text, file.parent)
+    own = {name: edge for name, edge in before.items() if edge.owner in {"static", "joints"}}
+    assert own.keys() <= after.keys()
+    for name, edge in own.items():
+        assert (edge.kind, edge.joint_name if edge.joint else "") == (
+            after[name].kind, after[name].joint_name if after[name].joint else "")  # fmt: skip
+        off = max(abs(a - b) for a, b in zip(edge.pose.xyz, after[name].pose.xyz, strict=True))
+        assert off < 1e-9
+        assert angle_between(edge.pose.quat_xyzw, after[name].pose.quat_xyzw) < 1e-9
+    assert data

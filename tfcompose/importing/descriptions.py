@@ -1,0 +1,94 @@
+"""What a robot_state_publisher is given, in the draft of a robot: a xacro file as a part, a URDF as links."""
+
+from __future__ import annotations
+
+import posixpath
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from tfcompose.findings import RejectedError
+from tfcompose.importing.programs import PACKAGE, where
+from tfcompose.importing.robot_file import imported, put_into
+from tfcompose.urdf.lint import read_urdf
+from tfcompose.urdf.packages import Packages
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from tfcompose.files import Target
+    from tfcompose.importing.draft import Draft
+    from tfcompose.importing.programs import Description
+    from tfcompose.resolve import Library
+
+#: As what the text of a description is read.
+_TEXT = "robot_description.urdf"
+
+
+@dataclass(frozen=True, slots=True)
+class Workshop:
+    """What reads descriptions: the packages, folders of those that are named, and presets, None to match none."""
+
+    packages: Packages
+    target: Target
+    library: Library | None
+    folders: Mapping[str, str] = field(default_factory=dict)
+
+
+def add_descriptions(draft: Draft, descriptions: Iterable[Description], workshop: Workshop) -> None:
+    """Add what robot_state_publishers are given; of several URDFs the first becomes links, and each other is named."""
+    for described in descriptions:
+        if described.file and not described.file.endswith(".urdf"):
+            _add_part(draft, described, workshop)
+        elif draft.sections["links"]:
+            draft.todo("a second robot_state_publisher with a URDF", described.at, advice="parts: {NAME: {urdf: FILE}}")
+        else:
+            _add_links(draft, described, workshop)
+
+
+def _add_part(draft: Draft, described: Description, workshop: Workshop) -> None:
+    path = described.file
+    package = next((name for name, folder in _folders(path, workshop) if folder), "")
+    if package:
+        inside = posixpath.relpath(path, next(folder for name, folder in _folders(path, workshop) if name == package))
+        address = f"{PACKAGE}{package}/{inside}"
+        if package in workshop.folders:
+            draft.sections["packages"][package] = workshop.target.from_folder(workshop.folders[package])
+    else:
+        address = path if path.startswith(PACKAGE) else workshop.target.from_folder(path)
+    keys = {"xacro": address}
+    keys |= {"args": dict(described.args)} if described.args else {}  # type: ignore[dict-item]
+    keys |= {"prefix": described.prefix} if described.prefix else {}
+    draft.has_unknown_frames = True
+    name = posixpath.basename(path).partition(".")[0].replace("-", "_") or "robot"
+    draft.sections["parts"][name] = keys
+    draft.note(("parts", name), where(described.at, "what robot_state_publisher is given"))
+
+
+def _folders(path: str, workshop: Workshop) -> Iterable[tuple[str, str]]:
+    """Yield the named packages that a path is in."""
+    for name, folder in workshop.folders.items():
+        if path.startswith(folder.rstrip("/") + "/"):
+            yield name, folder
+
+
+def _add_links(draft: Draft, described: Description, workshop: Workshop) -> None:
+    packages, file = workshop.packages, described.file
+    if described.text and packages.disk:
+        text = described.text
+        own = replace(packages.disk, read=lambda _: text)
+        packages, file = Packages(own, packages.named, packages.advice), _TEXT
+    elif file.startswith(PACKAGE):
+        draft.todo(f"the description {file}: its package is not found here", described.at)
+        return
+    try:
+        document = read_urdf(file, packages)
+    except RejectedError as error:
+        draft.todo(f"the description: {error.findings[0].message}", described.at)
+        return
+    for one in document.findings():
+        if one.severity == "error":
+            draft.todo(f"the description has {one.code}: {one.message}", described.at)
+    robot = imported(document, workshop.target, draft.robot, packages.local, workshop.library)
+    if described.prefix:
+        draft.sections["ros"]["frame_prefix"] = described.prefix
+    put_into(draft, robot)

@@ -1,0 +1,383 @@
+"""Launch files as a draft of a robot file: read in a process of their own, and put into the language's words."""
+
+from __future__ import annotations
+
+import json
+import os
+import posixpath
+import signal
+import subprocess
+import sys
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.findings import RejectedError, Span, finding
+from tfcompose.importing.programs import (
+    PACKAGE,
+    STATE_PUBLISHER,
+    Description,
+    Program,
+    add_program,
+    one_clock,
+    where,
+)
+from tfcompose.importing.yaml_text import Bare
+from tfcompose.numbers import number
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from tfcompose.files import Target
+    from tfcompose.importing.draft import Draft
+
+_MOST_WALL_S = 60.0
+_ADVICE = "--package NAME=FOLDER, or source the workspace's setup file"
+#: What of the environment is a setting of all processes.
+_SETTINGS = {"ROS_DOMAIN_ID": "domain_id", "ROS_AUTOMATIC_DISCOVERY_RANGE": "discovery"}
+#: What stands for a description among parameters.
+_BEGIN, _END = "\x02", "\x03"
+
+
+@dataclass(frozen=True, slots=True)
+class Launch:
+    """A launch file to be read.
+
+    ``arguments`` are its launch arguments, ``packages`` folders of packages that are not installed, ``prefixes`` those
+    of AMENT_PREFIX_PATH. With ``every_branch`` conditions do not count.
+    """
+
+    file: str
+    arguments: Mapping[str, str] = field(default_factory=dict)
+    packages: Mapping[str, str] = field(default_factory=dict)
+    prefixes: tuple[str, ...] = ()
+    every_branch: bool = False
+
+
+def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description]:
+    """Add what a launch file starts to the draft; return what its robot_state_publishers are given.
+
+    Raises:
+        RejectedError: if it is no launch file, or takes too long or too much memory.
+    """
+    answer = _answered(launch)
+    work = _Work(draft, launch, target)
+    for record in answer["records"]:
+        work.add(record)
+    work.finish()
+    if answer["stopped"]:
+        if not any(one["kind"] not in {"package", "todo", "argument"} for one in answer["records"]):
+            raise RejectedError([finding("TF002", f"{answer['stopped']}", Span(launch.file))])
+        draft.todo(f"the launch file is not read to its end: {answer['stopped']}", Span(launch.file))
+    return work.descriptions
+
+
+def _answered(launch: Launch) -> dict[str, Any]:
+    request = {
+        "file": str(Path(launch.file).absolute()), "arguments": dict(launch.arguments),
+        "packages": {name: str(Path(folder).absolute()) for name, folder in launch.packages.items()},
+        "prefixes": list(launch.prefixes), "every_branch": launch.every_branch,
+    }  # fmt: skip
+    program = f"import sys; sys.path[:] = {sys.path!r}; from tfcompose.importing.launch_process import main; main()"
+    command = [sys.executable, "-c", program]
+    try:
+        done = subprocess.run(
+            command, input=json.dumps(request).encode(), stdout=subprocess.PIPE, timeout=_MOST_WALL_S, check=False,
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        )  # fmt: skip
+        answer: dict[str, Any] = json.loads(done.stdout)
+    except subprocess.TimeoutExpired:
+        message = f"the launch file takes more than {_MOST_WALL_S:g} s"
+    except json.JSONDecodeError:
+        ended = f"by {signal.Signals(-done.returncode).name}" if done.returncode < 0 else f"with code {done.returncode}"
+        message = f"the launch file was ended {ended}: it takes too long, or too much memory"
+    else:
+        return answer
+    raise RejectedError([finding("TF008", message, Span(launch.file))])
+
+
+class _Work:
+    """Turns records into entries."""
+
+    def __init__(self, draft: Draft, launch: Launch, target: Target) -> None:
+        self.draft, self.launch, self.target = draft, launch, target
+        self.descriptions: list[Description] = []
+        self._names: dict[str, str] = {}
+        self._after: list[tuple[str, dict[str, str]]] = []
+        self._delays: list[tuple[str, float]] = []
+        self._missing: dict[str, Span] = {}
+        self._containers: dict[str, str] = {}
+
+    def add(self, record: dict[str, Any]) -> None:
+        """Add one record."""
+        span = self._span(record["at"])
+        kind = record["kind"]
+        several: dict[str, Callable[[dict[str, Any], Span], None]] = {
+            "node": self._node,
+            "process": self._node,
+            "container": self._container,
+            "load": self._load,
+            "include": self._include,
+            "argument": self._argument,
+            "lifecycle": self._lifecycle,
+            "required": self._required,
+        }
+        if kind in several:
+            several[kind](record, span)
+        elif kind == "package":
+            self._missing.setdefault(record["name"], span)
+        elif kind == "skipped":
+            self.draft.todo(f"left out: {record['text']}", span, advice="--all-branches takes it in")
+        else:
+            self.draft.todo(record["text"], span)
+
+    def finish(self) -> None:
+        """Add what depends on all records."""
+        processes = self.draft.sections["processes"]
+        for name, after in self._after:
+            known = {self._names[key]: what for key, what in after.items() if key in self._names}
+            if known:
+                processes[name].setdefault("after", {}).update(known)
+        self._delay()
+        self._settings()
+        one_clock(self.draft)
+        for package, span in self._missing.items():
+            self.draft.todo(f"package {package} not found", span, advice=_ADVICE)
+
+    def _span(self, at: Any) -> Span:
+        file, line = (at[0], at[1]) if at else ("", 1)
+        absolute = str(Path(self.launch.file).absolute())
+        shown = self.launch.file if file in {absolute, ""} else os.path.relpath(file)
+        return Span(shown, max(int(line), 1))
+
+    def _argument(self, record: dict[str, Any], span: Span) -> None:
+        name, value = record["name"], record["value"]
+        chosen = f"{value!r} here" if value != record["default"] else f"its default {value!r}"
+        explained = f" ({record['description'].strip()})" if record["description"].strip() else ""
+        self.draft.todo(f"the launch argument {name}{explained} has {chosen}", span, advice=f"import … {name}:=VALUE")
+
+    def _node(self, record: dict[str, Any], span: Span) -> None:
+        program = self._program(record, span)
+        if program.executable == STATE_PUBLISHER:
+            self._describe(program, span)
+            return
+        name = add_program(self.draft, program, self.target)
+        if name is None:
+            return
+        self._names[str(record.get("id"))] = name
+        self._conditions(record, ("processes", name))
+        if record.get("after"):
+            self._after.append((name, record["after"]))
+        if record.get("period"):
+            self._delays.append((name, record["period"]))
+
+    def _conditions(self, record: dict[str, Any], at: tuple[str, str]) -> None:
+        for text in record.get("when", ()):
+            self.draft.note(at, f"only if {text}")
+
+    def _program(self, record: dict[str, Any], span: Span) -> Program:
+        todo: list[str] = []
+        params, description = _split_description(record.get("params", []), todo)
+        keys = self._keys(record, todo)
+        argv = tuple(record.get("argv", ()))
+        prefix = record.get("prefix")
+        if prefix:
+            todo.append(f"the prefix {prefix}")
+        reader = None if record["kind"] == "process" else "ros2"
+        if record.get("ros1"):
+            reader = "tf" if record["package"] == "tf" else "tf2_ros"
+        return Program(
+            span, record.get("package"), record.get("executable"), argv, bool(record.get("shell")),
+            record.get("name"), record.get("label"), record.get("namespace"), tuple(params),
+            tuple((old, new) for old, new in record.get("remap", ())), self._env(record), keys,
+            record.get("period", 0.0), reader, description, tuple(todo),  # type: ignore[arg-type]
+        )  # fmt: skip
+
+    def _env(self, record: dict[str, Any]) -> dict[str, str]:
+        """Return the process's variables, but for those that are settings of all."""
+        return {name: value for name, value in record.get("env", {}).items() if not self._is_setting(name, value)}
+
+    def _is_setting(self, name: str, value: str) -> bool:
+        if name not in _SETTINGS:
+            return False
+        known = {"domain_id": int(value) if value.isdigit() else None, "discovery": value.lower()}
+        wanted = known[_SETTINGS[name]]
+        ros = self.draft.sections["ros"]
+        allowed = wanted in {"localhost", "subnet", "off"} if name != "ROS_DOMAIN_ID" else wanted is not None
+        return allowed and ros.setdefault(_SETTINGS[name], wanted) == wanted
+
+    def _keys(self, record: dict[str, Any], todo: list[str]) -> dict[str, Any]:
+        keys: dict[str, Any] = {}
+        if record.get("lifecycle"):
+            keys["lifecycle"] = record["lifecycle"]
+        if record.get("cwd"):
+            keys["cwd"] = self.target.from_folder(record["cwd"])
+        if record.get("required"):
+            keys["required"] = True
+        if record.get("respawn"):
+            keys["restart"] = "always"
+            retries = record.get("respawn_max_retries", -1)
+            keys |= {"max_restarts": int(retries)} if retries >= 0 else {}
+            if record.get("respawn_delay"):
+                todo.append(f"respawn_delay {record['respawn_delay']:g} s")
+        if record.get("only_env"):
+            todo.append("env replaces the environment: here its variables are added to it")
+        if record.get("sigterm_timeout"):
+            try:
+                keys["stop"] = {"timeout": _seconds(float(record["sigterm_timeout"]))}
+            except ValueError:
+                todo.append(f"sigterm_timeout {record['sigterm_timeout']}")
+        return keys
+
+    def _describe(self, program: Program, span: Span) -> None:
+        params: dict[str, Any] = {}
+        for one in program.params:
+            params |= one if isinstance(one, dict) else {}
+        described = program.description
+        if described is None and program.argv and program.argv[0].endswith(".urdf"):
+            described = Description(file=program.argv[0])
+        if described is None:
+            self.draft.todo("robot_state_publisher without a description that is known here", span)
+            return
+        rest = {key: value for key, value in params.items() if key != "robot_description"}
+        self._state_publisher_params(rest, program, span)
+        self.descriptions.append(replace(described, at=span, prefix=str(rest.get("frame_prefix", ""))))
+
+    def _state_publisher_params(self, params: dict[str, Any], program: Program, span: Span) -> None:
+        ros, joints = self.draft.sections["ros"], self.draft.sections["processes"].setdefault("joints", {})
+        if params.get("use_sim_time") is True:
+            ros["clock"] = "sim"
+        own = {key: params[key] for key in ("publish_frequency", "ignore_timestamp") if key in params}
+        if own:
+            joints.setdefault("params", {}).update(own)
+            self.draft.note(("processes", "joints"), where(span, "what robot_state_publisher is told"))
+        if not joints:
+            del self.draft.sections["processes"]["joints"]
+        known = {"use_sim_time", "publish_frequency", "ignore_timestamp", "frame_prefix", "use_tf_static"}
+        for key in params.keys() - known:
+            self.draft.todo(f"robot_state_publisher: the parameter {key}", span)
+        if program.namespace and program.namespace.strip("/"):
+            ros.setdefault("namespace", program.namespace.strip("/"))
+        moved = {old: new for old, new in program.remap if old in {"/tf", "/tf_static"} and old != new}
+        if moved and program.namespace and all(new == old.strip("/") for old, new in moved.items()):
+            ros["isolate"] = "topics"
+        elif moved:
+            self.draft.todo(f"robot_state_publisher is remapped: {moved}", span)
+        for one in program.todo:
+            self.draft.todo(one, span)
+
+    def _container(self, record: dict[str, Any], span: Span) -> None:
+        components = record["components"]
+        self._node(record, span)
+        name = self._names.get(str(record.get("id")), "")
+        self._containers[str(record.get("id"))] = name
+        self._components(components, name)
+
+    def _load(self, record: dict[str, Any], _span: Span) -> None:
+        container = str(record["container"])
+        self._components(record["components"], self._containers.get(container, container))
+
+    def _components(self, components: list[dict[str, Any]], container: str) -> None:
+        for one in components:
+            at = ("processes", container) if container in self.draft.sections["processes"] else ("", "")
+            self.draft.todo(f"the component {one['plugin']} of {one['package']}", self._span(one["at"]), at)
+
+    def _include(self, record: dict[str, Any], span: Span) -> None:
+        """Add a launch file of a package that is not found as one process."""
+        package, _, file = record["file"].removeprefix(PACKAGE).partition("/")
+        keys: dict[str, Any] = {"run": {"launch": f"{package}/{file.removeprefix('launch/')}"}}
+        if record["args"]:
+            keys["run"]["args"] = record["args"]
+        namespace = (record.get("namespace") or "").strip("/")
+        keys |= {"namespace": namespace} if namespace else {}
+        env = self._env(record)
+        keys |= {"env": env} if env else {}
+        name = posixpath.basename(file).partition(".")[0]
+        name = self.draft.process(name, keys, where(span, "an included launch file, which runs as one process"))
+        if record.get("after"):
+            self._after.append((name, record["after"]))
+        if record.get("period"):
+            self._delays.append((name, record["period"]))
+
+    def _lifecycle(self, record: dict[str, Any], span: Span) -> None:
+        name = self._names.get(str(record["node"]))
+        if name is None:
+            self.draft.todo("a change of a lifecycle node's state", span)
+        else:
+            process = self.draft.sections["processes"][name]
+            if process.get("lifecycle") != "active":
+                process["lifecycle"] = record["state"]
+
+    def _required(self, record: dict[str, Any], span: Span) -> None:
+        name = self._names.get(str(record["node"]))
+        if name is None:
+            self.draft.todo("the end of a process ends all", span)
+        else:
+            self.draft.sections["processes"][name]["required"] = True
+
+    def _delay(self) -> None:
+        """Let what a timer starts wait: for a process that counts as ready after that time."""
+        processes = self.draft.sections["processes"]
+        gates: dict[float, str] = {}
+        delayed = {name for name, _ in self._delays}
+        for name, period_s in self._delays:
+            if period_s not in gates:
+                free = [
+                    one for one in self._names.values()
+                    if one not in delayed and one not in gates.values() and "run" in processes[one]
+                    and "ready" not in processes[one] and "after" not in processes[one]
+                ]  # fmt: skip
+                if free:
+                    gates[period_s] = free[0]
+                    processes[free[0]]["ready"] = {"time": _seconds(period_s)}
+                else:
+                    text = number(period_s)
+                    gate = self.draft.process(f"delay_{text}", {"run": ["sleep", text]}, "the time of a timer")
+                    processes[gate]["required"] = False
+                    gates[period_s] = gate
+            gate = gates[period_s]
+            what = "done" if processes[gate]["run"] == ["sleep", number(period_s)] else "ready"
+            processes[name].setdefault("after", {})[gate] = what
+
+    def _settings(self) -> None:
+        ros = self.draft.sections["ros"]
+        for name in [name for name, value in ros.items() if value is None]:
+            del ros[name]
+
+
+def _seconds(value: float) -> Bare:
+    return Bare(f"{number(value)} s")
+
+
+def _split_description(params: list[Any], todo: list[str]) -> tuple[list[Any], Description | None]:
+    """Return parameters without descriptions, and the robot's description."""
+    description: Description | None = None
+    kept: list[Any] = []
+    for one in params:
+        if isinstance(one, str):
+            kept.append(one)
+            continue
+        own = {}
+        for key, value in one.items():
+            if key == "robot_description" and isinstance(value, str):
+                description = _description(value)
+            elif isinstance(value, str) and _BEGIN in value:
+                todo.append(f"the parameter {key}, which is the text of {_description(value).file}")
+            elif value is None or value == [] or (isinstance(value, list) and not _is_uniform(value)):
+                todo.append(f"the parameter {key}: {value!r}")
+            else:
+                own[key] = value
+        if own:
+            kept.append(own)
+    return kept, description
+
+
+def _is_uniform(value: list[Any]) -> bool:
+    return len({type(one) for one in value}) == 1 and isinstance(value[0], (bool, int, float, str))
+
+
+def _description(value: str) -> Description:
+    if _BEGIN in value:
+        mark = json.loads(value[value.index(_BEGIN) + 1 : value.index(_END)])
+        return Description(mark["file"], mark["args"])
+    return Description(text=value)

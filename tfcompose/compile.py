@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.check import check, silenced, with_replaced
 from tfcompose.findings import Allow, Finding, RejectedError, without_duplicates
-from tfcompose.language import composed, profiles_in, validate, with_includes
+from tfcompose.language import Given, composed, profiles_in, validate, with_includes
 from tfcompose.load import Source, load
 from tfcompose.resolve import Disk, Library, resolve
 
@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from tfcompose.model import Robot
+
+
+NOTHING = Given()
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,18 +49,20 @@ def compile_robot(  # noqa: PLR0913 (text, and what is merged over it)
     overlays: Sequence[Source] = (),
     read: Callable[[str], str] | None = None,
     disk: Disk | None = None,
+    given: Given = NOTHING,
 ) -> Compiled:
     """Return the robot that the text describes with profiles and overlays merged over it, and all findings, by place.
 
     ``read`` gives the text of a file that is included or holds a calibration; without it nothing can be. ``disk`` says
-    which files and packages there are; without it no mesh is looked for.
+    which files and packages there are; without it no mesh is looked for. ``given`` are its arguments' values, and the
+    environment, which is empty otherwise.
     """
     try:
         source = load(text, file)
         source = with_includes(source, read) if read else source
     except RejectedError as error:
         return Compiled(None, error.findings)
-    return compile_source(source, library, profiles, overlays, read, disk)
+    return compile_source(source, library, profiles, overlays, read, disk, given)
 
 
 def compile_source(  # noqa: PLR0913, PLR0917 (as above)
@@ -67,10 +72,11 @@ def compile_source(  # noqa: PLR0913, PLR0917 (as above)
     overlays: Sequence[Source] = (),
     read: Callable[[str], str] | None = None,
     disk: Disk | None = None,
+    given: Given = NOTHING,
 ) -> Compiled:
     """Return what ``compile_robot`` does, from text that has been loaded, with what it includes."""
     try:
-        validated = validate(composed(source, profiles, overlays), profiles_in(source))
+        validated = validate(composed(source, profiles, overlays, given), profiles_in(source), given)
     except RejectedError as error:
         return Compiled(None, error.findings)
     resolved = resolve(validated, library, read, disk)

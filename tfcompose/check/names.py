@@ -101,11 +101,12 @@ def _lower_case(name: str) -> str:
 
 @rule("TF504", idle=True)
 def unused_variable(robot: Robot) -> Iterator[Finding]:
-    """A variable is not used.
+    """A variable or an argument is not used.
 
     Probably its value is still written where the variable was meant to be, and changing the variable has no effect. Use
     it, ``"${mast}"``, or remove it. Variables that only a profile uses, or that come from an included file, are exempt.
     """
-    for name, at in robot.unused.items():
-        if at.file == robot.file and ("vars", name) not in robot.broken:
-            yield finding("TF504", f"unused variable {name}", at, help=f'use it, "${{{name}}}", or remove it')
+    for (section, name), at in robot.unused.items():
+        if at.file == robot.file and (section, name) not in robot.broken:
+            what, expression = ("argument", f"args.{name}") if section == "args" else ("variable", name)
+            yield finding("TF504", f"unused {what} {name}", at, help=f'use it, "${{{expression}}}", or remove it')

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from argparse import ArgumentParser, HelpFormatter
 from functools import partial
-from typing import TYPE_CHECKING, NoReturn, Protocol
+from typing import TYPE_CHECKING, Any, NoReturn, Protocol
 
 from tfcompose.cli.terminal import UNREADABLE, fail, size_of
 
@@ -26,6 +27,22 @@ class Parser(ArgumentParser):
             near = [one for word in words for one in difflib.get_close_matches(word, known, 1)]
             advice = f"did you mean {near[0]}?" if near else advice
         fail(f"{self.prog.partition(' ')[2]}: {message}; {advice}", UNREADABLE)
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Return the arguments; words such as ``cameras:=4`` are those of the robot file, wherever they stand."""
+        words = list(args or ())
+        takes_given = any(action.dest == "given" for action in self._actions)
+        given = [word for word in words if _GIVEN.match(word)] if takes_given else []
+        arguments = super().parse_args([word for word in words if word not in given], namespace)
+        if takes_given:
+            from tfcompose.cli.options import pairs
+
+            arguments.given = pairs([*given, *arguments.given], ":=")
+        return arguments
+
+
+#: A word that gives an argument of a robot file its value.
+_GIVEN = re.compile(r"[^\s=:-][^\s=:]*:=")
 
 
 class Command(Protocol):

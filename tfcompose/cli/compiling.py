@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import fail, print_findings, reject
 from tfcompose.compile import compile_robot
-from tfcompose.findings import RejectedError, did_you_mean
-from tfcompose.language import set_value, with_includes
+from tfcompose.findings import RejectedError, Span, did_you_mean
+from tfcompose.language import Given, GivenArg, set_value, with_includes
 from tfcompose.load import load
 from tfcompose.resolve import Library
 from tfcompose.urdf.inertia import UnmeasurableError
@@ -96,6 +96,12 @@ def overlays_of(arguments: Namespace) -> list[Source]:
     return [*files, *(set_value(setting) for setting in arguments.settings)]
 
 
+def given_by(arguments: Namespace) -> Given:
+    """Return what the command line and the environment give the robot's arguments."""
+    args = {name: GivenArg(value, Span(f"{name}:={value}")) for name, value in arguments.given.items()}
+    return Given(args, os.environ)
+
+
 def compiled_robot(file: str, arguments: Namespace) -> Robot:
     """Return the robot, which has no errors; warnings are printed.
 
@@ -114,8 +120,9 @@ def robot_with_sources(file: str, arguments: Namespace) -> tuple[Robot, tuple[So
     try:
         overlays = overlays_of(arguments)
         compiled = compile_robot(
-            read_text(file), file, library(), arguments.profiles, overlays=overlays, read=read_text, disk=disk()
-        )
+            read_text(file), file, library(), arguments.profiles,
+            overlays=overlays, read=read_text, disk=disk(), given=given_by(arguments),
+        )  # fmt: skip
     except RejectedError as error:
         reject(error.findings)
     if compiled.robot is None or compiled.errors:

@@ -67,6 +67,10 @@ def _lines(plan: Plan, files: dict[str, str]) -> Iterator[str]:
     processes = f"{len(plan.processes)} process{'es' * (len(plan.processes) != 1)}"
     yield f"robot {plan.robot}: {processes}, {counted(len(plan.edges), 'edge')}, domain: {domain}"
     yield from describe_share(plan)
+    for name, argument in plan.args.items():
+        yield f"  arg      {name}:={str(argument).lower() if isinstance(argument, bool) else _quoted(str(argument))}"
+    for name, value in plan.environment.items():
+        yield f"  env      {name}={_quoted(value)}, when it was built"
     for process in plan.processes:
         yield ""
         yield from _process(plan, process, files)

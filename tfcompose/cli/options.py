@@ -21,7 +21,10 @@ def add_file(parser: ArgumentParser) -> None:
 
 
 def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> None:
-    """Add what is merged over a robot file: --profile, then --overlay, then --set; each repeatable."""
+    """Add what is merged over a robot file, --profile, then --overlay, then --set, and values of its arguments.
+
+    To be called after FILE is added, if that is a word too.
+    """
     parser.add_argument(
         "-p", "--profile", action="append", default=[], metavar="NAME", dest="profiles", help=f"{text}; repeatable"
     )
@@ -33,6 +36,10 @@ def add_variant(parser: ArgumentParser, text: str = "apply this profile") -> Non
         "--set", action="append", default=[], metavar="PATH=VALUE", dest="settings",
         help="set one value, applied last: sensors.camera.tf=driver; repeatable",
     )  # fmt: skip
+    parser.add_argument("--show-args", action="store_true", help="print the robot file's arguments, and do no more")
+    parser.add_argument(
+        "given", nargs="*", default=[], metavar="NAME:=VALUE", help="the value of an argument of the robot file"
+    )
 
 
 def pairs(words: list[str], between: str) -> dict[str, str]:

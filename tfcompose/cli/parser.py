@@ -135,6 +135,10 @@ def _run_command(name: str, words: list[str]) -> int:
     try:
         arguments = parser.parse_args(words)
         arguments.commands = COMMANDS  # for those that are about commands
+        if getattr(arguments, "show_args", False):
+            from tfcompose.cli.args import show_args
+
+            return show_args(arguments)
         return COMMANDS[name].run(arguments)
     except SystemExit as end:  # after a complaint
         return end.code if isinstance(end.code, int) else UNREADABLE

@@ -51,7 +51,7 @@ def built_plan(file: Path) -> Plan:
 
 
 def refuse_variant(arguments: Namespace, *more: str) -> None:
-    """Refuse --profile, --overlay and --set, and further options, with a plan that is built already.
+    """Refuse --profile, --overlay, --set and arguments, and further options, with a plan that is built already.
 
     Raises:
         SystemExit: after saying so.
@@ -59,6 +59,9 @@ def refuse_variant(arguments: Namespace, *more: str) -> None:
     if arguments.profiles or arguments.overlays or arguments.settings or any(getattr(arguments, one) for one in more):
         *options, last = ["--profile", "--overlay", "--set", *(f"--{one}" for one in more)]
         fail(f"a built plan takes no {', '.join(options)} and {last}: these options are for building it", UNREADABLE)
+    if arguments.given:
+        built_with = "; tfcompose up --dry-run PLAN prints those that it was built with"
+        fail(f"{next(iter(arguments.given))}:=…: a built plan takes no arguments{built_with}", UNREADABLE)
 
 
 def expected_plan(file: str, arguments: Namespace) -> tuple[Plan, dict[str, Span]]:

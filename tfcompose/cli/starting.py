@@ -151,13 +151,13 @@ def _profiles_that_start(arguments: Namespace) -> list[str]:
 
 
 def _starts_with(profile: str, arguments: Namespace) -> bool:
-    from tfcompose.cli.compiling import library, overlays_of
+    from tfcompose.cli.compiling import given_by, library, overlays_of
     from tfcompose.compile import compile_robot
     from tfcompose.emit.plan import plan_of
 
-    profiles, overlays = [*arguments.profiles, profile], overlays_of(arguments)
+    profiles, overlays, given = [*arguments.profiles, profile], overlays_of(arguments), given_by(arguments)
     file, presets = arguments.file, library()
-    compiled = compile_robot(read_text(file), file, presets, profiles, overlays=overlays, read=read_text)
+    compiled = compile_robot(read_text(file), file, presets, profiles, overlays=overlays, read=read_text, given=given)
     if compiled.robot is None or compiled.errors:
         return False
     plan = plan_of(compiled.robot)

@@ -58,6 +58,8 @@ def plan_of(robot: Robot, target: Target = AS_IN_SOURCE) -> Plan:
         ),
         guard=robot.guard,
         claims=tuple(claim.planned() for claim in robot.claims),
+        args=robot.args,
+        environment=robot.environment,
     )
 
 

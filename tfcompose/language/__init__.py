@@ -4,11 +4,17 @@ The models are the one description of validation, JSON Schema and reference. ``o
 ``validate`` makes a ``RobotSpec`` of one. Must not import ``resolve``, ``check``, ``urdf``, ``yaml``.
 """
 
+from tfcompose.language.args import ArgSpec, Given, GivenArg
 from tfcompose.language.overlay import as_part, composed, lay_over, profiles_in, set_value, with_includes
 from tfcompose.language.validate import Validated, validate, validate_node_preset, validate_preset
+from tfcompose.language.variables import alternatives_of
 
 __all__ = [
+    "ArgSpec",
+    "Given",
+    "GivenArg",
     "Validated",
+    "alternatives_of",
     "as_part",
     "composed",
     "lay_over",

@@ -54,7 +54,8 @@ def json_schema(language: str, presets: Mapping[str, PresetSpec], nodes: Iterabl
         _add_profiles(own, definitions, at="#/$defs/Robot" if language == "overlay" else "#")
     if language == "overlay":
         definitions["Robot"], profile = own, definitions["Profile"]
-        own = profile | {"properties": profile["properties"] | {"profiles": own["properties"]["profiles"]}}
+        properties = {name: schema for name, schema in profile["properties"].items() if name != "when"}
+        own = profile | {"properties": properties | {"profiles": own["properties"]["profiles"]}}
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": f"tfcompose {language}, version 1"}
     return head | own | {"$defs": dict(sorted(definitions.items()))}
 
@@ -190,6 +191,9 @@ def _add_profiles(own: dict[str, Any], definitions: dict[str, Any], at: str) -> 
     robot = {key: own[key] for key in ("type", "properties", "additionalProperties", "patternProperties")}
     robot["properties"] = {name: schema for name, schema in own["properties"].items() if name != "profiles"}
     definitions["Profile"] = {"description": "What is merged over the robot."} | _overlay(at, robot, mappings)
+    when = definitions["FrameSpec"]["properties"]["when"]
+    about = "merged also where this holds, without --profile; it is decided by the file with the other profiles"
+    definitions["Profile"]["properties"]["when"] = when | {"description": about}
     own["properties"]["profiles"]["additionalProperties"] = {"$ref": "#/$defs/Profile"}
 
 

@@ -13,8 +13,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, Note, RejectedError, Span, did_you_mean, finding
+from tfcompose.language.args import Given
+from tfcompose.language.conditions import holds
+from tfcompose.language.expressions import ExpressionError
 from tfcompose.language.robot import RobotSpec
 from tfcompose.language.spec import Spec, mappings_at
+from tfcompose.language.variables import NothingNewError, Variables
 from tfcompose.load import DEEPEST, Path, Place, Source, load
 
 if TYPE_CHECKING:
@@ -25,10 +29,16 @@ if TYPE_CHECKING:
     Reader = Callable[[str], str]
 
 
-def composed(source: Source, profiles: Sequence[str] = (), overlays: Sequence[Source] = ()) -> Source:
+_NOTHING = Given()
+
+
+def composed(
+    source: Source, profiles: Sequence[str] = (), overlays: Sequence[Source] = (), given: Given = _NOTHING
+) -> Source:
     """Return the robot with its named profiles laid over it, in order, then the overlays; without ``profiles``.
 
-    An overlay may bring profiles of its own.
+    Before the named ones come those whose own condition, ``when``, holds for what is ``given`` to the others. An
+    overlay may bring profiles of its own.
 
     Raises:
         RejectedError: if a profile is not there.
@@ -44,14 +54,47 @@ def composed(source: Source, profiles: Sequence[str] = (), overlays: Sequence[So
     if unusable:
         unknown = (_unknown_profile(source, name, list(known)) for name in missing)
         raise RejectedError([*source.found, *wrong, *unknown])
-    result = replace(without(source, "profiles"), found=(*source.found, *wrong))
+    base = replace(without(source, "profiles"), found=(*source.found, *wrong))
+    result = _laid_over_all(base, source, profiles, overlays)
+    if any(isinstance(profile, dict) and "when" in profile for profile in known.values()):
+        holding, refused = _holding(source, result, given)
+        profiles = [*(name for name in holding if name not in profiles), *profiles]
+        result = _laid_over_all(replace(base, found=(*base.found, *refused)), source, profiles, overlays)
+    return replace(result, is_variant=bool(profiles or overlays))
+
+
+def _laid_over_all(base: Source, source: Source, profiles: Sequence[str], overlays: Sequence[Source]) -> Source:
     for name in profiles:
-        result = lay_over(result, source.part(("profiles", name)))
+        base = lay_over(base, without(source.part(("profiles", name)), "when"))
     for overlay in overlays:
         rest = without(overlay, "profiles")
         if rest.data or rest is overlay:
-            result = lay_over(result, rest)
-    return replace(result, is_variant=bool(profiles or overlays))
+            base = lay_over(base, rest)
+    return base
+
+
+def _holding(source: Source, others: Source, given: Given) -> tuple[list[str], list[Finding]]:
+    """Return the profiles whose condition holds with the values of the others, and what is wrong with conditions."""
+    variables = Variables(others, given)
+    names: list[str] = []
+    found = []
+    for name, profile in profiles_in(source).items():
+        at: Path = ("profiles", name)
+        if "when" not in profile:
+            continue
+        if "args" in profile:
+            advice = "a profile that is named with --profile may"
+            message = "a profile with a condition cannot change args, which decide it"
+            found.append(finding("TF107", message, source.at_key((*at, "args")), help=advice))
+            continue
+        try:
+            if holds(profile["when"], variables):
+                names.append(name)
+        except NothingNewError:
+            continue
+        except ExpressionError as error:
+            found.append(finding("TF105", str(error), source.at((*at, "when")), help=error.advice))
+    return names, found
 
 
 def lay_over(base: Source, overlay: Source, *, is_overlay: bool = True, of: type[Spec] = RobotSpec) -> Source:
@@ -59,6 +102,8 @@ def lay_over(base: Source, overlay: Source, *, is_overlay: bool = True, of: type
 
     With ``is_overlay`` a value that changes nothing is a finding. ``of`` is the language that both are written in.
     """
+    if of is RobotSpec:
+        base, overlay = _with_full_args(base), _with_full_args(overlay)
     merger = _Merger(base.replaced, overlay.replaced, of, is_overlay=is_overlay)
     if is_overlay and not overlay.data:
         merger.found.append(_idle("nothing is laid over the robot here", overlay.places))
@@ -73,6 +118,24 @@ def lay_over(base: Source, overlay: Source, *, is_overlay: bool = True, of: type
         allows=allows,
         replaced=merger.replaced,
         has_nulls=base.has_nulls or overlay.has_nulls,
+    )
+
+
+def _with_full_args(source: Source) -> Source:
+    """Return the source with each argument as a mapping: a value alone, laid over one, is its default."""
+    declared = source.data.get("args")
+    if not isinstance(declared, dict) or all(isinstance(one, dict) or one is None for one in declared.values()):
+        return source
+    place = source.places.inside["args"]
+    inside, keys, data = dict(place.inside), dict(place.keys), dict(declared)
+    for name, value in declared.items():
+        if not isinstance(value, dict) and value is not None:
+            data[name] = {"default": value}
+            at = place.inside[name]
+            inside[name] = Place(at.span, {"default": at}, {"default": at})
+    places = {**source.places.inside, "args": place.with_inside(inside, keys)}
+    return replace(
+        source, data=source.data | {"args": data}, places=source.places.with_inside(places, source.places.keys)
     )
 
 

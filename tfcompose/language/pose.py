@@ -19,7 +19,7 @@ from tfcompose.geometry import (
     quat_from_matrix,
     quat_from_rpy,
 )
-from tfcompose.language.spec import Checked, Spec, key, several
+from tfcompose.language.spec import Checked, Entry, Spec, key, several
 from tfcompose.language.values import Axis, Boolean, InARow, Numbers, OneOrMore, Text, Texts, Xyz, short
 from tfcompose.units import Angle, Length, Number, Rate, refused
 
@@ -174,7 +174,7 @@ def _each_once(names: Texts) -> Texts:
 Parents = TypeAliasType("Parents", Annotated[OneOrMore, AfterValidator(_each_once)])
 
 
-class EdgeKeys(Posed):
+class EdgeKeys(Posed, Entry):
     """The keys that may stand wherever a parent is."""
 
     parent: Parents | None = key(

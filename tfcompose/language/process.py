@@ -12,7 +12,7 @@ from typing_extensions import TypeAliasType
 from tfcompose.language.expressions import inserted
 from tfcompose.language.node_preset import ClaimSpec
 from tfcompose.language.pose import Posed
-from tfcompose.language.spec import Checked, Spec, fields_of, key, more_of, several
+from tfcompose.language.spec import Checked, Entry, Spec, fields_of, key, more_of, several
 from tfcompose.language.values import (
     Boolean,
     Integral,
@@ -23,6 +23,7 @@ from tfcompose.language.values import (
     Parameters,
     Text,
     TopicName,
+    VariableName,
     short,
 )
 from tfcompose.load import Path
@@ -36,14 +37,16 @@ from tfcompose.plan import (
     StartCondition,
     StopSignal,
 )
-from tfcompose.units import AngularVelocity, Duration, JointPosition, Quantity, Rate, Size, refused, shown
+from tfcompose.units import AngularVelocity, Duration, JointPosition, Quantity, Rate, Size, Truth, refused, shown
 
 #: What a process of the plan is where nothing is said.
 DEFAULTS = PlanProcess("", "run")
 
 
 def _inserted(value: Any) -> Any:
-    return inserted(value) if isinstance(value, Quantity) else value
+    computed = isinstance(value, (Quantity, Truth))
+    value = value.value if isinstance(value, Truth) else value
+    return inserted(value) if computed else value
 
 
 #: A string; a computed number is written as one.
@@ -229,12 +232,6 @@ class NamedNode(Spec):
     preset: Text | None = key(None, _PRESET, "slam_toolbox")
 
 
-def _names_a_variable(name: str) -> str:
-    if not name or "=" in name:
-        raise refused("TF106", f"{name!r} cannot name a variable")
-    return name
-
-
 RUNNING = frozenset({"run", "simulate", "external"})
 Way = Literal["run", "simulate", "external", "built-in"]
 """How a process runs, by the key that says so; built-in: one of tfcompose's own."""
@@ -281,9 +278,7 @@ class Started(Checked):
     remap: dict[str, Text] = key(
         {}, "topics, services and actions under other names", {"scan": "front/scan"}, to=NOT_EXTERNAL
     )
-    env: dict[Annotated[Text, AfterValidator(_names_a_variable)], Word] = key(
-        {}, "environment variables", {"RCUTILS_COLORIZED_OUTPUT": "1"}, to=NOT_EXTERNAL
-    )
+    env: dict[VariableName, Word] = key({}, "environment variables", {"RCUTILS_COLORIZED_OUTPUT": "1"}, to=NOT_EXTERNAL)
     cwd: Text | None = key(
         None, "the folder that it runs in, relative to this file; default: where up is called", "maps"
     )
@@ -318,7 +313,7 @@ class Started(Checked):
             yield ("shell",), refused("TF107", "shell: true, but run is not a string", advice, on_key=True, keeps=True)
 
 
-class ProcessSpec(Started):
+class ProcessSpec(Started, Entry):
     """What is started, simulated, or expected to run."""
 
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (

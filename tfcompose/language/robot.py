@@ -10,11 +10,12 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
 from pydantic_core import PydanticCustomError
 
+from tfcompose.language.args import Args
 from tfcompose.language.bodies import LinkSpec
 from tfcompose.language.optics import OpticsSpec
 from tfcompose.language.pose import EdgeKeys, MountKeys, Parents, Posed, Rotated
 from tfcompose.language.process import Driver, ProcessSpec
-from tfcompose.language.spec import Checked, Spec, below, inherited, key, measure_of, several
+from tfcompose.language.spec import Entry, Spec, below, inherited, key, measure_of, several
 from tfcompose.language.values import (
     Axis,
     Boolean,
@@ -38,6 +39,7 @@ from tfcompose.units import (
     Measure,
     Number,
     Quantity,
+    Truth,
     UnitError,
     example,
     quantity,
@@ -131,6 +133,7 @@ def _scalar(value: Any) -> str:
         if value.dimension != NUMBER:
             raise refused("TF104", f"{shown(value)} has a unit, and a parameter has none")
         value = value.value
+    value = value.value if isinstance(value, Truth) else value
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, (str, int)):
@@ -165,7 +168,7 @@ class ComponentSpec(Spec):
     params: XmlParameters = key({}, "its parameters", {"gear_ratio": 30})
 
 
-class HardwareSpec(Checked):
+class HardwareSpec(Entry):
     """A hardware component of ros2_control: a plugin and what it drives."""
 
     plugin: Text = key(..., "the class that drives it", "mock_components/GenericSystem")
@@ -253,7 +256,7 @@ MacroParameter = Annotated[
 ]
 
 #: What can be the part, and which keys go with it alone.
-PART_KINDS = {"spec": ("vars", "profiles"), "urdf": (), "xacro": ("args", "macro", "params", "include")}
+PART_KINDS = {"spec": ("vars", "profiles", "args"), "urdf": (), "xacro": ("args", "macro", "params", "include")}
 _MACRO_KEYS = ("params", "include")
 #: What a file is by its ending. xacro reads plain URDF too, so that xacro: FILE.urdf is right.
 _ENDINGS = {".urdf": "urdf", ".xacro": "xacro", ".yaml": "spec", ".yml": "spec"}
@@ -267,7 +270,7 @@ class PartSpec(MountKeys):
     spec: Text | None = key(None, "a robot file, relative to the file that names it", "rover.yaml")
     urdf: Text | None = key(None, f"a URDF file: {_WHERE}", "package://ur_description/urdf/ur5e.urdf")
     xacro: Text | None = key(None, f"a xacro file: {_WHERE}", "$(find ur_description)/urdf/ur.urdf.xacro")
-    args: Parameters = key({}, "arguments of the xacro file", {"name": "ur", "ur_type": "ur5e"})
+    args: Parameters = key({}, "arguments of the xacro file, or of the robot file", {"name": "ur", "ur_type": "ur5e"})
     macro: Text | None = key(
         None,
         "the macro of the xacro file to call; its parent and origin may be those of the part",
@@ -308,11 +311,11 @@ class PartSpec(MountKeys):
                 advice = "give spec, urdf or xacro"
                 yield (), refused("TF102", "a part without a robot", advice, on_key=True, keeps=True)
             return
-        for other, names in PART_KINDS.items():
-            for name in names:
-                if name in data and kind != other:
-                    message = f"{name} goes with {other}, not with {kind}"
-                    yield (name,), refused("TF107", message, on_key=True, keeps=True)
+        for name in dict.fromkeys(name for names in PART_KINDS.values() for name in names if name in data):
+            others = [other for other, names in PART_KINDS.items() if name in names]
+            if kind not in others:
+                message = f"{name} goes with {' and '.join(others)}, not with {kind}"
+                yield (name,), refused("TF107", message, on_key=True, keeps=True)
         for name in _MACRO_KEYS:
             if name in data and "macro" not in data:
                 yield (name,), refused("TF102", f"{name} without a macro", "macro: NAME", on_key=True, keeps=True)
@@ -358,6 +361,11 @@ class RobotSpec(Spec):
         None, "the link where the URDF begins; default: base_link, or the only root", "base_footprint"
     )
     vars: Parameters = key({}, "quantities, numbers or strings, used as ${name}", {"mast": "30 cm"})
+    args: Args = key(
+        {},
+        "values that are given when it is built, as NAME:=VALUE, used as ${args.NAME}",
+        {"cameras": {"default": 2, "max": 8}, "sim": False},
+    )
     ros: RosSpec = key(RosSpec(), "what all processes share", {"namespace": "robot1"})
     packages: dict[str, Text] = key(
         {},

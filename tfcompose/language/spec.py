@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from pydantic.fields import FieldInfo
 from typing_extensions import TypeAliasType
 
+from tfcompose.language.values import Condition, Loops
 from tfcompose.units import Measure, refused
 
 if TYPE_CHECKING:
@@ -69,6 +70,20 @@ class Checked(Spec):
         if errors:
             raise several(*errors)
         return done
+
+
+class Entry(Checked):
+    """An entry of a section, which may be there or not, or several times: ``conditions`` decides it before this."""
+
+    when: Condition | None = Field(
+        None, description="whether it is there: true, false or a condition", examples=["${args.sim}", "${args.n > 1}"]
+    )
+    for_: Loops | None = Field(
+        None,
+        alias="for",
+        description="there once for each value; its name, in quotes or not, says which: camera_${i}",
+        examples=[{"i": "${range(args.cameras)}"}, {"side": ["left", "right"]}],
+    )
 
 
 def several(*errors: tuple[Path, PydanticCustomError], also: ValidationError | None = None) -> ValidationError:
@@ -133,7 +148,7 @@ def fields_of(kind: Any) -> Mapping[str, FieldInfo]:
             one.name: FieldInfo.from_annotated_attribute(hints[one.name], one) for one in dataclasses.fields(kind)
         }
     names = dict.fromkeys(name for one in kind.__mro__ for name in inspect.get_annotations(one))
-    return {name: fields[name] for name in names if name in fields}
+    return {fields[name].alias or name: fields[name] for name in names if name in fields}
 
 
 def below(annotation: Any, step: str | int) -> Any:

@@ -6,18 +6,25 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.findings import Finding, RejectedError
+from tfcompose.findings import Finding, RejectedError, without_duplicates
+from tfcompose.language.args import Given
+from tfcompose.language.conditions import unfolded
 from tfcompose.language.node_preset import NodePresetSpec
 from tfcompose.language.overlay import is_for_later
 from tfcompose.language.preset import PresetSpec, wrong_names
 from tfcompose.language.reading import Refusal, read
 from tfcompose.language.robot import RobotSpec
-from tfcompose.language.variables import compute, unused
+from tfcompose.language.values import plain
+from tfcompose.language.variables import Variables, unused
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from tfcompose.load import Path, Source
+    from tfcompose.plan import ParameterValue
+
+
+_NOTHING = Given()
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,20 +32,26 @@ class Validated:
     """A spec without what was refused, and the findings about that.
 
     ``refused`` are the paths of what was; ``broken`` the entries, as (section, name), that they are in: what is missing
-    because of them is not reported a second time. ``unused`` are the variables that nothing uses.
+    because of them is not reported a second time. ``unused`` are the paths of variables and arguments
+    that nothing uses. ``source`` has the entries that conditions and loops leave. ``args`` are the values of the
+    arguments that were ``given`` or are their defaults, ``environment`` those of the variables that the file names.
     """
 
     spec: RobotSpec
     source: Source
     found: tuple[Finding, ...]
     refused: frozenset[Path] = frozenset()
-    unused: tuple[str, ...] = ()
+    unused: tuple[tuple[str, str], ...] = ()
+    given: Given = _NOTHING
+    args: dict[str, ParameterValue] = field(default_factory=dict)
+    environment: dict[str, str] = field(default_factory=dict)
     broken: frozenset[tuple[str, str]] = field(init=False)
 
     @property
     def source_data(self) -> dict[str, Any]:
-        """The plain data that the spec was made from."""
-        return self.source.data
+        """The plain data that the spec was made from, with what it was given."""
+        given = {"args given": self.args, "environment": self.environment}
+        return self.source.data | {name: values for name, values in given.items() if values}
 
     def __post_init__(self) -> None:
         entries = {(str(path[0]), str(path[1])) for path in self.refused if len(path) > 1}
@@ -54,21 +67,29 @@ def _children(broken: set[tuple[str, str]], joints: Any) -> Iterator[tuple[str, 
             yield ("links", child)
 
 
-def validate(source: Source, aside: Any = None) -> Validated:
-    """Return the typed spec; ``aside`` is data that is not merged over it now, and may use its variables too.
+def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Validated:
+    """Return the typed spec of a file that is ``given`` these arguments.
+
+    ``aside`` is data that is not merged over it now, and may use its variables too.
 
     Raises:
         RejectedError: if so much is missing that no robot is left (its name, or the version).
     """
+    variables = Variables(source, given)
+    idle = unused(source.data, aside)
+    done = unfolded(source, variables)
+    source = done.source
     nulls = _nulls(source)
-    data, wrong, uncomputed = compute(source.data)
-    already = [*(one.path for one in nulls), *uncomputed]
+    data = variables.compute(source.data, done.scopes)
+    already = [*(one.path for one in nulls), *variables.uncomputed]
     spec, refusals = read(RobotSpec, data, already)
-    found = (*source.found, *_findings([*nulls, *wrong, *refusals], source))
+    own = _findings([*nulls, *variables.refusals, *refusals], source)
+    found = (*source.found, *without_duplicates([*variables.found, *done.found]), *own)
     if spec is None:
         raise RejectedError(found)
-    refused = frozenset([*already, *(one.path for one in refusals)])
-    return Validated(spec, source, found, refused, unused(source.data, aside))
+    refused = frozenset([*already, *done.refused, *(one.path for one in refusals)])
+    args = {name: plain(value) for name, value in variables.args.items() if value is not None}
+    return Validated(spec, source, found, refused, idle, given, args, variables.environment)
 
 
 def validate_preset(source: Source) -> PresetSpec:

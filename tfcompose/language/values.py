@@ -12,7 +12,7 @@ from typing_extensions import TypeAliasType
 
 from tfcompose.findings import did_you_mean
 from tfcompose.geometry import Vector, norm
-from tfcompose.units import NUMBER, SMALLEST, Length, Number, Quantity, Size, refused, shown
+from tfcompose.units import NUMBER, SMALLEST, Length, Number, Quantity, Size, Truth, refused, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -91,7 +91,7 @@ def listed(value: Any) -> Any:
 
 def plain(value: Any) -> Any:
     """Return data as they are passed on: a computed quantity is its number."""
-    if isinstance(value, Quantity):
+    if isinstance(value, (Quantity, Truth)):
         return value.value
     if isinstance(value, dict):
         return {name: plain(item) for name, item in value.items()}
@@ -103,10 +103,20 @@ def _integral(value: Any) -> Any:
     return int(value.value) if is_integral else value
 
 
+def _truth(value: Any) -> Any:
+    return value.value if isinstance(value, Truth) else value
+
+
 def _is_true(value: Any) -> bool:
-    if value is True:
+    if _truth(value) is True:
         return True
     raise refused("TF106", f"{shown(value)} is not true", "remove the key")
+
+
+def _names_a_variable(name: str) -> str:
+    if not name or "=" in name:
+        raise refused("TF106", f"{name!r} cannot name a variable")
+    return name
 
 
 def _with_opacity(value: Any) -> Any:
@@ -164,8 +174,12 @@ COLOURS = {
 Anything = Annotated[Any, BeforeValidator(plain)]
 NoMapping = Annotated[Anything, Field(json_schema_extra={"not": {"type": "object"}})]
 Parameters = dict[str, Anything]
+#: Read before the keys are: whether an entry is there, and how often.
+Condition = Annotated[Any, BeforeValidator(lambda value: value, bool | str)]
+Loops = Annotated[Any, BeforeValidator(lambda value: value, dict[str, str | tuple[str | float | bool, ...]])]
 Text = Annotated[str, Strict()]
-Boolean = Annotated[bool, Strict()]
+#: True or false, which may be computed.
+Boolean = Annotated[bool, Strict(), BeforeValidator(_truth)]
 OnlyTrue = Annotated[bool, BeforeValidator(_is_true), Field(json_schema_extra={"const": True})]
 #: Annotates a whole number, which may be computed.
 Integral = BeforeValidator(_integral)
@@ -184,6 +198,8 @@ TopicName = Annotated[
         "the name of a topic or a service: letters, digits, _ and /",
     ),
 ]
+#: A variable of the environment.
+VariableName = Annotated[Text, AfterValidator(_names_a_variable)]
 Texts = tuple[Text, ...]
 #: A list of strings, or one string for a list of one.
 OneOrMore = TypeAliasType("OneOrMore", Annotated[Texts, BeforeValidator(listed, Text | Texts)])

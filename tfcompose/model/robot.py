@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tfcompose.model.hardware import Block, Hardware
     from tfcompose.model.optics import Optics
     from tfcompose.model.process import Claim, Process
+    from tfcompose.plan import ParameterValue
 
 #: How names of optical frames end: REP-103's suffix, the spelling of newer ZED wrappers, a link's, and a short one.
 OPTICAL_ENDINGS = ("_optical_frame", "_frame_optical", "_optical_link", "_optical")
@@ -121,7 +122,8 @@ class Robot:
 
     ``frames`` holds every frame that was declared, with its place; ``base`` is where the URDF begins, or None where the
     tree has no single root; ``sensors`` are those with a known preset, ``source_numbers`` the numbers of poses and
-    limits before they became poses, ``unused`` the variables that nothing uses; ``source_data`` is the plain data that
+    limits before they became poses, ``unused`` the paths of variables and arguments that nothing uses;
+    ``args`` and ``environment`` are the values that it was built with; ``source_data`` is the plain data that
     the robot was made from, profiles laid over it; ``broken`` holds the entries (section, name) that were refused
     already, of a part how its names begin; ``refused`` is where the refused entries of the file are. ``parts`` are
     those that are robots of their own, ``mounted`` the root frame of each part by its name, ``part_notes`` what to add
@@ -140,7 +142,9 @@ class Robot:
     guard: GuardPolicy = field(default_factory=GuardPolicy)
     sensors: tuple[MountedSensor, ...] = ()
     source_numbers: tuple[SourceNumbers, ...] = field(default=(), compare=False, repr=False)
-    unused: dict[str, Span] = field(default_factory=dict, compare=False)
+    unused: dict[tuple[str, str], Span] = field(default_factory=dict, compare=False)
+    args: dict[str, ParameterValue] = field(default_factory=dict, compare=False)
+    environment: dict[str, str] = field(default_factory=dict, compare=False)
     source_data: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
     broken: frozenset[tuple[str, str]] = frozenset()
     claims: tuple[Claim, ...] = ()

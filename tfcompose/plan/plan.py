@@ -344,7 +344,8 @@ class Plan:
     """Everything that ``tfcompose up`` needs, and nothing that it has to compile.
 
     ``host`` is the machine whose share of the processes this is: it starts those that are not ``external``. None is
-    the whole plan, and empty the share of the machine that the plan does not name.
+    the whole plan, and empty the share of the machine that the plan does not name. ``args`` are the values of the robot
+    file's arguments that it was built with, ``environment`` those of the variables that the file names.
     """
 
     version: Literal[1] = field(default=VERSION, kw_only=True)
@@ -358,6 +359,8 @@ class Plan:
     processes: tuple[PlanProcess, ...]
     claims: tuple[PlanClaim, ...] = field(default=(), kw_only=True)
     guard: GuardPolicy = field(default_factory=GuardPolicy)
+    args: dict[str, ParameterValue] = field(default_factory=dict, kw_only=True, metadata=OMITTED)
+    environment: dict[str, str] = field(default_factory=dict, kw_only=True, metadata=OMITTED)
 
     def process(self, name: str) -> PlanProcess:
         """Return the process of that name.

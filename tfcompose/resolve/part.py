@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, RejectedError, did_you_mean, finding
-from tfcompose.language import as_part
+from tfcompose.language import GivenArg, as_part
 from tfcompose.model import Part
 from tfcompose.plan import RosSettings
 from tfcompose.plan.codec import narrowed
@@ -81,6 +81,11 @@ class PartEntry:
         parts = (ros.namespace, self.declared.namespace or "")
         namespace = "/".join(part.strip("/") for part in parts if part.strip("/"))
         return narrowed(RosSettings, ros, namespace=namespace, frame_prefix=f"{self.outer_prefix}{self.prefix}")
+
+    def given_args(self) -> dict[str, GivenArg]:
+        """Return the values that the holder gives the part's arguments."""
+        at = (*self.at, "args")
+        return {name: GivenArg(value, self.source.at((*at, name))) for name, value in self.declared.args.items()}
 
     def laid_over(self, inner: Source) -> Source:
         """Return the part's source with what the holder says about all its parts laid over it."""

@@ -10,14 +10,14 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, Note, RejectedError, did_you_mean, finding
-from tfcompose.language import composed, validate, with_includes
+from tfcompose.language import Given, composed, validate, with_includes
 from tfcompose.load import load, path_named
 from tfcompose.resolve.foreign import foreign
 from tfcompose.resolve.part import PartEntry
 from tfcompose.resolve.resolved import Collected, Resolved
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from tfcompose.language import Validated
     from tfcompose.model import Robot
@@ -34,12 +34,16 @@ MOST_PARTS = 100
 
 @dataclass(slots=True)
 class Parts:
-    """Resolves the parts of one robot file, and theirs. ``resolve`` is what resolves a robot within these ``files``."""
+    """Resolves the parts of one robot file, and theirs. ``resolve`` is what resolves a robot within these ``files``.
+
+    ``environment`` is what their files may read of it.
+    """
 
     library: Library
     read: Reader | None
     disk: Disk | None
     resolve: Callable[..., Resolved]
+    environment: Mapping[str, str]
     files: tuple[str, ...] = ()
     collected: Collected = field(default_factory=Collected)
     found: list[Finding] = field(default_factory=list)
@@ -88,7 +92,8 @@ class Parts:
         inside = replace(self, files=(*self.files, file), found=[], missing=[])
         loaded = with_includes(load(read(file), file), read)
         self.collected.notes.setdefault(file, []).append(_note(part))
-        validated = validate(part.laid_over(composed(loaded, part.declared.profiles)))
+        given = Given(part.given_args(), self.environment)
+        validated = validate(part.laid_over(composed(loaded, part.declared.profiles, given=given)), None, given)
         resolved = self.resolve(validated, self.library, self.read, self.disk, inside)
         self.found += [_noted(one, part) for one in (*validated.found, *resolved.found)]
         self.found += _useless(part, file, validated)
@@ -110,8 +115,8 @@ def _useless(part: PartEntry, file: str, validated: Validated) -> list[Finding]:
     given, replaced = part.declared.vars, validated.source.replaced
     known = [name for name in validated.spec.vars if name not in given or ("vars", name) in replaced]
     found = []
-    for name in validated.unused:
-        if name in given and name not in known:
+    for section, name in validated.unused:
+        if section == "vars" and name in given and name not in known:
             at = part.source.at_key((*part.at, "vars", name))
             advice = did_you_mean(name, known, "remove it")
             found.append(finding("TF105", f"{file} has no use for the variable {name}", at, help=advice))

@@ -7,7 +7,8 @@ parameter files, raw URDF, claims, and a stock robot_state_publisher.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import partial, reduce
+from operator import or_
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import Finding, did_you_mean, finding
@@ -141,7 +142,10 @@ class _Work:
             return
         from tfcompose.resolve.parts import Parts
 
-        parts = self.holder or Parts(self.library, self.read, self.disk, resolve, (self.source.file,), self.collected)
+        files, environment = (self.source.file,), self.validated.given.environment
+        parts = self.holder or Parts(
+            self.library, self.read, self.disk, resolve, environment, files, collected=self.collected
+        )
         self.joined = parts.join(self.validated, settings_of(self.spec.ros).frame_prefix, packages)
         self.of_parts = parts.found
         self.broken |= {*parts.missing, *(entry for part in self.joined for entry in part.robot.broken)}
@@ -235,7 +239,9 @@ class _Work:
             sensors=tuple(drafts.sensors),
             claims=tuple(one for part in parts for one in part.claims),
             source_numbers=numbers + tuple(one for part in parts for one in part.source_numbers),
-            unused={name: self.source.at_key(("vars", name)) for name in self.validated.unused},
+            unused={path: self.source.at_key(path) for path in self.validated.unused},
+            args=self.validated.args,
+            environment=reduce(or_, (part.environment for part in parts), self.validated.environment),
             source_data=_source_data(self.validated, self.joined),
             broken=frozenset(self.broken),
             parts=tuple(alone for part in parts for alone in part.parts),

@@ -1,6 +1,7 @@
 """Check robot files and report every problem; needs no ROS.
 
-Report every problem in robot files, with its place. Each file is checked alone and with each of its profiles.
+Report every problem in robot files, with its place. Each file is checked alone and with each of its profiles, and alone
+in the combinations of values that its args can have.
 """
 
 from __future__ import annotations
@@ -14,15 +15,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose import __version__
-from tfcompose.cli.options import DEFAULT_FILE, add_format, add_variant, pairs
-from tfcompose.cli.terminal import UNREADABLE, can_redraw, exit_code_of, fail, has_reader, print_findings
+from tfcompose.cli.options import DEFAULT_FILE, add_format, add_variant
+from tfcompose.cli.terminal import UNREADABLE, can_redraw, exit_code_of, fail, has_reader, print_findings, warn
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from tfcompose.cli.fixing import Fixer
+    from tfcompose.compile import Compiled
     from tfcompose.findings import Finding
+    from tfcompose.language import Given
+    from tfcompose.load import Source
     from tfcompose.resolve import Library
 
     _Stamp = tuple[int, int] | None
@@ -35,6 +39,8 @@ _ROBOT = re.compile(
 URDF_ENDINGS = (".urdf", ".xacro")
 #: How often --watch checks the files, in seconds.
 CHECK_EVERY_S = 0.3
+#: For how long a file is judged in combinations of its arguments, in seconds; the first is always judged.
+JUDGE_FOR_S = 60.0
 #: Moves the cursor home and clears the screen (ECMA-48).
 CLEAR = "\033[H\033[2J"
 
@@ -46,8 +52,7 @@ def arguments(parser: ArgumentParser) -> None:
         nargs="*",
         metavar="FILE",
         default=[],
-        help="robot files, folders of them, .urdf and .xacro files, with NAME:=VALUE for arguments of xacro, or - for "
-        "standard input; default: robot.yaml",
+        help="robot files, folders of them, .urdf and .xacro files, or - for standard input; default: robot.yaml",
     )
     parser.add_argument(
         "--urdf", action="append", default=[], metavar="FILE", dest="urdfs",
@@ -95,9 +100,6 @@ def run(arguments: Namespace) -> int:
     """Lint the files; exit code 0, 1 with findings that count, 2 where a file cannot be read."""
     from tfcompose.cli.reading import STDIN, read_text
 
-    words = [word for word in arguments.files if ":=" in word]
-    arguments.files = [word for word in arguments.files if word not in words]
-    arguments.given = pairs(words, ":=")
     if (arguments.fix or arguments.diff or arguments.watch) and STDIN in arguments.files:
         fail("standard input cannot be fixed or watched: name a file", UNREADABLE)
     if (arguments.diff or arguments.watch) and arguments.format != "text":
@@ -113,8 +115,8 @@ def _lint(arguments: Namespace, read: Callable[[str], str]) -> int:
     files = _files(arguments)
     urdfs = dict.fromkeys([*arguments.urdfs, *(file for file in files if file.endswith(URDF_ENDINGS))])
     robots = [file for file in files if file not in urdfs]
-    if arguments.given and not urdfs:
-        fail(f"{next(iter(arguments.given))}:=…: only xacro files take arguments", UNREADABLE)
+
+    arguments.is_one = len(files) + len(arguments.urdfs) == 1
 
     def lint(file: str, read: Callable[[str], str]) -> list[Finding]:
         return _selected(lint_file(file, presets, arguments, read), arguments)
@@ -282,11 +284,14 @@ def _print(cases: dict[str, list[Finding]], arguments: Namespace, files: int) ->
 
 
 def lint_file(file: str, presets: Library, arguments: Namespace, read: Callable[[str], str]) -> list[Finding]:
-    """Return the findings of one file: alone and with each of its profiles, or with what is asked for only."""
+    """Return the findings of one file: alone and with each of its profiles, or with what is asked for only.
+
+    Alone it is judged in each combination of its arguments' values.
+    """
     from dataclasses import replace
 
     from tfcompose.check import unused_allows
-    from tfcompose.cli.compiling import disk, overlays_of
+    from tfcompose.cli.compiling import disk, given_by, overlays_of
     from tfcompose.compile import compile_source
     from tfcompose.findings import Note, RejectedError
     from tfcompose.language import profiles_in, with_includes
@@ -297,14 +302,26 @@ def lint_file(file: str, presets: Library, arguments: Namespace, read: Callable[
         overlays = overlays_of(arguments)
     except RejectedError as error:
         return list(error.findings)
-    if arguments.profiles or overlays:
-        return list(compile_source(source, presets, arguments.profiles, overlays, read, disk()).found)
-    alone = compile_source(source, presets, read=read, disk=disk())
-    found, used, complete = list(alone.found), set(alone.used), alone.robot is not None
-    for profile in profiles_in(source):
+    profiles, given = arguments.profiles, given_by(arguments)
+    if not arguments.is_one:  # an argument is one of any of the files
+        declared = source.data.get("args")
+        names = given.args.keys() & (declared if isinstance(declared, dict) else {}).keys()
+        given = replace(given, args={name: given.args[name] for name in names})
+
+    def compiled(given: Given, names: Sequence[str]) -> Compiled:
+        return compile_source(source, presets, names, overlays, read, disk(), given)
+
+    found, judged = _judged(source, arguments, overlays, given, compiled)
+    if profiles or overlays:
+        return sorted(found, key=lambda one: one.sort_key)
+    used = {pair for one in judged for pair in one.used}
+    complete = all(one.robot is not None for one in judged)
+    for profile, inside in profiles_in(source).items():
+        if "when" in inside and "args" in source.data:
+            continue  # it is laid over where its condition holds
         note = Note(f"with --profile {profile}")
         known = {(one.code, one.message, one.span) for one in found}
-        variant = compile_source(source, presets, [profile], read=read, disk=disk())
+        variant = compiled(given, [profile])
         used |= variant.used
         complete = complete and variant.robot is not None
         found += [
@@ -315,3 +332,36 @@ def lint_file(file: str, presets: Library, arguments: Namespace, read: Callable[
     if complete:  # else a comment may be about what was not looked at
         found += unused_allows(source.allows, used)
     return sorted(found, key=lambda one: one.sort_key)
+
+
+def _judged(
+    source: Source,
+    arguments: Namespace,
+    overlays: Sequence[Source],
+    given: Given,
+    compiled: Callable[[Given, Sequence[str]], Compiled],
+) -> tuple[list[Finding], list[Compiled]]:
+    """Return the findings in the combinations of the values that arguments can have, and what was compiled."""
+    if "args" not in source.data and not overlays:
+        alone = compiled(given, arguments.profiles)
+        return list(alone.found), [alone]
+    from dataclasses import replace
+
+    from tfcompose.cli.combinations import combinations, merged
+    from tfcompose.findings import RejectedError, Span
+    from tfcompose.language import GivenArg, alternatives_of, composed
+
+    try:
+        alternatives, first = alternatives_of(composed(source, arguments.profiles, overlays, given), given, source)
+    except RejectedError as error:
+        return list(error.findings), []
+    judged = []
+    begin = time.monotonic()
+    every = combinations(alternatives, first)
+    for index, one in enumerate(every):
+        if time.monotonic() - begin > JUDGE_FOR_S:
+            warn(f"{source.file}: judged in {index} of {len(every)} combinations of its args, within {JUDGE_FOR_S:g} s")
+            break
+        args = {name: GivenArg(value, Span(f"{name}:={value}")) for name, value in one.items()}
+        judged.append((one, compiled(replace(given, args={**given.args, **args}), arguments.profiles)))
+    return merged([(one, case.found) for one, case in judged]), [case for _, case in judged]

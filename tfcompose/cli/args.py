@@ -1,0 +1,60 @@
+"""``--show-args``: the arguments of a robot file, for people."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.compiling import overlays_of
+from tfcompose.cli.options import DEFAULT_FILE
+from tfcompose.cli.plans import is_plan
+from tfcompose.cli.reading import read_text
+from tfcompose.cli.terminal import UNREADABLE, fail, printable, reject
+from tfcompose.findings import RejectedError
+from tfcompose.language import Given, composed, validate, with_includes
+from tfcompose.language.args import as_given
+from tfcompose.load import load
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Iterator
+
+    from tfcompose.language import ArgSpec
+
+
+def show_args(arguments: Namespace) -> int:
+    """Print the arguments of the robot file; exit code 0, or as for ``build`` where it cannot be read."""
+    file = _file(arguments)
+    if is_plan(file):
+        fail(f"{file} is a built plan, and arguments are those of a robot file", UNREADABLE)
+    try:
+        source = with_includes(load(read_text(file), file), read_text)
+        source = composed(source, arguments.profiles, overlays_of(arguments))
+        args = validate(source, given=Given({}, os.environ)).spec.args
+    except RejectedError as error:
+        reject(error.findings)
+    if not args:
+        print(f"{file} has no args")
+    for name, declared in args.items():
+        print("\n".join(map(printable, _lines(name, declared))))
+    return 0
+
+
+def _file(arguments: Namespace) -> str:
+    """Return the robot file among the words, as each command calls it."""
+    for name in ("file", "files", "old", "what"):
+        value = getattr(arguments, name, None)
+        if value:
+            return str(value if isinstance(value, str) else value[0])
+    return DEFAULT_FILE
+
+
+def _lines(name: str, declared: ArgSpec) -> Iterator[str]:
+    facts = [f"one of {', '.join(declared.alternatives)}" if declared.choices else declared.kind]
+    bounds = (("at least", declared.min), ("at most", declared.max))
+    facts += [f"{what} {bound}" for what, bound in bounds if bound is not None]
+    facts.append("has to be given" if declared.default is None else f"default: {as_given(declared.default)}")
+    facts += [f"or {declared.env} in the environment"] if declared.env else []
+    yield f"{name}:=…  {', '.join(facts)}"
+    if declared.description:
+        yield f"    {declared.description}"

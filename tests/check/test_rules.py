@@ -31,6 +31,8 @@ NOT_OF_A_LINE = {"TF001", "TF002", "TF008", "TF009", "TF015", "TF016", "TF606", 
 NOT_OF_A_LINE |= {"TF720", "TF721", "TF722"}
 #: Of a command line: tests/urdf/test_mesh.py.
 NOT_OF_A_LINE |= {"TF726"}
+#: Of what is imported: tests/importing/test_shell.py.
+NOT_OF_A_LINE |= {"TF020"}
 #: Codes of the running robot, of its plan and of its surroundings.
 OF_THE_FILE = {"TF812", "TF813", "TF818", "TF847", "TF848", "TF851"}
 LIVE = {code for code in CATALOGUE if code.startswith(("TF8", "TF9"))} - OF_THE_FILE

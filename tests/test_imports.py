@@ -94,6 +94,7 @@ ONLY_IN: dict[str, set[str]] = {
     "yourdfpy": {"urdf"},
     "pypdfium2": {"draw"},
     "regex": {"launcher"},
+    "rich": {"cli"},
     "rclpy": {"ros"},
     "rosbags": {"bags"},
     "tf2_msgs": {"ros"},

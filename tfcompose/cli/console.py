@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections import deque
 from dataclasses import replace
@@ -73,6 +74,23 @@ class Output(Protocol):
         Raises:
             OSError: if nobody reads any more.
         """
+
+
+class StandardOutput:
+    """Standard output, which is written at once."""
+
+    def write(self, text: str, *, log: bool = False) -> None:
+        """Write the text."""
+        del log
+        sys.stdout.write(text)
+        sys.stdout.flush()
+
+
+class Nowhere:
+    """Takes what is kept elsewhere."""
+
+    def write(self, text: str, *, log: bool = False) -> None:
+        """Do nothing."""
 
 
 class Console:

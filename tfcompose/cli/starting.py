@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import sys
 import traceback
 from contextlib import ExitStack
@@ -14,7 +15,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.console import Console, StatusLine, vanished
+from tfcompose.cli.console import Console, Nowhere, StandardOutput, StatusLine, vanished
+from tfcompose.cli.live_run import can_show_live, follow
 from tfcompose.cli.plans import built_plan, copy_plan, is_plan, plan_to_start
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.runs import (
@@ -41,15 +43,17 @@ from tfcompose.cli.terminal import (
 )
 from tfcompose.findings import RejectedError
 from tfcompose.ipc import AllReady, AllStarted, Ended, PlanChange, UpdateRequest
+from tfcompose.launcher.child import end_with
 from tfcompose.launcher.control import listen
 from tfcompose.launcher.output import Logs, NonBlockingOutput
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDirError, runtime_dir_of
-from tfcompose.launcher.supervisor import Session, supervise
+from tfcompose.launcher.supervisor import ENDING, Session, supervise
 from tfcompose.ros.environment import child_environment, ros_trouble
 
 if TYPE_CHECKING:
     from argparse import Namespace
+    from collections.abc import Iterable
 
     from tfcompose.findings import Finding
     from tfcompose.launcher.runtime_dir import RuntimeDir
@@ -83,6 +87,11 @@ def start(file: Path, arguments: Namespace) -> int:
         session = Session(copy, lock.run, file.absolute().parent, listen(place))
         if arguments.detach or arguments.wait:
             return detach(plan, place, lock, session, arguments)
+        if arguments.live and can_show_live():
+            mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+            pid = _fork(plan, place, lock, session, arguments.duration, mask)
+            stack.close()  # the lock is the launcher's from now on
+            return follow(place, plan, pid, mask)
         session.output = NonBlockingOutput(sys.stdout.fileno())
         stack.callback(session.output.close)
         return _run(plan, place, session, session.output, arguments.duration)
@@ -166,16 +175,38 @@ def _starts_with(profile: str, arguments: Namespace) -> bool:
 
 def detach(plan: Plan, place: RuntimeDir, lock: Lock, session: Session, arguments: Namespace) -> int:
     """Start the launcher as a process of its own; return 0 when all is started, or ready; 1 when it is not."""
+    pid = _fork(plan, place, lock, session, arguments.duration)
+    return _follow(plan, place, pid, arguments)
+
+
+def _fork(  # noqa: PLR0913, PLR0917 (what a launcher needs)
+    plan: Plan,
+    place: RuntimeDir,
+    lock: Lock,
+    session: Session,
+    duration_s: float | None,
+    mask: Iterable[int] | None = None,
+) -> int:
+    """Start the launcher as a process of its own, and return its number.
+
+    With a ``mask`` of signals, which holds there, it ends with this process.
+    """
     warn_of_leftovers(place, session.run_id)
     warn_of_neighbours(place, plan)
     sys.stdout.flush()
     sys.stderr.flush()
+    starter = os.getpid()
     pid = os.fork()
     if pid == 0:
         code = FAILED
         try:
             lock.sign()
-            code = _launch(plan, place, session, arguments.duration)
+            if mask is not None:
+                end_with(starter, signal.SIGTERM)
+                signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+            code = _launch(plan, place, session, duration_s)
+        except KeyboardInterrupt:
+            code = INTERRUPTED
         except BaseException:  # noqa: BLE001 (nobody further out says what it was)
             traceback.print_exc()
         finally:
@@ -183,7 +214,7 @@ def detach(plan: Plan, place: RuntimeDir, lock: Lock, session: Session, argument
             os._exit(code)
     if session.listener:
         session.listener.close()
-    return _follow(plan, place, pid, arguments)
+    return pid
 
 
 def _launch(plan: Plan, place: RuntimeDir, session: Session, duration_s: float | None) -> int:
@@ -198,28 +229,15 @@ def _launch(plan: Plan, place: RuntimeDir, session: Session, duration_s: float |
     for fd in {nowhere, errors}:
         os.close(fd)
     logs = Logs(place.logs)
-    console = Console(plan, _Nowhere(), colour=False, keep=logs.write)
+    console = Console(plan, Nowhere(), colour=False, keep=logs.write)
     try:
         return supervise(plan, session.plan_file, report=console, duration_s=duration_s, session=session)
     finally:
         logs.close()
 
 
-class _Nowhere:
-    def write(self, text: str, *, log: bool = False) -> None:
-        """Do nothing: the logs have it."""
-
-
-class _StandardOutput:
-    def write(self, text: str, *, log: bool = False) -> None:
-        """Write at once."""
-        del log
-        sys.stdout.write(text)
-        sys.stdout.flush()
-
-
 def _follow(plan: Plan, place: RuntimeDir, pid: int, arguments: Namespace) -> int:
-    console = Console(plan, _StandardOutput(), colour=coloured(sys.stdout))
+    console = Console(plan, StandardOutput(), colour=coloured(sys.stdout))
     goal = AllReady if arguments.wait else AllStarted
     with contextlib.suppress(OSError):
         try:

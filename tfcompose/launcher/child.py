@@ -252,6 +252,13 @@ def subreaper() -> Iterator[None]:
         _LIBC.prctl(_PR_SET_CHILD_SUBREAPER, 0)
 
 
+def end_with(parent: int, number: signal.Signals) -> None:
+    """Have the kernel send this process the signal when its parent dies, or at once if it has."""
+    _LIBC.prctl(_PR_SET_PDEATHSIG, number)
+    if os.getppid() != parent:
+        os.kill(os.getpid(), number)
+
+
 def reap_adopted(known: Collection[int]) -> None:
     """Take the exit codes of children that have ended and are not known: those that were left to this process."""
     with contextlib.suppress(ChildProcessError):

@@ -306,16 +306,23 @@ def _lines(folder: Path, name: str) -> Iterator[tuple[str, str, str]]:
 class Follower:
     """Reads what is added to the logs, across turning over."""
 
-    def __init__(self, folder: Path, names: list[str]) -> None:
-        """Begin at the end of what is there now."""
+    def __init__(self, folder: Path, names: list[str], *, back: int = 0) -> None:
+        """Begin at the end of what is there now, or with the first line within so many bytes before it."""
         self._folder, self._names = folder, names
-        self._at = {name: self._end(name) for name in names}
+        self._at = {name: self._before(back, *self._end(name), name) for name in names}
         self._rest = dict.fromkeys(names, b"")
 
     def more(self) -> list[tuple[str, str, str]]:
         """Return (time, process, text) of the lines that came since the last call, oldest first."""
         found = [line for name in self._names for line in self._more(name)]
         return sorted(found, key=lambda line: line[0])
+
+    def _before(self, back: int, inode: int, end: int, name: str) -> tuple[int, int]:
+        begin = max(end - back, 0)
+        if 0 < begin < end:
+            with contextlib.suppress(OSError):
+                begin += len(_from(self._folder / f"{name}.log", begin - 1).partition(b"\n")[0])
+        return inode, begin
 
     def _end(self, name: str) -> tuple[int, int]:
         try:
@@ -337,8 +344,10 @@ class Follower:
                     data = _from(old, offset)
             offset = 0
         with contextlib.suppress(OSError):
-            data += _from(self._folder / f"{name}.log", offset)
-        self._at[name] = end
+            added = _from(self._folder / f"{name}.log", offset)
+            data += added
+            offset += len(added)
+        self._at[name] = (end[0], offset)
         *complete, self._rest[name] = (self._rest[name] + data).split(b"\n")
         for line in complete:
             at, _, text = line.decode(errors="replace").partition(" ")

@@ -195,20 +195,42 @@ def _is_there(one: Leftover) -> bool:
 # What groups use.
 
 
-def usage_of(groups: list[int]) -> dict[int, tuple[float, int]]:
+class UsageMeter:
+    """Measures what groups of processes use."""
+
+    def __init__(self) -> None:
+        self._ticks: dict[int, int] = {}
+        self._at = time.monotonic()
+
+    def begin(self, groups: Collection[int]) -> dict[int, list[int]]:
+        """Measure from now on; return the processes of each group that has any."""
+        members = _members(set(groups)) if groups else {}
+        self._at = time.monotonic()
+        self._ticks = {pid: _ticks(pid) for pids in members.values() for pid in pids}
+        return members
+
+    def usage(self, groups: Collection[int]) -> dict[int, tuple[float, int]]:
+        """Return (cores, bytes) for each group that has processes; the memory is proportional.
+
+        The cores are those since the last call; a process that began since then counts from the next one on.
+        """
+        at, before = self._at, self._ticks
+        members = self.begin(groups)
+        ticks_per_core = os.sysconf("SC_CLK_TCK") * max(self._at - at, 1e-3)
+        used = {}
+        for group, pids in members.items():
+            ticks = sum(self._ticks[pid] - before.get(pid, self._ticks[pid]) for pid in pids)
+            used[group] = (round(max(ticks, 0) / ticks_per_core, 3), sum(map(_memory, pids)))
+        return used
+
+
+def usage_of(groups: Collection[int]) -> dict[int, tuple[float, int]]:
     """Return (cores, bytes) for each group that has processes; the memory is proportional."""
-    if not groups:
+    meter = UsageMeter()
+    if not meter.begin(groups):
         return {}
-    members = _members(set(groups))
-    begun = time.monotonic()
-    before = {pid: _ticks(pid) for pids in members.values() for pid in pids}
     time.sleep(OVER_S)
-    seconds = time.monotonic() - begun
-    used = {}
-    for group, pids in members.items():
-        ticks = sum(_ticks(pid) - before[pid] for pid in pids)
-        used[group] = (round(max(ticks, 0) / os.sysconf("SC_CLK_TCK") / seconds, 3), sum(map(_memory, pids)))
-    return used
+    return meter.usage(groups)
 
 
 def _members(groups: set[int]) -> dict[int, list[int]]:

@@ -249,10 +249,11 @@ class _Supervisor:
 class Signals:
     """Catches what ends a plan, and SIGCHLD so that it wakes the loop; puts everything back afterwards.
 
-    A SIGHUP that is ignored, as below ``nohup``, stays ignored.
+    A SIGHUP that is ignored, as below ``nohup``, stays ignored. ``more`` are further signals to catch.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *more: signal.Signals) -> None:
+        self._more = more
         self._taken: deque[int] = deque()
         self._children_changed = False
         self._stack = contextlib.ExitStack()
@@ -266,7 +267,7 @@ class Signals:
         os.set_blocking(write_fd, False)
         before = signal.set_wakeup_fd(write_fd, warn_on_full_buffer=False)
         self._stack.callback(signal.set_wakeup_fd, before)
-        for number in (*ENDING, signal.SIGCHLD):
+        for number in (*ENDING, signal.SIGCHLD, *self._more):
             if number == signal.SIGHUP and signal.getsignal(number) == signal.SIG_IGN:
                 continue
             handler = signal.signal(number, self._append)

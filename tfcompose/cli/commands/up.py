@@ -1,9 +1,10 @@
 """Start a robot, or a built plan, and guard its TF tree.
 
-Build a robot and start it, or start a built plan. Print which edges are live, who owns them, and when the tree is
-complete. Ctrl-C, SIGTERM and SIGHUP end everything, with exit code 0; before anything is started, with that of the
-signal, such as 130 for Ctrl-C. If a node already publishes an edge, refuse and name it. If the
-robot runs already, restart only what differs in the new plan.
+Build a robot and start it, or start a built plan. On a terminal, show a live view of processes, edges and findings; ?
+lists its keys. Elsewhere, or with --no-live, print which edges are live, who owns them, and when the tree is complete,
+with the lines of each process. Ctrl-C, SIGTERM and SIGHUP end everything, with exit code 0; before anything is started,
+with that of the signal, such as 130 for Ctrl-C. If a node already publishes an edge, refuse and name it. If the robot
+runs already, restart only what differs in the new plan.
 """
 
 from __future__ import annotations
@@ -36,6 +37,10 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--host", metavar="NAME",
         help="start this host's share and expect the rest elsewhere; default: this machine, if the robot names it",
+    )  # fmt: skip
+    parser.add_argument(
+        "--no-live", dest="live", action="store_false",
+        help="print lines, as into a pipe, instead of the live view of a terminal",
     )  # fmt: skip
     parser.add_argument("--dry-run", action="store_true", help="print what would be started and exit")
     parser.add_argument(

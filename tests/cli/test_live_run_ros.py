@@ -1,0 +1,209 @@
+"""``tfcompose up`` at a shell on a real terminal, which an emulator reads: it is drawn, left, and put back."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import pty
+import signal
+import struct
+import sys
+import termios
+import threading
+from typing import TYPE_CHECKING
+
+import psutil
+import pyte
+import pytest
+
+from tests.support import processes
+from tests.support.waiting import gone, until
+
+if TYPE_CHECKING:
+    import subprocess
+    from collections.abc import Iterator
+    from pathlib import Path
+
+pytestmark = pytest.mark.ros
+
+#: A shell with this terminal as its own, as a window has it.
+SHELL = "import fcntl, os, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); os.execvp('bash', ['bash', '--norc', '-i'])"
+ROBOT = """\
+tfcompose: 1
+robot: rover
+frames:
+  base_link: {}
+  laser: {parent: base_link, xyz: [0.2, 0, 0.1]}
+processes:
+  talker:
+    run: [python3, -c, "import time; print('\\\\x1b[2Jspeaks', flush=True); time.sleep(600)"]
+"""
+PROMPT = "shell$ "
+#: What goes to the other screen of a terminal, and what comes back from it.
+OTHER_SCREEN, OWN_SCREEN = "\033[?1049h", "\033[?1049l"
+
+
+class Shell:
+    """An interactive shell on a terminal of 80 columns; what it shows is on ``screen``, and all bytes in ``text``."""
+
+    def __init__(self, folder: Path, **environment: str) -> None:
+        self.screen = pyte.Screen(80, 24)
+        self._stream = pyte.Stream(self.screen)
+        self._master, slave = pty.openpty()
+        self.text = ""
+        self.resize(80, 24)
+        env = os.environ | {"TERM": "xterm-256color", "PS1": PROMPT, "CI": "", "NO_COLOR": ""} | environment
+        command = [sys.executable, "-c", SHELL]
+        self.process: subprocess.Popen[str] = processes.start(
+            command, stdin=slave, stdout=slave, stderr=slave, cwd=folder, env=env
+        )
+        self._slave = slave
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        self.shows(PROMPT)
+
+    def _read(self) -> None:
+        with contextlib.suppress(OSError):
+            while data := os.read(self._master, 1 << 16):
+                text = data.decode(errors="replace")
+                self.text += text
+                self._stream.feed(text)
+
+    def type(self, text: str) -> None:
+        os.write(self._master, text.encode())
+
+    def up(self, *words: str) -> None:
+        self.type(f"{sys.executable} -m tfcompose up robot.yaml {' '.join(words)}\n")
+
+    @property
+    def shown(self) -> str:
+        return "\n".join(list(self.screen.display))
+
+    def shows(self, *words: str) -> None:
+        assert until(lambda: all(word in self.shown for word in words)), self.shown
+
+    def resize(self, columns: int, rows: int) -> None:
+        self.screen.resize(rows, columns)
+        fcntl.ioctl(self._master, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
+
+    def below(self) -> list[psutil.Process]:
+        return psutil.Process(self.process.pid).children(recursive=True)
+
+    def view(self) -> psutil.Process:
+        """Return the process that shows the live view: the shell's own child."""
+        return psutil.Process(self.process.pid).children()[0]
+
+    def close(self) -> None:
+        with contextlib.suppress(psutil.Error):
+            for one in self.below():
+                one.kill()
+        processes.end(self.process)
+        os.close(self._slave)
+        self._reader.join(5)
+        os.close(self._master)
+
+
+@pytest.fixture
+def shell(domain: object, tmp_path: Path) -> Iterator[Shell]:
+    assert domain
+    (tmp_path / "robot.yaml").write_text(ROBOT)
+    made = Shell(tmp_path)
+    yield made
+    made.close()
+
+
+def test_it_shows_the_robot_and_its_logs_and_ctrl_c_ends_it_and_puts_the_terminal_back(shell: Shell) -> None:
+    shell.up()
+    shell.shows("all well", "talker", "1/1 edges live")
+    started = shell.below()
+    shell.type("e")
+    shell.shows("base_link → laser")
+    shell.type("\033")
+    shell.shows("q end")
+    shell.type("2")
+    shell.shows("log of talker", "speaks")
+    for columns, rows in ((200, 60), (40, 8), (80, 24)):
+        shell.resize(columns, rows)
+        assert until(lambda: "speaks" in shell.shown and "Esc back" in shell.screen.display[-1])
+    shell.type("\003")
+    shell.shows("ended", PROMPT)
+    assert until(lambda: all(map(gone, started)))
+    assert shell.text.count(OTHER_SCREEN) == shell.text.count(OWN_SCREEN) == 1
+    shell.type("echo exit code $?\n")
+    shell.shows("exit code 0")
+    assert not shell.screen.cursor.hidden
+
+
+def test_ctrl_z_leaves_the_view_and_not_the_robot_and_fg_shows_it_again(shell: Shell) -> None:
+    shell.up()
+    shell.shows("all well")
+    shell.type("\032")
+    shell.shows("Stopped", PROMPT)
+    launcher = shell.view().children()[0]
+    assert shell.view().status() == psutil.STATUS_STOPPED
+    assert launcher.status() != psutil.STATUS_STOPPED
+    shell.type("stty -a | tr ' ;' '\\n\\n' | grep -cxE 'icanon|echo' | sed 's/^/settings /'\n")
+    shell.shows("settings 2")
+    shell.type("fg\n")
+    shell.shows("all well", "q end")
+    shell.type("q")
+    shell.shows("q again")
+    shell.type("q")
+    shell.shows("ended", PROMPT)
+    assert until(lambda: gone(launcher))
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGQUIT, signal.SIGKILL])
+def test_whatever_ends_the_view_ends_the_robot(shell: Shell, number: signal.Signals) -> None:
+    shell.up()
+    shell.shows("all well")
+    started = shell.below()
+    shell.view().send_signal(number)
+    assert until(lambda: all(map(gone, started)))
+
+
+def test_a_terminal_that_goes_away_ends_the_robot(shell: Shell) -> None:
+    shell.up()
+    shell.shows("all well")
+    started = shell.below()
+    shell.process.kill()
+    assert until(lambda: all(map(gone, started)))
+
+
+def test_a_process_that_fails_ends_it_and_the_reason_stays_on_the_terminal(shell: Shell, tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text(ROBOT.replace("time.sleep(600)", "time.sleep(1); raise SystemExit(3)"))
+    shell.up()
+    shell.shows("talker ended with exit code 3", "ended with exit code 1", PROMPT)
+    shell.type("echo exit code $?\n")
+    shell.shows("exit code 1")
+
+
+@pytest.mark.parametrize(
+    ("environment", "words"), [({"TERM": "dumb"}, ()), ({"CI": "true"}, ()), ({}, ("--no-live",)), ({}, ("| cat",))]
+)
+def test_elsewhere_it_prints_lines(
+    domain: object, tmp_path: Path, environment: dict[str, str], words: tuple[str, ...]
+) -> None:
+    assert domain
+    (tmp_path / "robot.yaml").write_text(ROBOT)
+    shell = Shell(tmp_path, **environment)
+    try:
+        shell.up("--for 1", *words)
+        shell.shows("tree complete", "tfcompose | ended")
+        assert OTHER_SCREEN not in shell.text
+    finally:
+        shell.close()
+
+
+def test_without_colours_there_are_none(domain: object, tmp_path: Path) -> None:
+    assert domain
+    (tmp_path / "robot.yaml").write_text(ROBOT)
+    shell = Shell(tmp_path, NO_COLOR="1")
+    try:
+        shell.up("--for 2")
+        shell.shows("all well")
+        colours = {char.fg for line in shell.screen.buffer.values() for char in line.values()}
+        assert colours == {"default"}
+    finally:
+        shell.close()

@@ -1,0 +1,327 @@
+"""``up`` on a terminal: the launcher runs in a process of its own, and this one shows what it reports.
+
+So what is drawn, however slowly the terminal takes it, never delays the robot; Ctrl-Z stops the view alone; and a
+fault of the view costs the view. The launcher ends with this process, whatever ends it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import selectors
+import signal
+import sys
+import time
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.console import Console, StandardOutput
+from tfcompose.cli.runs import plan_of_run
+from tfcompose.cli.terminal import FAILED, can_redraw, coloured, warn
+from tfcompose.ipc import (
+    REQUESTS,
+    Ended,
+    EventsRequest,
+    FindingShown,
+    RecoveredShown,
+    Replanned,
+    RobotStatus,
+    StatusRequest,
+    Stopping,
+    read_notice,
+)
+from tfcompose.launcher.control import connect
+from tfcompose.launcher.output import Follower
+from tfcompose.launcher.procfs import UsageMeter
+from tfcompose.launcher.supervisor import ENDING, Signals
+from tfcompose.plan.codec import decode
+from tfcompose.text import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from tfcompose.cli.dashboard import Dashboard
+    from tfcompose.cli.screen import Screen
+    from tfcompose.ipc import Notice, Request
+    from tfcompose.launcher.runtime_dir import RuntimeDir
+    from tfcompose.plan import Plan
+
+#: How often the launcher is asked for its state, at least and at most; what processes use is measured more rarely.
+STATUS_EVERY_S, STATUS_AT_MOST_EVERY_S, USAGE_EVERY_S = 1.0, 0.2, 5.0
+#: How often the log that is shown is read.
+LOG_EVERY_S = 0.25
+#: So much of a log is read when it is opened; bytes.
+LOG_BYTES = 512 * 1024
+#: After so long an Esc was the key itself, and not the begin of another one; seconds.
+ESCAPE_S = 0.05
+#: So many findings are printed again when the view is left.
+PRINTED_AT_MOST = 20
+
+
+def can_show_live() -> bool:
+    """Return whether this is a terminal of which this process is in the foreground, and somebody may sit at it."""
+    if not can_redraw(sys.stdout) or not sys.stdin.isatty() or os.environ.get("CI"):
+        return False
+    try:
+        return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
+    except OSError:
+        return False
+
+
+def follow(place: RuntimeDir, plan: Plan, launcher: int, mask: Iterable[int]) -> int:
+    """Show the run until its launcher, a child of this process, has ended; return its exit code.
+
+    Signals that end a plan are passed on to it. They are blocked until here, and ``mask`` is the mask before that.
+    """
+    with Signals(signal.SIGWINCH, signal.SIGTSTP, signal.SIGQUIT) as signals:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        from tfcompose.cli.dashboard import Dashboard  # rich takes a moment to load, and signals none
+        from tfcompose.cli.screen import Screen
+
+        view = _View(place, Dashboard(place.name, plan), launcher, signals)
+        with Screen(sys.stdin.fileno()) as screen:
+            code = view.run(screen)
+    view.print_rest(plan)
+    return code
+
+
+class _Connection:
+    """A connection to the launcher that is read line by line, without waiting."""
+
+    def __init__(self, place: RuntimeDir) -> None:
+        """Connect, or raise OSError."""
+        self._socket = connect(place)
+        self._socket.setblocking(False)  # noqa: FBT003 (its only argument)
+        self._rest = b""
+
+    def fileno(self) -> int:
+        return self._socket.fileno()
+
+    def send(self, request: Request) -> None:
+        """Send a request; raises OSError."""
+        self._socket.sendall(REQUESTS.line(request).encode())
+
+    def lines(self) -> list[bytes]:
+        """Return the lines that came.
+
+        Raises:
+            OSError: if the launcher has hung up.
+        """
+        found: list[bytes] = []
+        while True:
+            try:
+                data = self._socket.recv(64 * 1024)
+            except BlockingIOError:
+                return found
+            if not data:
+                if found:
+                    return found
+                raise ConnectionResetError
+            *lines, self._rest = (self._rest + data).split(b"\n")
+            found += lines
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class _View:
+    def __init__(self, place: RuntimeDir, dashboard: Dashboard, launcher: int, signals: Signals) -> None:
+        from tfcompose.cli.screen import Keys
+
+        self._place = place
+        self._dashboard = dashboard
+        self._launcher = launcher
+        self._signals = signals
+        self._keys = Keys()
+        self._meter = UsageMeter()
+        self._events: _Connection | None = None
+        self._states: _Connection | None = None
+        self._requested = self._stale = False
+        self._follower: Follower | None = None
+        self._last: list[Notice] = []
+        self._left_out = 0
+        self._fault = ""
+        now = time.monotonic()
+        self._status_at = self._usage_at = self._log_at = self._connect_at = self._requested_at = now
+        self._code: int | None = None
+
+    def run(self, screen: Screen) -> int:
+        with selectors.DefaultSelector() as selector:
+            self._selector = selector
+            self._screen = screen
+            selector.register(self._signals.fd, selectors.EVENT_READ, self._signals.woken)
+            selector.register(screen.fd, selectors.EVENT_READ, self._press)
+            try:
+                while self._code is None:
+                    self._connect()
+                    for key, _ in selector.select(self._sleep_s()):
+                        key.data()
+                    for number in self._signals.taken():
+                        self._take_signal(number)
+                    self._work()
+                    self._draw()
+                    self._reap()
+                self._take_events()
+            finally:
+                for connection in (self._events, self._states):
+                    if connection:
+                        connection.close()
+        return self._code
+
+    def print_rest(self, plan: Plan) -> None:
+        """Print on the terminal's own screen what went wrong, and how it ended."""
+        if self._fault:
+            warn(f"the live view failed: {self._fault}")
+        console = Console(plan, StandardOutput(), colour=coloured(sys.stdout))
+        with contextlib.suppress(OSError):
+            if self._left_out:
+                print(f"{counted(self._left_out, 'earlier finding')}: tfcompose logs tfcompose")
+            for notice in self._last:
+                console(notice)
+        if not any(isinstance(notice, Ended) for notice in self._last):
+            warn(f"the launcher has ended; see {self._place.logs / 'launcher.err'}")
+
+    # What comes.
+
+    def _connect(self) -> None:
+        if self._dashboard.ended or time.monotonic() < self._connect_at or (self._events and self._states):
+            return
+        self._connect_at = time.monotonic() + STATUS_EVERY_S
+        with contextlib.suppress(OSError):
+            if self._events is None:
+                self._events = _Connection(self._place)
+                self._events.send(EventsRequest())
+                self._dashboard.forget()
+                self._last.clear()
+                self._selector.register(self._events, selectors.EVENT_READ, self._take_events)
+            if self._states is None:
+                self._states = _Connection(self._place)
+                self._requested = False
+                self._selector.register(self._states, selectors.EVENT_READ, self._take_status)
+
+    def _take_events(self) -> None:
+        try:
+            lines = self._events.lines() if self._events else []
+        except OSError:
+            self._drop(self._events)
+            self._events = None
+            return
+        for line in lines:
+            notice, at = read_notice(line)
+            self._dashboard.take(notice, at)
+            self._stale = True
+            self._status_at = min(self._status_at, self._requested_at + STATUS_AT_MOST_EVERY_S)
+            if isinstance(notice, (FindingShown, RecoveredShown, Stopping, Ended)):
+                self._last.append(notice)
+            if len(self._last) > PRINTED_AT_MOST:
+                del self._last[0]
+                self._left_out += 1
+            if isinstance(notice, Replanned):
+                self._dashboard.plan = plan_of_run(self._place) or self._dashboard.plan
+
+    def _take_status(self) -> None:
+        try:
+            lines = self._states.lines() if self._states else []
+        except OSError:
+            self._drop(self._states)
+            self._states = None
+            return
+        for line in lines:
+            self._dashboard.status = decode(RobotStatus, json.loads(line))
+            self._requested, self._stale = False, True
+
+    def _drop(self, connection: _Connection | None) -> None:
+        if connection:
+            self._selector.unregister(connection)
+            connection.close()
+
+    def _press(self) -> None:
+        try:
+            data = os.read(self._screen.fd, 1024)
+        except OSError:
+            data = b""
+        if not data:  # the terminal has gone
+            self._selector.unregister(self._screen.fd)
+            self._pass_on(signal.SIGHUP)
+            return
+        self._take_keys(self._keys.feed(data))
+
+    def _take_keys(self, keys: list[str]) -> None:
+        for key in keys:
+            shown = self._dashboard.log_of
+            if self._dashboard.press(key):
+                self._pass_on(signal.SIGINT)
+            if self._dashboard.log_of != shown:
+                name = self._dashboard.log_of
+                self._follower = Follower(self._place.logs, [name], back=LOG_BYTES) if name else None
+                self._log_at = 0.0
+        self._stale = True
+
+    def _take_signal(self, number: int) -> None:
+        if number == signal.SIGTSTP:
+            self._screen.leave()
+            handler = signal.signal(signal.SIGTSTP, signal.SIG_DFL)
+            os.kill(os.getpid(), signal.SIGTSTP)
+            signal.signal(signal.SIGTSTP, handler)
+            self._screen.enter()
+        elif number in ENDING or number == signal.SIGQUIT:
+            self._pass_on(signal.SIGTERM if number == signal.SIGQUIT else signal.Signals(number))
+        self._stale = True
+
+    def _pass_on(self, number: signal.Signals) -> None:
+        if self._code is None:
+            os.kill(self._launcher, number)
+
+    # What is done now and then.
+
+    def _sleep_s(self) -> float:
+        due = [self._status_at, self._usage_at]
+        due += [self._log_at] if self._follower else []
+        due += [] if self._dashboard.ended or (self._events and self._states) else [self._connect_at]
+        longest = ESCAPE_S if self._keys.waits else STATUS_EVERY_S
+        return min(max(min(due) - time.monotonic(), 0.0), longest)
+
+    def _work(self) -> None:
+        now = time.monotonic()
+        if self._keys.waits and not self._selector.select(ESCAPE_S):
+            self._take_keys(self._keys.end())
+        if self._follower and now >= self._log_at:
+            self._log_at = now + LOG_EVERY_S
+            lines = [text for _, _, text in self._follower.more()]
+            self._dashboard.add_log_lines(lines)
+            self._stale |= bool(lines)
+        if now >= self._usage_at:
+            self._usage_at = now + USAGE_EVERY_S
+            status = self._dashboard.status
+            if status and self._dashboard.page == "processes":
+                self._dashboard.used = self._meter.usage([one.pid for one in status.processes if one.pid])
+        if now >= self._status_at:
+            self._status_at = now + STATUS_EVERY_S
+            self._ask(now)
+
+    def _ask(self, now: float) -> None:
+        if self._states is None or self._requested:
+            return
+        with contextlib.suppress(OSError):
+            self._states.send(StatusRequest())
+            self._requested, self._requested_at = True, now
+
+    def _draw(self) -> None:
+        if not self._stale or self._fault:
+            return
+        self._stale = False
+        try:
+            self._screen.draw(self._dashboard.lines)
+        except OSError:  # the terminal has gone
+            self._fault = "the terminal has gone"
+            self._pass_on(signal.SIGHUP)
+        except Exception as error:  # noqa: BLE001 (a fault of the view ends no robot)
+            self._fault = f"{type(error).__name__}: {error}"
+            self._screen.leave()
+            warn(f"the live view failed: {self._fault}; the robot goes on, and Ctrl-C ends it")
+
+    def _reap(self) -> None:
+        pid, status = os.waitpid(self._launcher, os.WNOHANG)
+        if pid:
+            code = os.waitstatus_to_exitcode(status)
+            self._code = code if code >= 0 else FAILED

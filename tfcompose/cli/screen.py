@@ -1,0 +1,111 @@
+"""The terminal of a live view: its other screen, keys as they are pressed, and how everything is put back."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import sys
+import termios
+from typing import TYPE_CHECKING
+
+from rich.console import Console, ConsoleDimensions
+from rich.live import Live
+from rich.text import Text
+
+from tfcompose.cli.terminal import coloured, size_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import TracebackType
+
+    from typing_extensions import Self
+
+#: Keys that send more than one byte, in the forms that terminals use.
+_NAMED = {
+    "A": "up", "B": "down", "C": "right", "D": "left", "H": "home", "F": "end",
+    "1~": "home", "4~": "end", "7~": "home", "8~": "end", "5~": "pgup", "6~": "pgdn",
+    "\r": "enter", "\n": "enter", "\033": "esc", "\x7f": "backspace", "\b": "backspace", " ": "pgdn",
+}  # fmt: skip
+_KEY = re.compile(r"\033[\[O]([0-9;]*[~A-Za-z])|([^\033]|\033)", re.DOTALL)
+_BEGUN = re.compile(r"\033(?:[\[O][0-9;]*)?\Z")
+
+
+class Keys:
+    """Bytes of a terminal into the names of keys."""
+
+    def __init__(self) -> None:
+        self._rest = ""
+
+    @property
+    def waits(self) -> bool:
+        """Whether a key has begun that may go on; after a moment without more, ``end`` says what it was."""
+        return bool(self._rest)
+
+    def feed(self, data: bytes) -> list[str]:
+        """Return the keys that are complete."""
+        text = self._rest + data.decode(errors="replace")
+        begun = _BEGUN.search(text)
+        self._rest = text[begun.start() :] if begun else ""
+        return _keys(text[: len(text) - len(self._rest)])
+
+    def end(self) -> list[str]:
+        """Return the keys in what came, as nothing followed."""
+        text, self._rest = self._rest, ""
+        return _keys(text)
+
+
+def _keys(text: str) -> list[str]:
+    pairs = (match.groups() for match in _KEY.finditer(text))
+    return [_NAMED.get(sequence, "") if sequence else _NAMED.get(char, char) for sequence, char in pairs]
+
+
+class Screen:
+    """A terminal whose other screen is drawn on, from the ``with`` block's begin to its end.
+
+    Ctrl-C and Ctrl-Z remain signals. What cannot be written since the terminal has gone raises OSError.
+    """
+
+    def __init__(self, keys_fd: int) -> None:
+        self.fd = keys_fd
+        self._before = termios.tcgetattr(keys_fd)
+        self._live: Live | None = None
+
+    def __enter__(self) -> Self:
+        self.enter()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.leave()
+
+    def enter(self) -> None:
+        """Go to the other screen, and take keys without Enter and without showing them."""
+        settings = termios.tcgetattr(self.fd)
+        settings[3] &= ~(termios.ICANON | termios.ECHO)
+        settings[6][termios.VMIN], settings[6][termios.VTIME] = 1, 0
+        termios.tcsetattr(self.fd, termios.TCSADRAIN, settings)
+        console = Console(file=sys.stdout, force_terminal=True, no_color=not coloured(sys.stdout), highlight=False)
+        self._live = Live(
+            console=console, screen=True, auto_refresh=False, redirect_stdout=False, redirect_stderr=False
+        )
+        console.size = ConsoleDimensions(*size_of(sys.stdout.fileno()))
+        self._live.start()
+
+    def leave(self) -> None:
+        """Put the terminal back to what it was; one that has gone needs nothing."""
+        live, self._live = self._live, None
+        if live is None:
+            return
+        with contextlib.suppress(OSError):
+            live.stop()
+        with contextlib.suppress(termios.error):
+            termios.tcsetattr(self.fd, termios.TCSADRAIN, self._before)
+
+    def draw(self, lines: Callable[[int, int], list[Text]]) -> None:
+        """Draw the lines that are returned for these columns and rows."""
+        if self._live is None:
+            return
+        size = size_of(sys.stdout.fileno())
+        self._live.console.size = ConsoleDimensions(*size)
+        self._live.update(Text("\n").join(lines(*size)), refresh=True)

@@ -261,7 +261,7 @@ def _strangers() -> Iterator[guarded.History]:
     past = _running(guard=GuardPolicy("strict"))
     past.joins("/slam", process="slam").fenced = False
     yield past.wait(1)
-    yield _sent("/flood", ", ".join(f"f{number} f{number + 1}" for number in range(2000)))
+    yield _sent("/flood", ", ".join(f"f{number} f{number + 1}" for number in range(2000)), 30)
     yield _sent(NO_NODE, "map odom")
     yield _sent(NO_NODE, "map odom", settle_s=9)
     for edges in ("map odom, odom cart", "cart wheel"):

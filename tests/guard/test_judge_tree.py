@@ -178,7 +178,17 @@ def test_a_flood_of_undeclared_edges_is_reported_once_and_declared_edges_are_jud
     codes = [one.code for one in running.found()]
     assert codes.count("TF853") == 1
     assert "TF801" in codes, "the declared edge in the flood"
-    expect(next(one for one in running.found() if one.code == "TF853"), "TF853", "/rogue")
+    expect(next(one for one in running.found() if one.code == "TF853"), "TF853", "/rogue", "3,000 frames")
+
+
+def test_a_flood_is_reported_with_how_much_and_how_often() -> None:
+    running = History().clear()
+    rogue = running.joins("/rogue")
+    running.check()
+    for _ in range(25):
+        running.judge.flooded_by(rogue.gid, 10_000, running.now)
+        running.wait(0.05)
+    expect(next(one for one in running.found() if one.code == "TF853"), "TF853", "/rogue", "10,000 frames", "20 Hz")
 
 
 def test_others_are_judged_during_a_flood_and_what_is_allowed_passes() -> None:

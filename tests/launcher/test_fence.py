@@ -65,7 +65,7 @@ def moved(command: Command) -> dict[str, str]:
 # By partition.
 
 
-def test_a_strict_plan_fences_off_what_children_send_and_lets_the_guard_read_both(tmp_path: Path) -> None:
+def test_a_strict_plan_fences_off_what_children_send_and_lets_the_guard_alone_read_it(tmp_path: Path) -> None:
     slam = PlanProcess("slam", "run", argv=("true",), remap={"/tf": "/r/tf"}, owns=(("map", "odom"),))
     commands, found = inspect(tmp_path, slam, GUARD)
     assert found == []
@@ -73,7 +73,7 @@ def test_a_strict_plan_fences_off_what_children_send_and_lets_the_guard_read_bot
         ("data_writer", "/r/tf"): "tfc_rover",
         ("data_writer", "/tf_static"): "tfc_rover",
     }
-    readers = {("data_reader", topic): ";tfc_rover" for topic in ("/r/tf", "/tf_static", "/tf")}
+    readers = {("data_reader", topic): "tfc_rover" for topic in ("/r/tf", "/tf_static", "/tf")}
     assert partitions(commands["guard"]) == readers
     for command in commands.values():
         assert command.fence

@@ -31,3 +31,27 @@ def test_tfcomposes_own_processes_read_no_shared_memory_and_others_do(
     env = child_environment(os.environ, RosSettings(discovery=discovery), own=own)
     output = processes.run([sys.executable, "-c", NODE], env=env, check=True)
     assert (output.stdout == "\n") == own, output.stdout
+
+
+#: Says how many UDP ports the process takes messages at, before and after it reads outside of partitions.
+APART = """
+import os
+from pathlib import Path
+from tfcompose.ros.node import PublicTFReader, open_node
+def ports():
+    held = {os.readlink(one) for one in Path("/proc/self/fd").iterdir() if one.exists()}
+    lines = [line.split() for line in Path("/proc/net/udp").read_text().splitlines()[1:]]
+    return len({words[1] for words in lines if f"socket:[{words[9]}]" in held})
+with open_node("one", "/") as node:
+    before = ports()
+    reader = PublicTFReader(node, "/tf", static=False)
+    print(ports() - before)
+    reader.close()
+"""
+
+
+def test_what_everybody_sends_has_a_port_of_its_own_at_a_strict_guard(domain: object) -> None:
+    """What does not fit into a port's buffer is thrown away: a flood would take what is fenced off with it."""
+    assert domain
+    env = child_environment(os.environ, RosSettings(discovery="localhost"), own=True)
+    assert processes.run([sys.executable, "-c", APART], env=env, check=True).stdout == "1\n"

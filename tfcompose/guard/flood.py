@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tfcompose.ros.tf_codec import Transform
 
 #: At one time it reads for so long, in seconds, and as long as it has to read, the guard waits no longer than that.
-SLICE_S, WAIT_S = 0.002, 0.02
+SLICE_S, WAIT_S = 0.001, 0.01
 _TOGETHER = 50
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from tfcompose.guard.liveness import EdgeHealth, Liveness, LivenessMemory
-from tfcompose.guard.reports import CaseMemory, Cases, PublisherReports
+from tfcompose.guard.reports import CaseMemory, Cases, Flood, PublisherReports
 from tfcompose.ipc import Clear, Found, GuardEvent
 from tfcompose.live.publishers import NAMELESS_S, SenderMemory, Senders
 from tfcompose.verdict.drivers import SentPoses
@@ -145,14 +145,14 @@ class Judge:
         """Return whether the publisher has published more undeclared edges than are judged."""
         return gid in self._verdicts.flooders
 
-    def flooded_by(self, gid: bytes | None) -> None:
-        """Take the publisher as one of more undeclared edges than are judged."""
-        self._verdicts.flooders.add(gid)
+    def flooded_by(self, gid: bytes | None, transforms: int, now: float) -> None:
+        """Take a message of so many transforms from a publisher of more undeclared edges than are judged."""
+        self._verdicts.flooders.setdefault(gid, Flood(now)).count(transforms, now)
 
     def tick(self, now: float) -> list[GuardEvent]:
         """Return what the passing of time means."""
         events = [*self._see_again(now), *self.cases.report(now), *map(Found, self._sent.judge())]
-        events += self._publishers.floods(self._senders, self._verdicts.flooders)
+        events += self._publishers.floods(self._senders, self._verdicts.flooders, now)
         if self._start.cleared is not None:
             over = self.cases.over(now)
             self._rules.changes += bool(over)
@@ -275,7 +275,7 @@ class Verdicts:
         self._verdict_edges = 0
         self._pending: dict[SentEdge, float] = {}
         #: Publishers of more undeclared edges than are judged.
-        self.flooders: set[bytes | None] = set()
+        self.flooders: dict[bytes | None, Flood] = {}
 
     @property
     def waits(self) -> bool:
@@ -334,7 +334,9 @@ class Verdicts:
         verdict.admitted = None if {*admitted} == {*message.edges} else frozenset(admitted)
         verdict.cases, verdict.children = tuple(cases), tuple(children)
         if left < 0:
-            self.flooders.add(message.gid)
+            if message.gid not in self.flooders:  # whose messages are counted from now on
+                self.flooders[message.gid] = Flood(now)
+                self.flooders[message.gid].count(len(message.edges), now)
             epoch = self._rules.changes
         verdict.epoch = epoch if certain and epoch == self._rules.changes else -1
         verdict.until = now + STRANGE_S if strange else float("inf")

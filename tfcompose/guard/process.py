@@ -43,7 +43,7 @@ from tfcompose.variables import (
 from tfcompose.verdict.ownership import MOST_UNDECLARED
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
     from typing import Any
 
     from rclpy.node import Node
@@ -76,11 +76,12 @@ class TopicWatch:
         emit: Callable[[GuardEvent], None],
         private: Mapping[str, Topics] | None = None,
     ) -> None:
-        self.data = TFTopics(node, topics, private, deep=True)
+        strict = judge.plan.guard.mode == "strict"
+        self._by_partition = strict and private is None
+        self.data = TFTopics(node, topics, private or ("partition" if strict else ""), deep=True)
         self._clock = SimClock(node) if judge.clocks.simulated else None
         self._reader = MessageReader(judge.compared)
-        strict = judge.plan.guard.mode == "strict"
-        profile = PROFILE_VARIABLES[0] if strict and private is None else ""
+        profile = PROFILE_VARIABLES[0] if self._by_partition else ""
         marks = RunMarks(RUN_ID, os.environ[RUN_ID], PROCESS, profile, LAUNCHER) if RUN_ID in os.environ else None
         self._graph = TFGraph(node, topics, None if private is None else tuple(private.values()), ours=marks)
         feedback = None if private is None else Feedback(node, private, self.data.own)
@@ -112,28 +113,24 @@ class TopicWatch:
 
     def close(self) -> None:
         """End what must end before the node does."""
-        self._graph.close()
+        self.data.close()
 
     def step(self) -> None:
         """Take what has come, and from time to time the graph."""
-        taken = list(self._taken())
         now = time.monotonic()
-        strangers = {each.received.gid for each in taken} - self._known.keys()
-        self._known |= dict.fromkeys(strangers)
-        if strangers or now >= self._due:
-            self._graph.hear_public()
-        if strangers:  # who sends once and goes is in the graph for a moment only
-            self._ask_graph(now)
         if self._clock:
             self.judge.clock(self._clock.now_ns(), now)
-        for each in taken:
-            self._take(each, now)
+        strangers = self._take(self.data.take_fenced(), now)  # first: it is passed on
+        public = list(self.data.take_public())
+        if self._by_partition:
+            self._graph.hear_public(one.received.gid for one in public if one.received.gid)
+        strangers |= self._take(public, now)
         declared = self._flood.read(now)  # after the others, which wait for nothing
         if declared is not None:
             self._read(declared, now)
         if now >= self._due:
             self._due = now + CHECK_EVERY_S
-            if not strangers:  # after the messages: what a strict guard passes on does not wait for it
+            if not strangers:  # else they were asked for
                 self._ask_graph(now)
             if self._clock:
                 self.judge.clocks.sent = self._graph.sends_clock()
@@ -148,21 +145,27 @@ class TopicWatch:
             if held := self.relay.held.report():
                 say(f"held back: {held}")
 
-    def _taken(self) -> Iterator[TFData]:
-        """Yield what has come; the id that it has instead stands for a sender where the rmw does not say who sent."""
-        for data in self.data.take():
-            received = data.received
-            yield data if received.gid else replace(data, received=replace(received, gid=received.raw_gid))
+    def _take(self, data: Iterable[TFData], now: float) -> bool:
+        """Take messages, and the graph before, where it must say who sent some; return whether that was so."""
+        taken = [_with_id(one) for one in data]
+        strangers = {one.received.gid for one in taken} - self._known.keys()
+        self._known |= dict.fromkeys(strangers)
+        if strangers:  # who sends once and goes is in the graph for a moment only
+            self._ask_graph(now)
+        for one in taken:
+            self._take_one(one, now)
+        return bool(strangers)
 
-    def _take(self, data: TFData, now: float) -> None:
+    def _take_one(self, data: TFData, now: float) -> None:
         """Take a message; what is long, or other than before from one who floods the tree, is read little by little."""
         received, judge = data.received, self.judge
-        floods = number_of_transforms(received.data) > self._most or judge.is_flooded_by(received.gid)
-        if floods and not self._decoder.knows(received.data):
-            judge.flooded_by(received.gid)
-            self._flood.add(data)
-        else:
-            self._read(data, now)
+        number = number_of_transforms(received.data)
+        if number > self._most or judge.is_flooded_by(received.gid):
+            judge.flooded_by(received.gid, number, now)
+            if not self._decoder.knows(received.data):
+                self._flood.add(data)
+                return
+        self._read(data, now)
 
     def _read(self, data: TFData, now: float) -> None:
         received = data.received
@@ -194,6 +197,12 @@ class TopicWatch:
     def _pass_on(self, events: list[GuardEvent]) -> None:
         for event in events:
             self._emit(event)
+
+
+def _with_id(data: TFData) -> TFData:
+    """Return it with the id that it has instead, where the rmw does not say who sent it: that tells senders apart."""
+    received = data.received
+    return data if received.gid else replace(data, received=replace(received, gid=received.raw_gid))
 
 
 def held_back(watches: list[TopicWatch]) -> dict[tuple[str, str, str], int] | None:
@@ -272,9 +281,9 @@ def guard(own: Own, stop: Stop) -> None:
         steps += [switches.check] if switches else []
         steps += [] if ORDERS_FD in os.environ else [LifecycleDriver(node, own.plan).check]
         steps += [ClockWatch(node, say, sim=own.plan.ros.clock == "sim").check, *(watch.report for watch in watches)]
-        subscriptions = [each for watch in watches for each in watch.data.subscriptions]
+        readers = [each for watch in watches for each in watch.data.readers]
         while not stop.requested:
-            wait(node, subscriptions, min(watch.wait_s for watch in watches), stop)
+            wait(node, readers, min(watch.wait_s for watch in watches), stop)
             for step in steps:
                 step()
         for watch in watches:

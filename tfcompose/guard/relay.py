@@ -74,13 +74,13 @@ class Relay:
 
     def pass_on(self, sent: TFData, message: Message, admitted: Collection[Edge] | None, who: str) -> None:
         """Pass on what is admitted of the message that ``who`` sent; None: all of it."""
-        if self._feedback and not sent.process:
-            self._feed(sent, message)  # everybody has it
+        if self._feedback and not sent.fenced:
+            self._feed(self._feedback, sent, message)  # everybody has it
             return
         gid = sent.received.gid
         may_pass = False if gid is None else self._graph.may_pass(gid)
-        if gid is None or may_pass is False:
-            self._complain(who)  # it is not fenced off, and has reached everybody, or nobody knows whose it is
+        if gid is None or not sent.fenced or may_pass is False:
+            self._complain(who)  # it has reached everybody, or nobody knows whose it is
             return
         if not who or may_pass is None:
             if message.static and len(self.waiting) < MOST_WAITING:
@@ -149,14 +149,13 @@ class Relay:
         if self._feedback:
             self._feedback.moving(data, process)
 
-    def _feed(self, sent: TFData, message: Message) -> None:
-        if self._feedback is None:
-            return
+    @staticmethod
+    def _feed(feedback: Feedback, sent: TFData, message: Message) -> None:
         if message.static:
             found = {t.child: t for t in decode(sent.received.data)}
-            self._feedback.fixed(sent.received.raw_gid or b"", found, "")
+            feedback.fixed(sent.received.raw_gid or b"", found, "")
         else:
-            self._feedback.moving(sent.received.data, "")
+            feedback.moving(sent.received.data, "")
 
     def _latch(
         self, gid: bytes, data: bytes, message: Message, admitted: Collection[Edge] | None, process: str

@@ -53,6 +53,8 @@ COLLECTED_S = 0.5
 COLLECTED_AT_MOST_S = 60.0
 #: Of so many publishers, and groups of cases, it is known that they were reported.
 MOST_REPORTED = 2000
+#: So long a flood is counted before it is reported, in seconds.
+FLOOD_COUNTED_S = 1.0
 #: So many edges have a line each when they are over; more are reported in one.
 OVER_IN_LINES = 3
 #: So long after it was first heard, an owner's latched message is surely all that is left of those before, in seconds.
@@ -309,6 +311,26 @@ class CaseMemory:
         return Case(violation, None if self.gid is None else bytes.fromhex(self.gid), last, last, reported=True)
 
 
+@dataclass(slots=True)
+class Flood:
+    """What a publisher of more undeclared edges than are judged has sent since then: messages, up to how long ones."""
+
+    since: float
+    last: float = 0.0
+    messages: int = 0
+    transforms: int = 0
+
+    def count(self, transforms: int, now: float) -> None:
+        """Count a message."""
+        self.messages, self.last, self.transforms = self.messages + 1, now, max(self.transforms, transforms)
+
+    @property
+    def hertz(self) -> float | None:
+        """How many messages came a second; None where that is not known."""
+        took_s = self.last - self.since
+        return (self.messages - 1) / took_s if self.messages > 1 and took_s > 0 else None
+
+
 class PublisherReports:
     """Publishers whose QoS or topic keeps listeners from receiving all of their messages; each is reported once.
 
@@ -350,15 +372,16 @@ class PublisherReports:
             )
         ]
 
-    def floods(self, senders: Senders, flooders: set[bytes | None]) -> list[Found]:
+    def floods(self, senders: Senders, flooders: dict[bytes | None, Flood], now: float) -> list[Found]:
         """Return the findings for publishers of more undeclared edges than are judged; forget those that have left."""
         found = []
-        for gid in [gid for gid in flooders if gid is not None]:
-            one = senders.known.get(gid)
-            if one and one.node:
-                found += self._once(one, flood(one.node, one.where))
-                if not senders.is_present(gid):
-                    flooders.discard(gid)
+        for gid, one in list(flooders.items()):
+            publisher = senders.known.get(gid) if gid is not None else None
+            if publisher is None or not publisher.node or now - one.since < FLOOD_COUNTED_S:
+                continue
+            found += self._once(publisher, flood(publisher.node, publisher.where, one.transforms, one.hertz))
+            if not senders.is_present(gid):
+                del flooders[gid]
         return found
 
     def leaks(self, publishers: Sequence[Publisher], topics: tuple[str, str]) -> list[Found]:

@@ -126,9 +126,7 @@ def _profile(plan: Plan, command: Command, topics: list[str], *, reads: bool) ->
     file = command.folder / named if named else None
     partition = partition_of(plan)
     try:
-        if reads:  # its readers stay open to everybody
-            return with_partitions(file, "data_reader", topics, f";{partition}")
-        return with_partitions(file, "data_writer", topics, partition)
+        return with_partitions(file, "data_reader" if reads else "data_writer", topics, partition)
     except RosError as error:
         message = f"guard: strict cannot add its fence to the profile file {file}: {error}"
         raise _CannotFenceError(message, "let it fence off by remapping: guard: {fence: remap}") from None

@@ -38,7 +38,7 @@ def echo(query: PoseQuery, on_pose: OnPose, stop: Stop) -> NoPose | None:
         begun = last = next_at = time.monotonic()
         given_ns: int | None = None
         while not stop.requested:
-            wait(node, data.subscriptions, 0.05, stop)
+            wait(node, data.readers, 0.05, stop)
             clock_ns = clock.now_ns()  # before what is taken, so that nothing of a time before the jump comes after it
             for each in data.take():
                 read = partial(listened.take, decoder, each)

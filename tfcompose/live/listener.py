@@ -62,7 +62,7 @@ class TreeListener:
         Raises:
             RosError: if ROS cannot take messages.
         """
-        wait(self.node, self._data.subscriptions, timeout_s, stop)
+        wait(self.node, self._data.readers, timeout_s, stop)
         sim_ns, now_ns = self.clock_ns, wall_ns()
         self.observer.observed_ns = now_ns
         taken: list[TFData] = []

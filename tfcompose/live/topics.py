@@ -11,18 +11,21 @@ from tfcompose.live.publishers import PARTICIPANT, OtherRun, Publisher, forget_o
 from tfcompose.live.state import NO_NODE
 from tfcompose.plan.topics import GLOBAL, is_fence
 from tfcompose.ros.graph import BARE_DDS, UNKNOWN_NODE, ids_say_who, own_gid, writers, writers_unmapped
-from tfcompose.ros.node import PublicTFReader, TFSubscription
+from tfcompose.ros.node import PublicTFReader, TFSubscription, middleware
 from tfcompose.ros.processes import began_at, environments, origin
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from typing import Literal
 
     from rclpy.node import Node
 
     from tfcompose.ros.graph import Writer
-    from tfcompose.ros.node import Received
+    from tfcompose.ros.node import Reader, Received
 
     Topics = tuple[str, str]
+    #: How processes are fenced off: by a partition, or by topics of each one's own; empty: they are not.
+    Fence = Literal["", "partition"] | Mapping[str, Topics]
 
 _ID_BYTES = 16
 
@@ -34,46 +37,92 @@ def id_of_topic(topic: str) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class TFData:
-    """A message as bytes, the kind of its topic, and whose own topic that is; empty: it is everybody's."""
+    """A message as bytes, the kind of its topic, and whether it was sent behind a fence.
+
+    ``process`` is whose own topic it came on; empty: that is everybody's.
+    """
 
     received: Received
     static: bool
+    fenced: bool = False
     process: str = ""
 
 
 class TFTopics:
-    """Subscriptions to a pair of TF topics (moving, fixed), and to those that processes are remapped to.
+    """What comes on a pair of TF topics (moving, fixed), and behind the fence of a strict guard, by ``fence``.
 
-    With ``deep`` they keep more messages than a listener's do. ``own`` are ids whose messages are not taken.
+    With ``deep`` more messages are kept than a listener keeps. ``own`` are ids whose messages are not taken. Call
+    ``close`` before the node ends.
     """
 
-    def __init__(
-        self, node: Node, topics: Topics, private: Mapping[str, Topics] | None = None, *, deep: bool = False
-    ) -> None:
+    def __init__(self, node: Node, topics: Topics, fence: Fence = "", *, deep: bool = False) -> None:
         self.own: set[bytes | None] = set()
-        self._subscriptions = [
-            (TFSubscription(node, static=static, topic=pair[static], deep=deep), static, process)
-            for process, pair in [("", topics), *(private or {}).items()]
+        private = ({"": topics} if fence else {}) if isinstance(fence, str) else fence
+        self._fenced = [
+            _Readable(
+                TFSubscription(node, static=static, topic=pair[static], deep=deep), static, fenced=True, process=process
+            )
+            for process, pair in private.items()
+            for static in (True, False)
+        ]
+        # What everybody sends has a port of its own, so that a flood there throws out nothing of what is fenced off.
+        apart = bool(fence) and middleware().startswith("rmw_fastrtps")
+        self._public = [
+            _Readable(
+                PublicTFReader(node, topics[static], static=static)
+                if apart
+                else TFSubscription(node, static=static, topic=topics[static], deep=deep),
+                static,
+            )
             for static in (True, False)
         ]
 
     @property
-    def subscriptions(self) -> list[TFSubscription]:
+    def readers(self) -> list[Reader]:
         """What is waited for."""
-        return [subscription for subscription, *_ in self._subscriptions]
+        return [one.reader for one in (*self._fenced, *self._public)]
 
     def take(self) -> Iterator[TFData]:
-        """Yield what has come, but from oneself.
+        """Yield what has come, but from oneself."""
+        yield from self.take_fenced()
+        yield from self.take_public()
+
+    def take_fenced(self) -> Iterator[TFData]:
+        """Yield what has come behind the fence, but from oneself."""
+        return self._take(self._fenced)
+
+    def take_public(self) -> Iterator[TFData]:
+        """Yield what has come on everybody's topics, but from oneself."""
+        return self._take(self._public)
+
+    def close(self) -> None:
+        """End the readers that the node does not end."""
+        for one in self._public:
+            if isinstance(one.reader, PublicTFReader):
+                one.reader.close()
+
+    def _take(self, readable: Sequence[_Readable]) -> Iterator[TFData]:
+        """Yield what has come there.
 
         What comes on a process's own topic is of that process, also where the rmw does not say whose it is.
         """
-        for subscription, static, process in self._subscriptions:
-            for received in subscription.take():
+        for one in readable:
+            for received in one.reader.take():
                 if received.raw_gid in self.own and received.raw_gid is not None:
                     continue
-                if process and received.gid is None:
-                    received = replace(received, gid=id_of_topic(subscription.topic))  # noqa: PLW2901 (the same message)
-                yield TFData(received, static, process)
+                if one.process and received.gid is None:
+                    received = replace(received, gid=id_of_topic(one.reader.topic))  # noqa: PLW2901 (the same message)
+                yield TFData(received, one.static, one.fenced, one.process)
+
+
+@dataclass(frozen=True, slots=True)
+class _Readable:
+    """A reader, and what holds for all that comes there, as in ``TFData``."""
+
+    reader: Reader
+    static: bool
+    fenced: bool = False
+    process: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,18 +205,10 @@ class TFGraph:
         self._own = b""
         #: Those who were heard outside of the fence's partition.
         self._public: dict[bytes, None] = {}
-        fenced = ours is not None and bool(ours.profile)
-        self._readers = [PublicTFReader(node, topics[fixed], static=fixed) for fixed in (False, True)] if fenced else []
 
-    def close(self) -> None:
-        """End its readers, before the node ends."""
-        for reader in self._readers:
-            reader.close()
-
-    def hear_public(self) -> None:
-        """Note who is heard outside of the fence's partition, as every listener hears them."""
-        for reader in self._readers:
-            self._public |= dict.fromkeys(reader.senders())
+    def hear_public(self, senders: Iterable[bytes]) -> None:
+        """Note who is heard outside of the fence, as every listener hears them."""
+        self._public |= dict.fromkeys(senders)
 
     def publishers(self) -> list[Publisher]:
         """Return who publishes now: on the pair of topics, and on those that processes are remapped to."""

@@ -234,4 +234,5 @@ def rcl() -> ctypes.CDLL:
     library.rmw_create_subscription.argtypes = (*(ctypes.c_void_p,) * 2, ctypes.c_char_p, *(ctypes.c_void_p,) * 2)
     library.rmw_take_serialized_message_with_info.argtypes = (ctypes.c_void_p,) * 5
     library.rmw_destroy_subscription.argtypes = (ctypes.c_void_p,) * 2
+    library.rmw_subscription_set_on_new_message_callback.argtypes = (ctypes.c_void_p,) * 3
     return library

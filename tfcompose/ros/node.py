@@ -11,6 +11,7 @@ import ctypes
 import faulthandler
 import os
 import weakref
+from abc import ABC, abstractmethod
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,6 +44,7 @@ LEAVE_S = 3.0
 _OK = 0
 _TAKE_FAILED = 401  # RCL_RET_SUBSCRIPTION_TAKE_FAILED: nothing is there
 _NO_GID = bytes(16)
+_OPTIONALLY = 2  # RMW_UNIQUE_NETWORK_FLOW_ENDPOINTS_OPTIONALLY_REQUIRED
 # What one take returns at most, so that a flood does not keep the caller from its signals.
 _MOST_AT_ONCE = 1000
 
@@ -229,29 +231,20 @@ class TFPublisher:
         self.publisher.publish(data)
 
 
-class Subscription:
-    """A subscription of any type, taken as bytes and never called back."""
+class Reader(ABC):
+    """Something that messages of one topic are taken from as bytes, and that ``wait`` waits for."""
 
-    def __init__(self, node: Node, message_type: Any, topic: str, qos: QoSProfile) -> None:
-        self.subscription: Any = node.create_subscription(message_type, topic, _ignore, qos, raw=True)
-        self._says_who = ids_say_who(node)
+    def __init__(self, topic: str, *, says_who: bool) -> None:
+        self._topic, self._says_who = topic, says_who
         library = rcl()
         self._bytes = _Bytes(allocator=library.rcutils_get_default_allocator())
         self._info = _MessageInfo()
-        self._take = library.rcl_take_serialized_message
-        self._arguments = (
-            ctypes.c_void_p(self.subscription.handle.pointer),
-            ctypes.byref(self._bytes),
-            ctypes.byref(self._info),
-            None,
-        )
         weakref.finalize(self, library.rcutils_uint8_array_fini, ctypes.byref(self._bytes))
 
     @property
     def topic(self) -> str:
         """The topic's full name."""
-        name: str = self.subscription.topic_name
-        return name
+        return self._topic
 
     def take(self) -> list[Received]:
         """Return all that has come since the last time, oldest first, and wait for nothing.
@@ -260,15 +253,17 @@ class Subscription:
             RosError: if rcl cannot take from this subscription.
         """
         found: list[Received] = []
-        while len(found) < _MOST_AT_ONCE:
-            result = self._take(*self._arguments)
-            if result == _TAKE_FAILED:
-                break
-            if result != _OK:
-                rcl().rcutils_reset_error()
-                raise RosError(f"rcl cannot take a message from {self.subscription.topic_name} (code {result})")
+        while len(found) < _MOST_AT_ONCE and self._take_one():
             found.append(self._received())
         return found
+
+    @abstractmethod
+    def _take_one(self) -> bool:
+        """Take a message into the buffer, and return whether there was one."""
+
+    @abstractmethod
+    def add_to(self, wait_set: Any) -> None:
+        """Have rclpy's wait set wait for it."""
 
     def _received(self) -> Received:
         info = self._info
@@ -281,6 +276,32 @@ class Subscription:
             sequence=info.publication_sequence,
             raw_gid=gid,
         )
+
+
+class Subscription(Reader):
+    """A subscription of any type, taken as bytes and never called back."""
+
+    def __init__(self, node: Node, message_type: Any, topic: str, qos: QoSProfile) -> None:
+        self.subscription: Any = node.create_subscription(message_type, topic, _ignore, qos, raw=True)
+        super().__init__(self.subscription.topic_name, says_who=ids_say_who(node))
+        self._take = rcl().rcl_take_serialized_message
+        self._arguments = (
+            ctypes.c_void_p(self.subscription.handle.pointer),
+            ctypes.byref(self._bytes),
+            ctypes.byref(self._info),
+            None,
+        )
+
+    def add_to(self, wait_set: Any) -> None:
+        """Have rclpy's wait set wait for it."""
+        wait_set.add_subscription(self.subscription.handle)
+
+    def _take_one(self) -> bool:
+        result = self._take(*self._arguments)
+        if result not in (_OK, _TAKE_FAILED):
+            rcl().rcutils_reset_error()
+            raise RosError(f"rcl cannot take a message from {self.topic} (code {result})")
+        return bool(result == _OK)
 
 
 class TFSubscription(Subscription):
@@ -328,62 +349,76 @@ class _Options(ctypes.Structure):
     )
 
 
-class PublicTFReader:
-    """Says who sends on a TF topic outside of all partitions, whatever partitions this process's profiles add.
+class PublicTFReader(Reader):
+    """Reads a TF topic outside of all partitions, whatever partitions this process's profiles add, by its own port.
 
     Profiles of readers go by the topic's name in ROS. This reader is of the same DDS topic under no name of ROS's, made
-    with rmw itself: rcl takes names only that begin with a slash. Call ``close`` before the node ends.
+    with rmw itself: rcl takes names only that begin with a slash. What is sent to it has a port of its own, where that
+    can be had: a flood there throws nothing out of what waits at the process's port for its other readers. It keeps as
+    much as a deep ``TFSubscription``. Call ``close`` before the node ends.
 
     Raises:
-        RosError: if rmw makes no such reader.
+        RosError: if rmw makes no such reader, or does not say when something comes.
     """
 
     def __init__(self, node: Node, topic: str, *, static: bool) -> None:
         library = rcl()
-        profile = TF_STATIC_READER if static else TF_READER
+        super().__init__(node.resolve_topic_name(topic), says_who=ids_say_who(node))
+        profile = DEEP_TF_STATIC_READER if static else DEEP_TF_READER
         numbers = (int(profile.history), profile.depth, int(profile.reliability), int(profile.durability))
         qos = _Qos(*numbers, avoid_ros_namespace_conventions=True)
-        self._depth, self._type = profile.depth, tf_message_type()
+        self._type = tf_message_type()
         self._node = ctypes.c_void_p(library.rcl_node_get_rmw_handle(node.handle.pointer))
-        support, options = ctypes.c_void_p(capsule_address(self._type._TYPE_SUPPORT)), _Options()  # noqa: SLF001 (what rclpy takes of a message's class)
-        named = (f"rt{node.resolve_topic_name(topic)}".encode(), ctypes.byref(qos), ctypes.byref(options))
+        support = ctypes.c_void_p(capsule_address(self._type._TYPE_SUPPORT))  # noqa: SLF001 (what rclpy takes of a message's class)
+        options = _Options(unique_network_flow_endpoints=_OPTIONALLY)
+        named = (f"rt{self.topic}".encode(), ctypes.byref(qos), ctypes.byref(options))
         made = library.rmw_create_subscription(self._node, support, *named)
         if not made:
             library.rcutils_reset_error()
             raise RosError(f"rmw makes no reader of {topic} outside of partitions")
         self._reader: ctypes.c_void_p | None = ctypes.c_void_p(made)
-        self._bytes = _Bytes(allocator=library.rcutils_get_default_allocator())
-        weakref.finalize(self, library.rcutils_uint8_array_fini, ctypes.byref(self._bytes))
+        self._taken = ctypes.c_bool()
+        taken, info = ctypes.byref(self._taken), ctypes.byref(self._info)
+        self._arguments = (self._reader, ctypes.byref(self._bytes), taken, info, None)
+        self._came = _rclpy.GuardCondition(node.context.handle)
+        # Whatever thread of DDS's the message came in calls rcl's function itself, without Python.
+        trigger = ctypes.cast(library.rcl_trigger_guard_condition, ctypes.c_void_p)
+        condition = ctypes.c_void_p(self._came.pointer)
+        if library.rmw_subscription_set_on_new_message_callback(self._reader, trigger, condition) != _OK:
+            library.rcutils_reset_error()
+            self.close()
+            raise RosError(f"rmw does not say when something comes on {topic}")
 
-    def senders(self) -> set[bytes]:
-        """Return the ids of those whose messages have come since the last time; at most a hundred messages count."""
-        library, info, taken, found = rcl(), _MessageInfo(), ctypes.c_bool(), set[bytes]()
-        where = (self._reader, ctypes.byref(self._bytes), ctypes.byref(taken), ctypes.byref(info), None)
-        for _ in range(self._depth if self._reader else 0):
-            if library.rmw_take_serialized_message_with_info(*where) != _OK or not taken.value:
-                break
-            found.add(bytes(info.gid))
-        return found
+    def add_to(self, wait_set: Any) -> None:
+        """Have rclpy's wait set wait for it."""
+        wait_set.add_guard_condition(self._came)
 
     def close(self) -> None:
         """End the reader."""
         if self._reader:
+            rcl().rmw_subscription_set_on_new_message_callback(self._reader, None, None)
             rcl().rmw_destroy_subscription(self._node, self._reader)
             self._reader = None
 
+    def _take_one(self) -> bool:
+        if self._reader is None:
+            return False
+        result = rcl().rmw_take_serialized_message_with_info(*self._arguments)
+        return result == _OK and self._taken.value
 
-def wait(node: Node, subscriptions: Sequence[Subscription], timeout_s: float | None, stop: Stop) -> None:
-    """Wait until a subscription has something, the time is over (None: never) or ``stop`` is requested.
+
+def wait(node: Node, readers: Sequence[Reader], timeout_s: float | None, stop: Stop) -> None:
+    """Wait until a reader has something, the time is over (None: never) or ``stop`` is requested.
 
     A new publisher or reader in the graph ends no wait. Nothing is taken.
     """
     if stop.requested:
         return
     context = node.context.handle
-    wait_set = _rclpy.WaitSet(len(subscriptions), 1, 0, 0, 0, 0, context)
+    wait_set = _rclpy.WaitSet(len(readers), 1 + len(readers), 0, 0, 0, 0, context)
     wait_set.add_guard_condition(stop.waker(context, lambda: _rclpy.GuardCondition(context)))
-    for subscription in subscriptions:
-        wait_set.add_subscription(subscription.subscription.handle)
+    for reader in readers:
+        reader.add_to(wait_set)
     wait_set.wait(-1 if timeout_s is None else max(0, int(timeout_s * 1e9)))
 
 

@@ -51,9 +51,13 @@ def topics_message(edges: str, topics: Sequence[tuple[str, str]], declared: str 
     return f"{edges} {'are' if several else 'is'} published {on}{', declared for ' if declared else ''}{declared}"
 
 
-def flood(node: str, where: str) -> Finding:
-    """Return the finding for a publisher of more undeclared edges than the guard judges."""
-    message = f"{node} publishes more undeclared edges than the guard judges: only its declared ones are judged now"
+def flood(node: str, where: str, transforms: int, hertz: float | None) -> Finding:
+    """Return the finding for a publisher of more undeclared edges than the guard judges.
+
+    Its messages have up to so many transforms and come so often; ``hertz`` is None where that is not known.
+    """
+    rate = f" at {hertz:.3g} Hz" if hertz else ""
+    message = f"{node} sends {transforms:,} frames{rate}, more than are judged: only its declared edges are"
     notes = [Note(f"{node} runs {where}")] if where else []
     return finding("TF853", message, None, notes=notes, help=f"end {node}, or let it use the same frames again")
 

@@ -69,6 +69,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "findings",
         "geometry",
         "language",
+        "live",
         "load",
         "model",
         "numbers",

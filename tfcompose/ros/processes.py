@@ -119,6 +119,15 @@ def _command(pid: int) -> str:
         return ""
 
 
+def words_of(pid: int) -> list[str]:
+    """Return the words of a process's command line, none where they cannot be had."""
+    try:
+        data = (_PROC / str(pid) / "cmdline").read_bytes()
+    except OSError:
+        return []
+    return [word.decode(errors="replace") for word in data.rstrip(b"\0").split(b"\0")] if data else []
+
+
 def _shown(command: bytes) -> str:
     line = " ".join(command.decode(errors="replace").replace("\0", " ").split())
     line = "".join(c if c.isprintable() else "?" for c in line)

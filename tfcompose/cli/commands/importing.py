@@ -1,8 +1,9 @@
-"""Import URDF, xacro, launch files, shell scripts or a running robot.
+"""Write a robot file from URDF, launch files, scripts or a running robot.
 
-Write a robot file from a URDF or xacro file, which builds to the same URDF; or from a shell script with ros2 run lines.
-Chains of frames that match a preset become sensors. What a robot file cannot say is a TODO comment with its file and
-line, and a finding.
+A URDF or xacro file: building the result gives the same URDF, and chains of frames that match a preset become sensors.
+A launch file or a shell script: processes, and frames of static transforms. A running tree, a recording: frames with
+their owners. Clearpath's robot.yaml and Autoware's calibrations. What a robot file cannot say is a TODO comment with
+its file and line, and a finding.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import pairs
+from tfcompose.cli.options import add_bag, add_for, namespace, pairs
 from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, reject
 
 if TYPE_CHECKING:
@@ -34,9 +35,17 @@ _ROBOT = re.compile(r"[a-z][a-z0-9_]*")
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument(
-        "file", metavar="FILE", help="a .urdf, .xacro or launch file, or a shell script; -: lines from stdin"
+        "file", nargs="?", metavar="FILE",
+        help="URDF, xacro, a launch file, a shell script, Clearpath's robot.yaml or calibrations of Autoware's; "
+        "-: lines from stdin",
+    )  # fmt: skip
+    parser.add_argument(
+        "args", nargs="*", metavar="NAME:=VALUE", help="arguments of the xacro or launch file; or further calibrations"
     )
-    parser.add_argument("args", nargs="*", metavar="NAME:=VALUE", help="arguments of the xacro or launch file")
+    parser.add_argument("--live", action="store_true", help="import the running tree")
+    add_bag(parser, "import a recording")
+    add_for(parser, "with --live, observe for S seconds; default: 10", 10.0)
+    parser.add_argument("--namespace", type=namespace, default="", help="of the topics tf and tf_static")
     parser.add_argument("-o", "--output", metavar="FILE", help="write the robot file here; default: print it")
     parser.add_argument("--force", action="store_true", help="overwrite an existing file")
     parser.add_argument("--robot", metavar="NAME", help="the robot's name; default: the source's")
@@ -57,6 +66,8 @@ def run(arguments: Namespace) -> int:
 
     _check_use(arguments)
     try:
+        if arguments.live or arguments.bag:
+            return _import_observed(arguments)
         if arguments.file.endswith((".urdf", ".xacro")):
             return _import_urdf(arguments)
         return _import_bringup(arguments)
@@ -93,11 +104,58 @@ def _import_bringup(arguments: Namespace) -> int:
     name = "stdin" if arguments.file == STDIN else posixpath.basename(arguments.file)
     wanted = arguments.robot or robot_name(name.partition(".")[0] if name != "stdin" else "robot")
     draft = Draft(wanted, [f"imported from {name} by tfcompose"])
-    if arguments.file.endswith(_LAUNCH):
+    if _is_kit(arguments.file):
+        _add_kits(draft, arguments)
+    elif arguments.file.endswith(_LAUNCH):
         _add_launch(draft, arguments)
     else:
         shown = arguments.file if arguments.file != STDIN else "<stdin>"
         add_script(draft, read_text(arguments.file), shown, _target(arguments))
+    return _finish(draft, arguments)
+
+
+def _is_kit(file: str) -> bool:
+    """Return whether it is a YAML file, and no launch file."""
+    from tfcompose.cli.reading import read_text
+    from tfcompose.load import load
+
+    return file.endswith((".yaml", ".yml")) and "launch" not in load(read_text(file), file).data
+
+
+def _add_kits(draft: Draft, arguments: Namespace) -> None:
+    from tfcompose.cli.reading import read_text
+    from tfcompose.importing.kits import add_kit
+    from tfcompose.load import load
+
+    target = _target(arguments)
+    for package, folder in pairs(arguments.packages, "=").items():
+        draft.sections["packages"][package] = target.from_folder(folder)
+    for file in (arguments.file, *arguments.args):
+        add_kit(draft, load(read_text(file), file))
+
+
+def _import_observed(arguments: Namespace) -> int:
+    """Import what is published, or was recorded."""
+    from tfcompose.cli.live import observe, read_bag
+    from tfcompose.importing.draft import Draft, robot_name
+    from tfcompose.importing.observed import Observed
+    from tfcompose.live.edges import SETTLE_S, TreeObserver
+    from tfcompose.plan.topics import topics_below
+    from tfcompose.ros.processes import words_of
+
+    observer = TreeObserver(settle_s=0.0 if arguments.bag else SETTLE_S)
+    topics = topics_below(arguments.namespace)
+    if arguments.bag:
+        read_bag(arguments.bag, {topics: observer})
+        name = Path(arguments.bag).stem
+        head = f"imported from the recording {name} by tfcompose"
+    else:
+        observe("tfcompose_import", {topics: observer}, duration_s=arguments.duration)
+        name, head = "robot", "imported from a running robot by tfcompose"
+    draft = Draft(arguments.robot or robot_name(name), [head])
+    if arguments.namespace:
+        draft.sections["ros"] |= {"namespace": arguments.namespace, "isolate": "topics"}
+    Observed(draft, observer.publishers.where, words_of).add(observer.edges(observer.until_ns))
     return _finish(draft, arguments)
 
 
@@ -150,8 +208,10 @@ def _check_use(arguments: Namespace) -> None:
     Raises:
         SystemExit: after saying so.
     """
-    if Path(arguments.file).suffix not in _ENDINGS:
-        fail(f"{arguments.file}: only URDF, xacro and launch files and shell scripts can be imported", UNREADABLE)
+    if bool(arguments.file) + arguments.live + bool(arguments.bag) != 1:
+        fail("name one source: a file, --live or --bag", UNREADABLE)
+    if arguments.file and Path(arguments.file).suffix not in _ENDINGS:
+        fail(f"{arguments.file}: only URDF, xacro, launch and YAML files and shell scripts can be imported", UNREADABLE)
     if arguments.robot and not _ROBOT.fullmatch(arguments.robot):
         fail(f"--robot {arguments.robot}: use lower case letters, digits and _, beginning with a letter", UNREADABLE)
     if arguments.output and Path(arguments.output).exists() and not arguments.force:

@@ -1,0 +1,121 @@
+"""Clearpath's robot.yaml and Autoware's calibration files, imported."""
+
+from pathlib import Path
+
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.support.bringups import compiled, import_of, places, printed_errors
+from tests.support.importing import PRESETS
+from tfcompose.cli import compiling, main
+from tfcompose.geometry import angle_between
+
+
+@pytest.fixture(autouse=True)
+def _one_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiling, "library", lambda: PRESETS)
+
+
+SENSORS = """base_link:
+  sensor_kit_base_link: {x: 0.9, y: 0.0, z: 2.0, roll: -0.001, pitch: 0.015, yaw: -0.0364}
+"""
+KIT = """sensor_kit_base_link:
+  camera0/camera_link:
+    x: 0.10731
+    y: 0.56343
+    z: -0.27697
+    roll: -0.025
+    pitch: 0.315
+    yaw: 1.035
+  gnss_link: {x: -0.1, y: 0.0, z: -0.2, roll: 0.0, pitch: 0.0, yaw: 0.0, spare: 1}
+"""
+
+
+def test_calibrations_of_autoware_are_frames(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "sensor_kit_calibration.yaml").write_text(KIT, encoding="utf-8")
+    source = tmp_path / "sensors_calibration.yaml"
+    source.write_text(SENSORS, encoding="utf-8")
+    text, data = import_of(source, str(tmp_path / "sensor_kit_calibration.yaml"))
+    assert list(data["frames"]) == ["base_link", "sensor_kit_base_link", "camera0/camera_link", "gnss_link"]
+    robot = compiled(text, tmp_path).robot
+    assert robot
+    camera = next(edge for edge in robot.edges if edge.child == "camera0/camera_link")
+    assert camera.pose.xyz == (0.10731, 0.56343, -0.27697)
+    expected = Rotation.from_euler("xyz", (-0.025, 0.315, 1.035)).as_quat()
+    assert angle_between(camera.pose.quat_xyzw, tuple(expected)) < 1e-9
+    assert places(printed_errors(capsys), "TF020") == ["sensor_kit_calibration.yaml:9"]
+
+
+XACRO = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro">'
+BASE = '<link name="base_link"/><link name="top"/><joint name="t" type="fixed"><parent link="base_link"/>'
+JOINT = '<joint name="${name}_joint" type="fixed"><xacro:insert_block name="origin"/><parent link="${parent_link}"/>'
+#: Macros in the places and with the parameters of Clearpath's; the figures are made up.
+FILES = {
+    "clearpath_platform_description/urdf/common.urdf.xacro": '<xacro:macro name="nothing"/>',
+    "clearpath_platform_description/urdf/a200/a200.urdf.xacro": (
+        '<xacro:arg name="is_sim" default="false"/><xacro:macro name="a200" params="wheel:=default">'
+        f'{BASE}<child link="top"/><origin xyz="0 0 0.2"/></joint></xacro:macro>'
+    ),
+    "clearpath_mounts_description/urdf/pacs/bracket.urdf.xacro": (
+        '<xacro:macro name="bracket" params="name parent_link model:=none *origin"><link name="${name}_mount"/>'
+        f'{JOINT}<child link="${{name}}_mount"/></joint></xacro:macro>'
+    ),
+    "clearpath_sensors_description/urdf/hokuyo_ust.urdf.xacro": (
+        '<xacro:macro name="hokuyo_ust" params="name parent_link *origin"><link name="${name}_link"/>'
+        f'<xacro:unless value="$(arg is_sim)">{JOINT}<child link="${{name}}_link"/></joint></xacro:unless>'
+        "</xacro:macro>"
+    ),
+}
+CLEARPATH = """serial_number: a200-0000
+version: 0
+system:
+  hosts: []
+  ros2: {namespace: a200_0000}
+mounts:
+  bracket:
+  - parent: top
+    xyz: [0.1, 0.0, 0.05]
+    rpy: [0.0, 0.0, 0.5]
+    model: horizontal
+sensors:
+  lidar2d:
+  - model: hokuyo_ust
+    urdf_enabled: true
+    launch_enabled: true
+    parent: bracket_0_mount
+    xyz: [0.0, 0.0, 0.01]
+    rpy: [0.0, 0.0, 0.0]
+    ros_parameters: {urg_node: {ip_address: 192.168.131.20}}
+  - {model: sick_lms1xx, urdf_enabled: false, parent: top, xyz: [0, 0, 0], rpy: [0, 0, 0]}
+"""
+
+
+def test_clearpaths_robot_has_the_frames_of_its_macros(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name, macro in FILES.items():
+        file = tmp_path / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(f"{XACRO}{macro}</robot>", encoding="utf-8")
+    source = tmp_path / "robot.yaml"
+    source.write_text(CLEARPATH, encoding="utf-8")
+    packages = dict.fromkeys(name.partition("/")[0] for name in FILES)
+    words = [word for name in packages for word in ("--package", f"{name}={tmp_path / name}")]
+    text, data = import_of(source, *words)
+    assert data["ros"] == {"namespace": "a200_0000", "isolate": "topics"}
+    assert list(data["parts"]) == ["platform", "bracket_0", "lidar2d_0"]
+    robot = compiled(text, tmp_path).robot
+    assert robot
+    assert {(edge.name, edge.pose.xyz) for edge in robot.edges} == {
+        ("base_link → top", (0, 0, 0.2)),
+        ("top → bracket_0_mount", (0.1, 0, 0.05)),
+        ("bracket_0_mount → lidar2d_0_link", (0, 0, 0.01)),
+    }
+    lines = [
+        CLEARPATH[: CLEARPATH.index(words)].count("\n") + 1 for words in ("hosts", "model: hokuyo", "{model: sick")
+    ]
+    assert sorted(places(printed_errors(capsys), "TF020")) == sorted(f"robot.yaml:{line}" for line in lines)
+
+
+def test_another_yaml_file_is_refused(tmp_path: Path) -> None:
+    source = tmp_path / "other.yaml"
+    source.write_text("a: {b: 1}\n", encoding="utf-8")
+    assert main(["import", str(source)]) == 1

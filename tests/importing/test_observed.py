@@ -1,0 +1,72 @@
+"""Trees that were observed, live or in a bag, imported."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.support.bags import START_S, UP, write_bag
+from tests.support.bringups import compiled
+from tests.support.tree_history import END_NS, TreeHistory, sound_tree
+from tfcompose.cli import main
+from tfcompose.importing.draft import Draft
+from tfcompose.importing.observed import Observed, round_rate, started_by
+from tfcompose.load import load
+
+
+def drafted(history: TreeHistory, where: str = "", words: tuple[str, ...] = ()) -> Draft:
+    draft = Draft("rover")
+    Observed(draft, lambda _: where, lambda _: words).add(history.observer.edges(END_NS))
+    return draft
+
+
+def test_edges_have_their_values_rates_and_owners(tmp_path: Path) -> None:
+    words = ("/opt/ros/jazzy/lib/drive/driver", "--fast", "--ros-args", "-r", "__node:=drive")
+    draft = drafted(sound_tree(), "on this machine as pid 7: …", words)
+    data = load(draft.text(), "robot.yaml").data
+    assert data["frames"] == {
+        "odom": {},
+        "base_link": {"parent": "odom", "owner": "drive", "rate": "50 Hz"},
+        "laser": {"parent": "base_link", "owner": "static_2", "static": True},
+    }
+    assert data["processes"] == {
+        "drive": {"external": True}, "static_2": {"external": True, "node": "/static"},
+    }  # fmt: skip
+    assert "package: drive, executable: driver, args: [" in draft.text()
+    result = compiled(draft.text(), tmp_path)
+    assert result.robot
+    assert not result.errors
+
+
+def test_a_second_publisher_is_named() -> None:
+    draft = drafted(sound_tree().moving("map base_link", b"x"))
+    assert [one.code for one in draft.found] == ["TF020"]
+
+
+@pytest.mark.parametrize(
+    ("measured", "meant"),
+    [(49.7, 50), (10.02, 10), (29.4, 30), (0.99, 1), (7.49, 7.5), (43.9, 43), (201, 200), (None, None), (0.0, None)],
+)
+def test_rates_are_round_where_a_round_one_is_near(measured: float | None, meant: float | None) -> None:
+    assert round_rate(measured) == meant
+
+
+def test_a_command_line_names_its_package() -> None:
+    assert started_by(("python3", "/ws/install/drive/lib/drive/node", "-v")) == {
+        "package": "drive", "executable": "node", "args": ["-v"],
+    }  # fmt: skip
+    assert started_by(("/usr/bin/rviz2",)) == {}
+    assert started_by(()) == {}
+
+
+def test_a_bag_becomes_a_robot_that_verify_finds_in_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    turned = (0.0, 0.0, 0.38268343236508984, 0.9238795325112867)
+    sent = [("/tf_static", 0.0, "base_link", "laser", 0.0, (0.1, 0.0, 0.25), turned)]
+    sent += [("/tf", tick / 20, "odom", "base_link", tick / 20, (tick / 20, 0.0, 0.0), UP) for tick in range(100)]
+    bag, out = write_bag(tmp_path / "bag", sent), tmp_path / "robot.yaml"
+    assert START_S
+    assert main(["import", "--bag", str(bag), "-o", str(out)]) == 0
+    data = load(out.read_text("utf-8"), str(out)).data
+    assert data["frames"]["laser"] == {"parent": "base_link", "xyz": [0.1, 0, 0.25], "rpy": [0, 0, "45 deg"]}
+    assert data["frames"]["base_link"] == {"parent": "odom", "owner": "recorded", "rate": "20 Hz"}
+    capsys.readouterr()
+    assert main(["verify", str(out), "--bag", str(bag)]) == 0, capsys.readouterr().out

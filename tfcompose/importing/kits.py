@@ -1,0 +1,238 @@
+"""Clearpath's ``robot.yaml`` and Autoware's calibration files, as drafts of robot files.
+
+Clearpath's generator calls a xacro macro of its packages for the platform and for each attachment, mount, sensor and
+manipulator (read in clearpath_common and clearpath_config): so do the parts here, under the same names.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.findings import RejectedError, Span, finding
+from tfcompose.geometry import Pose, quat_from_rpy
+from tfcompose.importing.draft import pose_keys
+from tfcompose.importing.programs import where
+
+if TYPE_CHECKING:
+    from tfcompose.geometry import Vector
+    from tfcompose.importing.draft import Draft
+    from tfcompose.load import Path, Source
+
+_AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+#: Of Clearpath's mounts those that are in a folder of their own.
+_PACS = frozenset({"bracket", "riser"})
+#: What all macros are written for: the generated robot includes it.
+_COMMON = "package://clearpath_platform_description/urdf/common.urdf.xacro"
+#: What of an entry the macro's call has, and not its parameters.
+_OF_CALL = frozenset({"parent", "xyz", "rpy", "name", "type", "enabled", "urdf_enabled"})
+_LINKS = ("box", "cylinder", "frame", "mesh", "sphere")
+_NUMBERED = re.compile(r"([a-z]+[0-9]+)-")
+
+
+def is_clearpath(source: Source) -> bool:
+    """Return whether it is a robot.yaml of Clearpath's."""
+    data = source.data
+    return isinstance(data.get("serial_number"), str) and bool(
+        data.keys() & {"platform", "system", "sensors", "mounts"}
+    )
+
+
+def is_autoware(source: Source) -> bool:
+    """Return whether it is a calibration of Autoware's: frames below their parents, each with x, y, z and angles."""
+    return bool(source.data) and all(
+        isinstance(children, dict)
+        and bool(children)
+        and all(isinstance(child, dict) and {"x", "y", "z"} <= child.keys() for child in children.values())
+        for children in source.data.values()
+    )
+
+
+def add_autoware(draft: Draft, source: Source) -> None:
+    """Add the frames of a calibration file."""
+    draft.note(("", ""), f"{source.file}: calibration: FILE at a frame reads its pose from the file instead")
+    for parent, children in source.data.items():
+        for child, values in children.items():
+            path: Path = (parent, child)
+            at = source.at_key(path)
+            numbers = [values.get(axis, 0.0) for axis in _AXES]
+            if not all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in numbers):
+                draft.todo(f"{child}: its values are no numbers", at)
+                continue
+            x, y, z, roll, pitch, yaw = map(float, numbers)
+            rpy = (roll, pitch, yaw)
+            pose = Pose((x, y, z), quat_from_rpy(*rpy))
+            draft.frame(str(parent), str(child), pose_keys(pose, rpy), at, where(at))
+            left = sorted(values.keys() - set(_AXES))
+            if left:
+                draft.todo(f"{child}: {', '.join(left)}", at, ("frames", str(child)))
+
+
+def _words(value: Any) -> Any:
+    """Return a macro's parameter: of a list its words, as URDF has them."""
+    return " ".join(map(str, value)) if isinstance(value, list) else value
+
+
+class _Clearpath:
+    """Reads one robot.yaml."""
+
+    def __init__(self, draft: Draft, source: Source) -> None:
+        self.draft, self.source, self.data = draft, source, source.data
+        found = _NUMBERED.match(source.data["serial_number"])
+        self.platform = found[1] if found else ""
+
+    def add(self) -> None:
+        """Add all sections."""
+        self._system()
+        self._platform()
+        for kind in _LINKS:
+            for index, path, entry in self._entries("links", kind):
+                name = entry.get("name", f"{kind}_{index}")
+                file = f"clearpath_platform_description/urdf/links/{kind}.urdf.xacro"
+                self._part(name, file, kind, entry, path)
+        for kind in self._kinds("mounts"):
+            for index, path, entry in self._entries("mounts", kind):
+                folder = "urdf/pacs" if kind in _PACS else "urdf"
+                file = f"clearpath_mounts_description/{folder}/{kind}.urdf.xacro"
+                self._part(f"{kind}_{index}", file, kind, entry, path)
+        for kind in self._kinds("sensors"):
+            for index, path, entry in self._entries("sensors", kind):
+                self._sensor(f"{kind}_{index}", entry, path)
+        for kind in self._kinds("manipulators"):
+            self._manipulators(kind)
+        known = {"serial_number", "version", "system", "platform", "links", "mounts", "sensors", "manipulators"}
+        for key in self.data.keys() - known:
+            self.draft.todo(f"{key}", self.source.at_key((key,)))
+
+    def _kinds(self, section: str) -> list[str]:
+        found = self.data.get(section)
+        return [kind for kind, several in found.items() if several] if isinstance(found, dict) else []
+
+    def _entries(self, section: str, kind: str) -> list[tuple[int, Path, dict[str, Any]]]:
+        found = self.data.get(section)
+        several = found.get(kind) if isinstance(found, dict) else None
+        listed = several if isinstance(several, list) else []
+        return [(i, (section, kind, i), one) for i, one in enumerate(listed) if isinstance(one, dict)]
+
+    def _system(self) -> None:
+        system = self.data.get("system")
+        ros = system.get("ros2") if isinstance(system, dict) else None
+        settings = ros if isinstance(ros, dict) else {}
+        namespace = str(settings.get("namespace") or "").strip("/")
+        if namespace:
+            self.draft.sections["ros"] |= {"namespace": namespace, "isolate": "topics"}
+            self.draft.note(("ros", "namespace"), where(self.source.at_key(("system", "ros2", "namespace"))))
+        domain = settings.get("domain_id")
+        if isinstance(domain, int):
+            self.draft.sections["ros"]["domain_id"] = domain
+        for key in settings.keys() - {"namespace", "domain_id"}:
+            self.draft.todo(f"system.ros2.{key}: {settings[key]}", self.source.at_key(("system", "ros2", key)))
+        for key in system.keys() - {"ros2"} if isinstance(system, dict) else ():
+            self.draft.todo(f"system.{key}", self.source.at_key(("system", key)))
+
+    def _platform(self) -> None:
+        platform = self.data.get("platform")
+        given = platform if isinstance(platform, dict) else {}
+        at = self.source.at_key(("serial_number",))
+        if not self.platform or self.platform == "generic":
+            self.draft.todo(f"the platform {self.data['serial_number']}: its description is of its own", at)
+        else:
+            model = self.platform
+            wheel = {"wheel": given.get("wheel", "default")}
+            keys = {"xacro": self._of_platform(), "macro": model, "params": wheel, "include": [_COMMON]}
+            self.draft.sections["parts"]["platform"] = keys
+            self.draft.note(("parts", "platform"), where(at))
+        attachments = given.get("attachments")
+        for index, entry in enumerate(attachments if isinstance(attachments, list) else []):
+            path: Path = ("platform", "attachments", index)
+            if not isinstance(entry, dict):
+                continue
+            of, _, kind = str(entry.get("type", "")).rpartition(".")
+            if entry.get("enabled") is False:
+                self.draft.todo(f"the attachment {entry.get('name')} is not enabled", self.source.at(path))
+                continue
+            file = f"clearpath_platform_description/urdf/{of or self.platform}/attachments/{kind}.urdf.xacro"
+            self._part(str(entry.get("name", f"{kind}_{index}")), file, kind, entry, path)
+        for key in given.keys() - {"attachments", "wheel"}:
+            self.draft.todo(f"platform.{key}", self.source.at_key(("platform", key)))
+
+    def _of_platform(self) -> str:
+        return f"package://clearpath_platform_description/urdf/{self.platform}/{self.platform}.urdf.xacro"
+
+    def _part(self, name: str, file: str, macro: str, entry: dict[str, Any], path: Path) -> None:
+        """Add what the generator calls a macro for."""
+        at = self.source.at(path)
+        params: dict[str, Any] = {"name": name, "parent_link": entry.get("parent", "base_link")}
+        origin = self._origin(entry, path)
+        params |= {key: _words(value) for key, value in entry.items() if key not in _OF_CALL}
+        params["origin"] = origin
+        include = [_COMMON]
+        if path[0] in {"sensors", "manipulators"} and self.platform:  # which take the arguments of the platform's file
+            include.append(self._of_platform())
+        keys: dict[str, Any] = {"xacro": f"package://{file}", "macro": macro, "params": params, "include": include}
+        self.draft.sections["parts"][name] = keys
+        self.draft.note(("parts", name), where(at))
+
+    def _origin(self, entry: dict[str, Any], path: Path) -> dict[str, Any]:
+        vectors: dict[str, Vector] = {}
+        for key in ("xyz", "rpy"):
+            value = entry.get(key, [0.0, 0.0, 0.0])
+            is_one = isinstance(value, list) and len(value) == len(_AXES) // 2
+            if not is_one or not all(isinstance(one, (int, float)) for one in value):
+                self.draft.todo(f"{key}: {value}", self.source.at((*path, key)))
+                value = [0.0, 0.0, 0.0]
+            x, y, z = map(float, value)
+            vectors[key] = (x, y, z)
+        return pose_keys(Pose(vectors["xyz"], quat_from_rpy(*vectors["rpy"])), vectors["rpy"]) or {"xyz": [0, 0, 0]}
+
+    def _sensor(self, name: str, entry: dict[str, Any], path: Path) -> None:
+        at, model = self.source.at(path), str(entry.get("model", ""))
+        if entry.get("urdf_enabled") is False:
+            self.draft.todo(f"{name}, {model}: urdf_enabled is false", at)
+            return
+        call = {key: value for key, value in entry.items() if key in _OF_CALL}
+        self._part(name, f"clearpath_sensors_description/urdf/{model}.urdf.xacro", model, call, path)
+        given = entry.get("ros_parameters")
+        if entry.get("launch_enabled") is not False:
+            nodes = f" ({', '.join(given)})" if isinstance(given, dict) and given else ""
+            message = f"the driver of {name}, {model}, with its ros_parameters{nodes}"
+            advice = "sensors: {NAME: {preset: VENDOR/MODEL, …}} starts it; tfcompose presets lists them"
+            self.draft.todo(message, at, ("parts", name), advice)
+
+    def _manipulators(self, kind: str) -> None:
+        for index, path, entry in self._entries("manipulators", kind):
+            model, type_ = str(entry.get("model", "")), kind.removesuffix("s")
+            own = {key: value for key, value in entry.items() if key not in {"model", "ros_parameters", "gripper"}}
+            name = f"{type_}_{index}"
+            self._part(name, f"clearpath_manipulators_description/urdf/{type_}/{model}.urdf.xacro", model, own, path)
+            gripper = entry.get("gripper")
+            if isinstance(gripper, dict):
+                grip = str(gripper.get("model", ""))
+                file = f"clearpath_manipulators_description/urdf/gripper/{grip}.urdf.xacro"
+                held = {"parent": f"{name}_end_effector_link", **gripper}
+                held.pop("model", None)
+                self._part(f"{name}_gripper", file, grip, held, (*path, "gripper"))
+            for key in entry.keys() & {"ros_parameters"}:
+                self.draft.todo(f"{name}: {key}", self.source.at_key((*path, key)), ("parts", name))
+
+
+def add_clearpath(draft: Draft, source: Source) -> None:
+    """Add what Clearpath's generator would describe."""
+    draft.has_unknown_frames = True
+    _Clearpath(draft, source).add()
+
+
+def add_kit(draft: Draft, source: Source) -> None:
+    """Add a YAML file that is Clearpath's or Autoware's.
+
+    Raises:
+        RejectedError: if it is neither.
+    """
+    if is_clearpath(source):
+        add_clearpath(draft, source)
+    elif is_autoware(source):
+        add_autoware(draft, source)
+    else:
+        advice = "a launch file has launch:, Clearpath's robot.yaml serial_number:, Autoware's PARENT: {CHILD: {x, …}}"
+        message = "neither a launch file, nor Clearpath's robot.yaml, nor Autoware's calibration"
+        raise RejectedError([finding("TF002", message, Span(source.file), help=advice)])

@@ -253,6 +253,7 @@ CATALOGUE: dict[str, Code] = {
         Code("TF908", "other_ros_settings", "environment", "warning"),
         Code("TF909", "ros_settings_contradict", "environment", "error"),
         Code("TF910", "written_otherwise", "environment", "error"),
+        Code("TF911", "schedule_refused", "environment", "error"),
     )
 }
 

@@ -475,6 +475,11 @@ discovers nobody, not even on the same machine.""",
 
 build --read-back has yourdfpy read each description and compares links, joints, poses, limits, masses, shapes and
 materials. Nothing is written then. This is a bug in tfcompose; please report it with the robot file.""",
+    "TF911": """The kernel refuses the schedule of a process.
+
+schedule: {cpus: [2, 3], priority: 80} needs these processors here, and the right to that real-time priority. The kernel
+is asked before anything is started. rtprio in /etc/security/limits.conf gives the right to a user after the next login,
+LimitRTPRIO= to a systemd unit, and --cap-add SYS_NICE or --ulimit rtprio to a container.""",
 }
 
 

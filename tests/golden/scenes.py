@@ -49,6 +49,7 @@ from tfcompose.ipc import Alive, Clear, Found, GateShut, Live, ProcessRequest
 from tfcompose.language import set_value
 from tfcompose.launcher.events import Exited, StartFailed, TimeUp
 from tfcompose.launcher.preflight import commands_of
+from tfcompose.launcher.schedule import refused_schedule
 from tfcompose.live.publishers import Message, OtherRun, Publisher, Senders
 from tfcompose.live.state import NO_NODE, MovingJoint, RosProcess, StampedData, Topic, TreeState
 from tfcompose.model import Robot
@@ -63,6 +64,7 @@ from tfcompose.plan import (
     PlanProcess,
     Ready,
     RosSettings,
+    Schedule,
     SourceLine,
 )
 from tfcompose.plan.file import read_plan
@@ -411,6 +413,10 @@ def launcher() -> Iterator[Finding]:
             base, file = {"PATH": "/nowhere", **env}, Path(folder, "plan.json")
             found = commands_of(plan, list(plan.processes), file, base, environment.child_environment)[1]
             yield from (_without(one, folder) for one in found)
+    held = PlanProcess("lidar", "run", schedule=Schedule((4095,)))
+    yield refused_schedule(held) or AN_EXAMPLE
+    with mock.patch.object(os, "sched_setscheduler", side_effect=PermissionError):
+        yield refused_schedule(replace(held, schedule=Schedule(policy="fifo", priority=80))) or AN_EXAMPLE
 
 
 def _without(found: Finding, folder: str) -> Finding:

@@ -217,6 +217,12 @@ def test_backoff_grows_and_ends_as_a_failure() -> None:
     assert history.exit_code == 1
 
 
+def test_a_process_may_say_how_long_after_its_end_it_is_started_again() -> None:
+    history = begin(replace(run_process("a", restart="on-failure"), restart_delay=2.5))
+    delays = [history.feed(Exited("a", 1)).sleep_until_due() for _ in range(3)]
+    assert delays == pytest.approx([2.5, 2.5, 2.5])
+
+
 def test_the_delay_before_a_restart_has_a_limit() -> None:
     history = begin(run_process("a", restart="on-failure"))
     history.state = replace(history.state, times=replace(history.state.times, backoff_limit_s=3.0))

@@ -79,7 +79,7 @@ def _lines(plan: Plan, files: dict[str, str]) -> Iterator[str]:
 def _process(plan: Plan, process: PlanProcess, files: dict[str, str]) -> Iterator[str]:
     yield f"{process.name} ({process.kind})"
     if process.kind != "external":
-        yield f"  command  {' '.join(map(_quoted, process.argv))}"
+        yield f"  command  {' '.join(map(_quoted, (*process.prefix, *process.argv)))}"
     if plan.guard.mode == "strict" and process.kind not in ("external", "guard"):
         yield f"  fence    {_fence(plan, process)}"
     nodes = [name + (f" → {process.lifecycle[name]}" if name in process.lifecycle else "") for name in process.nodes]
@@ -120,12 +120,17 @@ def _times(process: PlanProcess) -> Iterator[str]:
         yield f"  ready    {ready.kind} {what}{late}".rstrip()
     if process.restart != "no":
         most = MAX_RESTARTS if process.max_restarts is None else process.max_restarts
-        yield f"  restart  {process.restart}, {counted(most, 'time')} in a row"
+        delay = f", {process.restart_delay:g} s after its end" if process.restart_delay is not None else ""
+        yield f"  restart  {process.restart}, {counted(most, 'time')} in a row{delay}"
     if process.required is not None:
         yield "  required its end ends everything" if process.required else "  optional the rest goes on when it fails"
     if process.stop.signal != "SIGINT" or process.stop.timeout_s is not None:
         patience = "" if process.stop.timeout_s is None else f", {process.stop.timeout_s:g} s"
         yield f"  stop     {process.stop.signal}{patience}"
+    schedule = process.schedule
+    if schedule:
+        cpus = f"CPU {', '.join(map(str, schedule.cpus))}" if schedule.cpus else "any CPU"
+        yield f"  schedule {cpus}, {schedule.policy}" + (f" {schedule.priority}" if schedule.priority else "")
     if process.host is not None:
         yield f"  host     {process.host}"
 

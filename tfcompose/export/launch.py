@@ -5,6 +5,7 @@ from __future__ import annotations
 import graphlib
 import json
 import re
+import shlex
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -277,10 +278,11 @@ def _fixed(plan: Plan, edge: PlanEdge, name: str) -> _Code:
 def _started(plan: Plan, process: PlanProcess) -> _Code:
     if _is_launch(process):
         return _included(plan, process)
-    again = () if process.restart == "no" else ("respawn=True", "respawn_delay=1.0")
+    delay = 1.0 if process.restart_delay is None else process.restart_delay
+    again = () if process.restart == "no" else ("respawn=True", f"respawn_delay={delay}")
     ends = ("on_exit=Shutdown()",) if process.required else ()
     package = _EXECUTABLE.fullmatch(process.argv[0]) if process.argv else None
-    if package is None or not _is_node(process):
+    if package is None or not _is_node(process) or process.schedule:
         return _call("process", repr(process.name), *again, *ends)
     own, ros_words = _rest(process)
     namespace, _, node = process.nodes[0].rpartition("/")
@@ -291,6 +293,7 @@ def _started(plan: Plan, process: PlanProcess) -> _Code:
         *([_list(map(_filled, ros_words), "ros_arguments")] if ros_words else []),
         *([f"parameters=[str(BUILD / {process.params_file!r})]"] if process.params_file else []),
         *([_Code("additional_env={", _environment(process), "}")] if process.env else []),
+        *([f"prefix={shlex.join(process.prefix)!r}"] if process.prefix else []),
         "output='screen'", *again, *ends,
     ]  # fmt: skip
     state = process.lifecycle.get(process.nodes[0])

@@ -225,7 +225,7 @@ def _unit_text(plan: Plan, process: PlanProcess, machine: Machine, names: Mappin
         f"ExecStart={_exec(process, machine)}",
         *([f"ExecStartPost=/bin/sleep {settling_s:g}"] if settling_s else []),
         f"Restart={'on-failure' if done and restart == 'always' else restart}",
-        "RestartSec=1",
+        f"RestartSec={1 if process.restart_delay is None else process.restart_delay:g}",
         f"KillSignal={process.stop.signal}",
         "KillMode=mixed",
         f"TimeoutStopSec={STOP_S if process.stop.timeout_s is None else process.stop.timeout_s:g}",

@@ -1,6 +1,7 @@
 """Processes as users describe them: what is started, or expected to run, and how."""
 
 import re
+import shlex
 from collections.abc import Iterator
 from functools import cache
 from typing import Annotated, Any, ClassVar, Literal, get_args
@@ -33,6 +34,7 @@ from tfcompose.plan import (
     PlanProcess,
     ReadyKind,
     RestartPolicy,
+    SchedulingPolicy,
     SimulationKind,
     StartCondition,
     StopSignal,
@@ -52,6 +54,18 @@ def _inserted(value: Any) -> Any:
 #: A string; a computed number is written as one.
 Word = Annotated[Text, BeforeValidator(_inserted)]
 Words = tuple[Word, ...]
+
+
+def _split(value: Any) -> Any:
+    """Return the words of a text, as a shell has them."""
+    try:
+        return shlex.split(value) if isinstance(value, str) else value
+    except ValueError as error:
+        raise refused("TF106", f"{shown(value)} cannot be split into words: {error}", "a list of words") from None
+
+
+#: A command before another one, as words or as a text of words.
+Prefix = Annotated[Words, BeforeValidator(_split, Text | Words)]
 
 
 def _arguments(value: Any) -> Any:
@@ -150,6 +164,31 @@ class Simulate(Checked):
         None, "joint states: zero, sweep, or a position or sweep by joint; the others are at 0", "zero", {"lift": 0.2}
     )
     rate: Rate = key(20.0, "how often it publishes")
+
+
+class ScheduleSpec(Checked):
+    """How the kernel schedules a process."""
+
+    cpus: tuple[Annotated[int, Strict(), Field(ge=0, le=4095), Integral], ...] = key(
+        (), "the processors that it runs on, counted from 0; default: any", [2, 3]
+    )
+    policy: SchedulingPolicy | None = key(
+        None, "as in sched(7); fifo and rr are real-time policies; default: fifo with a priority, else other"
+    )
+    priority: Annotated[int, Strict(), Field(ge=1, le=99), Integral] | None = key(
+        None, "the priority of fifo and rr, 1 to 99", 80
+    )
+
+    @classmethod
+    def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
+        """Yield also a priority of a policy that has none, and one that is missing."""
+        yield from super().check(data)
+        policy, is_given = data.get("policy"), "priority" in data
+        if is_given and policy in {"other", "batch", "idle"}:
+            message = f"the policy {policy} has no priority"
+            yield ("priority",), refused("TF107", message, "policy: fifo, or rr", on_key=True, other="policy")
+        elif not is_given and policy in {"fifo", "rr"}:
+            yield (), refused("TF102", f"the policy {policy} needs a priority", "for example priority: 80", on_key=True)
 
 
 class StopSpec(Spec):
@@ -293,6 +332,15 @@ class Started(Checked):
     restart: RestartPolicy = key(DEFAULTS.restart, "when it is started again after it has ended", to=KEPT_ALIVE)
     max_restarts: Annotated[int, Strict(), Field(ge=0, le=1_000_000), Integral] | None = key(
         None, "how often in a row it is started again before it is given up", 5, to=KEPT_ALIVE
+    )
+    restart_delay: Duration | None = key(
+        None, "how long after its end it is started again; default: 1 s, doubled each time, up to 30 s", to=KEPT_ALIVE
+    )
+    prefix: Prefix = key(
+        (), "a program that runs it, with its arguments: gdb, valgrind, nice, …", ["nice", "-n", "10"],
+    )  # fmt: skip
+    schedule: ScheduleSpec | None = key(
+        None, "its processors and real-time priority", {"cpus": [2, 3], "priority": 80}, to=NOT_EXTERNAL
     )
     stop: StopSpec | None = key(None, "how it is stopped", {"signal": "SIGTERM", "timeout": "5 s"}, to=KEPT_ALIVE)
     ready: Ready | None = key(None, "when it counts as ready", {"topic": "scan"}, to=NOT_SIMULATED)

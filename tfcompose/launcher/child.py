@@ -16,6 +16,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from tfcompose.launcher.schedule import apply_schedule
 from tfcompose.signals import SIGNALS
 
 if TYPE_CHECKING:
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from io import FileIO
     from pathlib import Path
     from typing import IO
+
+    from tfcompose.plan import Schedule
 
 #: A line longer than this comes in pieces; bytes.
 LINE_LIMIT = 64 * 1024
@@ -49,14 +52,16 @@ _LIBC = ctypes.CDLL(None, use_errno=True)
 class Command:
     """Program and arguments, environment, and folder.
 
-    ``own`` says that it is one of tfcompose's. ``fence`` is a file that must be there first, and what it holds.
-    ``missing`` says, of a process that the run goes on without, why it cannot be started.
+    ``own`` says that it is one of tfcompose's; ``schedule`` is how the kernel schedules it. ``fence`` is a file that
+    must be there first, and what it holds. ``missing`` says, of a process that the run goes on without, why it cannot
+    be started.
     """
 
     argv: tuple[str, ...]
     env: dict[str, str]
     folder: Path
     own: bool = False
+    schedule: Schedule | None = None
     fence: tuple[Path, str] | None = None
     missing: str = ""
 
@@ -214,6 +219,8 @@ def spawn(command: Command, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes
         _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != launcher:  # it died before the line above
             os._exit(1)
+        if command.schedule:
+            apply_schedule(command.schedule)
         if command.own:
             signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.findings import RejectedError
 from tfcompose.launcher.preflight import commands_of
+from tfcompose.launcher.schedule import apply_schedule
 from tfcompose.plan.file import read_plan
 from tfcompose.ros.environment import child_environment
 from tfcompose.variables import JOINS
@@ -58,6 +59,8 @@ def main(argv: Sequence[str]) -> int:
         return command
     try:
         os.chdir(command.folder)
+        if command.schedule:
+            apply_schedule(command.schedule)
         os.execve(command.argv[0], command.argv, command.env)  # noqa: S606 (this is what it is for)
     except OSError as error:
         return _fail(f"{argv[1]} cannot be started: {error}", 1)

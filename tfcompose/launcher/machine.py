@@ -87,7 +87,7 @@ def wake_time(state: State) -> float | None:
     times, due = state.times, []
     for one in state.tracked.values():
         if one.state == "BACKOFF":
-            due.append(one.since + backoff_s(times, one.failures))
+            due.append(one.since + backoff_s(times, one.process, one.failures))
         firmer = firmer_at(times, one)
         gate = [at for at in (firmer, opens_at(one), late_at(state, one)) if at is not None]
         due += gate if state.stop is None else gate[: firmer is not None]
@@ -317,7 +317,9 @@ def _go_on(step: Transition) -> None:
         if one.state not in ("STOPPED", "BACKOFF"):
             continue
         fresh = one.state == "STOPPED" and one.wanted and step.state.clear is not None and not unmet(step.state, one)
-        again = one.state == "BACKOFF" and step.now >= one.since + backoff_s(step.state.times, one.failures)
+        again = one.state == "BACKOFF" and step.now >= one.since + backoff_s(
+            step.state.times, one.process, one.failures
+        )
         if fresh or again:
             step.start(name)
     report_progress(step)

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Protocol
 from tfcompose.findings import Finding, Note, did_you_mean, finding
 from tfcompose.launcher.child import Command
 from tfcompose.launcher.fence import by_partition, not_remapped, remapped, way_of
+from tfcompose.launcher.schedule import refused_schedule
 from tfcompose.variables import REMAPPED
 
 if TYPE_CHECKING:
@@ -110,6 +111,13 @@ def _command_of(
     else:
         program = executable_of(process, argv[0], folder, env)
         command = program if isinstance(program, NotFound) else Command((program, *argv[1:]), env, folder, own)
+    if isinstance(command, Command) and process.prefix:
+        runner = executable_of(process, process.prefix[0], folder, env)
+        words = (runner, *process.prefix[1:], *command.argv) if isinstance(runner, str) else ()
+        command = replace(command, argv=words) if isinstance(runner, str) else runner
+    if isinstance(command, Command) and process.schedule:
+        refused = refused_schedule(process)
+        command = refused or replace(command, schedule=process.schedule)
     if isinstance(command, NotFound) and process.required is False:
         return Command(argv, env, folder, missing=not_found([command]).message)
     return command

@@ -25,8 +25,10 @@ if TYPE_CHECKING:
     from tfcompose.plan import PlanProcess
 
 
-def backoff_s(times: Times, failures: int) -> float:
-    """Return how long to wait before the restart after so many failures in a row."""
+def backoff_s(times: Times, process: PlanProcess, failures: int) -> float:
+    """Return how long to wait before the restart of a process after so many failures in a row."""
+    if process.restart_delay is not None:
+        return process.restart_delay
     return min(times.backoff_s * 2.0 ** (failures - 1), times.backoff_limit_s)
 
 
@@ -117,7 +119,7 @@ def _schedule_restart(step: Transition, one: Tracked, event: Exited) -> None:
         when = f", after {counted(most, 'restart')}"
         step.fail_process(name, ended_by_itself(name, event.returncode, when, event.last_lines))
         return
-    delay = backoff_s(times, failures)
+    delay = backoff_s(times, one.process, failures)
     step.enter(name, "BACKOFF", f"{how}; restart {failures} of {most} in {delay:g} s", failures=failures)
 
 

@@ -35,6 +35,8 @@ LifecycleState = Literal["inactive", "active"]
 LogLevel = Literal["debug", "info", "warn", "error", "fatal"]
 #: What a stand-in does.
 SimulationKind = Literal["circle", "fixed", "joints"]
+#: How the kernel schedules a process (sched(7)); fifo and rr are real-time policies.
+SchedulingPolicy = Literal["other", "batch", "idle", "fifo", "rr"]
 #: How well the pose of a frame is known that a driver publishes.
 PoseKnowledge = Literal["exact", "nominal", "unknown"]
 
@@ -214,6 +216,18 @@ class StopRule:
     timeout_s: float | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """How the kernel schedules a process: on which processors (empty: any), and by which policy (sched(7)).
+
+    ``priority`` is that of the real-time policies, 1 to 99, and 0 for the others.
+    """
+
+    cpus: tuple[int, ...] = ()
+    policy: SchedulingPolicy = "other"
+    priority: int = 0
+
+
 #: A node's parameter that is not a list.
 ParameterValue = str | int | float | bool
 
@@ -245,6 +259,8 @@ class PlanProcess:
     nodes, the parameters that were written for them and decide what they publish.
     ``description`` is the file beside the plan that a publisher sends as ``robot_description``; None: the plan's.
     ``namespace`` is that of its nodes, without a leading slash; None: the plan's.
+    ``restart_delay`` is how long after its end it is started again, in seconds; None: longer each time. ``prefix`` are
+    the words before its command, a program that runs it.
     """
 
     name: str
@@ -270,6 +286,9 @@ class PlanProcess:
     switches: dict[str, dict[str, ParameterValue]] = field(default_factory=dict, metadata=OMITTED)
     namespace: str | None = field(default=None, metadata=OMITTED)
     simulate: Simulation | None = field(default=None, metadata=OMITTED)
+    restart_delay: float | None = field(default=None, metadata=OMITTED)
+    prefix: tuple[str, ...] = field(default=(), metadata=OMITTED)
+    schedule: Schedule | None = field(default=None, metadata=OMITTED)
 
     @property
     def topics(self) -> tuple[str, str]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.findings import Finding, Note, did_you_mean, finding
 from tfcompose.language.process import RUNNING, SIMULATIONS, SWEEP, keys_of
 from tfcompose.model import BUILT_IN, GUARD, JOINTS, MOVING, ROS2_LAUNCH, SHELL, STATIC, Node, Process
-from tfcompose.plan import Ready, Simulation, StopRule, Sweep
+from tfcompose.plan import Ready, Schedule, Simulation, StopRule, Sweep
 from tfcompose.resolve.poses import pose_of
 from tfcompose.resolve.presets import node_preset, node_preset_names
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Path, Source
     from tfcompose.model import Edge, Joint, Robot
-    from tfcompose.plan import ProcessKind
+    from tfcompose.plan import ProcessKind, SchedulingPolicy
 
 
 def user_process(name: str, declared: ProcessSpec, validated: Validated) -> tuple[Process | None, list[Finding]]:
@@ -152,7 +152,10 @@ _FIELDS = frozenset(one.name for one in fields(Process) if one.init)
 def how(declared: Started, namespace: str, way: Way = "run") -> dict[str, Any]:
     """Return the fields of a process that runs in this way, by the keys that have their names."""
     found = {key: getattr(declared, key) for key in _FIELDS & keys_of(way)}
-    stop, ready = found.pop("stop", None), found.pop("ready", None)
+    stop, ready, schedule = (found.pop(key, None) for key in ("stop", "ready", "schedule"))
+    if schedule:
+        usual: SchedulingPolicy = "fifo" if schedule.priority else "other"
+        found["schedule"] = Schedule(schedule.cpus, schedule.policy or usual, schedule.priority or 0)
     if declared.namespace is not None:
         found["namespace"] = namespace
     if stop:

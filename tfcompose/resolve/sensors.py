@@ -207,7 +207,9 @@ def _has_driven_frames(sensor: Sensor) -> bool:
 
 
 #: What a driver's further processes have in common with its first.
-_INHERITED = frozenset({"env", "cwd", "host", "log_level", "restart", "max_restarts", "stop"})
+_INHERITED = frozenset(
+    {"env", "cwd", "host", "log_level", "restart", "max_restarts", "restart_delay", "stop", "schedule"}
+)
 #: In an argument, the file that holds the parameters of a process.
 PARAMS_FILE = "${params_file}"
 

@@ -1,0 +1,58 @@
+"""How the kernel schedules a process: its processors, and its real-time priority."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+from tfcompose.findings import Finding, finding
+
+if TYPE_CHECKING:
+    from tfcompose.plan import PlanProcess, Schedule, SchedulingPolicy
+
+_POLICIES: dict[SchedulingPolicy, int] = {
+    "other": os.SCHED_OTHER,
+    "batch": os.SCHED_BATCH,
+    "idle": os.SCHED_IDLE,
+    "fifo": os.SCHED_FIFO,
+    "rr": os.SCHED_RR,
+}
+
+
+def apply_schedule(schedule: Schedule) -> None:
+    """Have the kernel schedule this process so, and what it becomes and starts.
+
+    Raises:
+        OSError: if the kernel refuses it.
+    """
+    if schedule.cpus:
+        os.sched_setaffinity(0, schedule.cpus)
+    if schedule.policy != "other":
+        os.sched_setscheduler(0, _POLICIES[schedule.policy], os.sched_param(schedule.priority))
+
+
+def refused_schedule(process: PlanProcess) -> Finding | None:
+    """Return what the kernel refuses of a process's schedule: it is asked with this process, which stays as it was."""
+    schedule = process.schedule
+    if schedule is None:
+        return None
+    cpus = os.sched_getaffinity(0)
+    policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        apply_schedule(schedule)
+        if policy != os.sched_getscheduler(0):
+            os.sched_setscheduler(0, policy, parameters)
+        lacking = set(schedule.cpus) - os.sched_getaffinity(0)
+    except PermissionError:
+        message = f"{process.name} may not have the policy {schedule.policy} with priority {schedule.priority}"
+        advice = "rtprio in /etc/security/limits.conf, LimitRTPRIO= in a systemd unit, or the capability CAP_SYS_NICE"
+        return finding("TF911", message, None, help=advice)
+    except (OSError, ValueError, OverflowError):
+        lacking = set(schedule.cpus)
+    finally:
+        if schedule.cpus:
+            os.sched_setaffinity(0, cpus)
+    if not lacking:
+        return None
+    message = f"{process.name} cannot run on {', '.join(f'CPU {one}' for one in sorted(lacking))}"
+    return finding("TF911", message, None, help="they count from 0; lscpu lists those that are there")

@@ -12,6 +12,15 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import yaml
+from yaml.events import (
+    AliasEvent,
+    DocumentStartEvent,
+    MappingEndEvent,
+    MappingStartEvent,
+    ScalarEvent,
+    SequenceEndEvent,
+    SequenceStartEvent,
+)
 
 from tfcompose.findings import Finding, Note, RejectedError, Span, finding
 from tfcompose.load.scalars import MAP, SCALAR_TAGS, SEQ, STR, TAG, plain, scalar
@@ -52,7 +61,7 @@ class _Open:
     waits_for_key: bool
     inside: dict[str | int, Place] = field(default_factory=dict)
     keys: dict[str, Place] = field(default_factory=dict)
-    merges: list[tuple[Any, Place]] = field(default_factory=list)
+    merges: tuple[tuple[Any, Place], ...] = ()
     size: int = 1
     height: int = 0
     key: str = ""
@@ -85,16 +94,18 @@ class Reader:
             RejectedError: where the text stops being YAML, is too deep, or too large.
         """
         try:
-            for event in yaml.parse(text, Loader=LOADER):
-                if isinstance(event, yaml.ScalarEvent):  # most of them are
+            events: Iterator[Any] = yaml.parse(text, Loader=LOADER)
+            for event in events:
+                kind = type(event)
+                if kind is ScalarEvent:  # most of them are
                     self._scalar(event)
-                elif isinstance(event, yaml.CollectionStartEvent):
-                    self._open(event)
-                elif isinstance(event, yaml.CollectionEndEvent):
+                elif kind is MappingStartEvent or kind is SequenceStartEvent:
+                    self._open(event, is_mapping=kind is MappingStartEvent)
+                elif kind is MappingEndEvent or kind is SequenceEndEvent:
                     self._close(event)
-                elif isinstance(event, yaml.AliasEvent):
+                elif kind is AliasEvent:
                     self._alias(event)
-                elif isinstance(event, yaml.DocumentStartEvent):
+                elif kind is DocumentStartEvent:
                     self._begin(event, single=single)
         except yaml.MarkedYAMLError as error:
             raise RejectedError([no_syntax(error, text, self.file)]) from None
@@ -112,22 +123,23 @@ class Reader:
             raise RejectedError([finding("TF002", message, self._place(event).span)])
 
     def _place(self, event: yaml.Event) -> Place:
-        return Place((self.file, event.start_mark, event.end_mark))
+        return Place(_between(self.file, event.start_mark, event.end_mark))
 
     def _refuse(self, message: str, place: Place) -> RejectedError:
         return RejectedError([*self.found, finding("TF008", message, place.span)])
 
     def _scalar(self, event: yaml.ScalarEvent) -> None:
-        place = Place((self.file, event.start_mark, event.end_mark))
+        place = Place(_between(self.file, event.start_mark, event.end_mark))
         before = len(self.found)
         value = self.value_of(event, place)
         if event.anchor:
             self._anchors[event.anchor] = _Part(value, place, found=self.found[before:])
-        if self._stack and self._stack[-1].waits_for_key:
+        top = self._stack[-1] if self._stack else None
+        if top is not None and top.waits_for_key:
             del self.found[before:]
             key = value if isinstance(value, str) and event.tag in {None, "!", STR} else None
             is_merge = key == "<<" and event.implicit[0]
-            self._key(self._stack[-1], key, place, "a number, true, false or null", is_merge=is_merge)
+            self._key(top, key, place, "a number, true, false or null", is_merge=is_merge)
         else:
             self._put(value, place, 1, 0)
 
@@ -165,22 +177,21 @@ class Reader:
         message = f"unknown tag {tag.replace(TAG, '!!')}"
         self.found.append(finding("TF005", message, place.span, help="tags are not used: leave it out"))
 
-    def _open(self, event: yaml.CollectionStartEvent) -> None:
+    def _open(self, event: yaml.CollectionStartEvent, *, is_mapping: bool) -> None:
         if len(self._stack) >= DEEPEST:
             raise self._refuse(f"nested deeper than {DEEPEST} levels", self._place(event))
-        is_mapping = type(event) is yaml.MappingStartEvent
         data: Any = {} if is_mapping else []
         self._stack.append(_Open(data, event, is_mapping, not self._stack, len(self.found), is_mapping))
         if event.anchor:
             self._anchors[event.anchor] = None
-        if event.tag not in {None, "!", MAP if is_mapping else SEQ}:
+        if event.tag is not None and event.tag not in {"!", MAP if is_mapping else SEQ}:
             self._unknown_tag(event.tag, self._place(event))
 
     def _close(self, event: yaml.Event) -> None:
         done = self._stack.pop()
         for value, place in done.merges:
             self._inherit(done, value, place)
-        place = Place((self.file, done.start.start_mark, event.end_mark), done.inside, done.keys)
+        place = Place(_between(self.file, done.start.start_mark, event.end_mark), done.inside, done.keys)
         self._size += 0 if self._stack else done.size
         if done.size > MOST_VALUES or self._size > MOST_VALUES:
             raise self._refuse(f"more than {MOST_VALUES:,} values once aliases are followed", place)
@@ -230,7 +241,7 @@ class Reader:
             message = f"a key must be a string; this one is {what}"
             self.found.append(finding("TF004", message, place.span, help="put it in quotes"))
             top.keeps = False
-        elif glued := _GLUED.match(key):
+        elif ("{" in key or "[" in key) and (glued := _GLUED.match(key)):
             message = f"a space after the colon of {glued[1]} is missing" if glued[2] else f"{glued[1]} has no colon"
             advice = f"write {glued[1]}: {glued[3]}"
             self.found.append(finding("TF002", message, place.span, help=advice))
@@ -241,7 +252,7 @@ class Reader:
             top.keeps = False
         else:
             top.keys[key] = place
-            top.keeps = not top.is_aside(key)
+            top.keeps = not (top.is_root and top.is_aside(key))
         top.found_before_value = len(self.found)
 
     def _put(self, value: Any, place: Place, size: int, height: int) -> None:
@@ -261,9 +272,14 @@ class Reader:
         if not top.keeps:
             del self.found[top.found_before_value :]
         elif top.is_merge:
-            top.merges.append((value, place))
+            top.merges += ((value, place),)
         else:
             top.data[top.key], top.inside[top.key] = value, place
+
+
+def _between(file: str, start: Any, end: Any) -> tuple[str, int, int, int, int]:
+    """Return the file, and lines and columns from 0; the parser's marks would all have to be kept."""
+    return file, start.line, start.column, end.line, end.column
 
 
 Path = tuple[str | int, ...]
@@ -274,19 +290,19 @@ _NOTHING: Mapping[Any, Any] = {}
 class Place:
     """Where a value stands; of a mapping or a list also where its keys, and the values in it, stand.
 
-    Most places are never asked for: the parser's marks become a ``Span`` only then. Places do not change. ``inside``
-    holds the places of the values by key or index, ``keys`` those of the keys; an alias has the place of its anchor.
+    Most places are never asked for, and become a ``Span`` only then. Places do not change. ``inside`` holds the places
+    of the values by key or index, ``keys`` those of the keys; an alias has the place of its anchor.
     """
 
     __slots__ = ("_at", "inside", "keys")
 
     def __init__(
         self,
-        at: Span | tuple[str, Any, Any],
+        at: Span | tuple[str, int, int, int, int],
         inside: Mapping[Any, Place] = _NOTHING,
         keys: Mapping[Any, Place] = _NOTHING,
     ) -> None:
-        """``at`` is the place, or the file and the parser's marks of beginning and end, which count from 0."""
+        """``at`` is the place, or the file and the lines and columns of beginning and end, which count from 0."""
         self._at = at
         self.inside = inside
         self.keys = keys
@@ -297,8 +313,8 @@ class Place:
         at = self._at
         if isinstance(at, Span):
             return at
-        file, start, end = at
-        self._at = span = Span(file, start.line + 1, start.column + 1, end.line + 1, end.column + 1)
+        file, line, column, end_line, end_column = at
+        self._at = span = Span(file, line + 1, column + 1, end_line + 1, end_column + 1)
         return span
 
     def with_inside(self, inside: Mapping[Any, Place], keys: Mapping[Any, Place]) -> Place:

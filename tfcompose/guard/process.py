@@ -28,7 +28,7 @@ from tfcompose.process import ready, say
 from tfcompose.ros.clock import ClockWatch, SimClock
 from tfcompose.ros.environment import PROFILE_VARIABLES
 from tfcompose.ros.graph import ids_say_who
-from tfcompose.ros.node import open_node, wait
+from tfcompose.ros.node import WaitSet, open_node
 from tfcompose.ros.tf_codec import number_of_transforms
 from tfcompose.text import counted
 from tfcompose.variables import (
@@ -281,9 +281,9 @@ def guard(own: Own, stop: Stop) -> None:
         steps += [switches.check] if switches else []
         steps += [] if ORDERS_FD in os.environ else [LifecycleDriver(node, own.plan).check]
         steps += [ClockWatch(node, say, sim=own.plan.ros.clock == "sim").check, *(watch.report for watch in watches)]
-        readers = [each for watch in watches for each in watch.data.readers]
+        wait_set = WaitSet(node, [each for watch in watches for each in watch.data.readers], stop)
         while not stop.requested:
-            wait(node, readers, min(watch.wait_s for watch in watches), stop)
+            wait_set.wait(min(watch.wait_s for watch in watches))
             for step in steps:
                 step()
         for watch in watches:

@@ -176,14 +176,15 @@ class Moving:
         moved = [(edges[one.joint], joints[one.joint]) for one in ordered]
         self._turning = turning = sum(joint.type not in SLIDING for _, joint in moved)
         self._message = ArrayTemplate([(e.parent, e.child) for e, _ in moved], [e.pose for e, _ in moved])
-        self._quat_at = self._message.quat_at[:turning]
-        self._xyz_at = self._message.xyz_at[turning:]
+        # One row a component and one column a joint: numpy is fast along long rows.
+        self._quat_at = self._message.quat_at[:turning].T.copy()
+        self._xyz_at = self._message.xyz_at[turning:].T.copy()
         poses = [(edge.pose, joint.axis) for edge, joint in moved]
         rotating, sliding = poses[:turning], poses[turning:]
-        self._at_0 = _rows([pose.quat_xyzw for pose, _ in rotating], 4)
-        self._turned = _rows([multiply(pose.quat_xyzw, (*axis, 0.0)) for pose, axis in rotating], 4)
-        self._start = _rows([pose.xyz for pose, _ in sliding], 3)
-        self._along = _rows([rotate(pose.quat_xyzw, axis) for pose, axis in sliding], 3)
+        self._at_0 = _columns([pose.quat_xyzw for pose, _ in rotating], 4)
+        self._turned = _columns([multiply(pose.quat_xyzw, (*axis, 0.0)) for pose, axis in rotating], 4)
+        self._start = _columns([pose.xyz for pose, _ in sliding], 3)
+        self._along = _columns([rotate(pose.quat_xyzw, axis) for pose, axis in sliding], 3)
 
     def message(self, positions: NDArray[np.float64], stamp_ns: int) -> bytes:
         """Return the TFMessage for these positions, in the order of the names, at this time in nanoseconds.
@@ -200,12 +201,13 @@ class Moving:
             q = q * self._multiplier + self._offset
         doubles, turning = self._message.doubles, self._turning
         if turning:
-            half = 0.5 * q[:turning, np.newaxis]
+            half = 0.5 * q[:turning]
             doubles[self._quat_at] = np.cos(half) * self._at_0 + np.sin(half) * self._turned
         if turning < len(q):
-            doubles[self._xyz_at] = self._start + q[turning:, np.newaxis] * self._along
+            doubles[self._xyz_at] = self._start + q[turning:] * self._along
         return self._message.data(stamp_ns)
 
 
-def _rows(rows: Sequence[tuple[float, ...]], width: int) -> NDArray[np.float64]:
-    return np.array(rows, np.float64).reshape(-1, width)
+def _columns(columns: Sequence[tuple[float, ...]], height: int) -> NDArray[np.float64]:
+    made: NDArray[np.float64] = np.array(columns, np.float64).reshape(-1, height).T.copy()
+    return made

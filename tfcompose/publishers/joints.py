@@ -29,7 +29,7 @@ def joints(own: Own, stop: Stop) -> None:
     from tfcompose.publishers.joint_mover import JointMover, PublishOptions  # noqa: PLC0415 (ROS, once signals are handled)
     from tfcompose.ros.clock import StampClock  # noqa: PLC0415 (ROS, once signals are handled)
     from tfcompose.ros.graph import publishing_nodes  # noqa: PLC0415 (ROS, once signals are handled)
-    from tfcompose.ros.node import TFPublisher, open_node, parameter, wait  # noqa: PLC0415 (ROS, once signals are handled)
+    from tfcompose.ros.node import TFPublisher, WaitSet, open_node, parameter  # noqa: PLC0415 (ROS, once signals are handled)
     from tfcompose.ros.sensor_data import JointStateSubscription  # noqa: PLC0415 (ROS, once signals are handled)
 
     if not wait_for_go(stop):
@@ -47,14 +47,16 @@ def joints(own: Own, stop: Stop) -> None:
         say(f"{counted(len(mover), 'edge')} on /tf, from {states.topic}{at_most}")
         ready()
         missing = _Missing(mover, states.topic, lambda: publishing_nodes(node, states.topic))
+        wait_set = WaitSet(node, [states, description.subscription], stop)
         while not stop.requested:
             is_waiting = missing.is_waiting or clock.is_waiting or description.is_waiting
-            wait(node, [states, description.subscription], CHECK_EVERY_S if is_waiting else None, stop)
-            for received in states.take():
+            with_something = wait_set.wait(CHECK_EVERY_S if is_waiting else None)
+            for received in states.take() if states in with_something else ():
                 message = mover.tf_message(received.data, received.received_ns)
                 if message is not None:
                     publisher.publish(message)
-            description.check()
+            if description.is_waiting or description.subscription in with_something:
+                description.check()
             missing.check()
             clock.check()
 

@@ -262,8 +262,8 @@ class Reader(ABC):
         """Take a message into the buffer, and return whether there was one."""
 
     @abstractmethod
-    def add_to(self, wait_set: Any) -> None:
-        """Have rclpy's wait set wait for it."""
+    def add_to(self, wait_set: Any) -> tuple[str, int]:
+        """Have rclpy's wait set wait for it, and return as which of which kind of its entities."""
 
     def _received(self) -> Received:
         info = self._info
@@ -292,9 +292,9 @@ class Subscription(Reader):
             None,
         )
 
-    def add_to(self, wait_set: Any) -> None:
-        """Have rclpy's wait set wait for it."""
-        wait_set.add_subscription(self.subscription.handle)
+    def add_to(self, wait_set: Any) -> tuple[str, int]:
+        """Have rclpy's wait set wait for it, and return as which of which kind of its entities."""
+        return "subscription", wait_set.add_subscription(self.subscription.handle)
 
     def _take_one(self) -> bool:
         result = self._take(*self._arguments)
@@ -389,9 +389,9 @@ class PublicTFReader(Reader):
             self.close()
             raise RosError(f"rmw does not say when something comes on {topic}")
 
-    def add_to(self, wait_set: Any) -> None:
-        """Have rclpy's wait set wait for it."""
-        wait_set.add_guard_condition(self._came)
+    def add_to(self, wait_set: Any) -> tuple[str, int]:
+        """Have rclpy's wait set wait for it, and return as which of which kind of its entities."""
+        return "guard_condition", wait_set.add_guard_condition(self._came)
 
     def close(self) -> None:
         """End the reader."""
@@ -407,19 +407,32 @@ class PublicTFReader(Reader):
         return result == _OK and self._taken.value
 
 
-def wait(node: Node, readers: Sequence[Reader], timeout_s: float | None, stop: Stop) -> None:
-    """Wait until a reader has something, the time is over (None: never) or ``stop`` is requested.
+class WaitSet:
+    """Readers that are waited for again and again, until ``stop`` is requested."""
 
-    A new publisher or reader in the graph ends no wait. Nothing is taken.
-    """
-    if stop.requested:
-        return
-    context = node.context.handle
-    wait_set = _rclpy.WaitSet(len(readers), 1 + len(readers), 0, 0, 0, 0, context)
-    wait_set.add_guard_condition(stop.waker(context, lambda: _rclpy.GuardCondition(context)))
-    for reader in readers:
-        reader.add_to(wait_set)
-    wait_set.wait(-1 if timeout_s is None else max(0, int(timeout_s * 1e9)))
+    def __init__(self, node: Node, readers: Sequence[Reader], stop: Stop) -> None:
+        self._readers, self._stop = tuple(readers), stop
+        self._context = node.context.handle
+        self._wait_set = _rclpy.WaitSet(len(readers), 1 + len(readers), 0, 0, 0, 0, self._context)
+
+    def wait(self, timeout_s: float | None) -> list[Reader]:
+        """Wait until a reader has something, the time is over (None: never) or ``stop`` is requested.
+
+        Return the readers that have something. A new publisher or reader in the graph ends no wait. Nothing is taken.
+        """
+        if self._stop.requested:
+            return []
+        wait_set, context = self._wait_set, self._context
+        wait_set.clear_entities()
+        wait_set.add_guard_condition(self._stop.waker(context, lambda: _rclpy.GuardCondition(context)))
+        awaited = [(reader, *reader.add_to(wait_set)) for reader in self._readers]
+        wait_set.wait(-1 if timeout_s is None else max(0, int(timeout_s * 1e9)))
+        return [reader for reader, kind, index in awaited if wait_set.is_ready(kind, index)]
+
+
+def wait(node: Node, readers: Sequence[Reader], timeout_s: float | None, stop: Stop) -> None:
+    """Wait once, as ``WaitSet.wait`` does."""
+    WaitSet(node, readers, stop).wait(timeout_s)
 
 
 def _topic(*, static: bool) -> str:

@@ -159,7 +159,7 @@ class ArrayTemplate:
         self.doubles: NDArray[np.float64] = raw[2 * _HEADER :].view("<f8")
         self._words: NDArray[np.uint32] = raw[2 * _HEADER :].view("<u4")
         found = np.array(template.offsets(), np.intp).reshape(-1, 2) - _HEADER
-        self._stamp_at = found[:, 0] // 4
+        self._stamp_at = (found[:, :1] // 4 + np.arange(2)).ravel()
         start = found[:, 1:] // 8
         self.xyz_at: NDArray[np.intp] = start + np.arange(3)
         self.quat_at: NDArray[np.intp] = start + np.arange(3, 7)
@@ -170,9 +170,7 @@ class ArrayTemplate:
         Raises:
             ValueError: if a message cannot hold it.
         """
-        seconds, nanoseconds = struct.unpack("<II", _stamp(stamp_ns))
-        self._words[self._stamp_at] = seconds
-        self._words[self._stamp_at + 1] = nanoseconds
+        self._words.put(self._stamp_at, struct.unpack("<II", _stamp(stamp_ns)))
         return self._message.tobytes()
 
 

@@ -106,7 +106,8 @@ def test_each_action_of_a_python_launch_file_has_its_entry(package: Path, monkey
     assert [processes[f"camera_{i}"]["params"] for i in range(2)] == [{"id": 0}, {"id": 1}]
     drive = processes["drive"]
     assert drive["params"] == {
-        "speed": 20, "file": "../drive.yaml", "wheels.count": 4, "text": "4", "from_argument": 2, "kept": "2",
+        "speed": 20, "file": "../drive.yaml", "wheels.count": 4, "text": "4", "from_argument": "${args.cameras}",
+        "kept": "2",
         "mixed": [1, 2.5],
     }  # fmt: skip
     assert drive["remap"] == {"scan": "scan_raw", "odom": "odometry"}
@@ -137,8 +138,64 @@ def test_arguments_are_given_and_conditions_passed_over(package: Path) -> None:
     assert "rviz2" in data["processes"]
     assert "keys" not in data["processes"]
     text, data = import_of(file, "--all-branches", code=None)
-    assert {"rviz2", "keys"} <= data["processes"].keys()
-    assert "only if rviz, which does not hold" in text
+    assert data["args"] == {
+        "cameras": {"default": 2, "description": "how many"}, "rviz": {"default": False},
+    }  # fmt: skip
+    assert data["processes"]["rviz2"]["when"] == "${args.rviz}"
+    assert data["processes"]["keys"]["when"] == "${not (args.rviz)}"
+    robot = compiled(text, package).robot
+    assert robot
+    assert {"rviz2", "keys"} & {process.name for process in robot.processes} == {"keys"}
+
+
+WITH_ARGUMENTS = """
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.conditions import IfCondition, LaunchConfigurationEquals, UnlessCondition
+from launch.substitutions import EqualsSubstitution, LaunchConfiguration as Given
+from launch_ros.actions import Node
+
+def generate_launch_description():
+    return LaunchDescription([
+        DeclareLaunchArgument("mode", default_value="slam", choices=["slam", "fixed"]),
+        DeclareLaunchArgument("rate", default_value="20"),
+        DeclareLaunchArgument("loud", default_value="True"),
+        DeclareLaunchArgument("height", default_value="0.5"),
+        Node(package="a", executable="slam", name="slam", condition=LaunchConfigurationEquals("mode", "slam")),
+        Node(package="a", executable="fixed", name="fixed",
+             condition=IfCondition(EqualsSubstitution(Given("mode"), "fixed"))),
+        Node(package="a", executable="b", name="b", arguments=["--mode", Given("mode"), ["--rate=", Given("rate")],
+             Given("loud")], parameters=[{"rate": Given("rate"), "loud": Given("loud"),
+             "topic": [Given("mode"), "/scan"], "number": [Given("rate"), "0"]}],
+             remappings=[("scan", [Given("mode"), "/scan"])],
+             condition=UnlessCondition(Given("loud"))),
+        Node(package="tf2_ros", executable="static_transform_publisher",
+             arguments=["--z", Given("height"), "--frame-id", "base_link", "--child-frame-id", "mast"]),
+    ])
+"""
+
+
+def test_launch_arguments_become_arguments_of_the_robot_where_launch_would_read_them_alike(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = source(tmp_path, "a.launch.py", WITH_ARGUMENTS)
+    text, data = import_of(file, "--all-branches", code=None)
+    assert data["args"] == {
+        "mode": {"type": "string", "default": "slam", "choices": ["slam", "fixed"]},
+        "rate": {"default": 20},
+        "loud": {"default": True},
+    }  # fmt: skip
+    processes = data["processes"]
+    assert processes["slam"]["when"] == "${args.mode == 'slam'}"
+    assert processes["fixed"]["when"] == "${args.mode == 'fixed'}"
+    assert processes["b"]["run"]["args"] == ["--mode", "${args.mode}", "--rate=${args.rate}", "True"]
+    assert processes["b"]["params"] == {
+        "rate": "${args.rate}", "loud": True, "topic": "${args.mode}/scan", "number": 200,
+    }  # fmt: skip
+    assert processes["b"]["remap"] == {"scan": "${args.mode}/scan"}
+    assert data["frames"]["mast"]["xyz"] == [0, 0, 0.5]
+    assert sorted(places(printed_errors(capsys), "TF020")) == [f"a.launch.py:{line}" for line in (11, 12, 13)]
+    assert compiled(text, tmp_path).robot
 
 
 XML = """<launch>

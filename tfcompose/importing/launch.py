@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import posixpath
+import re
 import signal
 import subprocess
 import sys
@@ -13,7 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import RejectedError, Span, finding
+from tfcompose.importing.launch_substitutions import scalar_of
 from tfcompose.importing.programs import (
+    JOINT_PUBLISHERS,
     PACKAGE,
     STATE_PUBLISHER,
     Description,
@@ -22,7 +25,8 @@ from tfcompose.importing.programs import (
     one_clock,
     where,
 )
-from tfcompose.importing.yaml_text import Bare
+from tfcompose.importing.static_transforms import PROGRAM
+from tfcompose.importing.yaml_text import Bare, Expression, arguments_in, with_values
 from tfcompose.numbers import number
 
 if TYPE_CHECKING:
@@ -32,6 +36,8 @@ if TYPE_CHECKING:
     from tfcompose.importing.draft import Draft
 
 _MOST_WALL_S = 60.0
+#: Programs whose arguments are read: they have their values.
+_READ = frozenset({PROGRAM, STATE_PUBLISHER, *JOINT_PUBLISHERS})
 _ADVICE = "--package NAME=FOLDER, or source the workspace's setup file"
 #: What of the environment is a setting of all processes.
 _SETTINGS = {"ROS_DOMAIN_ID": "domain_id", "ROS_AUTOMATIC_DISCOVERY_RANGE": "discovery"}
@@ -64,7 +70,7 @@ def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description
     work = _Work(draft, launch, target)
     for record in answer["records"]:
         work.add(record)
-    work.finish()
+    work.finish(answer["decided"])
     if answer["stopped"]:
         if not any(one["kind"] not in {"package", "todo", "argument"} for one in answer["records"]):
             raise RejectedError([finding("TF002", f"{answer['stopped']}", Span(launch.file))])
@@ -107,6 +113,8 @@ class _Work:
         self._delays: list[tuple[str, float]] = []
         self._missing: dict[str, Span] = {}
         self._containers: dict[str, str] = {}
+        self._only_when = ""
+        self._arguments: dict[str, tuple[dict[str, Any], Span]] = {}
 
     def add(self, record: dict[str, Any]) -> None:
         """Add one record."""
@@ -131,8 +139,9 @@ class _Work:
         else:
             self.draft.todo(record["text"], span)
 
-    def finish(self) -> None:
-        """Add what depends on all records."""
+    def finish(self, decided: list[str]) -> None:
+        """Add what depends on all records; ``decided`` are arguments whose values stand in what was added."""
+        self._args(decided)
         processes = self.draft.sections["processes"]
         for name, after in self._after:
             known = {self._names[key]: what for key, what in after.items() if key in self._names}
@@ -151,18 +160,45 @@ class _Work:
         return Span(shown, max(int(line), 1))
 
     def _argument(self, record: dict[str, Any], span: Span) -> None:
-        name, value = record["name"], record["value"]
-        chosen = f"{value!r} here" if value != record["default"] else f"its default {value!r}"
-        explained = f" ({record['description'].strip()})" if record["description"].strip() else ""
-        self.draft.todo(f"the launch argument {name}{explained} has {chosen}", span, advice=f"import … {name}:=VALUE")
+        self._arguments[record["name"]] = (record, span)
+
+    def _args(self, decided: list[str]) -> None:
+        """Add the arguments that entries name, and say of the others which values they had."""
+        used = arguments_in(self.draft.sections) | self._in_conditions()
+        for name, (record, span) in self._arguments.items():
+            value, at = record["value"], ("args", name)
+            explained = f" ({record['description'].strip()})" if record["description"].strip() else ""
+            if name in used:
+                typed = scalar_of(value)
+                keys: dict[str, Any] = {"type": "string"} if isinstance(typed, str) else {}
+                keys |= {"default": typed}
+                choices = [scalar_of(one) for one in record["choices"]]
+                keys |= {"choices": choices} if choices and {type(one) for one in choices} == {type(typed)} else {}
+                keys |= {"description": " ".join(record["description"].split())} if explained else {}
+                self.draft.sections["args"][name] = keys
+                self.draft.note(at, where(span))
+            if name in decided or name not in used:
+                chosen = f"{value!r} here" if value != record["default"] else f"its default {value!r}"
+                message = f"the launch argument {name}{explained} has {chosen}"
+                more = " where its value decides what is started, or is computed with" if name in used else ""
+                self.draft.todo(f"{message}{more}", span, at if name in used else ("", ""), f"import … {name}:=VALUE")
+
+    def _in_conditions(self) -> set[str]:
+        texts = [keys["when"] for entries in self.draft.sections.values() for keys in entries.values()
+                 if isinstance(keys, dict) and "when" in keys]  # fmt: skip
+        return {name for text in texts for name in re.findall(r"\bargs\.([A-Za-z_][A-Za-z0-9_]*)", text)}
 
     def _node(self, record: dict[str, Any], span: Span) -> None:
         program = self._program(record, span)
+        self._only_when = record.get("only_when", "")
         if program.executable == STATE_PUBLISHER:
             self._describe(program, span)
             return
+        before = set(self.draft.sections["frames"])
         name = add_program(self.draft, program, self.target)
         if name is None:
+            for child in self.draft.sections["frames"].keys() - before:
+                self._conditions(record, ("frames", child))
             return
         self._names[str(record.get("id"))] = name
         self._conditions(record, ("processes", name))
@@ -174,12 +210,17 @@ class _Work:
     def _conditions(self, record: dict[str, Any], at: tuple[str, str]) -> None:
         for text in record.get("when", ()):
             self.draft.note(at, f"only if {text}")
+        if record.get("only_when"):
+            entry = self.draft.sections[at[0]][at[1]]
+            entry["when"] = Expression(record["only_when"])
 
     def _program(self, record: dict[str, Any], span: Span) -> Program:
         todo: list[str] = []
         params, description = _split_description(record.get("params", []), todo)
         keys = self._keys(record, todo)
         argv = tuple(record.get("argv", ()))
+        if record.get("executable") in _READ:
+            argv = tuple(map(with_values, argv))
         prefix = record.get("prefix")
         if prefix:
             todo.append(f"the prefix {prefix}")
@@ -241,6 +282,8 @@ class _Work:
             return
         rest = {key: value for key, value in params.items() if key != "robot_description"}
         self._state_publisher_params(rest, program, span)
+        if self._only_when:
+            self.draft.todo(f"robot_state_publisher is there only when {self._only_when}", span)
         self.descriptions.append(replace(described, at=span, prefix=str(rest.get("frame_prefix", ""))))
 
     def _state_publisher_params(self, params: dict[str, Any], program: Program, span: Span) -> None:

@@ -9,6 +9,7 @@ How each action behaves was read in those packages' sources.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -22,6 +23,8 @@ from tfcompose.importing.launch_substitutions import (
     parameters_of,
     place,
     plain,
+    scalar_of,
+    symbolic_text,
     text_of,
     truth,
     with_package,
@@ -42,6 +45,14 @@ class Action:
         if self.condition is None:
             self._visited(context)
             return
+        when = self.condition.when(context) if context.every_branch and hasattr(self.condition, "when") else None
+        if when:
+            context.whens.append(f"({when})" if " or " in when or " and " in when else when)
+            try:
+                self._visited(context)
+            finally:
+                context.whens.pop()
+            return
         text = self.condition.describe() if hasattr(self.condition, "describe") else "a condition"
         try:
             holds = self.condition.evaluate(context)
@@ -51,6 +62,8 @@ class Action:
         if not holds and not context.every_branch:
             context.record("skipped", self.at, text=f"{self.described(context)} only if {text}")
             return
+        if context.every_branch:
+            context.todo(self.at, f"the condition of {self.described(context)}: {text}")
         context.conditions.append(text if holds else f"{text}, which does not hold")
         try:
             self._visited(context)
@@ -120,6 +133,9 @@ class DeclareLaunchArgument(Action):
         if choices and known not in choices:
             raise FailedError(f"{known} is none of {', '.join(choices)}")
         if context.depth == 0:
+            kinds = {bool: "bool", int: "int", float: "float", str: "string"}
+            if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
+                context.declared[name] = kinds[type(scalar_of(known))]
             context.record("argument", self.at, name=name, default=default, value=known, choices=choices,
                            description=str(self.description or ""))  # fmt: skip
 
@@ -133,7 +149,9 @@ class SetLaunchConfiguration(Action):
         self.name, self.value = name, value
 
     def execute(self, context: Context) -> None:
-        context.configurations[text_of(self.name, context)] = text_of(self.value, context)
+        name = text_of(self.name, context)
+        context.declared.pop(name, None)
+        context.configurations[name] = text_of(self.value, context)
 
 
 class UnsetLaunchConfiguration(Action):
@@ -442,6 +460,7 @@ class IncludeLaunchDescription(Action):
         given = {text_of(name, context): text_of(value, context) for name, value in self.launch_arguments}
         context.configurations |= given
         if path.startswith(PACKAGE):
+            given = {text_of(name, context): symbolic_text(value, context) for name, value in self.launch_arguments}
             context.record("include", self.at, file=path, args=given, namespace=context.namespace,
                            env=dict(context.environment), period=context.period_s,
                            after=dict(context.after))  # fmt: skip
@@ -485,7 +504,7 @@ class ExecuteProcess(Action):
         self.cmd, self.name = cmd, name
 
     def execute(self, context: Context) -> None:
-        cmd = [with_package(text_of(one, context)) for one in self.cmd]
+        cmd = [symbolic_text(one, context) for one in self.cmd]
         context.record("process", self.at, argv=cmd, label=_optional(self.name, context), **self.common(context))
 
     def common(self, context: Context) -> dict[str, Any]:
@@ -526,7 +545,7 @@ def _optional(value: Any, context: Context) -> str | None:
 
 def _texts(values: Any, context: Context) -> dict[str, str]:
     items = values.items() if isinstance(values, Mapping) else values or ()
-    return {text_of(key, context): with_package(text_of(value, context)) for key, value in items}
+    return {text_of(key, context): symbolic_text(value, context) for key, value in items}
 
 
 class Node(ExecuteProcess):
@@ -550,7 +569,7 @@ class Node(ExecuteProcess):
     def record(self, context: Context, kind: str, **more: Any) -> None:
         """Record the node with all that it is told."""
         words = self.arguments if isinstance(self.arguments, (list, tuple)) else [self.arguments]
-        argv = [with_package(text_of(one, context)) for one in words if one is not None]
+        argv = [symbolic_text(one, context) for one in words if one is not None]
         ros_argv = [text_of(one, context) for one in self.ros_arguments or ()]
         context.record(
             kind, self.at, package=_optional(self.package, context), executable=text_of(self.executable, context),
@@ -567,7 +586,7 @@ class Node(ExecuteProcess):
 
 def rules_of(given: Any, context: Context) -> list[tuple[str, str]]:
     """Return remappings as pairs of texts."""
-    return [(text_of(old, context), text_of(new, context)) for old, new in given or ()]
+    return [(text_of(old, context), symbolic_text(new, context)) for old, new in given or ()]
 
 
 class LifecycleNode(Node):

@@ -346,7 +346,7 @@ def answer(request: dict[str, Any]) -> dict[str, Any]:
     except (Exception, SystemExit) as error:  # noqa: BLE001 (whatever a launch file raises is a finding)
         stopped = f"{type(error).__name__}: {error}"
     records = context.records
-    return {"records": records[:MOST_RECORDS], "stopped": stopped, "configurations": context.configurations}
+    return {"records": records[:MOST_RECORDS], "stopped": stopped, "decided": sorted(context.decided)}
 
 
 def main() -> None:

@@ -42,6 +42,35 @@ def marks(text: str) -> list[dict[str, Any]]:
     return [json.loads(found[1]) for found in _MARK.finditer(text)]
 
 
+#: What stands for an argument of the robot file: its name and its value, between characters that no text has.
+_ARGUMENT = re.compile("\x04([^\x05]*)\x05([^\x06]*)\x06")
+
+
+def without_arguments(text: str) -> str:
+    """Return a text with the values of the arguments that stand in it."""
+    return _ARGUMENT.sub(lambda found: found[2], text)
+
+
+def symbolic_text(value: Any, context: Context) -> str:
+    """Return the text of a value in which launch arguments stand for themselves, where the robot file has them."""
+    before, context.symbolic = context.symbolic, True
+    try:
+        return with_package(text_of(value, context))
+    finally:
+        context.symbolic = before
+
+
+def scalar_of(text: str) -> Any:
+    """Return what a launch argument is: true or false, a number as it is written, or the text."""
+    if text.lower() in {"true", "false"}:
+        return text.lower() == "true"
+    if re.fullmatch(r"-?(0|[1-9][0-9]{0,15})", text) and text != "-0":
+        return int(text)
+    if re.fullmatch(r"-?(0|[1-9][0-9]*)\.[0-9]+", text) and repr(float(text)) == text:
+        return float(text)
+    return text
+
+
 def with_package(path: str) -> str:
     """Return a path below a package that is not found as an address: pathlib takes one slash for two."""
     return re.sub(r"^.*?package:/+", PACKAGE, path) if "package:/" in path else path
@@ -67,6 +96,12 @@ class Context:
         self.file = ""
         self.depth = 0
         self.at: Any = ("", 1)
+        #: The types of launch arguments that a robot file can have as its own, by name.
+        self.declared: dict[str, str] = {}
+        #: Those whose value decided something that stands in the robot file as it is now.
+        self.decided: set[str] = set()
+        self.symbolic = False
+        self.whens: list[str] = []
 
     @property
     def launch_configurations(self) -> dict[str, str]:
@@ -94,7 +129,8 @@ class Context:
 
     def record(self, kind: str, at: Any, **what: Any) -> None:
         """Keep what an action does."""
-        more = {"when": list(self.conditions)} if self.conditions else {}
+        more: dict[str, Any] = {"when": list(self.conditions)} if self.conditions else {}
+        more |= {"only_when": " and ".join(self.whens)} if self.whens else {}
         self.records.append({"kind": kind, "at": at, **more, **what})
 
     def todo(self, at: Any, text: str) -> None:
@@ -144,12 +180,23 @@ def plain(value: Any) -> str:
 def text_of(value: Any, context: Context) -> str:
     """Return the text of a value, of a substitution, or of a list of them, which belong together."""
     if isinstance(value, (Substitution, ParameterValue)):
+        if context.symbolic and not isinstance(value, (LaunchConfiguration, TextSubstitution, PathJoinSubstitution)):
+            return _plain_text(value, context)
         return str(value.perform(context))
     if isinstance(value, (list, tuple)):
         return "".join(text_of(one, context) for one in value)
     if isinstance(value, Missing):
         raise FailedError(f"{value.name} is not known here")
     return with_package(str(value)) if isinstance(value, os.PathLike) else str(value)
+
+
+def _plain_text(value: Any, context: Context) -> str:
+    """Return the text of a substitution that computes with values."""
+    before, context.symbolic = context.symbolic, False
+    try:
+        return str(value.perform(context))
+    finally:
+        context.symbolic = before
 
 
 def truth(value: Any, context: Context) -> bool:
@@ -183,7 +230,15 @@ class LaunchConfiguration(Substitution):
     def perform(self, context: Context) -> str:
         name = text_of(self.variable_name, context)
         if name in context.configurations:
-            return context.configurations[name]
+            value = context.configurations[name]
+            if name not in context.declared:
+                return value
+            if context.symbolic and str(scalar_of(value)).lower() == value:  # True would become true
+                return f"\x04{name}\x05{value}\x06"
+            if context.symbolic and context.declared[name] == "string":
+                return f"\x04{name}\x05{value}\x06"
+            context.decided.add(name)
+            return value
         if self.default is not None:
             return text_of(self.default, context)
         raise FailedError(f"the launch argument {name} has no value: give {name}:=…")
@@ -406,9 +461,14 @@ class Condition:
         """Return it for people."""
         return plain([self.predicate])
 
+    def when(self, context: Context) -> str | None:
+        """Return it as an expression of a robot file, or None where it cannot be one."""
+        return None
+
 
 class IfCondition(Condition):
-    pass
+    def when(self, context: Context) -> str | None:
+        return expression_of(self.predicate, context)
 
 
 class UnlessCondition(Condition):
@@ -418,14 +478,25 @@ class UnlessCondition(Condition):
     def describe(self) -> str:
         return f"not {plain([self.predicate])}"
 
+    def when(self, context: Context) -> str | None:
+        inner = expression_of(self.predicate, context)
+        return inner and f"not ({inner})"
+
 
 class LaunchConfigurationEquals(Condition):
     def __init__(self, launch_configuration_name: Any, expected_value: Any) -> None:
         super().__init__(launch_configuration_name)
         self.expected = expected_value
 
+    WORD = "=="
+
+    def when(self, context: Context) -> str | None:
+        return _comparison(plain([self.predicate]), self.WORD, self.expected, context)
+
     def evaluate(self, context: Context) -> bool:
-        value = context.configurations.get(text_of(self.predicate, context))
+        name = text_of(self.predicate, context)
+        context.decided |= {name} & context.declared.keys()
+        value = context.configurations.get(name)
         return value is None if self.expected is None else value == text_of(self.expected, context)
 
     def describe(self) -> str:
@@ -433,11 +504,45 @@ class LaunchConfigurationEquals(Condition):
 
 
 class LaunchConfigurationNotEquals(LaunchConfigurationEquals):
+    WORD = "!="
+
     def evaluate(self, context: Context) -> bool:
         return not super().evaluate(context)
 
     def describe(self) -> str:
         return f"{plain([self.predicate])} != {plain([self.expected])}"
+
+
+def expression_of(value: Any, context: Context) -> str | None:
+    """Return what is true or false as an expression of a robot file, or None where it cannot be one."""
+    one = value[0] if isinstance(value, (list, tuple)) and len(value) == 1 else value
+    if isinstance(one, LaunchConfiguration):
+        name = plain([one.variable_name])
+        return f"args.{name}" if context.declared.get(name) == "bool" else None
+    if isinstance(one, NotSubstitution):
+        inner = expression_of(one.args[0], context)
+        return inner and f"not ({inner})"
+    if isinstance(one, (AndSubstitution, OrSubstitution)):
+        several = [expression_of(arg, context) for arg in one.args]
+        word = " and " if isinstance(one, AndSubstitution) else " or "
+        return word.join(f"({inner})" for inner in several) if all(several) else None
+    if isinstance(one, EqualsSubstitution) and isinstance(one.args[0], LaunchConfiguration):
+        word = "!=" if isinstance(one, NotEqualsSubstitution) else "=="
+        return _comparison(plain([one.args[0].variable_name]), word, one.args[1], context)
+    return None
+
+
+def _comparison(name: str, word: str, expected: Any, context: Context) -> str | None:
+    kind = context.declared.get(name)
+    if kind is None or not isinstance(expected, str) or "'" in expected:
+        return None
+    if kind == "string":
+        return f"args.{name} {word} '{expected}'"
+    typed = scalar_of(expected)
+    if kind == "bool" and isinstance(typed, bool):
+        return f"args.{name}" if typed is (word == "==") else f"not args.{name}"
+    is_number = isinstance(typed, (int, float)) and not isinstance(typed, bool)
+    return f"args.{name} {word} {expected}" if is_number and kind in {"int", "float"} else None
 
 
 def evaluate_condition_expression(context: Context, expression: Any) -> bool:
@@ -456,6 +561,8 @@ class ParameterValue:
         """Return the value with its type."""
         if isinstance(self.value, (int, float)) and self.value_type in (None, type(self.value)):
             return self.value
+        if self.value_type is None:
+            return _typed_or_symbolic(self.value, context)
         text = text_of(self.value, context)
         if self.value_type is str or marks(text):
             return text
@@ -481,6 +588,20 @@ def _typed(text: str) -> Any:
     except yaml.YAMLError:
         raise FailedError(f"the value {text!r} of a parameter is no YAML") from None
     return value if isinstance(value, (bool, int, float, str, list)) else text
+
+
+def _typed_or_symbolic(value: Any, context: Context) -> Any:
+    """Return the value that YAML reads in a text; arguments stand for themselves where they are read alike."""
+    text = symbolic_text(value, context)
+    plain_value = without_arguments(text)
+    if marks(plain_value) or plain_value == text:
+        return plain_value if marks(plain_value) else _typed(plain_value)
+    typed = _typed(plain_value)
+    alone = _ARGUMENT.fullmatch(text)
+    if typed == (scalar_of(plain_value) if alone else plain_value) and isinstance(typed, (bool, int, float, str)):
+        return text
+    context.decided.update(found[1] for found in _ARGUMENT.finditer(text))
+    return typed
 
 
 def parameters_of(given: Any, context: Context, at: Any) -> list[Any]:
@@ -520,12 +641,10 @@ def parameter_value(value: Any, context: Context) -> Any:
     if isinstance(value, (bool, int, float, str)):
         return value
     if isinstance(value, Substitution):
-        text = text_of(value, context)
-        return text if marks(text) else _typed(text)
+        return _typed_or_symbolic(value, context)
     if isinstance(value, (list, tuple)):
         if any(isinstance(one, Substitution) for one in value):
-            text = text_of(value, context)
-            return text if marks(text) else _typed(text)
+            return _typed_or_symbolic(value, context)
         items = [parameter_value(one, context) for one in value]
         numbers = all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in items)
         return [float(one) for one in items] if numbers and any(isinstance(one, float) for one in items) else items

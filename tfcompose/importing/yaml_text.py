@@ -29,6 +29,12 @@ class Bare(str):
     __slots__ = ()
 
 
+class Expression(str):
+    """An expression, which is computed: ``${…}`` in the written file."""
+
+    __slots__ = ()
+
+
 class Literal(str):
     """A text of several lines, which keeps them."""
 
@@ -145,9 +151,27 @@ def section(name: str, entries: Mapping[str, Any], notes: Mapping[str, Iterable[
 
 def without_expressions(sections: dict[str, dict[str, Any]]) -> tuple[dict[str, dict[str, Any]], list[str]]:
     """Return sections in which no text is taken for an expression, and the lines of the variable that they need."""
-    if not any("${" in value for value in _texts(sections)):
-        return sections, []
-    return _escaped(sections), entry("vars", {"dollar": "$"})
+    lines = entry("vars", {"dollar": "$"}) if any("${" in value for value in _texts(sections)) else []
+    return _escaped(sections), lines
+
+
+#: What stands for an argument of the robot file among texts that may hold anything: its name, and its value.
+_ARGUMENT = re.compile("\x04([^\x05]*)\x05[^\x06]*\x06")
+
+
+def argument(name: str, value: str = "") -> str:
+    """Return what stands for an argument, ``name``, or for an expression: ``${args.name}`` in the written file."""
+    return f"\x04{name}\x05{value}\x06"
+
+
+def arguments_in(value: Any) -> set[str]:
+    """Return the names of the arguments in data."""
+    return {found[1] for one in _texts(value) for found in _ARGUMENT.finditer(one)}
+
+
+def with_values(value: str) -> str:
+    """Return a text with the values of its arguments."""
+    return re.sub("\x04[^\x05]*\x05([^\x06]*)\x06", r"\1", value)
 
 
 def _texts(value: Any) -> list[str]:
@@ -156,7 +180,7 @@ def _texts(value: Any) -> list[str]:
         return [one for item in value.values() for one in _texts(item)]
     if isinstance(value, (list, tuple)):
         return [one for item in value for one in _texts(item)]
-    return [value] if isinstance(value, str) else []
+    return [value] if isinstance(value, str) and not isinstance(value, Expression) else []
 
 
 def _escaped(value: Any) -> Any:
@@ -164,4 +188,9 @@ def _escaped(value: Any) -> Any:
         return {key: _escaped(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [_escaped(item) for item in value]
-    return type(value)(value.replace("${", "${dollar}{")) if isinstance(value, str) else value
+    if not isinstance(value, str):
+        return value
+    if isinstance(value, Expression):
+        return f"${{{value}}}"
+    text = _ARGUMENT.sub(lambda found: f"${{args.{found[1]}}}", value.replace("${", "${dollar}{"))
+    return Bare(f'"{text}"') if text != value and isinstance(value, Bare) else type(value)(text)

@@ -78,6 +78,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "tree",
         "urdf",
     },
+    "view": {"findings", "geometry", "language", "load", "model", "numbers", "units"},
     "cli": {"*"},
     "__main__": {"cli"},
 }

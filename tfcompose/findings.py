@@ -6,13 +6,15 @@ was seen read alike. A code is never used again for something else.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from tfcompose.catalogue import CATALOGUE, Severity
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
 
 class Span(NamedTuple):
@@ -126,6 +128,37 @@ def without_duplicates(found: Iterable[Finding]) -> list[Finding]:
         if len(notes) > len(before.notes):
             first[alone] = replace(before, notes=tuple(notes))
     return list(first.values())
+
+
+_BREAK = re.compile("\r\n|[\r\n\x85\u2028\u2029]")  # as YAML counts lines
+
+
+def line_starts(text: str) -> list[int]:
+    """Return where each line of a YAML text begins."""
+    return [0, *(found.end() for found in _BREAK.finditer(text))]
+
+
+def edited(text: str, edits: Sequence[Edit]) -> str | None:
+    """Return the text with the edits in it, or None where two of them meet or one lies outside."""
+    starts = line_starts(text)
+    newline = "\r\n" if "\r\n" in text else "\n"
+    pieces: list[tuple[int, int, str]] = []
+    for edit in edits:
+        at, new = edit.span, edit.text.replace("\n", newline)
+        if at.line == len(starts) + 1 and at.column == 1:  # behind a last line that does not end
+            pieces.append((len(text), len(text), newline + new.removesuffix(newline)))
+            continue
+        if at.end_line > len(starts):
+            return None
+        begin, end = starts[at.line - 1] + at.column - 1, starts[at.end_line - 1] + at.end_column - 1
+        quote = text[begin : begin + 1] if end - begin > 1 and text[begin] == text[end - 1] else ""
+        pieces.append((begin, end, f"{quote}{new}{quote}" if quote in {"'", '"'} else new))
+    pieces.sort()
+    if any(end > begin for (_, end, _), (begin, _, _) in pairwise(pieces)):
+        return None
+    for begin, end, new in reversed(pieces):
+        text = text[:begin] + new + text[end:]
+    return text
 
 
 def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:

@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from tests.support import processes
 from tests.support.cli import tfcompose_in
 from tfcompose.cli.compiling import library
-from tfcompose.cli.fixing import Fixer, edited, rewrite
+from tfcompose.cli.fixing import Fixer, rewrite
 from tfcompose.compile import compile_robot
-from tfcompose.findings import Edit, Finding, RejectedError, Span, finding, slip_of
+from tfcompose.findings import Edit, Finding, RejectedError, Span, edited, finding, slip_of
 from tfcompose.language import with_includes
 from tfcompose.load import load
 

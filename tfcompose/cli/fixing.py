@@ -7,16 +7,15 @@ from __future__ import annotations
 
 import codecs
 import os
-import re
 from collections import Counter
 from dataclasses import dataclass, field
 from difflib import unified_diff
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.writing import replace_file
+from tfcompose.findings import edited
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -25,8 +24,6 @@ if TYPE_CHECKING:
 
     Reader = Callable[[str], str]
     Lint = Callable[[str, Reader], list[Finding]]
-
-_BREAK = re.compile("\r\n|[\r\n\x85\u2028\u2029]")  # as YAML counts lines
 
 
 class ChangedError(OSError):
@@ -126,29 +123,6 @@ def _path(file: str) -> str:
 
 def _counted(found: Iterable[Finding]) -> Counter[tuple[str, str]]:
     return Counter((one.code, one.message) for one in found)
-
-
-def edited(text: str, edits: Sequence[Edit]) -> str | None:
-    """Return the text with the edits in it, or None where two of them meet or one lies outside."""
-    starts = [0, *(found.end() for found in _BREAK.finditer(text))]
-    newline = "\r\n" if "\r\n" in text else "\n"
-    pieces: list[tuple[int, int, str]] = []
-    for edit in edits:
-        at, new = edit.span, edit.text.replace("\n", newline)
-        if at.line == len(starts) + 1 and at.column == 1:  # behind a last line that does not end
-            pieces.append((len(text), len(text), newline + new.removesuffix(newline)))
-            continue
-        if at.end_line > len(starts):
-            return None
-        begin, end = starts[at.line - 1] + at.column - 1, starts[at.end_line - 1] + at.end_column - 1
-        quote = text[begin : begin + 1] if end - begin > 1 and text[begin] == text[end - 1] else ""
-        pieces.append((begin, end, f"{quote}{new}{quote}" if quote in {"'", '"'} else new))
-    pieces.sort()
-    if any(end > begin for (_, end, _), (begin, _, _) in pairwise(pieces)):
-        return None
-    for begin, end, new in reversed(pieces):
-        text = text[:begin] + new + text[end:]
-    return text
 
 
 def rewrite(path: Path, old: str, new: str) -> None:

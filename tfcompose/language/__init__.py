@@ -6,10 +6,12 @@ The models are the one description of validation, JSON Schema and reference. ``o
 
 from tfcompose.language.args import ArgSpec, Given, GivenArg
 from tfcompose.language.overlay import as_part, composed, lay_over, profiles_in, set_value, with_includes
+from tfcompose.language.pose import DIRECTIONS
 from tfcompose.language.validate import Validated, validate, validate_node_preset, validate_preset
 from tfcompose.language.variables import alternatives_of
 
 __all__ = [
+    "DIRECTIONS",
     "ArgSpec",
     "Given",
     "GivenArg",

@@ -125,7 +125,8 @@ class Calibration:
 class Edge(PlanEdge):
     """An edge of the plan, with what only the compiler knows of it.
 
-    ``at`` is where it was written, and ``source`` the line of that. ``node`` is empty where the owner has one node.
+    ``at`` is where it was written, ``source`` the line of that, and ``entry`` the path of the mapping that gives it: of
+    an edge inside a part it begins with the part's own. ``node`` is empty where the owner has one node.
     ``joint`` moves by joint states. ``free`` is a planar or floating joint, of which joint states say nothing.
     ``other_axes``: the vendor's name for the frame does not say whether it is optical, or says it wrongly.
     ``optical_edits`` returns the edits of the file that give the edge the optical rotation of REP-103; none where that
@@ -139,6 +140,7 @@ class Edge(PlanEdge):
     at: Span = field(kw_only=True)
     joint_name: str = field(default="", kw_only=True)
     given: bool = field(default=True, kw_only=True)
+    entry: tuple[str | int, ...] = field(default=(), compare=False, kw_only=True)
     owner_at: Span | None = field(default=None, kw_only=True)
     child_at: Span | None = field(default=None, kw_only=True)
     joint_at: Span | None = field(default=None, kw_only=True)

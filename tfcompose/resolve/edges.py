@@ -6,7 +6,7 @@ The numbers of poses and limits are kept as they were written too: a pose keeps 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -118,7 +118,7 @@ class Drafts:
             switched = len(keys.parent) > 1  # then the part's owner is who carries it about
             owner = keys.owner if switched else STATIC
             self.add(at, keys.parent, part.root, keys, joint_name=keys.joint, owner=owner, part=part.name)
-        self.edges += [Draft(edge, part=part.name) for edge in robot.edges]
+        self.edges += [Draft(replace(edge, entry=(*at, *edge.entry)), part=part.name) for edge in robot.edges]
         self.sensors += robot.sensors
         return True
 
@@ -177,6 +177,7 @@ class Drafts:
             joint_name=joint_name or "",
             joint_at=named_at,
             child_at=self.source.at((*at, "child")) if at[0] == "joints" else None,
+            entry=at,
             owner_at=self.source.at((*at, "owner")) if keys.owner else None,
             sensor=sensor.name if sensor else None,
             rate_at=self.source.at((*at, "rate")) if keys.rate else None,

@@ -83,6 +83,7 @@ class _Mounting:
             pose=pose, at=self.place(), given=False, sensor=self.sensor.name, nominal=nominal,
             other_axes=frame.other_axes, pose_known=not missing, joint_name=joint or "",
             joint_at=self.drafts.named_joint(joint, at) if joint else None,
+            entry=("sensors", self.sensor.name, "frames", name),
         )  # fmt: skip
         self.drafts.edges.append(Draft(edge))
 

@@ -313,6 +313,20 @@ def test_stock_nodes_send_the_edges_that_our_publishers_send_and_no_other(
     assert len(names) == len(set(names))
 
 
+def test_a_launch_file_has_prefixes_and_delays_and_what_has_a_schedule_is_started_as_up_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    keys = "restart: always, restart_delay: 2500 ms, prefix: nice -n 5"
+    run = "{run: {package: base, executable: drive_node}, %s}"
+    text = f"tfcompose: 1\nrobot: r\nlinks: {{base_link: {{}}}}\nprocesses:\n  a: {run % keys}\n"
+    text += f"  b: {run % 'schedule: {cpus: [0]}'}\n"
+    _, actions = launched(text, tmp_path, monkeypatch)
+    (node,) = (action for action in actions if getattr(action, "name", "") == "a")
+    assert (node.kind, node.prefix, node.respawn_delay) == ("Node", "nice -n 5", 2.5)
+    (held,) = (action for action in actions if getattr(action, "name", "") == "b")
+    assert held.cmd[1:] == ["-m", "tfcompose.launcher.exec", str(tmp_path / "plan.json"), "b"]
+
+
 def test_a_driver_is_a_node_with_its_name_parameters_and_remappings(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

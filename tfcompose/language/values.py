@@ -44,6 +44,19 @@ class Matches:
         return {**handler(schema), "pattern": f"^{self.pattern}$"}
 
 
+@dataclass(frozen=True, slots=True)
+class Computable:
+    """Annotates a value that an expression may give; ``plain`` is the function that takes it out of what that gives."""
+
+    plain: Callable[[Any], Any]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], CoreSchema]) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.plain, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: Any) -> dict[str, Any]:
+        return {"anyOf": [handler(schema), {"type": "string", "pattern": r"^\$\{"}]}
+
+
 _AXES = ("x", "y", "z")
 
 
@@ -179,10 +192,10 @@ Condition = Annotated[Any, BeforeValidator(lambda value: value, bool | str)]
 Loops = Annotated[Any, BeforeValidator(lambda value: value, dict[str, str | tuple[str | float | bool, ...]])]
 Text = Annotated[str, Strict()]
 #: True or false, which may be computed.
-Boolean = Annotated[bool, Strict(), BeforeValidator(_truth)]
+Boolean = Annotated[bool, Strict(), Computable(_truth)]
 OnlyTrue = Annotated[bool, BeforeValidator(_is_true), Field(json_schema_extra={"const": True})]
 #: Annotates a whole number, which may be computed.
-Integral = BeforeValidator(_integral)
+Integral = Computable(_integral)
 Name = Annotated[Text, Matches(r"[A-Za-z][A-Za-z0-9_]*", "a name: a letter, then letters, digits and _")]
 Namespace = Annotated[
     Text,

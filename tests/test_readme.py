@@ -63,6 +63,9 @@ def test_help_prints_topics_and_commands_and_all_of_them_as_html(tmp_path: Path)
     page = (tmp_path / "docs.html").read_text("utf-8")
     assert all(f'id="topic-{word}"' in page for word in TOPICS)
     assert all(f'id="command-{name}"' in page for name in COMMANDS)
+    addresses = re.findall(r'id="([^"]+)"', page)
+    assert len(set(addresses)) == len(addresses)
+    assert CATALOGUE.keys() <= set(re.findall(r'href="#([^"]+)"', page)) <= set(addresses)
     assert not re.search(r'<\w+ [^>]*(src|href)="(?!#)', page), "it needs no other file"
 
 

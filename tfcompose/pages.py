@@ -73,25 +73,33 @@ Paths are relative to the file that contains them, not to the folder in which tf
 
 It is a TODO comment there, with its file and line: what a robot file cannot say, what could not be understood, or what
 only runs elsewhere. Everything else is imported.""",
-    "TF101": """A key is not known here.
+    "TF101": """A key is unknown here.
 
 Probably it is misspelt. Unknown keys are refused, because a key that is silently ignored puts a frame in the wrong
 place.""",
     "TF102": """A required key is missing.
 
 The entry is incomplete without it.""",
-    "TF103": """A value has the wrong type: a string instead of a number, or a list of another length.""",
+    "TF103": """A value has the wrong type: a string instead of a number, or a list of another length.
+
+The help shows the form that is expected. Decimals take a point, not a comma; names with special characters, and an
+expression ${…} inside [ ] or { }, take quotes.""",
     "TF104": """A unit is unknown, or belongs to another quantity.
 
 Bare numbers are SI: m, rad, kg, s, Hz. A string may carry a unit: 30 cm, 15 deg, 50 Hz, 200 ms.""",
     "TF105": """An expression ${…} cannot be computed.
 
-It may contain vars, quantities, pi, + - * / ( ), and sin cos tan sqrt radians degrees.""",
-    "TF106": """A value is not allowed here.""",
+It may contain vars, args, quantities, pi, + - * / ( ), sin cos tan sqrt radians degrees, and env(NAME, default). A
+condition also has == != < <= > >=, and, or, not, and strings in quotes; a loop goes through range(3), or
+range(1, 4).""",
+    "TF106": """A value is not allowed here.
+
+The type is right, but the value is out of range, or not one of those that the key has. The message says which are
+allowed, or the help names the closest one.""",
     "TF107": """Two keys exclude each other.
 
 There are several ways to write a rotation, to run a process or to give a shape: choose one.""",
-    "TF304": """A robot is to be isolated but has no namespace.
+    "TF304": """A robot has isolate, but no namespace.
 
 isolate moves topics into the namespace, or prefixes frames with it. Add ros: {namespace: robot1}.""",
     "TF312": """A part has another clock, domain or discovery range than the robot that contains it.

@@ -36,6 +36,13 @@ MISTAKES = [
     (PROCESS % "env: [A=1]", "6:31 TF103", "env: {RCUTILS_COLORIZED_OUTPUT: '1'}"),
     (PROCESS % "remap: ['/a:=/b']", "6:33 TF103", "remap: {scan: front/scan}"),
     (PROCESS % "ready: {topic: '/sc an'}", "6:41 TF106", ""),
+    # what is new to YAML
+    (BASE + "frames:\n  laser\n    parent: base_link\n", "5:3 TF002", "laser:"),
+    (BASE + "frames:\n\n  laser  # on top\n    parent: base_link\n", "6:3 TF002", "laser:"),
+    (BASE + "frames:\n  laser: {parent:base_link}\n", "5:11 TF006", "parent: base_link"),
+    (BASE + "frames:\n  tag36h11:7:\n", "5:3 TF006", "{}"),
+    (BASE + "frames:\n  sensors:\n    cam: {preset: x}\n", "6:5 TF101", "section"),
+    # colours
     (SHAPE % "material: {color: [0, 0, 1]}", "3:57 TF101", "rgba"),
     (SHAPE % "color: bleu", "3:53 TF106", "blue"),
     (SHAPE % "color: [0, 0, 1], material: red", "3:64 TF107", ""),

@@ -77,7 +77,7 @@ def test_each_rule_stands_once_with_its_page_and_in_one_line_what_it_says() -> N
     assert [rule["id"] for rule in rules] == sorted({one.code for one in found})
     for rule in rules:
         assert rule["name"] == CATALOGUE[rule["id"]].name
-        assert rule["fullDescription"]["text"] == PAGES[rule["id"]]
+        assert rule["fullDescription"]["text"] == rule["help"]["text"] == PAGES[rule["id"]]
         assert rule["fullDescription"]["text"].startswith(rule["shortDescription"]["text"])
         assert "\n" not in rule["shortDescription"]["text"]
 

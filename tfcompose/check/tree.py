@@ -52,7 +52,7 @@ def cycle(robot: Robot) -> Iterator[Finding]:
             loop = list(path)[list(path).index(frame) :]
             names = " → ".join([*reversed(loop), loop[-1]])
             notes = [Note(f"{above[child].name} is defined here", above[child].at) for child in loop[1:]]
-            advice = "remove one of these edges, or give its child another parent"
+            advice = "parent and child of one of these edges are probably swapped: swap them, or remove that edge"
             if len(loop) == 1:
                 advice = f"remove the parent of {frame}"
                 if frame in robot.mounted.values():

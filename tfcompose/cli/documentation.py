@@ -84,6 +84,9 @@ def _vendors() -> str:
 
 _GENERATED: dict[str, Callable[[], str]] = {"language": _keys, "codes": _codes, "presets": _vendors}
 
+#: The heading of a model in the reference, to which the types of keys lead.
+_MODEL = re.compile(r"<h2>(\w+)</h2>")
+_CODE_CELL = re.compile(r"<td>(TF\d{3})</td>")
 _STYLE = """
 :root { color-scheme: light dark; }
 body { margin: 0 auto; max-width: 60rem; padding: 1rem; font: 16px/1.5 system-ui, sans-serif; }
@@ -91,7 +94,8 @@ pre { padding: .7rem; overflow-x: auto; background: #8882; border-radius: 4px; }
 code { font-size: 90%; }
 table { border-collapse: collapse; display: block; overflow-x: auto; }
 td, th { padding: .2rem .6rem; border: 1px solid #8886; text-align: left; vertical-align: top; }
-nav ul { columns: 3; padding-left: 1rem; }
+nav ul { columns: 7rem; padding-left: 1rem; }
+nav h2 { margin-bottom: 0; font-size: 1rem; }
 section { border-top: 1px solid #8886; margin-top: 2rem; }
 """
 
@@ -104,16 +108,36 @@ def html(commands: Mapping[str, Command]) -> str:
     """
     from markdown_it import MarkdownIt
 
+    from tfcompose.catalogue import CATALOGUE
+    from tfcompose.pages import page as code_page
+
     renderer = MarkdownIt("commonmark", {"html": False}).enable("table")
-    parts = {f"topic-{word}": renderer.render(topic(word)) for word in TOPICS}
+    topics = {f"topic-{word}": renderer.render(topic(word)) for word in TOPICS}
+    topics["topic-language"] = _MODEL.sub(_with_id, topics["topic-language"])
+    topics["topic-codes"] = _CODE_CELL.sub(r'<td><a href="#\1">\1</a></td>', topics["topic-codes"])
+    topics["topic-codes"] += "\n".join(
+        f'<h2 id="{code}">{code} {entry.name}</h2>\n{renderer.render(code_page(code))}'
+        for code, entry in CATALOGUE.items()
+    )
+    described = {}
     for name, command in commands.items():
         options = escape(command_parser(name, command).format_help())
         about = renderer.render(_read(name)) if name not in TOPICS else ""
-        parts[f"command-{name}"] = f"<h1>tfcompose {name}</h1>\n<pre>{options}</pre>\n{about}"
-    names = "".join(f'<li><a href="#{part}">{part.partition("-")[2]}</a></li>' for part in parts)
+        described[f"command-{name}"] = f"<h1>tfcompose {name}</h1>\n<pre>{options}</pre>\n{about}"
+    names = "\n".join(_links(title, parts) for title, parts in (("Topics", topics), ("Commands", described)))
+    parts = topics | described
     sections = "\n".join(f'<section id="{part}">\n{text}</section>' for part, text in parts.items())
     return (
         f'<!doctype html>\n<html lang="en">\n<meta charset="utf-8">\n'
         f'<meta name="viewport" content="width=device-width">\n<title>tfcompose {__version__}</title>\n'
-        f"<style>{_STYLE}</style>\n<h1>tfcompose {__version__}</h1>\n<nav><ul>{names}</ul></nav>\n{sections}\n</html>\n"
+        f"<style>{_STYLE}</style>\n<h1>tfcompose {__version__}</h1>\n<nav>\n{names}\n</nav>\n{sections}\n</html>\n"
     )
+
+
+def _links(title: str, parts: Mapping[str, str]) -> str:
+    items = "".join(f'<li><a href="#{part}">{part.partition("-")[2]}</a></li>' for part in parts)
+    return f"<h2>{title}</h2>\n<ul>{items}</ul>"
+
+
+def _with_id(heading: re.Match[str]) -> str:
+    return f'<h2 id="{heading[1].lower()}">{heading[1]}</h2>'

@@ -106,7 +106,7 @@ def lay_over(base: Source, overlay: Source, *, is_overlay: bool = True, of: type
         base, overlay = _with_full_args(base), _with_full_args(overlay)
     merger = _Merger(base.replaced, overlay.replaced, of, is_overlay=is_overlay)
     if is_overlay and not overlay.data:
-        merger.found.append(_idle("nothing is laid over the robot here", overlay.places))
+        merger.found.append(_idle("nothing is merged over the robot here", overlay.places))
     data, places = merger.merge((base.data, base.places), (overlay.data, overlay.places), ())
     found = (*base.found, *overlay.found, *merger.found)
     allows = tuple(dict.fromkeys((*base.allows, *overlay.allows)))
@@ -408,7 +408,7 @@ def set_value(setting: str) -> Source:
         message = f"--set names a key in {len(path)} levels; a robot has no more than {DEEPEST}"
         raise RejectedError([finding("TF016", message, Span("--set"))])
     if path[0] == "include":
-        message = "--set cannot include files: it is laid over what they hold"
+        message = "--set cannot include files: it is merged over them"
         raise RejectedError([finding("TF016", message, span, help="--overlay FILE")])
     read = load(f"value: {value_text.strip() or 'null'}", span.file)
     data: Any = read.data["value"]

@@ -186,12 +186,19 @@ def _unknown_key(model: type[Spec], path: Path, data: Any, meant: Counter[tuple[
     for step in path[:-1]:
         around = around[step]
     is_safe = slip not in around and meant[path[:-1], slip] == 1
-    advice = f"did you mean {slip}?" if slip else habit(name, known)
+    advice = f"did you mean {slip}?" if slip else _section(model, path) or habit(name, known)
     if not advice:
         listing = f"known here: {', '.join(known)}"
         option = f"an option of its preset goes under options: {{{name}: …}}; " if "options" in known else ""
         advice = did_you_mean(name, known, option + listing)
     return Refusal("TF101", path, f"unknown key {name}", advice, on_key=True, instead=slip if is_safe else None)
+
+
+def _section(model: type[Spec], path: Path) -> str:
+    """Return the help where an entry of a section has the name of a section: it is indented too far."""
+    if len(path) != 3 or path[1] not in fields_of(model) or path[0] == "profiles":  # noqa: PLR2004 (section, entry, key)
+        return ""
+    return f"{path[1]} is a section of its own, not one of {path[0]}: indent it as {path[0]} is"
 
 
 def _refusal(model: type[Spec], path: Path, error: ErrorDetails) -> Refusal:

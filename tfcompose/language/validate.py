@@ -139,6 +139,8 @@ def _nulls(source: Source) -> list[Refusal]:
                 message, advice = f"{step} has no value", f"write {step}: {{}}, or remove it"
                 if _AFTER_A_COMMA.fullmatch(str(step)):
                     advice = "decimals take a point, such as 1.5 kg; or a mapping is not closed"
+                elif glued := _WITHOUT_SPACE.fullmatch(str(step)):
+                    advice = f"a space belongs after the colon: {glued[1]}: {glued[2]}"
                 found.append(Refusal("TF006", at, message, advice, on_key=True))
 
     if source.has_nulls:
@@ -146,6 +148,8 @@ def _nulls(source: Source) -> list[Refusal]:
     return found
 
 
+#: A key and its value in one word, which the name of a frame with a colon, such as tag36h11:7, is not.
+_WITHOUT_SPACE = re.compile(r"([a-z_]+):(\S+)")
 #: What is left of a quantity such as 1,5 kg behind its comma.
 _AFTER_A_COMMA = re.compile(r"\d+(\s*[a-zA-Z°/^0-9]+)?")
 

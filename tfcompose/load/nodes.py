@@ -379,6 +379,13 @@ def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Finding:
     elif began and "expected ':'" in message and began.line < len(lines):
         mark, message = began, f"{lines[began.line].strip()} has no colon"
         advice = f"write {lines[began.line].strip()}:"
+    elif (
+        mark
+        and ("mapping values are not allowed" in message or "parsing a block" in message)
+        and (bare := _line_without_colon(lines, mark.line))
+    ):
+        mark, message, advice = bare
+        began = None
     elif began and mark and "parsing a block" in message and len(indent) == mark.column != began.column:
         message = f"indented by {mark.column} spaces, and what it belongs to by {began.column}"
         advice = f"begin it in column {began.column + 1}, as line {began.line + 1} does"
@@ -396,6 +403,22 @@ def no_syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Finding:
         notes = [Note("it began here", Span(file, began.line + 1, began.column + 1, began.line + 1, began.column + 2))]
     return finding("TF002", message, Span(file, line, column, line, column + 1), help=advice, notes=notes)
 
+
+def _line_without_colon(lines: list[str], number: int) -> tuple[yaml.Mark, str, str] | None:
+    """Return the place, message and help for a lone word above a line that is indented more; None for other lines."""
+    if number >= len(lines):
+        return None
+    above = number - 1
+    while above >= 0 and not lines[above].strip():
+        above -= 1
+    found = _LONE_WORD.fullmatch(lines[above]) if above >= 0 else None
+    if not found or len(found[1]) >= len(lines[number]) - len(lines[number].lstrip()):
+        return None
+    place = yaml.Mark("", 0, above, len(found[1]), None, 0)
+    return place, f"{found[2]} has no colon", f"write {found[2]}:"
+
+
+_LONE_WORD = re.compile(r"( *)([\w/.-]+)\s*(?:#.*)?")
 
 #: A key that swallowed the beginning of its value: ``mast {parent``, ``mast:{parent``.
 _GLUED = re.compile(r"([\w/.-]+)\s*(:)?\s*([{\[].*)")

@@ -88,6 +88,7 @@ def _rule(code: str, pages: Mapping[str, str]) -> dict[str, Any]:
     if page:
         rule["shortDescription"] = {"text": page.partition("\n")[0]}
         rule["fullDescription"] = {"text": page}
+        rule["help"] = {"text": page, "markdown": page}  # no helpUri: the pages are at no address of the web
     return rule
 
 

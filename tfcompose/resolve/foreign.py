@@ -168,7 +168,7 @@ def _loose(robot: Robot, bolted: Mapping[str, str], part: PartEntry) -> Robot:
         advice = (
             f"leave parent out, and give the macro its parent and pose: params: {{{next(iter(bolted))}: {parent}, …}}"
         )
-        message = f"the macro {part.declared.macro} hangs on {parent} by {what}"
+        message = f"the macro {part.declared.macro} is attached to {parent} by {what}"
         raise RejectedError([finding("TF313", message, part.source.at((*part.at, "parent")), help=advice)])
     if part.declared.joint is None:
         part.declared = part.declared.model_copy(update={"joint": f"{part.prefix}{edge.joint_name}"})

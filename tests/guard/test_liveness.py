@@ -159,6 +159,13 @@ def test_an_owner_that_is_fast_enough_again_is_reported_to_be(watch: Callable[..
     assert over.startswith("map → odom ")
 
 
+def test_an_owner_a_little_below_what_it_declares_is_neither_slow_anew_nor_fast_enough_again(
+    watch: Callable[..., History],
+) -> None:
+    history = watch(edge("map odom", "slam", 10)).steadily(6, 5, "odom").steadily(12, 8.5, "odom")
+    assert (len(history.found()), history.over()) == (1, [])
+
+
 def test_several_slow_edges_of_one_owner_are_one_finding(watch: Callable[..., History]) -> None:
     history = watch(edge("odom a", "drive", 10), edge("odom b", "drive", 10)).steadily(6, 5, "a", "b")
     expect(history.only(), "TF805", "odom → a, odom → b", " 5 Hz", "drive (/drive)", " 10 Hz")

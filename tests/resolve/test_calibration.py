@@ -435,3 +435,13 @@ def test_any_text_as_a_calibration_file_gives_findings_and_a_robot(text: str, fo
 @settings(max_examples=400, deadline=None)
 def test_any_change_of_a_calibration_file_gives_findings_and_a_robot(text: str, form: str) -> None:
     settle(text, form)
+
+
+def test_of_two_files_that_measure_an_edge_the_first_is_taken_and_the_other_reported() -> None:
+    files = {"a_yaml": message(), "b_yaml": message().replace("0.12", "0.13")}
+    result = compiled("calibrations: [a.yaml, b.yaml]\nframes: {lens: {parent: base_link}}\n", **files)
+    (found,) = result.errors
+    assert (found.code, found.notes[0].span and found.notes[0].span.file) == ("TF613", "a.yaml")
+    edge = result.robot and result.robot.parent_edge("lens")
+    assert edge
+    assert edge.pose.xyz == pytest.approx(XYZ)

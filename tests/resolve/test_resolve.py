@@ -16,6 +16,7 @@ from tfcompose.emit import emit
 from tfcompose.geometry import Pose, angle_between
 from tfcompose.model import Edge, Robot
 from tfcompose.plan.file import read_plan
+from tfcompose.resolve.presets import holds
 
 HEAD = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
 CAMERA = "sensors: {c: {preset: realsense/d435i, parent: base_link, %s}}\n"
@@ -312,3 +313,19 @@ def test_a_fixed_edge_has_the_name_of_a_joint_where_one_is_given() -> None:
 def test_a_list_of_parents_has_different_names(parents: str) -> None:
     found = compiled(TOOL.replace("[base_link, rack]", parents)).found
     assert [one.code for one in found if one.code.startswith("TF1")] != []
+
+
+def test_a_frame_that_a_driver_sends_again_and_again_inside_a_sensor_can_be_placed() -> None:
+    """The inside of a sensor does not move, on whichever topic its driver sends it; what moves is refused."""
+    text = "sensors: {z: {preset: zed/zed2i, parent: base_link, place: z_left_camera_frame, xyz: [1, 0, 0]}}\n"
+    robot = robot_of(text)
+    assert edge_of(robot, "z_left_camera_frame").kind == "dynamic"
+    assert pose_in_root(robot, "z_left_camera_frame")[1] == pytest.approx([1, 0, 0])
+
+
+def test_a_condition_on_several_values_of_an_option_holds_only_for_all_of_them() -> None:
+    condition = {"streams": ["depth", "color"]}
+    assert holds(condition, {"streams": ["color", "infra1", "depth"]}, "driver")
+    assert not holds(condition, {"streams": ["depth"]}, "driver")
+    assert not holds(condition, {"streams": ["color"]}, "driver")
+    assert holds({"tf": "driver"}, {}, "driver")

@@ -164,3 +164,11 @@ processes: {x: {external: true}}
     assert {one.get("name") for one in urdf.iter("material")} == {"left_paint", "right_paint"}
     kinds = {str(one.get("name")): one.get("type") for one in urdf.findall("joint")}
     assert kinds["left_lid"] == kinds["right_lid"] == "floating"
+
+
+def test_a_prefix_is_declared_by_any_element_around_it() -> None:
+    inner = '<gazebo><a xmlns:x="u"><x:b x:c="1"/></a></gazebo>'
+    assert not compile_robot(HEAD + f"xml:\n  a: '{inner}'\n", "r.yaml", library()).errors
+    neighbour = '<gazebo><a xmlns:x="u"/><x:b/></gazebo>'
+    (found,) = compile_robot(HEAD + f"xml:\n  a: '{neighbour}'\n", "r.yaml", library()).errors
+    assert found.code == "TF719"

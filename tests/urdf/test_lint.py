@@ -440,3 +440,22 @@ def test_a_package_that_is_not_where_it_is_named_is_not_taken_for_a_slip_of_itse
     named = Packages(named={"arm_description": ("nowhere", Span("r.yaml"))})
     assert "mean" not in words_of(named.not_found("arm_description", None).help)
     assert "mean" in words_of(named.not_found("arm_descriptoin", None).help)
+
+
+def test_a_package_is_found_from_a_file_deep_inside_it(tmp_path: Path) -> None:
+    (tmp_path / "package.xml").write_text("<package><name>mine</name></package>")
+    (tmp_path / "a.stl").touch()
+    deep = tmp_path / "robots" / "arms" / "long" / "urdf"
+    _, found = Packages(disk()).asset("package://mine/a.stl", Span(str(deep / "a.urdf")))
+    assert found is None
+
+
+def test_a_number_that_no_robot_has_is_refused() -> None:
+    """Products of three smaller numbers stay in the range of floats."""
+    urdf = '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="fixed"><parent link="a"/>'
+    urdf += '<child link="b"/><origin xyz="{} 0 0"/></joint></robot>'
+    found = {
+        size: {one.code for one in robot_of(read_xml(urdf.format(size), "r"), "r", Packages().asset).found}
+        for size in ("1e29", "1e31", "-1e31")
+    }
+    assert found == {"1e29": set(), "1e31": {"TF721"}, "-1e31": {"TF721"}}

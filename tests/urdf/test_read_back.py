@@ -163,3 +163,15 @@ def test_without_yourdfpy_that_is_one_sentence(
 @pytest.mark.parametrize("text", ["", "<robot", "<robot/>", "<robot name='r'><joint name='a'/></robot>"])
 def test_what_is_no_robot_is_reported_and_is_no_traceback(text: str) -> None:
     assert list(differences(robot_of(MORE), text, TARGET, full=True))
+
+
+@pytest.mark.parametrize(("key", "by"), [("xyz", 1e-9), ("rpy", 1e-9)])
+def test_a_pose_is_compared_to_the_last_digits_of_its_text(key: str, by: float) -> None:
+    robot = robot_of(MORE.replace("rpy: [0.1, 0.2, 0.3]", "xyz: [1, 2, 3], rpy: [0.1, 0.2, 0.3]"))
+    text = texts(robot)["robot.full.urdf"]
+    numbers = re.search(f'{key}="([^"]+)"', text[text.index('<joint name="j"') :])
+    assert numbers
+    first, *others = numbers[1].split()
+    moved = f'{key}="{float(first) + by} {" ".join(others)}"'
+    assert not list(differences(robot, text, TARGET, full=True))
+    assert list(differences(robot, text.replace(numbers[0], moved), TARGET, full=True))

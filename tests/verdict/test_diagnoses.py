@@ -55,6 +55,14 @@ def handed_over(alternation_hz: float) -> TreeHistory:
     )
 
 
+def now_and_then(*at_s: float) -> TreeHistory:
+    """Return the tree of an edge that comes at these times."""
+    history = TreeHistory()
+    for now in (BEGUN_NS + int(each * SECOND_NS) for each in at_s):
+        history.takes(row("odom base_link", now), at_ns=now)
+    return history
+
+
 def in_a_simulation(speed: float) -> TreeState:
     """Return the tree of an edge at 10 Hz, where simulated time goes so fast."""
     history = TreeHistory().moving(
@@ -117,6 +125,19 @@ CASES: dict[str, tuple[TreeState, set[str]]] = {
     "late for data is told once": (stamped(1.0).observed(stamped=data("base_link", 0.0)), {"TF841"}),
     "nobody is missed by name where nobody publishes": (TreeState(SECONDS, plan=sound_plan()), {"TF845"}),
     "on both topics": (sound_tree().fixed("odom base_link", b"x").observed(), {"TF809"}),
+    "two trees that the plan has": (
+        sound_tree()
+        .fixed("shelf box")
+        .observed(plan=sound_plan(*sound_plan().edges, replace(sound_plan().edges[1], parent="shelf", child="box"))),
+        set(),
+    ),
+    "two trees": (sound_tree().fixed("shelf box").observed(), {"TF830"}),
+    "of a short look two messages are no rate": (replace(now_and_then(0.0, 0.5).observed(), seconds=1.0), set()),
+    "of a long one they are": (now_and_then(0.0, 4.8).observed(), {"TF838"}),
+    "rare messages with a hole among them": (
+        now_and_then(*(n / 4 for n in range(8)), *(n / 4 for n in range(13, 20))).observed(),
+        {"TF838"},
+    ),
     "an allowed edge": (
         sound_tree()
         .moving("base_link tag_1", b"x")

@@ -60,7 +60,10 @@ def _invalid(name: str, at: Span, what: str, severity: Severity = "error") -> Fi
         return finding("TF501", f"invalid {what} {name!r}", at, help=f"write {bare}: tf2 drops a leading slash")
     better = re.sub(r"[^A-Za-z0-9_/]+|//+", "_", name).strip("/")
     advice = f"for example {better}" if _GOOD.fullmatch(better) and better != name.strip("/") else _ALLOWED
-    return finding("TF501", f"invalid {what} {name!r}", at, help=advice, severity=severity)
+    message = f"invalid {what} {name!r}"
+    if severity == "warning":
+        message = f"{what} {name!r} has characters that no parameter or topic can have"
+    return finding("TF501", message, at, help=advice, severity=severity)
 
 
 _ALLOWED = "use letters, digits and _; a node's name does not begin with a digit"

@@ -1,0 +1,52 @@
+"""Long messages of a flood are read a little at a time, and not for more than a part of each second."""
+
+from itertools import count
+
+import pytest
+
+from tfcompose.guard.flood import SLICE_S, FloodReader
+from tfcompose.live.flood import BUSY_S
+from tfcompose.live.topics import TFData
+from tfcompose.ros.node import Received
+from tfcompose.ros.tf_codec import Transform, decode, encode
+
+LONG = encode([Transform(0, "map", f"rogue_{n}", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)) for n in range(20_000)])
+DECLARED = encode([Transform(0, "map", "odom", (1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
+
+
+def sent(data: bytes) -> TFData:
+    return TFData(Received(data, b"x", 0, 0, 1), static=False)
+
+
+def test_a_moment_of_reading_ends_after_its_time_and_a_second_has_so_much_of_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    times = count()
+    monkeypatch.setattr("time.thread_time", lambda: next(times) * SLICE_S / 4)
+    reader = FloodReader({"odom"})
+    reader.add(sent(LONG))
+    taken: list[int] = []
+    while not taken or taken[-1] > 1:  # ticks of the clock; 1 where the second's time is over
+        before = next(times)
+        assert reader.read(0.0) is None
+        taken.append(next(times) - before)
+    assert max(taken) < 10
+    assert len(taken) == pytest.approx(BUSY_S / SLICE_S, abs=2)
+    assert reader.is_reading
+    begun = next(times)
+    reader.read(1.0)
+    assert next(times) > begun + 2
+
+
+def test_the_declared_edges_of_a_flood_are_taken_and_further_messages_skipped_meanwhile() -> None:
+    reader = FloodReader({"odom"})
+    parts = [decode(LONG), decode(DECLARED)]
+    reader.add(sent(encode([*parts[0], *parts[1]])))
+    reader.add(sent(DECLARED))
+    assert reader.skipped == 1
+    found = None
+    for second in range(100):
+        found = reader.read(float(second)) or found
+    assert not reader.is_reading
+    assert found
+    assert [one.child for one in decode(found.received.data)] == ["odom"]

@@ -68,6 +68,14 @@ class Found:
 
 
 @dataclass(frozen=True, slots=True)
+class Unfenced:
+    """A process of a strict plan sends past the fence: it must be stopped, whatever else is only reported."""
+
+    found: Finding
+    process: str
+
+
+@dataclass(frozen=True, slots=True)
 class Recovered:
     """A case that was reported is over; the sentence says which."""
 
@@ -103,7 +111,19 @@ class Alive:
 
 
 GuardEvent = (
-    Alive | Clear | Taken | Live | Silent | OwnerReady | Complete | Found | Recovered | GateOpen | GateShut | Remember
+    Alive
+    | Clear
+    | Taken
+    | Live
+    | Silent
+    | OwnerReady
+    | Complete
+    | Found
+    | Unfenced
+    | Recovered
+    | GateOpen
+    | GateShut
+    | Remember
 )
 
 GUARD_EVENTS = TaggedUnion[GuardEvent]("event", get_args(GuardEvent))

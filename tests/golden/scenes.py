@@ -260,9 +260,11 @@ def _strangers() -> Iterator[guarded.History]:
         rogue = strict.joins("/rogue")
         rogue.fenced = fenced
         yield strict.repeat(rogue, "map odom", 5)
-    past = _running(guard=GuardPolicy("strict"))
-    past.joins("/slam", process="slam").fenced = False
-    yield past.wait(1)
+    for profile in ("", "/opt/own.xml"):
+        past = _running(guard=GuardPolicy("strict"))
+        slam = past.joins("/slam", process="slam")
+        slam.fenced, slam.profile = False, profile
+        yield past.wait(1)
     yield _sent("/flood", ", ".join(f"f{number} f{number + 1}" for number in range(2000)), 30)
     yield _sent(NO_NODE, "map odom")
     yield _sent(NO_NODE, "map odom", settle_s=9)

@@ -7,11 +7,12 @@ import pytest
 from tests.support.findings import expect
 from tests.support.guard_history import EDGES, FIXED, PROCESSES, SETTLE_S, TICK_S, History, edge
 from tfcompose.guard.judge import Judge
-from tfcompose.ipc import Clear, Found, Live, Recovered, Taken
+from tfcompose.ipc import Clear, Found, Live, Recovered, Taken, Unfenced
 from tfcompose.live.publishers import OtherRun, Publisher
 from tfcompose.live.state import NAMELESS, NO_NODE
 from tfcompose.live.topics import Identity, RunMarks
 from tfcompose.plan import GuardPolicy, Plan, RosSettings
+from tfcompose.verdict.publishers import unfenced
 
 
 def test_a_publisher_whose_name_comes_later_is_judged_when_it_is_known(running: History) -> None:
@@ -253,8 +254,8 @@ def test_a_program_without_ros_is_called_one_and_not_by_what_the_middleware_call
 # A process of a strict plan that is not behind its fence.
 
 
-def identity(process: str, *, fenced: bool) -> Identity:
-    return Identity(ours=True, process=process, fenced=fenced)
+def identity(process: str, *, fenced: bool, profile: str = "") -> Identity:
+    return Identity(ours=True, process=process, fenced=fenced, profile=profile)
 
 
 @pytest.mark.parametrize(
@@ -264,8 +265,14 @@ def identity(process: str, *, fenced: bool) -> Identity:
         ([], Identity(ours=False)),
         ([{"RUN": "other"}], Identity(ours=False)),
         ([{"RUN": "1", "P": "arm/a", "XML": "/run/plan-1/fence/arm.a.xml"}], identity("arm/a", fenced=True)),
-        ([{"RUN": "1", "P": "a", "XML": "/home/me/fast.xml"}], identity("a", fenced=False)),
-        ([{"RUN": "1", "P": "a", "XML": "/run/plan-1/fence/b.xml"}], identity("a", fenced=False)),
+        (
+            [{"RUN": "1", "P": "a", "XML": "/home/me/fast.xml"}],
+            identity("a", fenced=False, profile="/home/me/fast.xml"),
+        ),
+        (
+            [{"RUN": "1", "P": "a", "XML": "/run/1/fence/b.xml"}],
+            identity("a", fenced=False, profile="/run/1/fence/b.xml"),
+        ),
         ([{"RUN": "1", "P": "a"}], identity("a", fenced=False)),
         ([{"RUN": "1", "P": "a"}, {}], identity("a", fenced=False)),
         ([{"RUN": "1", "P": "a"}, {"RUN": "1", "P": "b"}], Identity(ours=True)),
@@ -276,17 +283,47 @@ def test_the_environment_of_a_process_says_whose_it_is_and_whether_it_is_fenced(
 ) -> None:
     assert RunMarks("RUN", "1", "P", "XML").identify(environments) == expected
     without = RunMarks("RUN", "1", "P").identify(environments)
-    assert without == replace(expected, fenced=None)
+    assert without == replace(expected, fenced=None, profile="")
 
 
 def test_a_process_of_the_run_that_sends_past_the_fence_is_reported_once_to_be_stopped() -> None:
     running = History(GuardPolicy(mode="strict")).clear()
+
+    def left() -> list[Unfenced]:
+        return [event for event in running.events if isinstance(event, Unfenced)]
+
     for fenced, process in ((True, "slam"), (None, "slam"), (False, ""), (False, "slam"), (False, "slam")):
         gid = b"1" * 16 if fenced is False and process else bytes([7]) * 16
         one = Publisher(gid, "/slam", static=False, ours=bool(process), process=process, fenced=fenced)
         running.events += running.judge.graph([one], running.now)
-    (found,) = [event for event in running.events if isinstance(event, Found)]
+    assert not left(), "what it sends may be judged first"
+    for _ in range(2):
+        running.now += 1.0
+        running.events += running.judge.graph([one], running.now)
+    (found,) = left()
     assert (found.found.code, found.process) == ("TF852", "slam")
+
+
+def test_what_a_process_past_the_fence_has_sent_is_reported_before_it_is_stopped() -> None:
+    running = History(GuardPolicy(mode="strict")).clear()
+    slam, renamed = running.joins("/slam"), running.joins("/slam")
+    slam.ours, slam.process, slam.fenced = True, "slam", True
+    renamed.ours, renamed.process, renamed.fenced = True, "drive", False
+    running.check().send(slam, "map odom").send(renamed, "map odom").check()
+    found = [one.found.code for one in running.events if isinstance(one, (Found, Unfenced))]
+    assert found == ["TF801", "TF852"]
+
+
+@pytest.mark.parametrize(
+    ("profile", "words"),
+    [
+        ("/opt/own.xml", ["FASTRTPS_DEFAULT_PROFILES_FILE: /opt/own.xml", "slam: {env", "take"]),
+        ("", ["keep FASTRTPS_DEFAULT_PROFILES_FILE"]),
+    ],
+)
+def test_the_finding_about_who_leaves_the_fence_names_the_line_to_move(profile: str, words: list[str]) -> None:
+    found = unfenced("/slam", "slam", "/tf", profile, remapped=False)
+    assert all(word in found.help for word in words)
 
 
 @pytest.mark.parametrize(("static", "fenced", "kept"), [(True, None, True), (True, True, False), (False, None, False)])

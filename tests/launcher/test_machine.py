@@ -24,6 +24,7 @@ from tfcompose.ipc import (
     Stopping,
     Taken,
     TreeComplete,
+    Unfenced,
     Waiting,
 )
 from tfcompose.launcher.events import (
@@ -289,6 +290,14 @@ def test_the_plans_own_offender_is_stopped_and_stays_so_where_the_policy_is_stop
         None,
     )
     expect(history.feed(Found(ERROR, "slam")).found()[-1], "TF801", "nothing is stopped", "slam")
+
+
+def test_a_process_past_the_fence_is_stopped_where_violations_are_only_reported() -> None:
+    history = begin(GUARD, STATIC, run_process("slam", restart="always")).feed(Clear(), Unfenced(ERROR, "slam"))
+    assert history.killed == [("slam", SIGINT)]
+    expect(history.found()[-1], "TF801", "slam is stopped", "strict")
+    everything = begin(GUARD, STATIC, guard=GuardPolicy(on_violation="stop")).feed(Clear(), Unfenced(ERROR, "static"))
+    assert everything.all(Stopping) == [Stopping("TF801 foreign_publisher")]
 
 
 def test_an_offender_that_somebody_else_started_is_not_stopped() -> None:

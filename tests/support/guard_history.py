@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.geometry import Pose
 from tfcompose.guard.judge import Judge, JudgeMemory
-from tfcompose.ipc import Clear, Found, GuardEvent, Recovered, Taken
+from tfcompose.ipc import Clear, Found, GuardEvent, Recovered, Taken, Unfenced
 from tfcompose.live.publishers import Message, OtherRun
 from tfcompose.live.publishers import Publisher as TFPublisher
 from tfcompose.plan import GuardPolicy, Plan, PlanClaim, PlanEdge, PlanProcess, RosSettings, SourceLine
@@ -67,6 +67,7 @@ class Publisher:
     process: str = ""
     fenced: bool | None = None
     run: OtherRun | None = None
+    profile: str = ""
 
 
 @dataclass
@@ -153,6 +154,7 @@ class History:
                 process=p.process,
                 fenced=p.fenced,
                 run=p.run,
+                profile=p.profile,
             )
             for p in self.graph
         ]
@@ -189,12 +191,10 @@ class History:
         return self
 
     def found(self) -> list[Finding]:
-        return [event.found for event in self.events if isinstance(event, (Found, Taken))]
+        return [event.found for event in self.events if isinstance(event, (Found, Taken, Unfenced))]
 
     def reports(self) -> list[str]:
-        return [
-            f"{event.found.code} {event.found.message}" for event in self.events if isinstance(event, (Found, Taken))
-        ]
+        return [f"{one.code} {one.message}" for one in self.found()]
 
     def over(self) -> list[str]:
         """Return what is said to have ended."""

@@ -37,8 +37,8 @@ class FloodReader:
 
     @property
     def is_reading(self) -> bool:
-        """Whether there is something to read."""
-        return self._data is not None
+        """Whether there is something to read, and time left for it in this second."""
+        return self._data is not None and self._spent_s <= BUSY_S
 
     def add(self, data: TFData) -> None:
         """Take a message to read, unless there is one already."""

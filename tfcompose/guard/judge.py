@@ -125,7 +125,10 @@ class Judge:
         """Take who publishes on /tf and /tf_static now, and return what that means."""
         self._senders.update(publishers)
         events = [*self._see_again(now), *self._publishers.wrong_settings(publishers)]
-        events += self._publishers.unfenced(publishers, remapped=self.remapped)
+        for one in self._publishers.leaving_the_fence(publishers, self._senders, now):
+            # What it has sent is reported first: it can be stopped for this before that is due.
+            events += self.cases.report(now, at_once=one.gid)
+            events += self._publishers.unfenced(one, remapped=self.remapped)
         if self._start.cleared is not None and now >= self._finds_until:
             events += self.live.static_writers({one.node for one in publishers if one.static and one.node is not None})
         return events

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Note
-from tfcompose.ipc import Found, GuardEvent, Recovered, Taken
+from tfcompose.ipc import Found, GuardEvent, Recovered, Taken, Unfenced
 from tfcompose.live.publishers import FEWEST_GAPS, NAMELESS_S, UNCOUNTED
 from tfcompose.live.state import NAMELESS
 from tfcompose.plan.topics import GLOBAL
@@ -72,6 +72,10 @@ FATE_S = 0.3
 #: Violations that ``stop-offender`` ends: who commits them breaks the tree.
 _STOPPED_FOR = frozenset({"TF801", "TF802", "TF803", "TF820"})
 
+#: So long what a publisher past the fence sends is waited for, so that it is reported before that is stopped.
+UNFENCED_SILENT_S = 0.5
+_UNFENCED = "TF852"
+
 #: All that another robot publishes is one finding.
 OTHER_ROBOT = "TF854"
 
@@ -130,10 +134,13 @@ class Cases:
         """Whether there is something that was not reported yet."""
         return not all(case.reported for case in self.open.values())
 
-    def report(self, now: float) -> list[GuardEvent]:
-        """Report new cases, those of one kind and node in one finding."""
+    def report(self, now: float, *, at_once: bytes | None = None) -> list[GuardEvent]:
+        """Report new cases, those of one kind and node in one finding.
+
+        With ``at_once`` they are that publisher's, also those of which more may come to be known.
+        """
         grouped: dict[Group, list[Case]] = {}
-        for case in self._ripe(now):
+        for case in self._ripe(now) if at_once is None else self._new(at_once):
             grouped.setdefault((*self._group(case), False), []).append(case)
         events: list[GuardEvent] = []
         for group, cases in grouped.items():
@@ -156,6 +163,10 @@ class Cases:
         severe = any(case.violation.edge for case in cases) or any(self._was_first(case, now) for case in cases)
         known = [one for one in self.open.values() if one.reported and self._group(one) == (OTHER_ROBOT, robot)]
         return any(not severe or one.violation.edge for one in known)
+
+    def _new(self, gid: bytes) -> Iterator[Case]:
+        """Yield the cases of a publisher that were not reported."""
+        yield from [case for case in self.open.values() if case.gid == gid and not case.reported]
 
     def _ripe(self, now: float) -> Iterator[Case]:
         """Yield the cases to report: those of which nothing more comes to be known.
@@ -341,6 +352,7 @@ class PublisherReports:
         self._plan = plan
         self._nodes = {node for process in plan.processes for node in process.nodes}
         self._reported: dict[tuple[str, bytes], None] = {}
+        self._silent_since: dict[bytes, float] = {}
 
     @property
     def changes(self) -> int:
@@ -361,16 +373,25 @@ class PublisherReports:
         if not one.reliable:
             yield best_effort_publisher(one.node, topic)
 
-    def unfenced(self, publishers: Sequence[Publisher], *, remapped: bool) -> list[Found]:
-        """Return the findings for the run's own processes that send past the fence, which may be of remappings."""
-        return [
-            replace(found, process=one.process)
+    def leaving_the_fence(self, publishers: Sequence[Publisher], senders: Senders, now: float) -> list[Publisher]:
+        """Return the run's own publishers that send past the fence, once something of theirs was judged.
+
+        One that sends nothing for a while is returned then.
+        """
+        outside = [
+            one
             for one in publishers
-            if one.node and one.ours and one.process and one.fenced is False
-            for found in self._once(
-                one, unfenced(one.node, one.process, one.topic or GLOBAL[one.static], remapped=remapped)
-            )
+            if one.node and one.ours and one.process and one.fenced is False and not self._is_known(_UNFENCED, one)
         ]
+        since = {one.gid: self._silent_since.get(one.gid, now) for one in outside}
+        self._silent_since = since
+        return [one for one in outside if senders.sender(one.gid) or now - since[one.gid] >= UNFENCED_SILENT_S]
+
+    def unfenced(self, one: Publisher, *, remapped: bool) -> list[Unfenced]:
+        """Return the finding for one of these; the fence may be of remappings."""
+        topic = one.topic or GLOBAL[one.static]
+        found = unfenced(one.node or "", one.process, topic, one.profile, remapped=remapped)
+        return [Unfenced(new.found, one.process) for new in self._once(one, found)]
 
     def floods(self, senders: Senders, flooders: dict[bytes | None, Flood], now: float) -> list[Found]:
         """Return the findings for publishers of more undeclared edges than are judged; forget those that have left."""
@@ -417,8 +438,11 @@ class PublisherReports:
         """Take this as reported by the guard before."""
         self._reported = {(code, bytes.fromhex(gid)): None for code, gid in memory}
 
+    def _is_known(self, code: str, one: Publisher) -> bool:
+        return (code, one.gid) in self._reported
+
     def _once(self, one: Publisher, found: Finding) -> list[Found]:
-        if (found.code, one.gid) in self._reported:
+        if self._is_known(found.code, one):
             return []
         self._reported[found.code, one.gid] = None
         if len(self._reported) > MOST_REPORTED:

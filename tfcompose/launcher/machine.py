@@ -34,6 +34,7 @@ from tfcompose.ipc import (
     Silent,
     Taken,
     TreeComplete,
+    Unfenced,
     Waiting,
 )
 from tfcompose.launcher.events import Begin, Event, Exited, Kill, LogMatched, NewPlan, Order, Started, StartFailed
@@ -67,9 +68,6 @@ if TYPE_CHECKING:
     from tfcompose.launcher.events import Action
     from tfcompose.launcher.state import State, Tracked
     from tfcompose.plan import Plan, PlanEdge
-
-#: What a strict plan's own processes are stopped for, also where violations are only reported.
-_STOPPED_BY_STRICT = frozenset({"TF852"})
 
 
 def step(state: State, event: Event, now: float) -> tuple[State, tuple[Action, ...]]:
@@ -197,6 +195,8 @@ def _guard_reported(step: Transition, event: Event) -> None:
             _complete(step, edges)
         case Found(found, process):
             _violation(step, found, process)
+        case Unfenced(found, process):
+            _left_the_fence(step, found, process)
         case Recovered(message):
             step.notify(RecoveredShown(message, step.since_begin))
         case Remember(changed):
@@ -239,21 +239,29 @@ def _violation(step: Transition, found: Finding, process: str) -> None:
     ``process`` is empty where it is not sure, or not a process of the plan.
     """
     policy = step.state.plan.guard.on_violation
-    if found.code in _STOPPED_BY_STRICT and policy == "report":
-        policy = "stop-offender"
-    if found.severity != "error" or policy == "report":
-        step.report(found)
-    elif policy == "stop":
+    if found.severity == "error" and policy == "stop":
         step.report(found)
         step.stop(Stop("failure", 1), found.label)
-    elif not process:
-        step.report(found)
-    elif why := refusal(step.state, process, "stop"):
-        step.report(_noted(found, f"nothing is stopped: {why}"))
+    elif found.severity == "error" and policy == "stop-offender" and process:
+        _stop_offender(step, found, process, "on_violation is stop-offender")
     else:
-        why = "guard is strict" if found.code in _STOPPED_BY_STRICT else "on_violation is stop-offender"
-        step.report(_noted(found, f"{process} is stopped and not restarted: {why}"))
-        process_requested(step, ProcessRequest("stop", process))
+        step.report(found)
+
+
+def _left_the_fence(step: Transition, found: Finding, process: str) -> None:
+    """Report a process that sends past a strict plan's fence, and stop it, or everything, if that is the policy."""
+    if step.state.plan.guard.on_violation == "stop":
+        _violation(step, found, process)
+    else:
+        _stop_offender(step, found, process, "guard is strict")
+
+
+def _stop_offender(step: Transition, found: Finding, process: str, because: str) -> None:
+    if why := refusal(step.state, process, "stop"):
+        step.report(_noted(found, f"nothing is stopped: {why}"))
+        return
+    step.report(_noted(found, f"{process} is stopped and not restarted: {because}"))
+    process_requested(step, ProcessRequest("stop", process))
 
 
 def _noted(found: Finding, text: str) -> Finding:

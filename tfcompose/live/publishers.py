@@ -123,6 +123,7 @@ class Publisher:
         others: further nodes of which it may be one.
         process: the plan's process that it is of, where that was seen.
         run: the run of another robot that it is of, where that was seen.
+        profile: the profile file that its process was started with instead of the fence's; empty: none, or not known.
     """
 
     gid: bytes
@@ -138,6 +139,7 @@ class Publisher:
     others: tuple[str, ...] = ()
     process: str = ""
     run: OtherRun | None = None
+    profile: str = ""
 
     @property
     def nodes(self) -> tuple[str, ...]:

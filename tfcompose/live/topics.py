@@ -134,12 +134,14 @@ class Identity:
         process: the plan's process that it is of.
         fenced: whether it was started with its profile of the fence; None too where it is of another run.
         run: the run of another robot that it is of.
+        profile: the profile file that it was started with, where that is not the fence's.
     """
 
     ours: bool | None = None
     process: str = ""
     fenced: bool | None = None
     run: OtherRun | None = None
+    profile: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,8 +168,9 @@ class RunMarks:
             others = [one for one in found if one.get(self.variable)]
             return Identity(ours=bool(own), run=self._other(others[0]) if len(found) == len(others) == 1 else None)
         process = own[0].get(self.process, "")
-        fenced = is_fence(own[0].get(self.profile, ""), process) if self.profile and process else None
-        return Identity(ours=True, process=process, fenced=fenced)
+        profile = own[0].get(self.profile, "") if self.profile and process else ""
+        fenced = is_fence(profile, process) if self.profile and process else None
+        return Identity(ours=True, process=process, fenced=fenced, profile="" if fenced else profile)
 
     def _other(self, environment: Mapping[str, str]) -> OtherRun | None:
         """Return the run that this is the environment of, unless it is one's own."""
@@ -291,6 +294,7 @@ class TFGraph:
             fenced if fenced is not None else False if one.gid in self._public else known.fenced,
             process=known.process,
             run=known.run,
+            profile=known.profile,
         )
 
     def _own_gid(self) -> bytes:

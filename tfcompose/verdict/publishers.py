@@ -10,6 +10,7 @@ from tfcompose.findings import Finding, Note, finding
 from tfcompose.geometry import Offset, Pose, normalised, offset_of
 from tfcompose.live.state import NAMELESS, who
 from tfcompose.plan.topics import GLOBAL
+from tfcompose.ros.environment import PROFILE_VARIABLES
 from tfcompose.ros.tf_codec import TF_MESSAGE
 from tfcompose.text import counted, listed, with_more
 
@@ -73,15 +74,26 @@ def flooded(state: TreeState) -> Iterator[Finding]:
         yield finding("TF853", message, None, notes=notes, help=f"end {node}, or let it use the same frames again")
 
 
-def unfenced(node: str, process: str, topic: str, *, remapped: bool) -> Finding:
-    """Return the finding for a process of a strict plan that is not behind the fence, which may be of remappings."""
+def unfenced(node: str, process: str, topic: str, profile: str, *, remapped: bool) -> Finding:
+    """Return the finding for a process of a strict plan that is not behind the fence, which may be of remappings.
+
+    ``profile`` is the profile file that it was started with instead of the fence's; empty: none.
+    """
     message = f"{node} of {process} publishes {topic} past the fence of guard: strict: every listener receives it"
     if remapped:
-        advice = "let it take ROS arguments: start it as {package, executable}, or add --ros-args to its words"
+        advice = "let it take ROS arguments: start it as {package, executable}, or add --ros-args to its words; "
+        advice += 'a script passes them on with "$@"'
         return finding("TF852", message, None, help=advice)
-    advice = f"name its profile file in the robot's file, and the fence is added: processes: {{{process}: {{env: "
-    advice += "{FASTRTPS_DEFAULT_PROFILES_FILE: FILE}}}; or guard: {fence: remap}"
-    return finding("TF852", message, None, help=advice)
+    variable = PROFILE_VARIABLES[0]
+    given = f"with {variable}={profile}, which" if profile else f"without {variable}, which"
+    notes = [Note(f"it runs {given} a script or program that starts it {'sets' if profile else 'unsets'}")]
+    if profile:
+        advice = f"take {variable} out of the script, and name the file in the robot's file, where the fence is added "
+        advice += f"to it: processes: {{{process}: {{env: {{{variable}: {profile}}}}}}}"
+    else:
+        advice = f"let the script keep {variable}, which names the fence"
+    advice += '; or, with a script that passes "$@" on, guard: {fence: remap}'
+    return finding("TF852", message, None, notes=notes, help=advice)
 
 
 def best_effort_publisher(node: str, topic: str) -> Finding:

@@ -78,7 +78,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "tree",
         "urdf",
     },
-    "view": {"findings", "geometry", "language", "load", "model", "numbers", "units"},
+    "view": {"compile", "findings", "geometry", "language", "load", "model", "numbers", "units"},
     "cli": {"*"},
     "__main__": {"cli"},
 }
@@ -90,9 +90,10 @@ ONLY_IN: dict[str, set[str]] = {
     "pydantic": {"language"},
     "pydantic_core": {"language", "units"},
     "typing_extensions": {"language"},
-    "numpy": {"publishers", "ros", "tf2", "urdf"},  # urdf: what trimesh gives are its arrays
+    "numpy": {"publishers", "ros", "tf2", "urdf", "view"},  # urdf: what trimesh gives are its arrays
     "xacro": {"urdf"},
-    "trimesh": {"urdf"},
+    "trimesh": {"urdf", "view"},
+    "viser": {"view"},
     "yourdfpy": {"urdf"},
     "pypdfium2": {"draw"},
     "regex": {"launcher"},

@@ -26,7 +26,7 @@ from tfcompose.urdf.packages import FETCH, Disk
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from tfcompose.geometry import Vector
     from tfcompose.load import Source
@@ -86,13 +86,13 @@ def _preset_packages() -> list[str]:
     return folders
 
 
-def overlays_of(arguments: Namespace) -> list[Source]:
-    """Return what --overlay and --set lay over a robot, in that order.
+def overlays_of(arguments: Namespace, read: Callable[[str], str] = read_text) -> list[Source]:
+    """Return what --overlay and --set lay over a robot, in that order; ``read`` gives a file's text.
 
     Raises:
         RejectedError: if a file cannot be read or is not YAML, or a setting is not one.
     """
-    files = [with_includes(load(read_text(file), file), read_text) for file in arguments.overlays]
+    files = [with_includes(load(read(file), file), read) for file in arguments.overlays]
     return [*files, *(set_value(setting) for setting in arguments.settings)]
 
 

@@ -40,6 +40,7 @@ from tfcompose.cli.commands import (
     tree,
     up,
     verify,
+    view,
     wait,
 )
 from tfcompose.cli.terminal import INTERRUPTED, OUTPUT_CLOSED, UNREADABLE
@@ -72,7 +73,7 @@ GROUPS: dict[str, dict[str, Command]] = {
         "start": steering.START,
         "wait": wait,
     },
-    "Look": {"doctor": doctor, "monitor": monitor, "echo": echo, "verify": verify},
+    "Look": {"view": view, "doctor": doctor, "monitor": monitor, "echo": echo, "verify": verify},
     "Ship": {"export": export},
     "Help": {"help": manual, "completion": completion},
 }

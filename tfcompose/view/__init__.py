@@ -1,5 +1,5 @@
-"""Moves what is mounted: a new pose becomes edits of the robot file, by pure functions over its text.
+"""Shows a robot in the browser, and moves what is mounted: a new pose becomes edits of the robot file.
 
-Files are read, compiled and written by whoever calls it. Must not import ``cli``, ``guard``, ``launcher``, ``rclpy``,
-``yaml``.
+``edit`` is pure functions over the file's text; ``scene`` and ``panel`` stand on viser. Files are read, compiled and
+written by whoever starts the view. Must not import ``cli``, ``guard``, ``launcher``, ``rclpy``, ``yaml``.
 """

@@ -1,0 +1,162 @@
+"""The view: joints and mounts move, saving changes one line, one HTML file holds the scene, and the server ends."""
+
+import math
+import signal
+import socket
+import subprocess
+import sys
+import urllib.request
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import pytest
+import viser
+
+from tests.support import processes
+from tests.support.cli import tfcompose_in
+from tfcompose.cli.compiling import library
+from tfcompose.cli.fixing import ChangedError, rewrite
+from tfcompose.compile import Compiled, compile_robot
+from tfcompose.geometry import Pose, offset_of, quat_from_rpy
+from tfcompose.view.panel import Panel
+from tfcompose.view.scene import started, stop
+from tfcompose.view.session import Session, poses_in_roots
+
+ROVER = Path(__file__).parents[2] / "robots" / "field_rover.yaml"
+PRESETS = library()
+
+
+def session_of(file: Path) -> Session:
+    def compiled(texts: Mapping[str, str]) -> Compiled:
+        return compile_robot(texts[str(file)], str(file), PRESETS)
+
+    return Session({str(file): file.read_text("utf-8")}, compiled, lambda path, old, new: rewrite(Path(path), old, new))
+
+
+@pytest.fixture
+def rover(tmp_path: Path) -> Path:
+    file = tmp_path / "field_rover.yaml"
+    file.write_bytes(ROVER.read_bytes())
+    return file
+
+
+@pytest.fixture
+def server() -> Iterator[viser.ViserServer]:
+    one = started("127.0.0.1", 0, "test")
+    yield one
+    stop(one)
+
+
+def test_a_moved_mount_is_saved_as_one_line_and_its_comment_stays(rover: Path, server: viser.ViserServer) -> None:
+    before = rover.read_text("utf-8").splitlines()
+    session = session_of(rover)
+    panel = Panel(server, session, edit=True)
+    panel.frames.value = "front_link"
+    mount = session.mount("front_link")
+    given = mount.given(mount.edge.pose)
+    panel.move(Pose((0.5, *given.xyz[1:]), given.quat_xyzw))
+    panel.save()
+    after = rover.read_text("utf-8").splitlines()
+    changed = [(old, new) for old, new in zip(before, after, strict=True) if old != new]
+    assert changed == [
+        (
+            "    xyz: [0.48, 0.0475, 0.30]         # so the camera's middle is in the rover's",
+            "    xyz: [0.5, 0.0475, 0.30]         # so the camera's middle is in the rover's",
+        )
+    ]
+    assert "+    xyz: [0.5," in panel.report.content
+    assert not session.moved
+
+
+def test_undo_and_redo_lead_back_and_forth(rover: Path) -> None:
+    session = session_of(rover)
+    mount = session.mount("front_link").edge
+    old = mount.pose
+    session.move(mount.child, Pose((1, 0, 0)))
+    session.move(mount.child, Pose((2, 0, 0)))
+    assert session.undo()
+    assert session.mount("front_link").edge.pose == Pose((1, 0, 0))
+    assert session.undo()
+    assert session.mount("front_link").edge.pose == old
+    assert not session.undo()
+    assert session.redo()
+    assert session.redo()
+    assert session.mount("front_link").edge.pose == Pose((2, 0, 0))
+    assert not session.redo()
+
+
+def test_what_a_variable_gives_is_not_saved_and_an_overlay_is_offered(rover: Path) -> None:
+    session, text = session_of(rover), rover.read_text("utf-8")
+    mount = session.mount("lidar_base_link") if "lidar_base_link" in session.robot.frames else None
+    child = mount.edge.child if mount else next(one.mount for one in session.robot.sensors if one.name == "lidar")
+    session.move(child, Pose((0.1, 0, 1.5)))
+    saved = session.save()
+    assert rover.read_text("utf-8") == text
+    assert "${0.2475 + mast}" in saved.elsewhere[0].reason
+    assert saved.elsewhere[0].overlay("", "o.yaml") == "sensors:\n  lidar:\n    xyz: [0.1, 0, 1.5]\n"
+    assert session.moved
+
+
+def test_a_file_that_somebody_else_changed_is_not_overwritten(rover: Path) -> None:
+    session = session_of(rover)
+    session.move(session.mount("front_link").edge.child, Pose((1, 0, 0)))
+    rover.write_text("# another text\n", "utf-8")
+    with pytest.raises(ChangedError):
+        session.save()
+    assert rover.read_text("utf-8") == "# another text\n"
+
+
+def test_a_slider_moves_the_body_of_a_wheel(rover: Path, server: viser.ViserServer) -> None:
+    panel = Panel(server, session_of(rover), edit=False)
+    before = panel.scene.body_pose("front_left_wheel_link")
+    panel.set_joint("front_left_wheel_joint", math.radians(30))
+    expected = before @ Pose(quat_xyzw=quat_from_rpy(0, 0, math.radians(30)))
+    off = offset_of(expected, panel.scene.body_pose("front_left_wheel_link"))
+    assert off.xyz_m < 1e-6
+    assert off.rot_rad < 1e-6
+    assert panel.scene.body_pose("front_right_wheel_link").xyz != before.xyz
+
+
+def test_a_mimic_joint_follows() -> None:
+    text = """tfcompose: 1
+robot: r
+links: {a: {}, b: {}, c: {}}
+joints:
+  one: {type: prismatic, parent: a, child: b, axis: [1, 0, 0], limit: {lower: 0, upper: 1, effort: 1, velocity: 1}}
+  two: {type: prismatic, parent: a, child: c, axis: [0, 1, 0], limit: {lower: -1, upper: 1, effort: 1, velocity: 1},
+        mimic: {joint: one, multiplier: -2, offset: 0.1}}
+"""
+    robot = compile_robot(text, "r.yaml", PRESETS).robot
+    assert robot
+    poses = poses_in_roots(robot, {"one": 0.25})
+    assert poses["b"].xyz == (0.25, 0, 0)
+    assert poses["c"].xyz == (0, -0.4, 0)
+
+
+def test_html_is_one_small_file(rover: Path) -> None:
+    done = tfcompose_in(rover.parent, "view", rover.name, "--html", "rover.html")
+    assert (done.returncode, done.stdout) == (0, "")
+    page = (rover.parent / "rover.html").read_text("utf-8")
+    assert "__VISER_EMBED_DATA__" in page
+    assert len(page) < 3_000_000
+
+
+def test_the_server_answers_until_ctrl_c_and_a_taken_port_names_the_next(rover: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        done = tfcompose_in(rover.parent, "view", rover.name, "--port", str(port))
+        assert done.returncode == 2
+        assert f"port {port} is taken; --port " in done.stderr
+    command = [sys.executable, "-m", "tfcompose", "view", rover.name, "--port", str(port)]
+    running = processes.start(command, cwd=rover.parent, stdout=subprocess.PIPE)
+    try:
+        assert running.stdout
+        address = running.stdout.readline().partition(";")[0]
+        with urllib.request.urlopen(address, timeout=30) as answer:  # noqa: S310 (on this machine)
+            assert answer.status == 200
+        running.send_signal(signal.SIGINT)
+        assert running.wait(30) == 130
+    finally:
+        processes.end(running)

@@ -1,0 +1,214 @@
+"""The panel next to the scene: a selected frame, the owners, joints to move, and the pose of a mount to edit."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.geometry import Pose, quat_from_rpy
+from tfcompose.numbers import clean_rpy
+from tfcompose.view.edit import ImmovableError
+from tfcompose.view.scene import RobotScene, wxyz
+from tfcompose.view.session import poses_in_roots
+
+if TYPE_CHECKING:
+    import viser
+
+    from tfcompose.model import Joint, Robot
+    from tfcompose.view.session import Session
+
+#: How far a joint without limits can be moved, in radians or metres, and the step of the gizmo in millimetres, degrees.
+_UNLIMITED = math.pi
+_SNAP_MM, _SNAP_DEG = 1.0, 1.0
+
+
+class Panel:
+    """Shows a session on a server; with ``edit`` its mounts can be moved and saved."""
+
+    def __init__(self, server: viser.ViserServer, session: Session, *, edit: bool) -> None:
+        self.session = session
+        self._gui = server.gui
+        self._server = server
+        self.positions: dict[str, float] = {}
+        self.scene = RobotScene(server.scene, session.robot)
+        self._gizmo: Any = None
+        self._numbers: list[Any] = []
+        self._showing = False
+        server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
+        with server.gui.add_folder("Frame"):
+            self._search = server.gui.add_text("search", "")
+            self.frames: Any = server.gui.add_dropdown("frame", tuple(session.robot.frames))
+            self._about = server.gui.add_markdown("")
+        self._search.on_update(self._filter)
+        self.frames.on_update(lambda _: self._select())
+        if edit:
+            self._add_editor()
+        self._add_owners()
+        self._add_joints(session.robot)
+        self.refresh()
+        self.scene.frame_camera(server, poses_in_roots(session.robot, self.positions))
+        self._select()
+
+    def refresh(self) -> None:
+        """Put the scene where joints and mounts are now."""
+        robot = self.session.robot
+        poses = poses_in_roots(robot, self.positions)
+        self.scene.update(robot, poses)
+
+    def _filter(self, _event: Any) -> None:
+        names = [name for name in self.session.robot.frames if self._search.value.lower() in name.lower()]
+        if names:
+            self.frames.options = tuple(names)
+
+    def _select(self) -> None:
+        robot, frame = self.session.robot, self.frames.value
+        edge = robot.parent_edge(frame)
+        if edge is None:
+            self._about.content = f"**{frame}** is a root ({robot.frames[frame]})"
+        else:
+            x, y, z = (f"{value * 1000:.4g}" for value in edge.pose.xyz)
+            roll, pitch, yaw = (f"{math.degrees(angle):.4g}" for angle in clean_rpy(edge.pose.quat_xyzw))
+            self._about.content = (
+                f"**{frame}** in **{edge.parent}**, {edge.kind}, by **{edge.owner}**\n\n"
+                f"{x}, {y}, {z} mm · {roll}, {pitch}, {yaw} deg\n\n{edge.at}"
+            )
+        if self._numbers:
+            self._show_mount()
+
+    def _add_owners(self) -> None:
+        with self._gui.add_folder("Owners"):
+            for owner, (red, green, blue) in self.scene.colours.items():
+                swatch = f'<span style="color: rgb({red}, {green}, {blue})">&#9632;</span>'
+                self._gui.add_html(f'<div style="padding: 0 0.7em">{swatch} {escape(owner)}</div>')
+                box = self._gui.add_checkbox("shown", initial_value=True)
+                box.on_update(partial(self._show_owner, owner, box))
+
+    def _show_owner(self, owner: str, box: Any, _event: Any) -> None:
+        self.scene.show_owner(owner, visible=box.value)
+
+    def _add_joints(self, robot: Robot) -> None:
+        joints = [edge.joint for edge in robot.edges if edge.joint and edge.joint.mimic is None]
+        if not joints:
+            return
+        with self._gui.add_folder("Joints"):
+            sliders = [self._slider(joint) for joint in joints]
+            self._gui.add_button("zero").on_click(lambda _: self._zero(sliders))
+
+    def _slider(self, joint: Joint) -> Any:
+        slides = joint.type == "prismatic"
+        lower, upper = -_UNLIMITED, _UNLIMITED
+        if joint.limit and joint.type != "continuous":
+            lower = joint.limit.lower if joint.limit.lower is not None else lower
+            upper = joint.limit.upper if joint.limit.upper is not None else upper
+        scale, unit = (1000.0, "mm") if slides else (math.degrees(1), "deg")
+        start = min(max(0.0, lower), upper)
+        slider = self._gui.add_slider(
+            f"{joint.name} ({unit})", lower * scale, max(upper, lower + 1e-6) * scale, 0.1, start * scale
+        )
+        self.positions[joint.name] = start
+
+        def changed(_event: Any) -> None:
+            self.set_joint(joint.name, slider.value / scale)
+
+        slider.on_update(changed)
+        return slider
+
+    def set_joint(self, name: str, position: float) -> None:
+        """Move a joint, in radians or metres."""
+        self.positions[name] = position
+        self.refresh()
+
+    def _zero(self, sliders: list[Any]) -> None:
+        for slider in sliders:
+            slider.value = min(max(0.0, slider.min), slider.max)
+
+    def _add_editor(self) -> None:
+        labels = ("x (mm)", "y (mm)", "z (mm)", "roll (deg)", "pitch (deg)", "yaw (deg)")
+        with self._gui.add_folder("Mount"):
+            self._given = self._gui.add_markdown("")
+            self._numbers = [self._gui.add_number(label, 0.0, step=0.001) for label in labels]
+            self._snap = self._gui.add_checkbox("snap to mm and degrees", initial_value=True)
+            self._gui.add_button("undo").on_click(lambda _: self._again(self.session.undo()))
+            self._gui.add_button("redo").on_click(lambda _: self._again(self.session.redo()))
+            self._gui.add_button("save").on_click(lambda _: self.save())
+            self.report = self._gui.add_markdown("")
+        for handle in self._numbers:
+            handle.on_update(lambda _: self._typed())
+
+    def _again(self, has_moved: bool) -> None:  # noqa: FBT001 (what undo and redo return)
+        if has_moved:
+            self.refresh()
+            self._select()
+
+    def _show_mount(self) -> None:
+        """Show the numbers that the file has for the selected frame, and a gizmo where they put it."""
+        if self._gizmo is not None:
+            self._gizmo.remove()
+            self._gizmo = None
+        try:
+            mount = self.session.mount(self.frames.value)
+        except ImmovableError as error:
+            self._given.content = str(error)
+            return
+        given = mount.given(mount.edge.pose)
+        self._given.content = f"pose of **{mount.place}** in **{mount.relative_to}**"
+        self._fill(given)
+        poses = poses_in_roots(self.session.robot, self.positions)
+        at = poses[mount.place]
+        self._gizmo = self._server.scene.add_transform_controls("/gizmo", scale=0.25, wxyz=wxyz(at), position=at.xyz)
+        self._gizmo.on_update(lambda event: self._dragged() if event.phase == "end" else None)
+
+    def _fill(self, given: Pose) -> None:
+        values = [value * 1000 for value in given.xyz] + [math.degrees(one) for one in clean_rpy(given.quat_xyzw)]
+        self._showing = True
+        for handle, value in zip(self._numbers, values, strict=True):
+            handle.value = round(value, 6) + 0.0
+        self._showing = False
+
+    def _typed(self) -> None:
+        if not self._showing:
+            x, y, z, roll, pitch, yaw = (handle.value for handle in self._numbers)
+            angles = (math.radians(angle) for angle in (roll, pitch, yaw))
+            self.move(Pose((x / 1000, y / 1000, z / 1000), quat_from_rpy(*angles)))
+
+    def _dragged(self) -> None:
+        mount = self.session.mount(self.frames.value)
+        w, qx, qy, qz = (float(value) for value in self._gizmo.wxyz)
+        px, py, pz = (float(value) for value in self._gizmo.position)
+        base = poses_in_roots(self.session.robot, self.positions)[mount.relative_to]
+        given = base.inverse() @ Pose((px, py, pz), (qx, qy, qz, w))
+        if self._snap.value:
+            rpy = (math.radians(round(math.degrees(a) / _SNAP_DEG) * _SNAP_DEG) for a in clean_rpy(given.quat_xyzw))
+            gx, gy, gz = (round(value * 1000 / _SNAP_MM) * _SNAP_MM / 1000 for value in given.xyz)
+            given = Pose((gx, gy, gz), quat_from_rpy(*rpy))
+        self.move(given)
+        self._select()
+
+    def move(self, given: Pose) -> None:
+        """Give the selected mount the pose that its file is to have."""
+        try:
+            mount = self.session.mount(self.frames.value)
+        except ImmovableError as error:
+            self.report.content = str(error)
+            return
+        self.session.move(mount.edge.child, mount.of_edge(given))
+        self.refresh()
+
+    def save(self) -> None:
+        """Save what was moved, and report it."""
+        try:
+            saved = self.session.save()
+        except OSError as error:
+            self.report.content = f"not saved: {error}"
+            return
+        lines = [f"- {one.code} {one.message}" for one in saved.refused]
+        text = "not saved, there would be errors:\n" if lines else "saved:\n" if saved.diff else "nothing to save\n"
+        text += f"```diff\n{saved.diff}```\n" if saved.diff else ""
+        lines += [f"- {one.code} {one.message}" for one in saved.found if saved.diff]
+        for one in saved.elsewhere:
+            offer = f"; in an overlay:\n```yaml\n{one.overlay('', '')}```" if one.entry else ""
+            lines.append(f"- {one.reason} ({one.at}){offer}")
+        self.report.content = text + "\n".join(lines)
+        self._select()

@@ -1,0 +1,149 @@
+"""A robot as a scene of viser: bodies, frames as axes, and edges as lines in the colour of their owner."""
+
+from __future__ import annotations
+
+import colorsys
+import contextlib
+import io
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import trimesh
+import viser
+
+from tfcompose.geometry import Pose
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from tfcompose.model import Robot, Shape
+
+#: Where a colour begins on the wheel, and how far the next one is: the golden angle keeps neighbours apart.
+_FIRST_HUE, _NEXT_HUE = 0.58, 0.381966
+_GREY = (105, 112, 122)
+_AXES_M = 0.08
+
+
+def started(host: str, port: int, name: str) -> viser.ViserServer:
+    """Return a server at a port that is free; 0 takes any."""
+    with contextlib.redirect_stdout(io.StringIO()):  # its banner
+        return viser.ViserServer(host, port, label=name, verbose=False)
+
+
+def stop(server: viser.ViserServer) -> None:
+    """End a server."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        server.stop()
+
+
+def wxyz(pose: Pose) -> tuple[float, float, float, float]:
+    """Return the rotation in the order that viser takes."""
+    x, y, z, w = pose.quat_xyzw
+    return (w, x, y, z)
+
+
+def colours_of(robot: Robot) -> dict[str, tuple[int, int, int]]:
+    """Return a colour for each owner of an edge, in the order of the tree."""
+    owners = dict.fromkeys(edge.owner for edge in robot.edges)
+    colours = {}
+    for index, owner in enumerate(owners):
+        rgb = colorsys.hsv_to_rgb((_FIRST_HUE + index * _NEXT_HUE) % 1, 0.85, 0.85)
+        colours[owner] = (round(rgb[0] * 255), round(rgb[1] * 255), round(rgb[2] * 255))
+    return colours
+
+
+def mesh_of(shape: Shape) -> Any:
+    """Return the triangles of a shape in its own frame, or None for a mesh that is not there or cannot be read."""
+    size = shape.size
+    if shape.kind == "box":
+        return trimesh.creation.box(extents=size)
+    if shape.kind == "cylinder":
+        return trimesh.creation.cylinder(radius=size[0], height=size[1], sections=32)
+    if shape.kind == "sphere":
+        return trimesh.creation.icosphere(subdivisions=2, radius=size[0])
+    if shape.kind == "capsule":
+        return trimesh.creation.capsule(radius=size[0], height=size[1], count=[24, 24])
+    try:
+        mesh: Any = trimesh.load(shape.mesh.path if shape.mesh else "", force="mesh")
+        mesh.apply_scale(list(size))
+    except Exception:  # noqa: BLE001 (readers of a dozen formats: anything can come out of them)
+        return None
+    return mesh
+
+
+class RobotScene:
+    """What a scene shows of one robot; ``update`` moves it."""
+
+    def __init__(self, scene: viser.SceneApi, robot: Robot) -> None:
+        self._scene = scene
+        self.colours = colours_of(robot)
+        self._bodies: dict[str, Any] = {}
+        self._axes: Any = None
+        self._lines: dict[str, Any] = {}
+        scene.set_up_direction("+z")
+        scene.world_axes.visible = False
+        scene.add_grid("/grid", 10, 10, cell_size=0.1, section_size=1, cell_color=(235, 235, 235), fade_distance=12)
+        for index, (frame, link) in enumerate(robot.links.items()):
+            shapes = link.visuals or link.collisions
+            if shapes and frame in robot.frames:
+                self._add_body(frame, f"/body/{index}", shapes)
+
+    def _add_body(self, frame: str, name: str, shapes: tuple[Shape, ...]) -> None:
+        self._bodies[frame] = self._scene.add_frame(name, show_axes=False)
+        for number, shape in enumerate(shapes):
+            mesh = mesh_of(shape)
+            if mesh is None:
+                continue
+            rgba = shape.material.rgba if shape.material else None
+            colour = (round(rgba[0] * 255), round(rgba[1] * 255), round(rgba[2] * 255)) if rgba else _GREY
+            self._scene.add_mesh_simple(
+                f"{name}/{number}",
+                np.asarray(mesh.vertices, np.float32),
+                np.asarray(mesh.faces, np.uint32),
+                color=colour,
+                opacity=0.8,
+                flat_shading=True,
+                side="double",
+                cast_shadow=False,
+                receive_shadow=False,
+                wxyz=wxyz(shape.pose),
+                position=shape.pose.xyz,
+            )
+
+    def update(self, robot: Robot, poses: Mapping[str, Pose]) -> None:
+        """Put every frame where it is in the root of its tree."""
+        for frame, body in self._bodies.items():
+            body.wxyz, body.position = wxyz(poses[frame]), poses[frame].xyz
+        rotations = np.array([wxyz(poses[frame]) for frame in robot.frames], np.float32).reshape(-1, 4)
+        positions = np.array([poses[frame].xyz for frame in robot.frames], np.float32).reshape(-1, 3)
+        if self._axes is None:
+            self._axes = self._scene.add_batched_axes(
+                "/frames", rotations, positions, axes_length=_AXES_M, axes_radius=_AXES_M / 20
+            )
+        else:
+            self._axes.batched_wxyzs, self._axes.batched_positions = rotations, positions
+        for index, (owner, colour) in enumerate(self.colours.items()):
+            ends = [(poses[edge.parent].xyz, poses[edge.child].xyz) for edge in robot.edges if edge.owner == owner]
+            points = np.array(ends, np.float32).reshape(-1, 2, 3)
+            if owner in self._lines:
+                self._lines[owner].points = points
+            else:
+                self._lines[owner] = self._scene.add_line_segments(
+                    f"/edges/{index}", points, colour, thickness=3, thickness_units="screen"
+                )
+
+    def frame_camera(self, server: viser.ViserServer, poses: Mapping[str, Pose]) -> None:
+        """Let the camera of a new client begin where the robot fills the picture."""
+        points = np.array([pose.xyz for pose in poses.values()]).reshape(-1, 3)
+        distance = max(1.0, 1.6 * float(np.linalg.norm(points, axis=1).max()))
+        server.initial_camera.position = distance * np.array([0.8, 0.8, 0.6])
+
+    def show_owner(self, owner: str, *, visible: bool) -> None:
+        """Show or hide the edges of an owner."""
+        self._lines[owner].visible = visible
+
+    def body_pose(self, frame: str) -> Pose:
+        """Return where the scene has the body of a frame."""
+        w, x, y, z = (float(value) for value in self._bodies[frame].wxyz)
+        px, py, pz = (float(value) for value in self._bodies[frame].position)
+        return Pose((px, py, pz), (x, y, z, w))

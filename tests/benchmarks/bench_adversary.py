@@ -82,22 +82,7 @@ def _tried(robot: Robot, kind: str) -> str:
 
 EDGES, HERTZ, FRAMES = 50, 50.0, 10_000
 ROUND_S, BEFORE_S = 20.0, 2.0
-OWNER = f"""
-import signal, sys, time
-from tfcompose.ros.tf_codec import Template
-from tfcompose.ros.node import TFPublisher, open_node
-signal.signal(signal.SIGINT, lambda *_: sys.exit())
-words, _, ros = "\\n".join(sys.argv[1:]).partition("--ros-args\\n")
-with open_node("owner", "/", args=ros.split("\\n") if ros else []) as node:
-    publisher = TFPublisher(node, static=False)
-    template = Template([("base_link", f"frame_{{n}}") for n in range({EDGES})])
-    due = time.monotonic()
-    while True:
-        template.set_stamp(time.time_ns())
-        publisher.publish(template.data)
-        due += 1 / {HERTZ}
-        time.sleep(max(0.0, due - time.monotonic()))
-"""
+OWNER = Path(__file__).with_name("owner.py")
 
 
 def floods(guard: str, *, flooded: bool) -> tuple[list[float], float, float, float]:
@@ -105,8 +90,7 @@ def floods(guard: str, *, flooded: bool) -> tuple[list[float], float, float, flo
     frames = [f"frame_{n}" for n in range(EDGES)]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "owner.py").write_text(OWNER, encoding="utf-8")
-        owner = Child([sys.executable, "owner.py"], frames)
+        owner = Child([sys.executable, str(OWNER), "base_link", str(EDGES), f"{HERTZ:g}"], frames)
         with running(folder, guard, {"owner": owner}) as robot:
             robot.says("tree complete")
             guarding = psutil.Process(robot.pid_of("guard"))

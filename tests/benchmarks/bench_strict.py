@@ -28,31 +28,16 @@ MEDIAN_MS, P99_MS = 0.4, 1.0
 DOMAIN = "94"
 #: What is measured: the guard's mode, and its fence.
 WAYS = {"watch": "mode: watch", "strict": "mode: strict, fence: partition", "remapped": "mode: strict, fence: remap"}
-OWNER = f"""
-import signal, sys, time
-from tfcompose.ros.tf_codec import Template
-from tfcompose.ros.node import TFPublisher, open_node
-signal.signal(signal.SIGINT, lambda *_: sys.exit())
-with open_node("owner", "/", args=sys.argv[2:]) as node:
-    publisher = TFPublisher(node, static=False)
-    template = Template([("base", f"frame_{{n}}") for n in range({EDGES})])
-    due = time.monotonic()
-    while True:
-        template.set_stamp(time.time_ns())
-        publisher.publish(template.data)
-        due += 1 / {HERTZ}
-        time.sleep(max(0.0, due - time.monotonic()))
-"""
+OWNER = Path(__file__).with_name("owner.py")
 
 
 def robot(folder: Path, mode: str) -> Path:
     """Write the robot's file and return its path."""
-    (folder / "owner.py").write_text(OWNER, encoding="utf-8")
     frames = "".join(f"  frame_{n}: {{parent: base, owner: owner, rate: {HERTZ:g} Hz}}\n" for n in range(EDGES))
     file = folder / f"{mode}.yaml"
     file.write_text(
         f"tfcompose: 1\nrobot: bench_{mode}\nros: {{discovery: localhost}}\nbase: base\nframes:\n  base: {{}}\n{frames}"
-        f"processes:\n  owner: {{run: [{sys.executable}, {folder / 'owner.py'}], node: /owner}}\n"
+        f"processes:\n  owner: {{run: [{sys.executable}, {OWNER}, base, '{EDGES}', '{HERTZ:g}'], node: /owner}}\n"
         f"guard: {{{WAYS[mode]}}}\n",
         encoding="utf-8",
     )

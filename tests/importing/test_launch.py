@@ -1,5 +1,6 @@
 """Launch files in Python, XML and YAML, imported."""
 
+import io
 import random
 import socket
 import subprocess
@@ -11,7 +12,7 @@ import pytest
 
 from tests.support.bringups import compiled, import_of, places, printed_errors
 from tests.support.importing import PRESETS
-from tfcompose.cli import compiling, main
+from tfcompose.cli import compiling, main, reading
 from tfcompose.geometry import angle_between
 from tfcompose.importing import launch
 
@@ -296,6 +297,16 @@ def test_launch_files_of_ros_1_are_read(tmp_path: Path) -> None:
     }  # fmt: skip
     robot = compiled(text, tmp_path).robot
     assert robot
+
+
+def test_a_launch_file_comes_from_standard_input(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reading._standard_input.cache_clear()
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(ROS1.encode())))
+    assert main(["import", "-"]) == 0
+    reading._standard_input.cache_clear()
+    assert "# <stdin>:3: in the order x y z yaw pitch roll frame child period" in capsys.readouterr().out
 
 
 DISPLAY = """

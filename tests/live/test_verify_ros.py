@@ -14,6 +14,7 @@ from tests.support.doctor import at_last
 from tests.support.fake_nodes import sending
 from tests.support.processes import Started
 from tfcompose.geometry import Pose
+from tfcompose.load import load
 from tfcompose.plan import PlanEdge, PlanProcess, Simulation
 from tfcompose.plan.file import read_plan, write_plan
 
@@ -43,6 +44,20 @@ def test_a_robot_as_planned_is_as_expected(running: Path) -> None:
         assert "2 of 2" in tfcompose("verify", str(running), "--live", "--for", str(seconds))
 
     at_last(is_as_expected)
+
+
+def test_what_is_imported_of_a_running_robot_is_as_expected_on_it(running: Path) -> None:
+    """Import names the nodes, and the rate; what it writes passes verify on the same robot."""
+    out = running.with_name("imported.yaml")
+
+    def is_imported(seconds: float) -> None:
+        tfcompose("import", "--live", "--for", str(seconds), "-o", str(out), "--force")
+        frames = load(out.read_text("utf-8"), str(out)).data["frames"]
+        assert frames["laser"] == {"parent": "base_link", "xyz": [0, 0, 0.3], "owner": "static_2", "static": True}
+        assert (frames["base_link"]["owner"], frames["base_link"]["rate"]) == ("drive", "50 Hz")
+        assert "2 of 2" in tfcompose("verify", str(out), "--live", "--for", str(seconds))
+
+    at_last(is_imported)
 
 
 def test_a_second_publisher_and_a_strange_frame_are_reported(running: Path) -> None:

@@ -50,7 +50,8 @@ class Launch:
     """A launch file to be read.
 
     ``arguments`` are its launch arguments, ``packages`` folders of packages that are not installed, ``prefixes`` those
-    of AMENT_PREFIX_PATH. With ``every_branch`` conditions do not count.
+    of AMENT_PREFIX_PATH. With ``every_branch`` conditions do not count. ``shown`` is how findings call the file, unless
+    by its name.
     """
 
     file: str
@@ -58,6 +59,7 @@ class Launch:
     packages: Mapping[str, str] = field(default_factory=dict)
     prefixes: tuple[str, ...] = ()
     every_branch: bool = False
+    shown: str = ""
 
 
 def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description]:
@@ -156,7 +158,7 @@ class _Work:
     def _span(self, at: Any) -> Span:
         file, line = (at[0], at[1]) if at else ("", 1)
         absolute = str(Path(self.launch.file).absolute())
-        shown = self.launch.file if file in {absolute, ""} else os.path.relpath(file)
+        shown = (self.launch.shown or self.launch.file) if file in {absolute, ""} else os.path.relpath(file)
         return Span(shown, max(int(line), 1))
 
     def _argument(self, record: dict[str, Any], span: Span) -> None:

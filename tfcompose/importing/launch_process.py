@@ -19,6 +19,7 @@ import re
 import resource
 import subprocess
 import sys
+import tempfile
 import types
 from pathlib import Path
 from typing import Any
@@ -332,6 +333,7 @@ def answer(request: dict[str, Any]) -> dict[str, Any]:
     for name in [name for name in sys.modules if name.partition(".")[0] in _LAUNCH]:
         del sys.modules[name]
     sys.dont_write_bytecode = True
+    tempfile.gettempdir()  # finds out now, by writing there, what is asked for later
     _confine(context)
     stopped = ""
     context.file = request["file"]

@@ -97,6 +97,8 @@ def _import_urdf(arguments: Namespace) -> int:
 
 def _import_bringup(arguments: Namespace) -> int:
     """Import what starts processes: everything that is understood is written, and the rest is named."""
+    from tempfile import NamedTemporaryFile
+
     from tfcompose.cli.reading import STDIN, read_text
     from tfcompose.importing.draft import Draft, robot_name
     from tfcompose.importing.shell import add_script
@@ -107,7 +109,12 @@ def _import_bringup(arguments: Namespace) -> int:
     if _is_kit(arguments.file):
         _add_kits(draft, arguments)
     elif arguments.file.endswith(_LAUNCH):
-        _add_launch(draft, arguments)
+        _add_launch(draft, arguments, arguments.file)
+    elif arguments.file == STDIN and (ending := _ending_of(read_text(STDIN))):
+        with NamedTemporaryFile("w", suffix=ending, encoding="utf-8") as file:
+            file.write(read_text(STDIN))
+            file.flush()
+            _add_launch(draft, arguments, file.name, "<stdin>")
     else:
         shown = arguments.file if arguments.file != STDIN else "<stdin>"
         add_script(draft, read_text(arguments.file), shown, _target(arguments))
@@ -159,17 +166,30 @@ def _import_observed(arguments: Namespace) -> int:
     return _finish(draft, arguments)
 
 
-def _add_launch(draft: Draft, arguments: Namespace) -> None:
+def _ending_of(text: str) -> str:
+    """Return the ending that a launch file has with this text, empty where it is none."""
+    if "def generate_launch_description" in text:
+        return ".py"
+    return (
+        ".xml"
+        if re.search(r"^\s*<launch\b", text, re.MULTILINE)
+        else ".yaml"
+        if re.search(r"^launch:", text, re.MULTILINE)
+        else ""
+    )
+
+
+def _add_launch(draft: Draft, arguments: Namespace, file: str, shown: str = "") -> None:
     from tfcompose.cli.compiling import library
     from tfcompose.cli.reading import read_text
     from tfcompose.importing.descriptions import Workshop, add_descriptions
     from tfcompose.importing.launch import Launch, add_launch
 
-    read_text(arguments.file)  # refuses what is no text
+    read_text(file)  # refuses what is no text
     given, packages = pairs(arguments.args, ":="), pairs(arguments.packages, "=")
     known, target = _known_packages(packages), _target(arguments)
     prefixes = known.disk.prefixes if known.disk else ()
-    launch = Launch(arguments.file, given, packages, prefixes, arguments.all_branches)
+    launch = Launch(file, given, packages, prefixes, arguments.all_branches, shown)
     folders = {name: str(Path(folder).absolute()) for name, folder in packages.items()}
     descriptions = add_launch(draft, launch, target)
     presets = None if arguments.no_sensors else library()

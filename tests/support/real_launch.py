@@ -1,0 +1,50 @@
+"""What ROS's launch would start: each process is recorded in its place, and none is started.
+
+``python real_launch.py OUT FILE [NAME:=VALUE …]`` writes the commands, with the parameters of their files, as JSON.
+"""
+
+import json
+import sys
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import yaml
+from launch import LaunchDescription, LaunchService
+from launch.actions import IncludeLaunchDescription
+from launch.actions.execute_local import ExecuteLocal
+from launch.launch_description_sources import AnyLaunchDescriptionSource
+from launch_ros.substitutions.executable_in_package import ExecutableInPackage
+
+STARTED: list[dict[str, Any]] = []
+
+
+def record(action: Any, context: Any) -> None:
+    """Stand in the place of the action's execution."""
+    action.prepare(context)
+    words = list(action.process_description.final_cmd)
+    files = [Path(file).read_text("utf-8") for word, file in pairwise(words) if word == "--params-file"]
+    STARTED.append({"words": words, "params": [yaml.unsafe_load(text) for text in files]})
+
+
+def executable(substitution: Any, context: Any) -> str:
+    """Return the package and the program: they need not be installed."""
+    package, program = ("".join(map(context.perform_substitution, one)) for one in (
+        substitution.package, substitution.executable))  # fmt: skip
+    return f"{package}/{program}"
+
+
+def main(out: str, file: str, *arguments: str) -> None:
+    """Record what a launch file starts."""
+    ExecuteLocal.execute = record
+    ExecutableInPackage.perform = executable
+    service = LaunchService(noninteractive=True)
+    given = [tuple(word.split(":=", 1)) for word in arguments]
+    included = IncludeLaunchDescription(AnyLaunchDescriptionSource(file), launch_arguments=given)
+    service.include_launch_description(LaunchDescription([included]))
+    service.run(shutdown_when_idle=True)
+    Path(out).write_text(json.dumps(STARTED), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

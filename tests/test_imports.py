@@ -33,7 +33,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "units": {"findings"},
     "language": {"catalogue", "findings", "geometry", "load", "model", "plan", "units"},
     "resolve": {"catalogue", "findings", "geometry", "language", "load", "model", "plan", "units", "urdf"},
-    "check": {"catalogue", "findings", "geometry", "load", "model", "text", "tree"},
+    "rays": {"geometry", "model"},
+    "check": {"catalogue", "findings", "geometry", "load", "model", "rays", "text", "tree"},
     "draw": {"text"},
     "urdf": {"catalogue", "check", "files", "findings", "geometry", "load", "model", "numbers", "text"},
     "export": {"emit", "files", "numbers", "plan"},
@@ -90,9 +91,9 @@ ONLY_IN: dict[str, set[str]] = {
     "pydantic": {"language"},
     "pydantic_core": {"language", "units"},
     "typing_extensions": {"language"},
-    "numpy": {"publishers", "ros", "tf2", "urdf", "view"},  # urdf: what trimesh gives are its arrays
+    "numpy": {"publishers", "rays", "ros", "tf2", "urdf", "view"},  # rays and urdf: what trimesh gives are its arrays
     "xacro": {"urdf"},
-    "trimesh": {"urdf", "view"},
+    "trimesh": {"rays", "urdf", "view"},
     "viser": {"view"},
     "yourdfpy": {"urdf"},
     "pypdfium2": {"draw"},
@@ -206,7 +207,7 @@ def test_no_module_imports_itself_by_way_of_others_not_even_for_its_types() -> N
 
 
 #: Parts that import in a function what is optional, or heavy and rarely needed.
-LATE_IMPORTS = {"bags", "cli", "findings", "guard", "publishers", "resolve", "ros", "tf2"}
+LATE_IMPORTS = {"bags", "cli", "findings", "guard", "publishers", "rays", "resolve", "ros", "tf2"}
 
 
 def test_nothing_is_imported_inside_a_function() -> None:

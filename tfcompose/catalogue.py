@@ -34,7 +34,8 @@ class Code:
     """One kind of finding.
 
     ``severity`` is that of its findings unless they say otherwise. An ``unbuildable`` robot cannot be built while the
-    finding is there: no tree, an edge that nobody publishes, a process that never starts.
+    finding is there: no tree, an edge that nobody publishes, a process that never starts. ``limit`` is what
+    ``rules`` can set instead: how far is too far, in SI, and whether it is a length (m), an angle (rad) or a part (%).
     """
 
     code: str
@@ -42,6 +43,7 @@ class Code:
     family: Family
     severity: Severity
     unbuildable: bool = False
+    limit: tuple[float, str] | None = None
 
     @property
     def can_be_allowed(self) -> bool:
@@ -155,6 +157,13 @@ CATALOGUE: dict[str, Code] = {
         Code("TF622", "mount_copied", "sensors", "warning"),
         Code("TF623", "serial_missing", "sensors", "warning"),
         Code("TF624", "serial_used_twice", "sensors", "error"),
+        Code("TF640", "sensor_inside_body", "sensors", "warning", limit=(0.02, "m")),
+        Code("TF641", "view_blocked", "sensors", "warning", limit=(0.5, "%")),
+        Code("TF642", "blind_sector", "sensors", "warning", limit=(1.5707963267948966, "rad")),
+        Code("TF643", "camera_sees_only_robot", "sensors", "warning", limit=(0.95, "%")),
+        Code("TF644", "camera_sees_only_floor", "sensors", "warning", limit=(1.0, "m")),
+        Code("TF645", "sensors_dazzle_each_other", "sensors", "warning", limit=(5.0, "m")),
+        Code("TF646", "zone_not_covered", "sensors", "warning"),
         # joints, bodies, materials, foreign URDFs, meshes
         Code("TF701", "mimic_without_master", "bodies", "error"),
         Code("TF702", "mimic_loop", "bodies", "error"),

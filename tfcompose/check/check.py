@@ -11,7 +11,20 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.catalogue import CATALOGUE, can_be_allowed, code_of, codes_and_names
-from tfcompose.check import bodies, joints, names, optical, ownership, poses, prefixes, processes, sensors, stock, tree
+from tfcompose.check import (
+    bodies,
+    joints,
+    names,
+    optical,
+    ownership,
+    placement,
+    poses,
+    prefixes,
+    processes,
+    sensors,
+    stock,
+    tree,
+)
 from tfcompose.check.rule import Rule
 from tfcompose.findings import Allow, Finding, Note, Span, did_you_mean, finding
 
@@ -37,7 +50,7 @@ def by_code(rules: Iterable[Rule]) -> dict[str, Rule]:
     return table
 
 
-_FAMILIES = (tree, ownership, stock, prefixes, poses, optical, names, sensors, bodies, joints, processes)
+_FAMILIES = (tree, ownership, stock, prefixes, poses, optical, names, sensors, placement, bodies, joints, processes)
 RULES = by_code(value for family in _FAMILIES for value in vars(family).values() if isinstance(value, Rule))
 
 

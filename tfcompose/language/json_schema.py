@@ -47,7 +47,7 @@ def json_schema(language: str, presets: Mapping[str, PresetSpec], nodes: Iterabl
         _overlaid(own, definitions)
     if root is RobotSpec:
         own["patternProperties"] = {"^x-": {"description": "your own anchors, which tfcompose does not read"}}
-        _add_codes(own["properties"]["rules"])
+        _add_codes(own["properties"]["rules"], definitions)
         _add_presets(own, definitions, presets)
         for kind in ("NamedNode", "NodeSpec"):
             definitions[kind]["properties"]["preset"] |= {"enum": sorted(nodes)}
@@ -171,11 +171,12 @@ def _removable(schema: dict[str, Any]) -> dict[str, Any]:
     return about | ({"anyOf": [form, {"type": "null"}]} if form else {})
 
 
-def _add_codes(rules: dict[str, Any]) -> None:
+def _add_codes(rules: dict[str, Any], definitions: dict[str, Any]) -> None:
     """Let ``rules`` know the codes of findings that can be switched."""
-    level = rules.pop("additionalProperties")
+    definitions["RuleSetting"] = rules.pop("additionalProperties")
+    setting = {"$ref": "#/$defs/RuleSetting"}
     codes = [code for code in CATALOGUE.values() if code.can_be_allowed]
-    rules["properties"] = {code.code: level | {"description": code.name.replace("_", " ")} for code in codes}
+    rules["properties"] = {code.code: setting | {"description": code.name.replace("_", " ")} for code in codes}
     rules["additionalProperties"] = False
 
 

@@ -15,6 +15,7 @@ from tfcompose.language.bodies import LinkSpec
 from tfcompose.language.optics import OpticsSpec
 from tfcompose.language.pose import EdgeKeys, MountKeys, Parents, Posed, Rotated
 from tfcompose.language.process import Driver, ProcessSpec
+from tfcompose.language.rules import RuleSetting, ZoneSpec
 from tfcompose.language.spec import Entry, Spec, below, inherited, key, measure_of, several
 from tfcompose.language.values import (
     Axis,
@@ -407,6 +408,11 @@ class RobotSpec(Spec):
     preset_path: OneOrMore = key(
         (), "folders with presets of your own, VENDOR/MODEL.yaml, relative to this file", ["presets"]
     )
-    rules: dict[str, Literal["off", "warning", "error"]] = key(
-        {}, "how severe a finding is, by its code", {"TF405": "off"}
+    coverage: dict[str, ZoneSpec] = key(
+        {},
+        "zones that sensors have to see",
+        {"front": {"frame": "base_link", "center": [1, 0, 0.2], "box": [1, 1, 0.4], "by": ["lidar"], "least": "90 %"}},
+    )
+    rules: dict[str, RuleSetting] = key(
+        {}, "how severe a finding is, by its code, and its limit", {"TF405": "off", "TF641": {"limit": "30 %"}}
     )

@@ -21,7 +21,16 @@ from tfcompose.model.edge import (
 )
 from tfcompose.model.optics import Optics, OpticsKind, OpticsSource, Projection, Shutter
 from tfcompose.model.process import BUILT_IN, GUARD, JOINTS, ROS2_LAUNCH, SHELL, STATIC, AsInFile, Claim, Node, Process
-from tfcompose.model.robot import OPTICAL_ENDINGS, MountedSensor, Part, Robot, SourceNumbers, is_optical, may_be_refused
+from tfcompose.model.robot import (
+    OPTICAL_ENDINGS,
+    MountedSensor,
+    Part,
+    Robot,
+    SourceNumbers,
+    Zone,
+    is_optical,
+    may_be_refused,
+)
 
 __all__ = [
     "BOUNDED",
@@ -59,6 +68,7 @@ __all__ = [
     "Shape",
     "Shutter",
     "SourceNumbers",
+    "Zone",
     "colour_name",
     "is_optical",
     "materials",

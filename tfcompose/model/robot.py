@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from tfcompose.findings import Note, Span
+    from tfcompose.geometry import Vector
     from tfcompose.model.body import Link
     from tfcompose.model.edge import Edge
     from tfcompose.model.hardware import Block, Hardware
@@ -58,6 +59,22 @@ class MountedSensor:
     serial: str | None = None
     tf_at: Span | None = None
     optics: tuple[Optics, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Zone:
+    """A box that sensors have to see: its middle and lengths in ``frame``, in metres.
+
+    ``by`` names kinds of streams, or sensors, of which one has to see it; ``least`` is the part that must be seen.
+    """
+
+    name: str
+    at: Span
+    frame: str
+    center: Vector
+    size: Vector
+    by: tuple[str, ...] = ()
+    least: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +145,8 @@ class Robot:
     already, of a part how its names begin; ``refused`` is where the refused entries of the file are. ``parts`` are
     those that are robots of their own, ``mounted`` the root frame of each part by its name, ``part_notes`` what to add
     to findings in a part's file. ``foreign`` are files of other tools, in which nothing can be fixed here. A robot that
-    ``is_variant`` is a file's with profiles or overlays merged over it.
+    ``is_variant`` is a file's with profiles or overlays merged over it. ``zones`` are those that sensors have to see,
+    ``limits`` what the file sets instead of the limits of codes.
     """
 
     name: str
@@ -156,6 +174,8 @@ class Robot:
     refused: tuple[Span, ...] = field(default=(), compare=False)
     part_notes: dict[str, list[Note]] = field(default_factory=dict, compare=False)
     is_variant: bool = field(default=False, compare=False)
+    zones: tuple[Zone, ...] = ()
+    limits: dict[str, float] = field(default_factory=dict, compare=False)
 
     def final(self, frame: str) -> str:
         """Return the frame's name on the live tree: with the prefix, unless it is shared."""

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         Process,
         Robot,
         Shape,
+        Zone,
     )
     from tfcompose.model.hardware import Block, Hardware
     from tfcompose.plan import GuardPolicy
@@ -71,6 +72,7 @@ def renamed(robot: Robot, names: Names) -> Robot:
         parts=tuple(_part(part, names) for part in robot.parts),
         hardware=tuple(_hardware(hardware, names, again) for hardware in robot.hardware),
         blocks=tuple(_blocks(robot, names)),
+        zones=tuple(_zone(zone, robot, names) for zone in robot.zones),
     )
 
 
@@ -165,6 +167,12 @@ def _sensor(sensor: MountedSensor, names: Names) -> MountedSensor:
         driver=names.process(sensor.driver) if sensor.driver else "",
         optics=tuple(replace(one, frame=names.frame(one.frame)) for one in sensor.optics),
     )
+
+
+def _zone(zone: Zone, robot: Robot, names: Names) -> Zone:
+    sensors = {sensor.name for sensor in robot.sensors}
+    by = tuple(names.process(one) if one in sensors else one for one in zone.by)
+    return replace(zone, name=f"{names.part}/{zone.name}", frame=names.frame(zone.frame), by=by)
 
 
 def _policy(policy: GuardPolicy, robot: Robot, names: Names) -> GuardPolicy:

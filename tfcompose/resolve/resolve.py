@@ -31,6 +31,7 @@ from tfcompose.resolve.processes import (
     with_positions,
 )
 from tfcompose.resolve.resolved import Collected, Resolved
+from tfcompose.resolve.rules import limits_of, zones_of
 from tfcompose.resolve.sensors import add_sensor
 from tfcompose.urdf.packages import Packages
 
@@ -212,6 +213,11 @@ class _Work:
         roots = robot.roots()
         return roots[0] if len(roots) == 1 else None
 
+    def _limits(self) -> dict[str, float]:
+        limits, refused = limits_of(self.spec, self.source)
+        self.found += refused
+        return limits
+
     def _wrong_names(self, own: list[Process]) -> list[Finding]:
         everybody = self._everybody(own)
         known = frozenset(name for _, name in self.broken) | {process.name for process in everybody}
@@ -252,6 +258,8 @@ class _Work:
             refused=tuple(at for entry in sorted(self.validated.broken) if (at := self.source.exactly_at(entry))),
             part_notes=self.collected.notes,
             is_variant=self.source.is_variant,
+            zones=zones_of(self.spec, self.source) + tuple(zone for part in in_tree for zone in part.zones),
+            limits=self._limits(),
         )
 
 

@@ -1,0 +1,11 @@
+"""What sensors see of their own robot: rays from a stream's frame, and the bodies that they hit.
+
+Pure functions of a ``Robot``; boxes, cylinders, spheres and capsules need no library, and meshes are hit where trimesh
+is installed. Must not import ``language``, ``load``, ``resolve``, ``check``.
+"""
+
+from tfcompose.rays.bodies import Body, bodies_around, fixed_to
+from tfcompose.rays.cast import Ray, View, cast, view_of
+from tfcompose.rays.directions import contains, directions, is_plane
+
+__all__ = ["Body", "Ray", "View", "bodies_around", "cast", "contains", "directions", "fixed_to", "is_plane", "view_of"]

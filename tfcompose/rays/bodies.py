@@ -1,0 +1,72 @@
+"""The bodies around a sensor, in the frame of one of its streams."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from tfcompose.geometry import Pose
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from tfcompose.model import MountedSensor, Robot, Shape
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A shape of a link. ``pose`` is the shape's, in the frame from which it is seen."""
+
+    link: str
+    shape: Shape
+    pose: Pose
+
+    @property
+    def radius(self) -> float:
+        """The radius of the sphere around the shape; endless for a mesh, whose extent its file knows."""
+        size = self.shape.size
+        match self.shape.kind:
+            case "sphere":
+                return size[0]
+            case "cylinder":
+                return math.hypot(size[0], size[1] / 2)
+            case "capsule":
+                return size[0] + size[1] / 2
+            case "mesh":
+                return math.inf
+        return math.hypot(*size) / 2
+
+
+def fixed_to(robot: Robot, frame: str) -> dict[str, Pose]:
+    """Return the pose in ``frame`` of each frame that stands still there, up and down the tree.
+
+    What a continuous joint turns counts with its pose at zero, if it is below: a wheel turns on the spot.
+    """
+    neighbours: dict[str, list[tuple[str, Pose]]] = {}
+    for edge in robot.edges:
+        is_fixed = edge.kind == "static" or (edge.sensor is not None and not edge.joint)
+        spins = edge.joint is not None and edge.joint.type == "continuous"
+        if not edge.pose_known or not (is_fixed or spins):
+            continue
+        neighbours.setdefault(edge.parent, []).append((edge.child, edge.pose))
+        if is_fixed:
+            neighbours.setdefault(edge.child, []).append((edge.parent, edge.pose.inverse()))
+    poses, waiting = {frame: Pose()}, [frame]
+    while waiting:
+        here = waiting.pop()
+        for there, pose in neighbours.get(here, ()):
+            if there not in poses:
+                poses[there] = poses[here] @ pose
+                waiting.append(there)
+    return poses
+
+
+def bodies_around(robot: Robot, sensor: MountedSensor, poses: Mapping[str, Pose]) -> Iterator[Body]:
+    """Yield the shapes of the links at ``poses`` that are not the sensor's own: for collision, else those seen."""
+    own = {sensor.mount, *sensor.frames}
+    for name, pose in poses.items():
+        link = robot.links.get(name)
+        if link and name not in own:
+            for shape in link.collisions or link.visuals:
+                yield Body(name, shape, pose @ shape.pose)

@@ -95,6 +95,7 @@ ONLY_IN: dict[str, set[str]] = {
     "xacro": {"urdf"},
     "trimesh": {"rays", "urdf", "view"},
     "viser": {"view"},
+    "websockets": {"view"},
     "yourdfpy": {"urdf"},
     "pypdfium2": {"draw"},
     "regex": {"launcher"},

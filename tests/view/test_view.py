@@ -1,5 +1,6 @@
 """The view: joints and mounts move, saving changes one line, one HTML file holds the scene, and the server ends."""
 
+import http
 import math
 import signal
 import socket
@@ -11,6 +12,9 @@ from pathlib import Path
 
 import pytest
 import viser
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+from websockets.typing import Origin, Subprotocol
 
 from tests.support import processes
 from tests.support.cli import tfcompose_in
@@ -45,6 +49,30 @@ def server() -> Iterator[viser.ViserServer]:
     one = started("127.0.0.1", 0, "test")
     yield one
     stop(one)
+
+
+@pytest.mark.parametrize("origin", ["http://localhost:{port}", "http://127.0.0.1:{port}", None])
+def test_its_own_page_may_connect(server: viser.ViserServer, origin: str | None) -> None:
+    assert joins(server.get_port(), origin)
+
+
+@pytest.mark.parametrize("origin", ["https://example.org", "http://127.0.0.1.example.org:{port}", "null"])
+def test_a_page_of_another_site_may_not_connect(server: viser.ViserServer, origin: str) -> None:
+    assert not joins(server.get_port(), origin)
+
+
+def joins(port: int, origin: str | None) -> bool:
+    """Return whether a page of this origin gets a websocket."""
+    own = Origin(origin.format(port=port)) if origin else None
+    protocol = Subprotocol(f"viser-v{viser.__version__}")
+    try:
+        connection = connect(f"ws://127.0.0.1:{port}", origin=own, subprotocols=[protocol], open_timeout=20)
+    except InvalidStatus as error:
+        if error.response.status_code == http.HTTPStatus.FORBIDDEN:
+            return False
+        raise
+    connection.close()
+    return True
 
 
 def test_a_moved_mount_is_saved_as_one_line_and_its_comment_stays(rover: Path, server: viser.ViserServer) -> None:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import colorsys
 import contextlib
 import io
+import re
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import trimesh
 import viser
+import websockets.asyncio.server
 
 from tfcompose.geometry import Pose
 
@@ -24,10 +27,23 @@ _GREY = (105, 112, 122)
 _AXES_M = 0.08
 
 
+#: Pages that may talk to the server: its own, which this machine has. Programs that are no browser name no origin.
+_OWN_PAGES = (re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?"), None)
+
+
 def started(host: str, port: int, name: str) -> viser.ViserServer:
-    """Return a server at a port that is free; 0 takes any."""
-    with contextlib.redirect_stdout(io.StringIO()):  # its banner
-        return viser.ViserServer(host, port, label=name, verbose=False)
+    """Return a server at a port that is free; 0 takes any.
+
+    It refuses pages of other sites, which could otherwise move and save mounts while they are open in a browser here.
+    viser has no setting for that, so it starts with websockets' own.
+    """
+    serve = websockets.asyncio.server.serve
+    websockets.asyncio.server.serve = partial(serve, origins=_OWN_PAGES)  # type: ignore[assignment,misc]
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):  # its banner
+            return viser.ViserServer(host, port, label=name, verbose=False)
+    finally:
+        websockets.asyncio.server.serve = serve  # type: ignore[misc]
 
 
 def stop(server: viser.ViserServer) -> None:

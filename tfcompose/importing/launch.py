@@ -6,6 +6,7 @@ import json
 import os
 import posixpath
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
     from tfcompose.importing.draft import Draft
 
 _MOST_WALL_S = 60.0
+#: The delay that exports write for a process without ``restart_delay``, whose first delay it is.
+_FIRST_DELAY_S = 1.0
 #: Programs whose arguments are read: they have their values.
 _READ = frozenset({PROGRAM, STATE_PUBLISHER, *JOINT_PUBLISHERS})
 _ADVICE = "--package NAME=FOLDER, or source the workspace's setup file"
@@ -223,9 +226,6 @@ class _Work:
         argv = tuple(record.get("argv", ()))
         if record.get("executable") in _READ:
             argv = tuple(map(with_values, argv))
-        prefix = record.get("prefix")
-        if prefix:
-            todo.append(f"the prefix {prefix}")
         reader = None if record["kind"] == "process" else "ros2"
         if record.get("ros1"):
             reader = "tf" if record["package"] == "tf" else "tf2_ros"
@@ -258,11 +258,12 @@ class _Work:
         if record.get("required"):
             keys["required"] = True
         if record.get("respawn"):
-            keys["restart"] = "always"
-            retries = record.get("respawn_max_retries", -1)
-            keys |= {"max_restarts": int(retries)} if retries >= 0 else {}
-            if record.get("respawn_delay"):
-                todo.append(f"respawn_delay {record['respawn_delay']:g} s")
+            keys |= _restarts(record)
+        if record.get("prefix"):
+            try:
+                keys["prefix"] = shlex.split(record["prefix"])
+            except ValueError:
+                todo.append(f"the prefix {record['prefix']}")
         if record.get("only_env"):
             todo.append("env replaces the environment: here its variables are added to it")
         if record.get("sigterm_timeout"):
@@ -426,3 +427,14 @@ def _description(value: str) -> Description:
         mark = json.loads(value[value.index(_BEGIN) + 1 : value.index(_END)])
         return Description(mark["file"], mark["args"])
     return Description(text=value)
+
+
+def _restarts(record: dict[str, Any]) -> dict[str, Any]:
+    """Return how a process that respawns is started again."""
+    keys: dict[str, Any] = {"restart": "always"}
+    retries = record.get("respawn_max_retries", -1)
+    if retries >= 0:
+        keys["max_restarts"] = int(retries)
+    if record.get("respawn_delay") not in (None, 0.0, _FIRST_DELAY_S):
+        keys["restart_delay"] = _seconds(float(record["respawn_delay"]))
+    return keys

@@ -18,7 +18,7 @@ from tfcompose.findings import Finding, RejectedError
 from tfcompose.language.process import keys_of
 from tfcompose.launcher.preflight import filled_in, folder_of, own_env
 from tfcompose.model import Process
-from tfcompose.plan import PlanProcess, Ready, StopRule
+from tfcompose.plan import PlanProcess, Ready, Schedule, StopRule
 from tfcompose.plan.file import read_plan, write_plan
 
 HEAD = "tfcompose: 1\nrobot: r\nros: {namespace: r1}\nframes: {map: {}}\nrules: {TF818: off, TF848: off}\nprocesses:\n"
@@ -50,6 +50,9 @@ REACH: dict[str, dict[str, Any]] = {
     "log_level: debug": {"log_level": "debug"},
     "after: {static: started}": {"after": {"static": "started"}},
     "restart: always, max_restarts: 3": {"restart": "always", "max_restarts": 3},
+    "restart: always, restart_delay: 5 s": {"restart_delay": 5.0},
+    "prefix: [nice, -n, '10']": {"prefix": ("nice", "-n", "10")},
+    "schedule: {cpus: [2, 3], policy: fifo, priority: 80}": {"schedule": Schedule((2, 3), "fifo", 80)},
     "stop: {signal: SIGTERM, timeout: 200 ms}": {"stop": StopRule("SIGTERM", 0.2)},
     "stop: {}": {"stop": StopRule("SIGINT", None)},
     "ready: edges": {"ready": Ready("edges")},

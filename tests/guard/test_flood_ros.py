@@ -32,10 +32,11 @@ def test_a_moment_of_reading_ends_after_its_time_and_a_second_has_so_much_of_it(
         taken.append(next(times) - before)
     assert max(taken) < 10
     assert len(taken) == pytest.approx(BUSY_S / SLICE_S, abs=2)
-    assert reader.is_reading
+    assert not reader.is_reading, "the guard does not wake up for what it may not read in this second"
     begun = next(times)
     reader.read(1.0)
     assert next(times) > begun + 2
+    assert reader.is_reading
 
 
 def test_the_declared_edges_of_a_flood_are_taken_and_further_messages_skipped_meanwhile() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 from tests.support import processes
 
 #: So long it is looked, again and again: where much else runs, publishers are found late, and late in truth.
-OBSERVE_S = (3.0, 3.0, 3.0, 6.0, 12.0)
+OBSERVE_S = (3.0, 3.0, 3.0, 6.0, 12.0, 12.0, 12.0)
 
 
 def doctor(*words: str, seconds: float = 3.0) -> tuple[int, list[dict[str, Any]]]:

@@ -207,3 +207,23 @@ processes: {p: {run: [x, "dev_${env(PORT)}"]}}
 
 def test_an_argument_that_nothing_uses_is_named() -> None:
     assert [one.code for one in built("args: {n: 1}\n").found] == ["TF504"]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message", "advice"),
+    [
+        ("args.camera", "camera", "cameras"),
+        ("args.cameras", "args.cameras", "range(args.cameras)"),
+    ],
+)
+def test_a_loop_over_no_list_names_what_is_unknown_in_it_or_its_range(wrong: str, message: str, advice: str) -> None:
+    (found,) = built(CAMERAS.replace("range(args.cameras)", wrong)).errors
+    assert message in found.message
+    assert advice in found.help
+
+
+def test_a_choice_as_python_writes_it_leads_to_when() -> None:
+    text = CAMERAS.replace("${i * 10 cm}", "${0.1 if i == 0 else 0.2}")
+    found = built(text).errors
+    assert found
+    assert all((one.code, "if" in one.message, "when" in one.help) == ("TF105", True, True) for one in found)

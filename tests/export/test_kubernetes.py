@@ -208,5 +208,11 @@ def test_a_plan_that_a_config_map_cannot_hold_is_refused_with_a_way_out(tmp_path
     assert (done.returncode, "--at" in done.stderr) == (2, True)
     assert not (tmp_path / "built" / "k8s").exists()
     assert processes.run([*TFCOMPOSE, *words, "--at", "/opt/robot"], cwd=tmp_path).returncode == 0
-    assert processes.run([*TFCOMPOSE, "export", "k8s", str(plan)], cwd=tmp_path).returncode == 2
     assert json.loads(plan.read_text("utf-8"))["robot"] == "rover"
+
+
+def test_without_an_image_nothing_is_built(tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text(DRIVEN)
+    done = processes.run([*TFCOMPOSE, "export", "k8s", "robot.yaml"], cwd=tmp_path)
+    assert (done.returncode, "--image" in done.stderr) == (2, True)
+    assert not (tmp_path / "build").exists()

@@ -27,7 +27,7 @@ TOPICS = {
     "strict": "holding back what a process does not own",
     "background": "robots without a terminal: ps, logs, restart, down",
     "hosts": "a robot on several computers",
-    "exports": "systemd, docker compose and launch files",
+    "exports": "systemd, docker compose, Kubernetes and launch files",
     "ci": "lint, diff and verify in CI; exit codes",
     "python": "the TF buffer in Python",
     "costs": "what it costs, measured",

@@ -65,6 +65,8 @@ def run(arguments: Namespace) -> int:
     from tfcompose.launcher.fence import not_remapped
 
     arguments.file = in_folder(arguments.file)
+    if arguments.kind == "k8s" and not arguments.image:
+        fail("name the image of the pods, with ROS 2 Jazzy and tfcompose: --image NAME", UNREADABLE)
     if is_plan(arguments.file):
         refuse_variant(arguments)
         file = Path(arguments.file)
@@ -130,8 +132,6 @@ def _for_kubernetes(plan: Plan, folder: Path, arguments: Namespace) -> tuple[tup
     from tfcompose.cli.reading import read_text
     from tfcompose.export.kubernetes import MOST_BYTES, Cluster, files_of, kubernetes
 
-    if not arguments.image:
-        fail("name the image of the pods, with ROS 2 Jazzy and tfcompose: --image NAME", UNREADABLE)
     paths = dict.fromkeys(path for process in plan.started for path in files_of(plan, process))
     texts = {path: read_text(str(folder / path)) for path in paths}
     size = sum(len(text.encode()) for text in texts.values())

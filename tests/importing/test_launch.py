@@ -1,7 +1,10 @@
 """Launch files in Python, XML and YAML, imported."""
 
 import io
+import os
 import random
+import re
+import signal
 import socket
 import subprocess
 import sys
@@ -412,6 +415,46 @@ def test_a_launch_file_without_end_is_ended(
     monkeypatch.setattr(launch, "_MOST_WALL_S", 3.0)
     assert main(["import", str(source(tmp_path, "endless.launch.py", text))]) == 1
     assert "endless.launch.py" in printed_errors(capsys)
+
+
+@pytest.mark.parametrize(
+    ("place", "text"),
+    [
+        ("a.launch.py:2", "\ndef generate_launch_description(:\n"),
+        ("a.launch.py:3", "def generate_launch_description():\n    import gone\n    return 1 / 0\n"),
+        ("a.launch.py:2", "def generate_launch_description():\n    raise KeyboardInterrupt\n"),
+        ("a.launch.py:1", "x = 1\n"),
+        ("a.launch.py:1", "import os\nos._exit(0)\n"),
+        ("a.launch.xml:2", "<launch>\n<node\n"),
+        ("a.launch.xml:1", ""),
+        ("<stdin>:2", "def generate_launch_description():\n    return 1 / 0\n"),
+        ("<stdin>:1", "import os; os.abort()\ndef generate_launch_description(): pass\n"),
+    ],
+)
+def test_a_launch_file_that_cannot_be_read_is_refused_at_its_line(
+    place: str, text: str, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(reading, "_standard_input", text.encode)
+    name = place.partition(":")[0]
+    assert main(["import", "-" if name == "<stdin>" else source(tmp_path, name, text).name]) == 1
+    printed = capfd.readouterr().err
+    assert re.search(rf"^{re.escape(place)}:1: error\[TF00[28]\]", printed, re.MULTILINE), printed
+    assert "Traceback" not in printed
+    assert ("gone" in printed) == ("gone" in text)
+
+
+def test_ctrl_c_ends_an_import_without_a_traceback(tmp_path: Path) -> None:
+    begun = tmp_path / "begun"
+    os.mkfifo(begun)
+    text = f"def generate_launch_description():\n    open({str(begun)!r}).read()\n    while True: pass\n"
+    file = source(tmp_path, "endless.launch.py", text)
+    words = [sys.executable, "-m", "tfcompose", "import", str(file)]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, start_new_session=True, text=True) as process:
+        begun.write_text("the launch file is read\n", encoding="utf-8")  # waits for its reader
+        os.killpg(process.pid, signal.SIGINT)
+        _, printed = process.communicate(timeout=60)
+    assert (process.returncode, printed) == (130, "")
 
 
 def test_no_launch_file_makes_a_traceback(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,6 +11,8 @@ from pathlib import Path
 from tfcompose.findings import Finding, RejectedError, Span, finding
 
 MOST_BYTES = 16_000_000
+#: Of files with another ending than these, the robot files are named that are there in their place.
+_ENDINGS = (".urdf", ".xacro", ".launch", ".py", ".xml", ".sh", ".bash")
 #: The name of standard input.
 STDIN = "-"
 
@@ -71,11 +73,11 @@ def _unreadable(path: str, error: OSError) -> Finding:
     advice = ""
     if isinstance(error, FileNotFoundError):
         folder = Path(path).parent
-        ending = next((one for one in (".urdf", ".xacro") if path.endswith(one)), ".yaml")
+        ending = next((one for one in _ENDINGS if path.endswith(one)), ".yaml")
         there = sorted(file.name for file in folder.glob(f"*{ending}")) if folder.is_dir() else []
         advice = f"in {folder} there is {', '.join(there[:8])}" if there else f"there is no {ending} file in {folder}"
     elif isinstance(error, IsADirectoryError):
-        advice = "name a robot file in it"
+        advice = "name a file in it"
     return finding("TF001", f"cannot be read: {error.strerror}", Span(path), help=advice)
 
 

@@ -64,6 +64,10 @@ class Launch:
     every_branch: bool = False
     shown: str = ""
 
+    def span(self, line: int = 1) -> Span:
+        """Return the place of one of its lines."""
+        return Span(self.shown or self.file, max(line, 1))
+
 
 def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description]:
     """Add what a launch file starts to the draft; return what its robot_state_publishers are given.
@@ -77,9 +81,10 @@ def add_launch(draft: Draft, launch: Launch, target: Target) -> list[Description
         work.add(record)
     work.finish(answer["decided"])
     if answer["stopped"]:
+        at = launch.span(answer["line"])
         if not any(one["kind"] not in {"package", "todo", "argument"} for one in answer["records"]):
-            raise RejectedError([finding("TF002", f"{answer['stopped']}", Span(launch.file))])
-        draft.todo(f"the launch file is not read to its end: {answer['stopped']}", Span(launch.file))
+            raise RejectedError([finding("TF002", answer["stopped"], at), *draft.found])
+        draft.todo(f"the launch file is not read to its end: {answer['stopped']}", at)
     return work.descriptions
 
 
@@ -89,7 +94,10 @@ def _answered(launch: Launch) -> dict[str, Any]:
         "packages": {name: str(Path(folder).absolute()) for name, folder in launch.packages.items()},
         "prefixes": list(launch.prefixes), "every_branch": launch.every_branch,
     }  # fmt: skip
-    program = f"import sys; sys.path[:] = {sys.path!r}; from tfcompose.importing.launch_process import main; main()"
+    program = (
+        "import signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN); "  # a Ctrl-C is for who asked
+        f"sys.path[:] = {sys.path!r}; from tfcompose.importing.launch_process import main; main()"
+    )
     command = [sys.executable, "-c", program]
     try:
         done = subprocess.run(
@@ -100,11 +108,13 @@ def _answered(launch: Launch) -> dict[str, Any]:
     except subprocess.TimeoutExpired:
         message = f"the launch file takes more than {_MOST_WALL_S:g} s"
     except json.JSONDecodeError:
-        ended = f"by {signal.Signals(-done.returncode).name}" if done.returncode < 0 else f"with code {done.returncode}"
-        message = f"the launch file was ended {ended}: it takes too long, or too much memory"
+        message = f"the launch file ends the process that reads it, with code {done.returncode}"
+        if done.returncode < 0:
+            ended = signal.Signals(-done.returncode).name
+            message = f"the launch file was ended by {ended}: it takes too long, or too much memory"
     else:
         return answer
-    raise RejectedError([finding("TF008", message, Span(launch.file))])
+    raise RejectedError([finding("TF008", message, launch.span())])
 
 
 class _Work:
@@ -153,7 +163,6 @@ class _Work:
             if known:
                 processes[name].setdefault("after", {}).update(known)
         self._delay()
-        self._settings()
         one_clock(self.draft)
         for package, span in self._missing.items():
             self.draft.todo(f"package {package} not found", span, advice=_ADVICE)
@@ -161,8 +170,7 @@ class _Work:
     def _span(self, at: Any) -> Span:
         file, line = (at[0], at[1]) if at else ("", 1)
         absolute = str(Path(self.launch.file).absolute())
-        shown = (self.launch.shown or self.launch.file) if file in {absolute, ""} else os.path.relpath(file)
-        return Span(shown, max(int(line), 1))
+        return self.launch.span(line) if file in {absolute, ""} else Span(os.path.relpath(file), max(line, 1))
 
     def _argument(self, record: dict[str, Any], span: Span) -> None:
         self._arguments[record["name"]] = (record, span)
@@ -243,7 +251,7 @@ class _Work:
     def _is_setting(self, name: str, value: str) -> bool:
         if name not in _SETTINGS:
             return False
-        known = {"domain_id": int(value) if value.isdigit() else None, "discovery": value.lower()}
+        known = {"domain_id": int(value) if value.isdecimal() else None, "discovery": value.lower()}
         wanted = known[_SETTINGS[name]]
         ros = self.draft.sections["ros"]
         allowed = wanted in {"localhost", "subnet", "off"} if name != "ROS_DOMAIN_ID" else wanted is not None
@@ -384,11 +392,6 @@ class _Work:
             gate = gates[period_s]
             what = "done" if processes[gate]["run"] == ["sleep", number(period_s)] else "ready"
             processes[name].setdefault("after", {})[gate] = what
-
-    def _settings(self) -> None:
-        ros = self.draft.sections["ros"]
-        for name in [name for name, value in ros.items() if value is None]:
-            del ros[name]
 
 
 def _seconds(value: float) -> Bare:

@@ -97,21 +97,24 @@ class Reader:
         module: dict[str, Any] = {"__file__": path, "__name__": f"{substitutions.MODULE}{len(context.records)}"}
         try:
             exec(compile(text, path, "exec"), module)  # noqa: S102 (that is what this process is for)
-            return module[_MAKE]() if _MAKE in module else None
+            if _MAKE in module:
+                return module[_MAKE]()
         except (FailedError, MemoryError):
             raise
         except SyntaxError as error:
-            raise FailedError(f"line {error.lineno}: {error.msg}") from None
-        except (Exception, SystemExit) as error:  # noqa: BLE001 (any can come out of it)
-            raise FailedError(f"it stopped{_line(error, path)}: {type(error).__name__}: {error}") from None
+            raise FailedError(error.msg, error.lineno or 0) from None
+        except BaseException as error:  # noqa: BLE001 (any can come out of it)
+            raise FailedError(f"it stopped: {type(error).__name__}: {error}", _line(error, path)) from None
+        raise FailedError(f"it has no function {_MAKE}")
 
 
-def _line(error: BaseException, path: str) -> str:
+def _line(error: BaseException, path: str) -> int:
+    """Return the line of the file at which it was stopped, 0 where it was in none of its own."""
     trace, line = error.__traceback__, 0
     while trace is not None:
         line = trace.tb_lineno if trace.tb_frame.f_code.co_filename == path else line
         trace = trace.tb_next
-    return f" at line {line}" if line else ""
+    return line
 
 
 # What launch files import
@@ -324,7 +327,7 @@ def _confine(context: Context) -> None:  # noqa: C901 (one hook after another)
 
 
 def answer(request: dict[str, Any]) -> dict[str, Any]:
-    """Return what came of reading a launch file: records, in order, and why it stopped if it did."""
+    """Return what came of reading a launch file: records, in order, and why and at which line it stopped if it did."""
     reader = Reader(request)
     context = reader.context
     actions.LOADERS[:] = [reader.load]
@@ -335,20 +338,21 @@ def answer(request: dict[str, Any]) -> dict[str, Any]:
     sys.dont_write_bytecode = True
     tempfile.gettempdir()  # finds out now, by writing there, what is asked for later
     _confine(context)
-    stopped = ""
+    stopped, line = "", 0
     context.file = request["file"]
     try:
         actions.visit_all([reader.load(request["file"], context)], context)
     except FailedError as error:
-        stopped = str(error)
+        stopped, line = error.reason, error.line
     except MemoryError:
         stopped = "it needs too much memory"
     except RecursionError:
         stopped = "it goes too deep"
-    except (Exception, SystemExit) as error:  # noqa: BLE001 (whatever a launch file raises is a finding)
+    except BaseException as error:  # noqa: BLE001 (whatever a launch file raises is a finding)
         stopped = f"{type(error).__name__}: {error}"
     records = context.records
-    return {"records": records[:MOST_RECORDS], "stopped": stopped, "decided": sorted(context.decided)}
+    decided = sorted(context.decided)
+    return {"records": records[:MOST_RECORDS], "stopped": stopped, "line": line, "decided": decided}
 
 
 def main() -> None:

@@ -29,7 +29,11 @@ PACKAGE = "package://"
 
 
 class FailedError(Exception):
-    """Something of a launch file cannot be resolved."""
+    """Something of a launch file cannot be resolved; ``line`` is set where it is about a whole file, else 0."""
+
+    def __init__(self, reason: str, line: int = 0) -> None:
+        super().__init__(f"line {line}: {reason}" if line else reason)
+        self.reason, self.line = reason, line
 
 
 def marked(**what: Any) -> str:

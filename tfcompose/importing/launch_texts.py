@@ -61,15 +61,15 @@ def of_xml(text: str, file: str) -> list[Entity]:
     try:
         root = read_xml(text, file)
     except RejectedError as error:
-        raise FailedError(_reason(error)) from None
+        raise _refusal(error) from None
     if root.tag != "launch":
         raise FailedError(f"<{root.tag}> is no launch file")
     return [_of_element(child, file) for child in root.children]
 
 
-def _reason(error: RejectedError) -> str:
+def _refusal(error: RejectedError) -> FailedError:
     found = error.findings[0]
-    return f"line {found.span.line}: {found.message}" if found.span else found.message
+    return FailedError(found.message, found.span.line if found.span else 0)
 
 
 def _of_element(element: Element, file: str) -> Entity:
@@ -86,7 +86,7 @@ def of_yaml(text: str, file: str) -> list[Entity]:
     try:
         source = load(text, file)
     except RejectedError as error:
-        raise FailedError(_reason(error)) from None
+        raise _refusal(error) from None
     listed = source.data.get("launch")
     if not isinstance(listed, list):
         raise FailedError("it has no list under launch:")
@@ -502,4 +502,4 @@ def read(path: str) -> tuple[str, str]:
         raise FailedError(f"{path} cannot be read: {error}") from None
     if path.endswith(".py"):
         return text, "py"
-    return text, "xml" if text.lstrip().startswith("<") else "yaml"
+    return text, "xml" if path.endswith((".xml", ".launch")) or text.lstrip().startswith("<") else "yaml"

@@ -301,6 +301,26 @@ def test_what_is_not_the_mounts_own_is_offered_in_an_overlay(name: str, overlay:
     assert reason in found.reason
 
 
+def test_an_entry_that_another_one_shares_gets_no_new_key() -> None:
+    text = f"{BASE}frames:\n  one: &one {{parent: base_link}}\n  tool: *one\n"
+    for pose in (Pose((1, 0, 0)), Pose(quat_xyzw=quat_from_rpy(0, 0.2, 0))):
+        assert "frames.one" in kept_elsewhere(text, "", "tool", pose).reason
+
+
+@pytest.mark.parametrize("profiles", [(), ("tall",)])
+@pytest.mark.parametrize("values", [("&p [0, 0, 1]", "*p"), ("[0, 0, &h 1]", "[0, 0, *h]")])
+def test_what_a_profile_shares_is_not_edited(values: tuple[str, str], profiles: tuple[str, ...]) -> None:
+    own, other = values
+    text = f"{BASE}frames:\n  tool: {{parent: base_link, xyz: {own}}}\n"
+    text += f"profiles:\n  tall:\n    frames: {{tool: {{xyz: {other}}}}}\n"
+    done = compiled(text, profiles=profiles)
+    assert done.robot
+    found = change_of(done.robot, done.sources[0], {"r.yaml": text}, "tool", Pose((0, 0, 2)))
+    assert isinstance(found, Elsewhere)
+    assert "profiles.tall.frames.tool" in found.reason
+    assert pose_in(robot_of(text, found.overlay("", "o.yaml"), profiles), "tool") == Pose((0, 0, 2))
+
+
 def test_a_number_that_stays_may_be_computed() -> None:
     text = f"{BASE}vars: {{h: 1 m}}\nframes:\n  tool: {{parent: base_link, xyz: [0, 0, '${{h}}']}}\n"
     new = moved(text, "tool", Pose((0.5, 0, 1)))

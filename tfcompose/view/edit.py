@@ -296,13 +296,13 @@ class _Change:
         at = (*self.mount.entry, *path)
         span = self.source.exactly_at(at)
         if span is None:
-            raise _ElsewhereError(f"{'.'.join(map(str, path))} is not there", self.source.at(at))
+            raise _ElsewhereError(f"{_dotted(path)} is not there", self.source.at(at))
         if span.file not in self.texts:
             raise _ElsewhereError(f"{_dotted(path) or 'the pose'} is given in {span.file}", span)
         sharing = [other for other, place in self._places(span.file).walk() if place.span == span]
-        others = [other for other in sharing if other[-len(at) :] != at]
-        if others:
-            raise _SharedError(path[0], ".".join(map(str, others[0])), span)
+        if len(sharing) > 1:
+            other = next(other for other in sharing if other != at)
+            raise _SharedError(str(path[0]) if path else "the entry", _dotted(other), span)
         found = _PROPERTIES.match(text_at(self.texts[span.file], span))
         return span._replace(column=span.column + found.end()) if found and "\n" not in found[0] else span
 
@@ -346,8 +346,8 @@ _PART = 2
 
 
 class _SharedError(_ElsewhereError):
-    def __init__(self, key: str | int, other: str, at: Span) -> None:
-        super().__init__(f"{key} is shared with {other}", at)
+    def __init__(self, what: str, other: str, at: Span) -> None:
+        super().__init__(f"{what} is shared with {other}", at)
 
 
 #: Mappings of numbers: their keys, in the order of ``Robot.source_numbers``.

@@ -18,12 +18,13 @@ from websockets.typing import Origin, Subprotocol
 
 from tests.support import processes
 from tests.support.cli import tfcompose_in
+from tests.support.tables import for_each
 from tfcompose.cli.compiling import library
 from tfcompose.cli.fixing import ChangedError, rewrite
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.geometry import Pose, offset_of, quat_from_rpy
 from tfcompose.view.panel import Panel
-from tfcompose.view.scene import started, stop
+from tfcompose.view.scene import RobotScene, started, stop
 from tfcompose.view.session import Session, poses_in_roots
 
 ROVER = Path(__file__).parents[2] / "robots" / "field_rover.yaml"
@@ -167,6 +168,68 @@ def test_html_is_one_small_file(rover: Path) -> None:
     page = (rover.parent / "rover.html").read_text("utf-8")
     assert "__VISER_EMBED_DATA__" in page
     assert len(page) < 3_000_000
+
+
+@pytest.mark.parametrize("words", [("--html", "none/r.html"), ("--html", "."), ("--html", "./field_rover.yaml")])
+def test_a_refused_page_changes_nothing(rover: Path, words: tuple[str, ...]) -> None:
+    done = tfcompose_in(rover.parent, "view", rover.name, *words)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.splitlines()[-1].startswith("tfcompose: ")
+    assert words[1] in done.stderr or Path(words[1]).name in done.stderr
+    assert rover.read_bytes() == ROVER.read_bytes()
+
+
+def test_a_robot_without_frames_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "r.yaml").write_text("tfcompose: 1\nrobot: r\n", "utf-8")
+    done = tfcompose_in(tmp_path, "view", "r.yaml", "--html", "r.html")
+    assert done.returncode == 1
+    assert "TF206" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+WRONG = {
+    "a child that is not there": "links: {base_link: {}, arm: {parent: base_link, xyz: [1, 0, 0]}}\n"
+    "joints: {j: {type: continuous, parent: base_link, child: amr, axis: [0, 0, 1]}}",
+    "limits the wrong way round": "links: {base_link: {}, arm: {}}\njoints: {j: {type: revolute, parent: base_link,"
+    " child: arm, axis: [0, 0, 1], limit: {lower: 1, upper: -1, effort: 1, velocity: 1}}}",
+    "an unknown unit": "links: {base_link: {}, arm: {parent: base_link, xyz: [1 metre, 0, 0], rpy: [0, 1 degr, 0]}}",
+}
+
+
+@for_each(WRONG)
+def test_a_wrong_robot_is_shown_and_its_mounts_move(name: str, tmp_path: Path, server: viser.ViserServer) -> None:
+    file = tmp_path / "r.yaml"
+    file.write_text(f"tfcompose: 1\nrobot: r\n{WRONG[name]}\n", "utf-8")
+    session = session_of(file)
+    assert session.state.errors
+    panel = Panel(server, session, edit=True)
+    panel.frames.value = "arm"
+    panel.move(Pose((3, 0, 0), quat_from_rpy(0, 0.5, 0)))
+    panel.save()
+    assert panel.report.content
+
+
+@pytest.mark.parametrize("port", [-1, 65_536])
+def test_a_port_that_does_not_exist_is_refused(rover: Path, port: int) -> None:
+    done = tfcompose_in(rover.parent, "view", rover.name, f"--port={port}")
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1].startswith(f"tfcompose: there is no port {port}")
+
+
+def test_the_camera_begins_outside_the_robot_and_the_grid_is_below_it(server: viser.ViserServer) -> None:
+    text = """tfcompose: 1
+robot: r
+links: {base_link: {}, car: {parent: base_link, xyz: [2, 0, 0.5], visual: {box: [4, 2, 2]}}}
+"""
+    robot = compile_robot(text, "r.yaml", PRESETS).robot
+    assert robot
+    RobotScene(server.scene, robot).frame_camera(server, poses_in_roots(robot, {}))
+    camera = server.initial_camera
+    assert camera.look_at == pytest.approx([2, 0, 0.5])
+    assert math.dist(camera.position, camera.look_at) > math.hypot(2, 1, 1)
+    grid = server.scene.get_handle_by_name("/grid")
+    assert grid
+    assert grid.position[2] == pytest.approx(-0.5)
 
 
 def test_the_server_answers_until_ctrl_c_and_a_taken_port_names_the_next(rover: Path) -> None:

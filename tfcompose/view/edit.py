@@ -17,7 +17,7 @@ from tfcompose.language import DIRECTIONS
 from tfcompose.load import load
 from tfcompose.model import JOINTS, STATIC, is_optical
 from tfcompose.numbers import number
-from tfcompose.units import quantity
+from tfcompose.units import UnitError, quantity
 from tfcompose.view.rotations import FORMS
 from tfcompose.view.yaml_text import Keys, text_at, with_value
 
@@ -287,7 +287,7 @@ class _Change:
         if "${" in scalar:
             raise _ElsewhereError(f"{_dotted(path)} is computed: {scalar}", span)
         found = _NUMBER.fullmatch(scalar)
-        if found is None:
+        if found is None or _value(scalar) is None:
             raise _ElsewhereError(f"{_dotted(path)} is {scalar}", span)
         return Edit(span, self._short(value, found[3] or "", found[2]))
 
@@ -378,10 +378,18 @@ def _scalars(value: Any, path: Path = ()) -> dict[Path, Any]:
     return {at: one for step, item in items for at, one in _scalars(item, (*path, step)).items()}
 
 
+def _value(text: str) -> float | None:
+    """Return the quantity in SI, or None where the text is none."""
+    try:
+        return quantity(text).value
+    except UnitError:
+        return None
+
+
 def _leaves(value: Any) -> Iterator[tuple[Path, float]]:
     """Yield the numbers in a value with their paths; one that is computed is not among them."""
     for path, item in _scalars(value).items():
-        if isinstance(item, str) and "${" not in item:
-            yield path, quantity(item).value
+        if isinstance(item, str) and (number_in := _value(item)) is not None:
+            yield path, number_in
         elif isinstance(item, (int, float)) and not isinstance(item, bool):
             yield path, float(item)

@@ -102,6 +102,7 @@ class Panel:
         if joint.limit and joint.type != "continuous":
             lower = joint.limit.lower if joint.limit.lower is not None else lower
             upper = joint.limit.upper if joint.limit.upper is not None else upper
+        upper = max(lower, upper)
         scale, unit = (1000.0, "mm") if slides else (math.degrees(1), "deg")
         start = min(max(0.0, lower), upper)
         slider = self._gui.add_slider(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import colorsys
 import contextlib
 import io
+import itertools
 import re
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 _FIRST_HUE, _NEXT_HUE = 0.58, 0.381966
 _GREY = (105, 112, 122)
 _AXES_M = 0.08
+#: Where the camera begins, as a direction from the middle of the robot, and how many radii of it away.
+_FROM = np.array([0.62, 0.62, 0.48])
+_RADII = 2.0
 
 
 #: Pages that may talk to the server: its own, which this machine has. Programs that are no browser name no origin.
@@ -94,11 +98,11 @@ class RobotScene:
         self._scene = scene
         self.colours = colours_of(robot)
         self._bodies: dict[str, Any] = {}
+        self._corners: dict[str, list[Any]] = {}
         self._axes: Any = None
         self._lines: dict[str, Any] = {}
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
-        scene.add_grid("/grid", 10, 10, cell_size=0.1, section_size=1, cell_color=(235, 235, 235), fade_distance=12)
         for index, (frame, link) in enumerate(robot.links.items()):
             shapes = link.visuals or link.collisions
             if shapes and frame in robot.frames:
@@ -108,8 +112,10 @@ class RobotScene:
         self._bodies[frame] = self._scene.add_frame(name, show_axes=False)
         for number, shape in enumerate(shapes):
             mesh = mesh_of(shape)
-            if mesh is None:
+            if mesh is None or mesh.is_empty:
                 continue
+            corners = itertools.product(*mesh.bounds.T.tolist())
+            self._corners.setdefault(frame, []).extend((shape.pose @ Pose(one)).xyz for one in corners)
             rgba = shape.material.rgba if shape.material else None
             colour = (round(rgba[0] * 255), round(rgba[1] * 255), round(rgba[2] * 255)) if rgba else _GREY
             self._scene.add_mesh_simple(
@@ -138,8 +144,9 @@ class RobotScene:
             )
         else:
             self._axes.batched_wxyzs, self._axes.batched_positions = rotations, positions
+        edges = [edge for edge in robot.edges if edge.parent in poses and edge.child in poses]
         for index, (owner, colour) in enumerate(self.colours.items()):
-            ends = [(poses[edge.parent].xyz, poses[edge.child].xyz) for edge in robot.edges if edge.owner == owner]
+            ends = [(poses[edge.parent].xyz, poses[edge.child].xyz) for edge in edges if edge.owner == owner]
             points = np.array(ends, np.float32).reshape(-1, 2, 3)
             if owner in self._lines:
                 self._lines[owner].points = points
@@ -149,10 +156,23 @@ class RobotScene:
                 )
 
     def frame_camera(self, server: viser.ViserServer, poses: Mapping[str, Pose]) -> None:
-        """Let the camera of a new client begin where the robot fills the picture."""
-        points = np.array([pose.xyz for pose in poses.values()]).reshape(-1, 3)
-        distance = max(1.0, 1.6 * float(np.linalg.norm(points, axis=1).max()))
-        server.initial_camera.position = distance * np.array([0.8, 0.8, 0.6])
+        """Let the camera of a new client begin where the robot fills the picture, with a grid below all of it."""
+        bodies = [(poses[frame] @ Pose(xyz)).xyz for frame, corners in self._corners.items() for xyz in corners]
+        points = np.array([pose.xyz for pose in poses.values()] + bodies).reshape(-1, 3)
+        least, most = points.min(axis=0), points.max(axis=0)
+        middle, radius = (least + most) / 2, float(np.linalg.norm(most - least)) / 2 + _AXES_M
+        server.initial_camera.look_at = middle
+        server.initial_camera.position = middle + _RADII * radius * _FROM
+        self._scene.add_grid(
+            "/grid",
+            20,
+            20,
+            cell_size=0.1,
+            section_size=1,
+            cell_color=(235, 235, 235),
+            fade_distance=max(12.0, 4 * radius),
+            position=(0.0, 0.0, float(least[2])),
+        )
 
     def show_owner(self, owner: str, *, visible: bool) -> None:
         """Show or hide the edges of an owner."""

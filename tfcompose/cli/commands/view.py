@@ -17,7 +17,7 @@ from tfcompose.cli.terminal import UNREADABLE, fail
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from tfcompose.compile import Compiled
     from tfcompose.view.session import Session
@@ -37,7 +37,7 @@ def arguments(parser: ArgumentParser) -> None:
 
 
 def run(arguments: Namespace) -> int:
-    """Serve the view until Ctrl-C, or write it; exit code 1 with errors in the robot, 2 if it cannot be shown."""
+    """Serve the view until Ctrl-C, or write it; exit code 1 if the file gives no robot, 2 if it cannot be shown."""
     try:
         from tfcompose.view.panel import Panel
         from tfcompose.view.scene import RobotScene, started, stop
@@ -46,6 +46,8 @@ def run(arguments: Namespace) -> int:
         fail(f"{error.name} is not installed: pip install 'tfcompose[view]'", UNREADABLE)
     from tfcompose.cli.writing import replace_file
 
+    if arguments.html:
+        _check_output(Path(arguments.html), [arguments.file, *arguments.overlays])
     session = _session(arguments)
     port = 0 if arguments.html else _free(arguments.port)
     server = started(_HOST, port, session.robot.name)
@@ -55,13 +57,24 @@ def run(arguments: Namespace) -> int:
             scene = RobotScene(server.scene, robot)
             scene.update(robot, poses)
             scene.frame_camera(server, poses)
-            replace_file(Path(arguments.html), server.scene.as_html().encode())
+            try:
+                replace_file(Path(arguments.html), server.scene.as_html().encode())
+            except OSError as error:
+                fail(f"{arguments.html} cannot be written: {error.strerror}", UNREADABLE)
             return 0
         Panel(server, session, edit=arguments.edit)
         _serve(f"http://{_HOST}:{server.get_port()}", arguments)
     finally:
         stop(server)
     return 0
+
+
+def _check_output(path: Path, files: Sequence[str]) -> None:
+    """Refuse a page that cannot be written, or that would replace one of the robot's files; ends then."""
+    if not path.parent.is_dir():
+        fail(f"{path} cannot be written: no folder {path.parent}", UNREADABLE)
+    if path.resolve() in {Path(file).resolve() for file in files}:
+        fail(f"--html {path} would replace a file of the robot", UNREADABLE)
 
 
 def _session(arguments: Namespace) -> Session:
@@ -97,7 +110,7 @@ def _session(arguments: Namespace) -> Session:
         session = Session(texts, compiled, lambda file, old, new: rewrite(Path(file), old, new))
     except RejectedError as error:
         reject(error.findings)
-    if session.state.robot is None:
+    if session.state.robot is None or not session.robot.frames:
         reject(session.state.found)
     print_findings(session.state.found, sys.stderr)
     return session
@@ -105,7 +118,9 @@ def _session(arguments: Namespace) -> Session:
 
 def _free(port: int) -> int:
     """Return the port; ends with the next free one named where it is taken."""
-    following = next((other for other in range(port, _LAST_PORT) if _is_free(other)), None)
+    if not 0 <= port <= _LAST_PORT:
+        fail(f"there is no port {port}: --port takes 0 to {_LAST_PORT}, 0 for any that is free", UNREADABLE)
+    following = next((other for other in range(port, _LAST_PORT + 1) if _is_free(other)), None)
     if following != port:
         fail(f"port {port} is taken" + (f"; --port {following} is free" if following else ""), UNREADABLE)
     return port

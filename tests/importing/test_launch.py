@@ -18,6 +18,7 @@ from tests.support.importing import PRESETS
 from tfcompose.cli import compiling, main, reading
 from tfcompose.geometry import angle_between
 from tfcompose.importing import launch
+from tfcompose.load import load
 
 PYTHON = """
 import os
@@ -141,6 +142,9 @@ def test_arguments_are_given_and_conditions_passed_over(package: Path) -> None:
     assert "camera_1" not in data["processes"]
     assert "rviz2" in data["processes"]
     assert "keys" not in data["processes"]
+    out = file.with_name("imported.yaml")
+    assert main(["import", str(file), "-o", str(out), "cameras:=3", "--force"]) == 0
+    assert "camera_2" in load(out.read_text("utf-8"), str(out)).data["processes"]
     text, data = import_of(file, "--all-branches", code=None)
     assert data["args"] == {
         "cameras": {"default": 2, "description": "how many"}, "rviz": {"default": False},

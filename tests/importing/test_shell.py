@@ -89,6 +89,12 @@ def test_lines_come_from_standard_input(
     assert [(edge.name, edge.pose.xyz) for edge in result.robot.edges] == [("base_link → a", (1, 0, 0))]
 
 
+@pytest.mark.parametrize("word", ["x:=1", "more.sh"])
+def test_a_script_takes_neither_arguments_nor_a_second_file(word: str, tmp_path: Path) -> None:
+    source = script(tmp_path, "ros2 run drive node\n")
+    assert main(["import", str(source), word]) == 2
+
+
 def test_a_source_that_starts_nothing_is_refused(tmp_path: Path) -> None:
     source = script(tmp_path, "echo hello\n")
     assert main(["import", str(source)]) == 1

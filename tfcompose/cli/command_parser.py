@@ -29,7 +29,7 @@ class Parser(ArgumentParser):
         fail(f"{self.prog.partition(' ')[2]}: {message}; {advice}", UNREADABLE)
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Return the arguments; words such as ``cameras:=4`` are those of the robot file, wherever they stand."""
+        """Return the arguments; words such as ``cameras:=4`` are those of the source, wherever they stand."""
         words = list(args or ())
         takes_given = any(action.dest == "given" for action in self._actions)
         given = [word for word in words if _GIVEN.match(word)] if takes_given else []
@@ -41,7 +41,7 @@ class Parser(ArgumentParser):
         return arguments
 
 
-#: A word that gives an argument of a robot file its value.
+#: A word that gives an argument of a robot, xacro or launch file its value.
 _GIVEN = re.compile(r"[^\s=:-][^\s=:]*:=")
 
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from tfcompose.files import Target
     from tfcompose.findings import Finding
     from tfcompose.importing.draft import Draft
+    from tfcompose.load import Source
     from tfcompose.urdf.lint import Document
     from tfcompose.urdf.packages import Packages
 
@@ -39,8 +40,9 @@ def arguments(parser: ArgumentParser) -> None:
         help="URDF, xacro, a launch file, a shell script, Clearpath's robot.yaml or calibrations of Autoware's; "
         "-: lines from stdin",
     )  # fmt: skip
+    parser.add_argument("more", nargs="*", metavar="FILE", help="further calibrations")
     parser.add_argument(
-        "args", nargs="*", metavar="NAME:=VALUE", help="arguments of the xacro or launch file; or further calibrations"
+        "given", nargs="*", default=[], metavar="NAME:=VALUE", help="an argument of the xacro or launch file"
     )
     parser.add_argument("--live", action="store_true", help="import the running tree")
     add_bag(parser, "import a recording")
@@ -80,9 +82,10 @@ def _import_urdf(arguments: Namespace) -> int:
 
     from tfcompose.urdf.lint import read_urdf
 
-    given, packages = pairs(arguments.args, ":="), pairs(arguments.packages, "=")
+    _refuse_more(arguments)
+    packages = pairs(arguments.packages, "=")
     known = _known_packages(packages)
-    document = read_urdf(arguments.file, known, given)
+    document = read_urdf(arguments.file, known, arguments.given)
     errors = [one for one in document.findings() if one.severity == "error"]
     print_findings(errors, sys.stderr)
     if errors and not arguments.keep_going:
@@ -106,8 +109,8 @@ def _import_bringup(arguments: Namespace) -> int:
     name = "stdin" if arguments.file == STDIN else posixpath.basename(arguments.file)
     wanted = arguments.robot or robot_name(name.partition(".")[0] if name != "stdin" else "robot")
     draft = Draft(wanted, [f"imported from {name} by tfcompose"])
-    if _is_kit(arguments.file):
-        _add_kits(draft, arguments)
+    if kit := _kit(arguments.file):
+        _add_kits(draft, kit, arguments)
     elif arguments.file.endswith(_LAUNCH):
         _add_launch(draft, arguments, arguments.file)
     elif arguments.file == STDIN and (ending := _ending_of(read_text(STDIN))):
@@ -116,29 +119,43 @@ def _import_bringup(arguments: Namespace) -> int:
             file.flush()
             _add_launch(draft, arguments, file.name, "<stdin>")
     else:
+        _refuse_more(arguments)
+        _refuse_given(arguments)
         shown = arguments.file if arguments.file != STDIN else "<stdin>"
         add_script(draft, read_text(arguments.file), shown, _target(arguments))
     return _finish(draft, arguments)
 
 
-def _is_kit(file: str) -> bool:
-    """Return whether it is a YAML file, and no launch file."""
+def _refuse_more(arguments: Namespace) -> None:
+    if arguments.more:
+        fail(f"{arguments.more[0]} is not NAME:=VALUE, and only calibrations can be several files", UNREADABLE)
+
+
+def _refuse_given(arguments: Namespace) -> None:
+    if arguments.given:
+        fail(f"{next(iter(arguments.given))}:=…: only xacro and launch files take arguments", UNREADABLE)
+
+
+def _kit(file: str) -> Source | None:
+    """Return a YAML file that is no launch file, or None."""
     from tfcompose.cli.reading import read_text
     from tfcompose.load import load
 
-    return file.endswith((".yaml", ".yml")) and "launch" not in load(read_text(file), file).data
+    source = load(read_text(file), file) if file.endswith((".yaml", ".yml")) else None
+    return source if source and "launch" not in source.data else None
 
 
-def _add_kits(draft: Draft, arguments: Namespace) -> None:
+def _add_kits(draft: Draft, first: Source, arguments: Namespace) -> None:
     from tfcompose.cli.reading import read_text
     from tfcompose.importing.kits import add_kit
     from tfcompose.load import load
 
+    _refuse_given(arguments)
     target = _target(arguments)
     for package, folder in pairs(arguments.packages, "=").items():
         draft.sections["packages"][package] = target.from_folder(folder)
-    for file in (arguments.file, *arguments.args):
-        add_kit(draft, load(read_text(file), file))
+    for source in (first, *(load(read_text(file), file) for file in arguments.more)):
+        add_kit(draft, source)
 
 
 def _import_observed(arguments: Namespace) -> int:
@@ -185,11 +202,12 @@ def _add_launch(draft: Draft, arguments: Namespace, file: str, shown: str = "") 
     from tfcompose.importing.descriptions import Workshop, add_descriptions
     from tfcompose.importing.launch import Launch, add_launch
 
+    _refuse_more(arguments)
     read_text(file)  # refuses what is no text
-    given, packages = pairs(arguments.args, ":="), pairs(arguments.packages, "=")
+    packages = pairs(arguments.packages, "=")
     known, target = _known_packages(packages), _target(arguments)
     prefixes = known.disk.prefixes if known.disk else ()
-    launch = Launch(file, given, packages, prefixes, arguments.all_branches, shown)
+    launch = Launch(file, arguments.given, packages, prefixes, arguments.all_branches, shown)
     folders = {name: str(Path(folder).absolute()) for name, folder in packages.items()}
     descriptions = add_launch(draft, launch, target)
     presets = None if arguments.no_sensors else library()
@@ -230,6 +248,8 @@ def _check_use(arguments: Namespace) -> None:
     """
     if bool(arguments.file) + arguments.live + bool(arguments.bag) != 1:
         fail("name one source: a file, --live or --bag", UNREADABLE)
+    if not arguments.file:
+        _refuse_given(arguments)
     if arguments.file and Path(arguments.file).suffix not in _ENDINGS:
         fail(f"{arguments.file}: only URDF, xacro, launch and YAML files and shell scripts can be imported", UNREADABLE)
     if arguments.robot and not _ROBOT.fullmatch(arguments.robot):

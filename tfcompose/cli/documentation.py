@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -106,6 +105,8 @@ def html(commands: Mapping[str, Command]) -> str:
     Raises:
         ModuleNotFoundError: without the package markdown-it-py.
     """
+    from html import escape
+
     from markdown_it import MarkdownIt
 
     from tfcompose.catalogue import CATALOGUE

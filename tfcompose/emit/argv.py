@@ -132,16 +132,16 @@ def params_file(nodes: dict[str, dict[str, Any]]) -> str:
     """Return the file's text. Texts are always quoted, so that ROS cannot take one for a number or a bool."""
     lines = []
     for node, params in nodes.items():
-        lines += [f"{_text(node)}:", "  ros__parameters:", *mapping(params, "    ")]
+        lines += [f"{_text(node)}:", "  ros__parameters:", *_mapping(params, "    ")]
     return "\n".join([*lines, ""])
 
 
-def mapping(values: dict[str, Any], indent: str) -> list[str]:
+def _mapping(values: dict[str, Any], indent: str) -> list[str]:
     """Return the mapping as lines of YAML; lists and texts as JSON, which is YAML as well."""
     lines = []
     for key, value in values.items():
         if isinstance(value, dict) and value:
-            lines += [f"{indent}{_text(key)}:", *mapping(value, indent + "  ")]
+            lines += [f"{indent}{_text(key)}:", *_mapping(value, indent + "  ")]
         else:
             lines.append(f"{indent}{_text(key)}: {_text(value)}")
     return lines

@@ -6,7 +6,6 @@ poses typed, and saved where the values stand in the file.
 
 from __future__ import annotations
 
-import socket
 import sys
 import time
 from pathlib import Path
@@ -127,6 +126,8 @@ def _free(port: int) -> int:
 
 
 def _is_free(port: int) -> bool:
+    import socket
+
     with socket.socket() as one:
         one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

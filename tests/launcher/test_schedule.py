@@ -11,6 +11,7 @@ from unittest import mock
 
 import pytest
 
+from tests.support import processes
 from tests.support.findings import expect
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
@@ -26,8 +27,19 @@ if TYPE_CHECKING:
 
     from tfcompose.findings import Finding
     from tfcompose.launcher.child import Command
+    from tfcompose.plan import SchedulingPolicy
 
 ASKS = "import json, os; print(json.dumps([sorted(os.sched_getaffinity(0)), os.sched_getscheduler(0), os.nice(0)]))"
+ASKS_AS_NOBODY = """
+import json, os
+from tfcompose.launcher.schedule import refused_schedule
+from tfcompose.plan import PlanProcess, Schedule
+if not os.getuid():
+    os.setuid(65534)
+before = os.sched_getscheduler(0)
+found = refused_schedule(PlanProcess("p", "run", schedule=Schedule((), "{policy}")))
+print(json.dumps([found and found.message, os.sched_getscheduler(0) - before]))
+"""
 PROCESS = PlanProcess("p", "run", argv=(sys.executable, "-c", ASKS))
 
 
@@ -64,6 +76,13 @@ def test_what_the_kernel_refuses_is_a_finding_and_nothing_is_started(tmp_path: P
     assert refused is not None
     expect(refused, "TF911", "p", "fifo", "80")
     assert os.sched_getaffinity(0) == before
+
+
+@pytest.mark.parametrize("policy", ["batch", "idle"])
+def test_what_asks_the_kernel_keeps_its_own_schedule_without_a_right_to_it(policy: SchedulingPolicy) -> None:
+    """A process without privileges cannot leave the policy idle, once it has it."""
+    done = processes.run([sys.executable, "-c", ASKS_AS_NOBODY.format(policy=policy)], check=True)
+    assert json.loads(done.stdout) == [None, 0]
 
 
 def test_a_prefix_that_is_not_there_is_named(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, finding
@@ -32,27 +33,26 @@ def apply_schedule(schedule: Schedule) -> None:
 
 
 def refused_schedule(process: PlanProcess) -> Finding | None:
-    """Return what the kernel refuses of a process's schedule: it is asked with this process, which stays as it was."""
+    """Return what the kernel refuses of a process's schedule; a thread asks it, so that this one stays as it was."""
     schedule = process.schedule
     if schedule is None:
         return None
-    cpus = os.sched_getaffinity(0)
-    policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
-        apply_schedule(schedule)
-        if policy != os.sched_getscheduler(0):
-            os.sched_setscheduler(0, policy, parameters)
-        lacking = set(schedule.cpus) - os.sched_getaffinity(0)
+        with ThreadPoolExecutor(1) as thread:
+            lacking = set(schedule.cpus) - thread.submit(_cpus_with, schedule).result()
     except PermissionError:
         message = f"{process.name} may not have the policy {schedule.policy} with priority {schedule.priority}"
         advice = "rtprio in /etc/security/limits.conf, LimitRTPRIO= in a systemd unit, or the capability CAP_SYS_NICE"
         return finding("TF911", message, None, help=advice)
     except (OSError, ValueError, OverflowError):
         lacking = set(schedule.cpus)
-    finally:
-        if schedule.cpus:
-            os.sched_setaffinity(0, cpus)
     if not lacking:
         return None
     message = f"{process.name} cannot run on {', '.join(f'CPU {one}' for one in sorted(lacking))}"
     return finding("TF911", message, None, help="they count from 0; lscpu lists those that are there")
+
+
+def _cpus_with(schedule: Schedule) -> set[int]:
+    """Have the kernel schedule this thread so, for good, and return the processors that it has then."""
+    apply_schedule(schedule)
+    return os.sched_getaffinity(0)

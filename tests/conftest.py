@@ -21,7 +21,7 @@ from tests.support.waiting import TIMEOUT_S
 from tfcompose.geometry import Pose
 from tfcompose.plan import Clock, Joint, Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
 from tfcompose.plan.file import write_plan
-from tfcompose.ros.environment import missing_ros
+from tfcompose.ros.environment import FASTDDS_PROFILE, PROFILE_VARIABLES, missing_ros
 
 NO_ROS = missing_ros()
 collect_ignore_glob = ["*_ros.py"] if NO_ROS else []
@@ -86,6 +86,25 @@ def _processes() -> Iterator[None]:
 def _all_processes() -> Iterator[None]:
     with processes.ended_at_exit():
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _fastdds_profile(request: pytest.FixtureRequest) -> None:
+    """Have nodes of this process announce themselves as tfcompose's own do, whichever test makes the first of them.
+
+    Fast DDS reads its profiles once in a process, with the first node. Stock nodes are found at their next announcement
+    only, up to 3 s later.
+    """
+    if NO_ROS or not any(item.get_closest_marker("ros") for item in request.session.items):
+        return
+    from tfcompose.ros.node import open_node  # noqa: PLC0415 (ROS, which is there)
+
+    with reserved_domain() as number, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_DOMAIN_ID", str(number))
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        patch.setenv(PROFILE_VARIABLES[0], str(FASTDDS_PROFILE))
+        with open_node("first", ""):
+            pass
 
 
 @pytest.fixture

@@ -41,5 +41,6 @@ def test_the_doctor_lays_nothing_over_a_built_plan(
 ) -> None:
     assert main(["build", str(ROBOT), "-o", str(tmp_path)]) == 0
     assert main(["doctor", str(tmp_path / "plan.json"), "--set", "ros.frame_prefix=r1/"]) == 2
+    assert main(["doctor", "cameras:=4", "--for", "0.1"]) == 2
     assert plans == []
     assert "--set" in capsys.readouterr().err

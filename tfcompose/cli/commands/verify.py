@@ -76,7 +76,8 @@ def _running_plan(arguments: Namespace) -> tuple[Plan, dict[str, Span]] | None:
     """Return the plan of the robot that runs in this ROS domain, without places; None if a file or a bag is given."""
     from tfcompose.cli.runs import plan_of_domain
 
-    if arguments.file or arguments.bag or arguments.profiles or arguments.overlays or arguments.settings:
+    changed = arguments.profiles or arguments.overlays or arguments.settings or arguments.given
+    if arguments.file or arguments.bag or changed:
         return None
     plan = plan_of_domain()
     return (plan, {}) if plan else None

@@ -219,3 +219,11 @@ def test_keys_are_known_in_pieces_and_in_the_forms_that_terminals_send() -> None
     assert keys.end() == ["esc"]
     assert not keys.waits
     assert keys.feed("ö".encode()) == ["ö"]
+
+
+def test_what_was_printed_before_the_view_is_among_its_events_after_each_connection() -> None:
+    plan = Plan("rover", "", None, RosSettings(), (), ())
+    view = Dashboard("rover@0", plan, ["an earlier run left 77 behind\033[2J"], clock=lambda: NOON)
+    assert "WARNING an earlier run left 77 behind" in shown(view)
+    view.forget()
+    assert shown(view).count("an earlier run left 77 behind") == 1

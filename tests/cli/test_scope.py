@@ -11,7 +11,7 @@ import pytest
 from tests.support.robots import ROVER
 from tfcompose.cli import main
 from tfcompose.cli.commands import monitor
-from tfcompose.cli.runs import chosen_run, run_of_domain, warn_of_other_domains
+from tfcompose.cli.runs import chosen_run, other_domains, run_of_domain
 from tfcompose.geometry import Pose
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDir, runtime_dir_of
 from tfcompose.plan import Plan, PlanEdge, PlanProcess, RosSettings, SourceLine
@@ -109,11 +109,11 @@ def test_the_plan_of_the_domains_robot_is_known(runs: Run, monkeypatch: pytest.M
     assert run_of_domain() is None
 
 
-def test_a_run_of_the_same_robot_in_another_domain_is_named(runs: Run, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_of_the_same_robot_in_another_domain_is_named(runs: Run) -> None:
     runs("rover", 71)
     runs("crawler", 71)
-    warn_of_other_domains(runs("rover", 67))
-    assert "--robot rover@71" in capsys.readouterr().err
+    (warning,) = other_domains(runs("rover", 67))
+    assert "--robot rover@71" in warning
 
 
 def test_two_files_with_one_robots_name_do_not_share_a_folder_silently(

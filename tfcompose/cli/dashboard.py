@@ -114,12 +114,15 @@ class _Scroll:
 class Dashboard:
     """The live view's state. ``name`` is the robot's with its domain; ``clock`` gives seconds since 1970.
 
+    ``warnings`` were printed before the view, and are its first events.
+
     ``status`` and ``used`` are what was learned last; ``log_of`` names the process whose log is to be read for
     ``add_log_lines``, if a log is shown.
     """
 
     name: str
     plan: Plan
+    warnings: Sequence[str] = ()
     clock: Callable[[], float] = time.time
     status: RobotStatus | None = None
     used: Usage = field(default_factory=dict)
@@ -135,10 +138,13 @@ class Dashboard:
     _events: deque[tuple[float, str]] = field(default_factory=lambda: deque(maxlen=KEPT_EVENTS))
     _counts: dict[str, int] = field(default_factory=lambda: {"error": 0, "warning": 0})
     _console: Console = field(init=False)
+    _began: float = field(init=False)
     _at: float = 0.0
 
     def __post_init__(self) -> None:
         self._console = Console(self.plan, Nowhere(), colour=False, keep=self._keep)
+        self._began = self.clock()
+        self.forget()
 
     # What happens.
 
@@ -161,6 +167,7 @@ class Dashboard:
         """Forget what notices said: they are going to come again."""
         self._reports.clear()
         self._events.clear()
+        self._events.extend((self._began, f"WARNING {plain(one)}") for one in self.warnings)
         self._counts = dict.fromkeys(self._counts, 0)
 
     def add_log_lines(self, lines: Iterable[str]) -> None:

@@ -38,7 +38,7 @@ from tfcompose.plan.codec import decode
 from tfcompose.text import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from tfcompose.cli.dashboard import Dashboard
     from tfcompose.cli.screen import Screen
@@ -68,17 +68,18 @@ def can_show_live() -> bool:
         return False
 
 
-def follow(place: RuntimeDir, plan: Plan, launcher: int, mask: Iterable[int]) -> int:
+def follow(place: RuntimeDir, plan: Plan, launcher: int, mask: Iterable[int], warnings: Sequence[str]) -> int:
     """Show the run until its launcher, a child of this process, has ended; return its exit code.
 
     Signals that end a plan are passed on to it. They are blocked until here, and ``mask`` is the mask before that.
+    ``warnings`` were printed before, and are behind the view while it is shown: they are among its events.
     """
     with Signals(signal.SIGWINCH, signal.SIGTSTP, signal.SIGQUIT) as signals:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         from tfcompose.cli.dashboard import Dashboard  # rich takes a moment to load, and signals none
         from tfcompose.cli.screen import Screen
 
-        view = _View(place, Dashboard(place.name, plan), launcher, signals)
+        view = _View(place, Dashboard(place.name, plan, warnings), launcher, signals)
         with Screen(sys.stdin.fileno()) as screen:
             code = view.run(screen)
     view.print_rest(plan)
@@ -190,10 +191,11 @@ class _View:
         with contextlib.suppress(OSError):
             if self._events is None:
                 self._events = _Connection(self._place)
-                self._events.send(EventsRequest())
+                self._selector.register(self._events, selectors.EVENT_READ, self._take_events)
                 self._dashboard.forget()
                 self._last.clear()
-                self._selector.register(self._events, selectors.EVENT_READ, self._take_events)
+                self._left_out = 0
+                self._events.send(EventsRequest())
             if self._states is None:
                 self._states = _Connection(self._place)
                 self._requested = False

@@ -226,8 +226,13 @@ def hidden_run(place: RuntimeDir) -> str | None:
     return None
 
 
-def warn_of_neighbours(place: RuntimeDir, plan: Plan) -> None:
-    """Complain about other robots that run in the domain on the same TF topics: each guard would report the other's."""
+def warnings_before_start(place: RuntimeDir, plan: Plan, run_id: str) -> list[str]:
+    """Return what is in the way of a robot that is about to start, a sentence each."""
+    return [*other_domains(place), *_left_behind(place, run_id), *_neighbours(place, plan)]
+
+
+def _neighbours(place: RuntimeDir, plan: Plan) -> Iterator[str]:
+    """Name other robots that run in the domain on the same TF topics: each guard would report the other's."""
     found = [
         (other.robot, holder)
         for other, holder in running()
@@ -235,9 +240,9 @@ def warn_of_neighbours(place: RuntimeDir, plan: Plan) -> None:
     ]
     for robot, holder in found:
         where = f"runs in domain {place.domain} on the same TF topics"
-        warn(f"{robot} (pid {holder.pid}, since {since(holder)}) {where}")
+        yield f"{robot} (pid {holder.pid}, since {since(holder)}) {where}"
     if found:
-        warn(
+        yield (
             "each guard will report the other's edges: give one ros: {domain_id: N}, "
             "or ros: {namespace: NAME, isolate: topics}"
         )
@@ -249,11 +254,11 @@ def _share_topics(other: RuntimeDir, plan: Plan) -> bool:
     return running_plan is not None and not judged_topics(plan).isdisjoint(judged_topics(running_plan))
 
 
-def warn_of_other_domains(place: RuntimeDir) -> None:
-    """Complain about runs of the same robot in other domains, such as that of a domain_id that has changed."""
+def other_domains(place: RuntimeDir) -> Iterator[str]:
+    """Name runs of the same robot in other domains, such as that of a domain_id that has changed."""
     for other, holder in running():
         if other.share == place.share and other.domain != place.domain:
-            warn(
+            yield (
                 f"{other.name} still runs (pid {holder.pid}, since {since(holder)}); "
                 f"tfcompose down --robot {other.name} stops it"
             )
@@ -287,11 +292,11 @@ def plan_of_domain() -> Plan | None:
     return running[1]
 
 
-def warn_of_leftovers(place: RuntimeDir, run_id: str) -> None:
-    """Complain about processes of earlier runs that are still there."""
+def _left_behind(place: RuntimeDir, run_id: str) -> Iterator[str]:
+    """Name processes of earlier runs that are still there."""
     found = [one for one in leftovers(f"{place.name}:") if one.run != run_id and one.launcher is None]
     for one in found:
-        warn(f"an earlier run left {one.pid} behind: {one.command}")
+        yield f"an earlier run left {one.pid} behind: {one.command}"
     if found:
         them = "it" if len(found) == 1 else "them"
-        warn(f"tfcompose down --leftovers --robot {place.name} stops {them}")
+        yield f"tfcompose down --leftovers --robot {place.name} stops {them}"

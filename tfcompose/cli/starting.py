@@ -26,9 +26,7 @@ from tfcompose.cli.runs import (
     request,
     since,
     wait_until_ready,
-    warn_of_leftovers,
-    warn_of_neighbours,
-    warn_of_other_domains,
+    warnings_before_start,
 )
 from tfcompose.cli.terminal import (
     FAILED,
@@ -82,16 +80,18 @@ def start(file: Path, arguments: Namespace) -> int:
         stack.callback(lock.close)
         if hidden := hidden_run(place):
             fail(hidden)
-        warn_of_other_domains(place)
         copy = copy_plan(plan, file, place, alone=True)
         session = Session(copy, lock.run, file.absolute().parent, listen(place))
+        warnings = warnings_before_start(place, plan, session.run_id)
+        for one in warnings:
+            warn(one)
         if arguments.detach or arguments.wait:
-            return detach(plan, place, lock, session, arguments)
+            return _detach(plan, place, lock, session, arguments)
         if arguments.live and can_show_live():
             mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
             pid = _fork(plan, place, lock, session, arguments.duration, mask)
             stack.close()  # the lock is the launcher's from now on
-            return follow(place, plan, pid, mask)
+            return follow(place, plan, pid, mask, warnings)
         session.output = NonBlockingOutput(sys.stdout.fileno())
         stack.callback(session.output.close)
         return _run(plan, place, session, session.output, arguments.duration)
@@ -103,8 +103,6 @@ def _run(plan: Plan, place: RuntimeDir, session: Session, output: NonBlockingOut
     status = StatusLine(plan, lambda: size_of(output.fd)[0]) if can_redraw(sys.stdout) else None
     console = Console(plan, output, colour=coloured(sys.stdout), keep=logs.write, status=status)
     session.refresh = console.refresh if status else None
-    warn_of_leftovers(place, session.run_id)
-    warn_of_neighbours(place, plan)
     try:
         return supervise(plan, session.plan_file, report=console, duration_s=duration_s, session=session)
     finally:
@@ -173,7 +171,7 @@ def _starts_with(profile: str, arguments: Namespace) -> bool:
     return not commands_of(plan, plan.started, Path(file), os.environ, child_environment)[1]
 
 
-def detach(plan: Plan, place: RuntimeDir, lock: Lock, session: Session, arguments: Namespace) -> int:
+def _detach(plan: Plan, place: RuntimeDir, lock: Lock, session: Session, arguments: Namespace) -> int:
     """Start the launcher as a process of its own; return 0 when all is started, or ready; 1 when it is not."""
     pid = _fork(plan, place, lock, session, arguments.duration)
     return _follow(plan, place, pid, arguments)
@@ -191,8 +189,6 @@ def _fork(  # noqa: PLR0913, PLR0917 (what a launcher needs)
 
     With a ``mask`` of signals, which holds there, it ends with this process.
     """
-    warn_of_leftovers(place, session.run_id)
-    warn_of_neighbours(place, plan)
     sys.stdout.flush()
     sys.stderr.flush()
     starter = os.getpid()

@@ -47,12 +47,11 @@ def add_descriptions(draft: Draft, descriptions: Iterable[Description], workshop
 
 def _add_part(draft: Draft, described: Description, workshop: Workshop) -> None:
     path = described.file
-    package = next((name for name, folder in _folders(path, workshop) if folder), "")
+    around = ((name, folder) for name, folder in workshop.folders.items() if path.startswith(folder.rstrip("/") + "/"))
+    package, folder = next(around, ("", ""))
     if package:
-        inside = posixpath.relpath(path, next(folder for name, folder in _folders(path, workshop) if name == package))
-        address = f"{PACKAGE}{package}/{inside}"
-        if package in workshop.folders:
-            draft.sections["packages"][package] = workshop.target.from_folder(workshop.folders[package])
+        address = f"{PACKAGE}{package}/{posixpath.relpath(path, folder)}"
+        draft.sections["packages"][package] = workshop.target.from_folder(folder)
     else:
         address = path if path.startswith(PACKAGE) else workshop.target.from_folder(path)
     keys = {"xacro": address}
@@ -62,13 +61,6 @@ def _add_part(draft: Draft, described: Description, workshop: Workshop) -> None:
     name = posixpath.basename(path).partition(".")[0].replace("-", "_") or "robot"
     draft.sections["parts"][name] = keys
     draft.note(("parts", name), where(described.at, "what robot_state_publisher is given"))
-
-
-def _folders(path: str, workshop: Workshop) -> Iterable[tuple[str, str]]:
-    """Yield the named packages that a path is in."""
-    for name, folder in workshop.folders.items():
-        if path.startswith(folder.rstrip("/") + "/"):
-            yield name, folder
 
 
 def _add_links(draft: Draft, described: Description, workshop: Workshop) -> None:

@@ -41,7 +41,8 @@ class Draft:
 
     ``sections`` hold plain data as in a robot file, ``notes`` the comments above entries, ``found`` what is not
     imported: each of those is a comment as well. ``head`` are comments above everything, ``base`` the robot's base
-    where it is not the usual one. ``above`` are frames that something else brings, as parts do: they are no roots.
+    where it is not the usual one. ``brought`` are frames that sensors bring: they are no roots. With
+    ``has_unknown_frames`` there are parts that bring others, whose names are not known.
     """
 
     robot: str
@@ -98,7 +99,7 @@ class Draft:
         return name
 
     def is_empty(self) -> bool:
-        """Whether it holds neither frames nor processes."""
+        """Return whether no section has an entry."""
         return not any(self.sections.values())
 
     def text(self) -> str:
@@ -162,11 +163,11 @@ def pose_keys(pose: Pose, rpy: Vector | None = None, *, quaternion: bool = False
     return keys | {"rpy": turned}
 
 
-def robot_name(wanted: str, fallback: str = "robot") -> str:
+def robot_name(wanted: str) -> str:
     """Return a robot's name: lower case letters, digits and _, a letter first."""
     name = re.sub(r"[^a-z0-9_]+", "_", wanted.lower()).strip("_")
     if not name:
-        return fallback
+        return "robot"
     return name if name[0].isalpha() else f"robot_{name}"
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import RejectedError, Span, finding
-from tfcompose.importing.launch_substitutions import scalar_of
+from tfcompose.importing.launch_substitutions import marks, scalar_of
 from tfcompose.importing.programs import (
     JOINT_PUBLISHERS,
     PACKAGE,
@@ -44,8 +44,6 @@ _READ = frozenset({PROGRAM, STATE_PUBLISHER, *JOINT_PUBLISHERS})
 _ADVICE = "--package NAME=FOLDER, or source the workspace's setup file"
 #: What of the environment is a setting of all processes.
 _SETTINGS = {"ROS_DOMAIN_ID": "domain_id", "ROS_AUTOMATIC_DISCOVERY_RANGE": "discovery"}
-#: What stands for a description among parameters.
-_BEGIN, _END = "\x02", "\x03"
 
 
 @dataclass(frozen=True, slots=True)
@@ -410,7 +408,7 @@ def _split_description(params: list[Any], todo: list[str]) -> tuple[list[Any], D
         for key, value in one.items():
             if key == "robot_description" and isinstance(value, str):
                 description = _description(value)
-            elif isinstance(value, str) and _BEGIN in value:
+            elif isinstance(value, str) and marks(value):
                 todo.append(f"the parameter {key}, which is the text of {_description(value).file}")
             elif value is None or value == [] or (isinstance(value, list) and not _is_uniform(value)):
                 todo.append(f"the parameter {key}: {value!r}")
@@ -426,10 +424,8 @@ def _is_uniform(value: list[Any]) -> bool:
 
 
 def _description(value: str) -> Description:
-    if _BEGIN in value:
-        mark = json.loads(value[value.index(_BEGIN) + 1 : value.index(_END)])
-        return Description(mark["file"], mark["args"])
-    return Description(text=value)
+    found = marks(value)
+    return Description(found[0]["file"], found[0]["args"]) if found else Description(text=value)
 
 
 def _restarts(record: dict[str, Any]) -> dict[str, Any]:

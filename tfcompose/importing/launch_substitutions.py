@@ -21,6 +21,8 @@ from typing import Any
 
 import yaml
 
+from tfcompose.importing.yaml_text import argument, arguments_in, with_values
+
 #: What stands for the text of a file, or for what xacro makes of one: JSON between two characters that no text has.
 BEGIN, END = "\x02", "\x03"
 _MARK = re.compile(f"{BEGIN}([^{END}]*){END}")
@@ -44,15 +46,6 @@ def marked(**what: Any) -> str:
 def marks(text: str) -> list[dict[str, Any]]:
     """Return what stands in a text for descriptions."""
     return [json.loads(found[1]) for found in _MARK.finditer(text)]
-
-
-#: What stands for an argument of the robot file: its name and its value, between characters that no text has.
-_ARGUMENT = re.compile("\x04([^\x05]*)\x05([^\x06]*)\x06")
-
-
-def without_arguments(text: str) -> str:
-    """Return a text with the values of the arguments that stand in it."""
-    return _ARGUMENT.sub(lambda found: found[2], text)
 
 
 def symbolic_text(value: Any, context: Context) -> str:
@@ -237,10 +230,9 @@ class LaunchConfiguration(Substitution):
             value = context.configurations[name]
             if name not in context.declared:
                 return value
-            if context.symbolic and str(scalar_of(value)).lower() == value:  # True would become true
-                return f"\x04{name}\x05{value}\x06"
-            if context.symbolic and context.declared[name] == "string":
-                return f"\x04{name}\x05{value}\x06"
+            is_kept = str(scalar_of(value)).lower() == value  # True would become true
+            if context.symbolic and (is_kept or context.declared[name] == "string"):
+                return argument(name, value)
             context.decided.add(name)
             return value
         if self.default is not None:
@@ -597,14 +589,14 @@ def _typed(text: str) -> Any:
 def _typed_or_symbolic(value: Any, context: Context) -> Any:
     """Return the value that YAML reads in a text; arguments stand for themselves where they are read alike."""
     text = symbolic_text(value, context)
-    plain_value = without_arguments(text)
+    plain_value, names = with_values(text), arguments_in(text)
     if marks(plain_value) or plain_value == text:
         return plain_value if marks(plain_value) else _typed(plain_value)
     typed = _typed(plain_value)
-    alone = _ARGUMENT.fullmatch(text)
+    alone = any(text == argument(name, plain_value) for name in names)
     if typed == (scalar_of(plain_value) if alone else plain_value) and isinstance(typed, (bool, int, float, str)):
         return text
-    context.decided.update(found[1] for found in _ARGUMENT.finditer(text))
+    context.decided |= names
     return typed
 
 

@@ -79,7 +79,7 @@ class Program:
 def add_program(draft: Draft, program: Program, target: Target) -> str | None:
     """Add a program to the draft; return the name of its process, or None where it is none.
 
-    A robot_state_publisher is not added here: its description makes links or a part, which ``launched`` does.
+    A robot_state_publisher is not added here: its description makes links or a part, which ``descriptions`` does.
     """
     program = _split(program)
     if program.executable == PROGRAM:

@@ -10,6 +10,7 @@ import re
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from tfcompose.importing.draft import robot_name
 from tfcompose.importing.omitted import angles, omitted, with_material_names, without_unused_blocks
 from tfcompose.importing.sensors import recognised
 from tfcompose.importing.values import Values, rotation
@@ -247,9 +248,6 @@ def _value(text: str) -> Any:
     return text
 
 
-_NO_NAME = re.compile(r"[^a-z0-9_]+")
-
-
 def imported(
     document: Document, target: Target, name: str, packages: Mapping[str, str], library: Library | None
 ) -> Imported:
@@ -264,17 +262,11 @@ def imported(
     notes = omitted(document)
     for mount, note in undecided.items():
         notes.setdefault(("frames", mount), []).append(note)
-    name = name or _robot_name(robot.name)
+    name = name or robot_name(robot.name)
     other_name = [f"called {robot.name} in the source"] if name != robot.name else []
     notes.setdefault(("", ""), []).extend([*renamed, *unused, *other_name])
     folders = {package: target.from_folder(folder) for package, folder in packages.items()}
     return Imported(robot, name, target, tuple(sensors), notes, angles(document.root), folders)
-
-
-def _robot_name(name: str) -> str:
-    """Return the name as the language has it: lower case letters, digits and _, a letter first."""
-    name = _NO_NAME.sub("_", name.lower()).strip("_")
-    return name if name[:1].isalpha() else f"robot_{name}".rstrip("_")
 
 
 def with_findings(robot: Imported, source: str, lint: Callable[[str], Compiled]) -> tuple[str, list[Finding]]:

@@ -156,11 +156,11 @@ def without_expressions(sections: dict[str, dict[str, Any]]) -> tuple[dict[str, 
 
 
 #: What stands for an argument of the robot file among texts that may hold anything: its name, and its value.
-_ARGUMENT = re.compile("\x04([^\x05]*)\x05[^\x06]*\x06")
+_ARGUMENT = re.compile("\x04([^\x05]*)\x05([^\x06]*)\x06")
 
 
-def argument(name: str, value: str = "") -> str:
-    """Return what stands for an argument, ``name``, or for an expression: ``${args.name}`` in the written file."""
+def argument(name: str, value: str) -> str:
+    """Return what stands for an argument that has this value: ``${args.name}`` in the written file."""
     return f"\x04{name}\x05{value}\x06"
 
 
@@ -171,7 +171,7 @@ def arguments_in(value: Any) -> set[str]:
 
 def with_values(value: str) -> str:
     """Return a text with the values of its arguments."""
-    return re.sub("\x04[^\x05]*\x05([^\x06]*)\x06", r"\1", value)
+    return _ARGUMENT.sub(r"\2", value)
 
 
 def _texts(value: Any) -> list[str]:

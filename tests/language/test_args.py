@@ -155,6 +155,18 @@ def test_a_condition_or_a_loop_that_cannot_be_decided_is_one_finding(entry: str,
     assert found == [("TF105", "r.yaml", line)]
 
 
+@pytest.mark.parametrize(
+    "entry",
+    [
+        "a: {parent: base_link, when: }",
+        "'a_${i}': {for: {i: [1, 2]}, parent: base_link, when: }",
+        "a: {for: , parent: base_link}",
+    ],
+)
+def test_a_condition_or_a_loop_without_a_value_is_refused(entry: str) -> None:
+    assert places(built(f"frames:\n  {entry}\n")) == [("TF006", "r.yaml", 5)]
+
+
 def test_loops_over_several_variables_make_every_combination() -> None:
     text = "frames: {'${side}_${i}': {for: {side: [left, right], i: '${range(1, 3)}'}, parent: base_link}}\n"
     assert {*robot(built(text)).frames} == {"base_link", "left_1", "left_2", "right_1", "right_2"}

@@ -111,8 +111,9 @@ class _Unfolding:
         """Yield the names, the data and the places of what an entry stands for."""
         section, template = str(at[0]), str(at[1])
         place = self.source.places.nearest(at)
+        decided = {key for key in _KEYS if entry.get(key) is not None}  # one without a value is refused later
         try:
-            scopes = self._scopes(entry["for"], template) if entry.get("for") is not None else [{}]
+            scopes = self._scopes(entry["for"], template) if "for" in decided else [{}]
         except ExpressionError as error:
             self._refuse((*at, "for"), error)
             return
@@ -126,14 +127,14 @@ class _Unfolding:
                 self._refuse(at, error, on_key=True)
                 continue
             try:
-                if entry.get("when") is not None and not _decided(entry["when"], self.variables, scope):
+                if "when" in decided and not _decided(entry["when"], self.variables, scope):
                     continue
             except ExpressionError as error:  # with the entry there, nothing else is missing
                 self._refuse((*at, "when"), error)
-            inner = {key: value for key, value in entry.items() if key not in _KEYS}
+            inner = {key: value for key, value in entry.items() if key not in decided}
             where = place.with_inside(
-                {key: below for key, below in place.inside.items() if key not in _KEYS},
-                {key: below for key, below in place.keys.items() if key not in _KEYS},
+                {key: below for key, below in place.inside.items() if key not in decided},
+                {key: below for key, below in place.keys.items() if key not in decided},
             )
             if scope:
                 self.done.scopes[section, name] = scope

@@ -13,6 +13,8 @@ from tests.support.tables import for_each
 from tfcompose.cli.compiling import library
 from tfcompose.cli.schemas import LANGUAGES, schema_text
 from tfcompose.compile import compile_robot
+from tfcompose.findings import RejectedError
+from tfcompose.language import validate_node_preset, validate_preset
 from tfcompose.load import load
 
 ROOT = Path(__file__).parents[2]
@@ -127,6 +129,31 @@ def test_an_overlay_may_hold_a_part_of_what_a_robot_does_and_profiles(overlay: s
     profiles = list(source.data.get("profiles", ()))
     assert bool(compile_robot(text, "r.yaml", library(), profiles, overlays=[source]).errors) is not fine
     assert validator("overlay").is_valid(source.data) is fine
+
+
+@pytest.mark.parametrize(
+    ("language", "file", "line"),
+    [
+        ("preset", "generic/camera.yaml", "    backward: {}"),
+        ("preset", "generic/camera.yaml", "    horizontal: {}"),
+        ("preset", "generic/camera.yaml", "    elevations: [{}]"),
+        ("preset", "generic/camera.yaml", "    channels: {}"),
+        ("preset", "generic/camera.yaml", "    near: {}"),
+        ("node", "nodes/slam_toolbox/slam_toolbox.yaml", "one_of: {}"),
+    ],
+)
+def test_presets_have_no_expressions(language: str, file: str, line: str) -> None:
+    text = (ROOT / "tfcompose" / "presets" / file).read_text("utf-8")
+    if language == "preset":
+        text = text[: text.index("optics:")] + "optics:\n  image:\n    frame: '{name}_optical_frame'\n"
+    validate = {"preset": validate_preset, "node": validate_node_preset}[language]
+    value = "true" if "backward" in line or "one_of" in line else "1"
+    fine, wrong = (load(text + line.format(one), file) for one in (value, '"${a}"'))
+    validate(fine)
+    validator(language).validate(fine.data)
+    with pytest.raises(RejectedError):
+        validate(wrong)
+    assert not validator(language).is_valid(wrong.data)
 
 
 def test_a_robot_without_its_name_or_version_is_refused() -> None:

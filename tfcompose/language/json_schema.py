@@ -13,7 +13,9 @@ from tfcompose.language.node_preset import NodePresetSpec
 from tfcompose.language.preset import PresetSpec
 from tfcompose.language.robot import RobotSpec
 from tfcompose.language.spec import described, examples_of, fields_of, walk
+from tfcompose.language.values import COMPUTED
 from tfcompose.load.scalars import plain
+from tfcompose.units import EXPRESSION
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping
@@ -33,6 +35,8 @@ def json_schema(language: str, presets: Mapping[str, PresetSpec], nodes: Iterabl
     """
     root = RobotSpec if language == "overlay" else LANGUAGES[language]
     own = _with_named_types(root.model_json_schema(schema_generator=_Generator), {one for _, one in walk(root)})
+    if root is not RobotSpec:
+        own = _without_expressions(own)
     definitions = own.pop("$defs", {})
     for _, kind in walk(root):
         schema = own if kind is root else definitions[kind.__name__]
@@ -78,6 +82,23 @@ def _with_named_types(schema: dict[str, Any], mappings: Collection[Any]) -> dict
     inside = {name: one for name, one in schema["$defs"].items() if name in names}
     made: dict[str, Any] = inlined(schema | {"$defs": inside})
     return made
+
+
+def _without_expressions(schema: Any) -> Any:
+    """Return the schema without ``${…}``, which only robot files compute."""
+    if isinstance(schema, list):
+        return [_without_expressions(item) for item in schema if item not in _EXPRESSIONS]
+    if not isinstance(schema, dict):
+        return schema
+    made = {key: _without_expressions(item) for key, item in schema.items()}
+    if isinstance(made.get("pattern"), str):
+        made["pattern"] = made["pattern"].removeprefix(f"{EXPRESSION}|")
+    if len(made.get("anyOf", ())) == 1:
+        made |= made.pop("anyOf")[0]
+    return made
+
+
+_EXPRESSIONS = ({"type": "string", "pattern": EXPRESSION}, COMPUTED)
 
 
 class _Generator(GenerateJsonSchema):
@@ -252,14 +273,13 @@ def _add_presets(own: dict[str, Any], definitions: dict[str, Any], presets: Mapp
 
 def _option(option: Option) -> dict[str, Any]:
     """Return the schema of one of a preset's options."""
-    computed = {"type": "string", "pattern": r"^\$\{"}
     forms: dict[str, dict[str, Any]] = {
         "bool": {"type": "boolean"},
         "text": {"type": "string"},
         "choice": {"enum": list(dict.fromkeys([*option.variants, *map(plain, option.variants)]))},
         "set": {"type": "array", "items": {"enum": list(option.values)}},
     }
-    schema: dict[str, Any] = {"anyOf": [forms[option.type], computed]}
+    schema: dict[str, Any] = {"anyOf": [forms[option.type], COMPUTED]}
     if option.about:
         schema["description"] = option.about
     if option.default is not None:

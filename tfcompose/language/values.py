@@ -12,7 +12,7 @@ from typing_extensions import TypeAliasType
 
 from tfcompose.findings import did_you_mean
 from tfcompose.geometry import Vector, norm
-from tfcompose.units import NUMBER, SMALLEST, Length, Number, Quantity, Size, Truth, refused, shown
+from tfcompose.units import EXPRESSION, NUMBER, SMALLEST, Length, Number, Quantity, Size, Truth, refused, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -54,7 +54,11 @@ class Computable:
         return core_schema.no_info_before_validator_function(self.plain, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: Any) -> dict[str, Any]:
-        return {"anyOf": [handler(schema), {"type": "string", "pattern": r"^\$\{"}]}
+        return {"anyOf": [handler(schema), COMPUTED]}
+
+
+#: The JSON Schema of a value that is one expression.
+COMPUTED = {"type": "string", "pattern": f"^{EXPRESSION}"}
 
 
 _AXES = ("x", "y", "z")

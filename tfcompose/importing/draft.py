@@ -14,7 +14,6 @@ from tfcompose.geometry import norm, normalised
 from tfcompose.importing.values import angle, rotation
 from tfcompose.importing.yaml_text import comment, entry, flow, section, without_expressions
 from tfcompose.model import BUILT_IN
-from tfcompose.tree import trees
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -132,13 +131,6 @@ class Draft:
                     roots.setdefault(parent, {})
         return {**self.sections, "frames": {**roots, **frames}}
 
-    def roots(self) -> list[str]:
-        """Return the roots of the trees that its frames and joints make, the largest tree's first."""
-        sections = self._with_roots()
-        ends = [(keys["parent"], child) for child, keys in sections["frames"].items() if "parent" in keys]
-        ends += [(joint["parent"], joint["child"]) for joint in sections["joints"].values()]
-        return list(trees(ends))
-
 
 def _described(parent: str, keys: Mapping[str, Any]) -> str:
     return flow({"parent": parent, **keys})
@@ -174,7 +166,7 @@ def robot_name(wanted: str) -> str:
 def text_with_findings(draft: Draft, lint: Callable[[str], Compiled]) -> tuple[str, Compiled]:
     """Return the robot file, and what ``lint`` finds in it.
 
-    The base is the root of the largest tree where there is no base_link; names of the source are no errors.
+    Names of the source are no errors.
     """
     compiled = lint(draft.text())
     if any(one.code == "TF501" for one in compiled.errors):

@@ -38,7 +38,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "file", nargs="?", metavar="FILE",
         help="URDF, xacro, a launch file, a shell script, Clearpath's robot.yaml or calibrations of Autoware's; "
-        "-: lines from stdin",
+        "-: a script's lines or a launch file from stdin",
     )  # fmt: skip
     parser.add_argument("more", nargs="*", metavar="FILE", help="further calibrations")
     parser.add_argument(

@@ -204,11 +204,21 @@ def test_what_is_wrong_is_found_with_the_nodes_and_the_numbers(
     nodes: FakeNodes, scene: Callable[[FakeNodes], None]
 ) -> None:
     scene(nodes)
-    found = doctor_finds(SCENES[scene], LATE)
-    for code, names in SCENES[scene].items():
-        text = messages_of(found, code)
-        assert [name for name in names if name not in text] == [], text
-    assert {one["code"] for one in found} <= {*SCENES[scene], *LATE}, found
+
+    def are_found(seconds: float) -> None:
+        exit_code, found = doctor(seconds=seconds)
+        assert exit_code == 1
+        for code, names in SCENES[scene].items():
+            text = messages_of(found, code)
+            assert [name for name in names if name not in text] == [], text
+        assert {one["code"] for one in found if not in_a_pause(one)} <= {*SCENES[scene], *LATE}, found
+
+    at_last(are_found)
+
+
+def in_a_pause(found: dict[str, Any]) -> bool:
+    """Return whether it is that the observation ended while /paused paused, which it does half of the time."""
+    return found["code"] == "TF804" and str(found["message"]).startswith("/paused ")
 
 
 def test_a_sound_robot_gives_no_finding_and_exit_code_0(nodes: FakeNodes) -> None:

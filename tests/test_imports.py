@@ -76,7 +76,6 @@ MAY_IMPORT: dict[str, set[str]] = {
         "numbers",
         "resolve",
         "text",
-        "tree",
         "urdf",
     },
     "view": {"compile", "findings", "geometry", "language", "load", "model", "numbers", "units"},

@@ -157,6 +157,22 @@ def test_the_config_map_gives_each_pod_the_files_that_it_reads_where_it_reads_th
     assert pod_of(on_nodes, "rover-drive")["spec"]["volumes"][0]["hostPath"]["path"] == "/opt/robot"
 
 
+def test_files_whose_paths_make_one_key_keep_their_texts() -> None:
+    """``arm/drive`` is a process of a part, ``arm_drive`` one beside it."""
+    plan = compiled_plan(DRIVEN)
+    files = {"drive": "params/arm/drive.yaml", "slam": "params/arm_drive.yaml"}
+    changed = [replace(one, params_file=files.get(one.name)) for one in plan.processes]
+    texts = {path: path for one in changed for path in files_of(plan, one)}
+    made = {
+        file.path: yaml.safe_load(file.text)
+        for file in kubernetes(replace(plan, processes=tuple(changed)), Cluster("i"), texts)[0]
+    }
+    for name, file in files.items():
+        items = pod_of(made, f"rover-{name}")["spec"]["volumes"][0]["configMap"]["items"]
+        (key,) = [item["key"] for item in items if item["path"] == file]
+        assert made["plan.yaml"]["data"][key] == file
+
+
 def test_a_new_plan_restarts_what_it_changes_and_tfcomposes_own() -> None:
     def digests(text: str) -> dict[str, str]:
         made, _ = manifests(text)

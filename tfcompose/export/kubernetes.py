@@ -19,6 +19,7 @@ from tfcompose.export.supervisors import (
     STOP_S,
     after,
     command_of,
+    distinct,
     gaps_of,
     outside_of,
     plain_name,
@@ -135,13 +136,14 @@ def _service(robot: str) -> dict[str, Any]:
 
 
 def _config_map(robot: str, texts: Mapping[str, str]) -> dict[str, Any]:
-    data = {_key(path): text for path, text in texts.items()}
+    keys = _keys(texts)
+    data = {keys[path]: text for path, text in texts.items()}
     return _manifest("ConfigMap", "v1", f"{robot}-plan", robot, {"data": data})
 
 
-def _key(path: str) -> str:
-    """Return the key of a file; a ConfigMap has no folders."""
-    return _NO_KEY.sub("_", path)
+def _keys(texts: Mapping[str, str]) -> dict[str, str]:
+    """Return the key of each file, by its path; a ConfigMap has no folders."""
+    return distinct(texts.keys(), lambda path: _NO_KEY.sub("_", path))
 
 
 def _stateful_set(name: str, robot: str, pod: dict[str, Any]) -> dict[str, Any]:
@@ -194,7 +196,7 @@ def _pod(
         "terminationGracePeriodSeconds": math.ceil(stop_s),
         **({"initContainers": waits} if waits else {}),
         "containers": [container],
-        "volumes": [{"name": "plan", **_volume(plan, process, labels[_ROBOT], cluster)}],
+        "volumes": [{"name": "plan", **_volume(plan, process, labels[_ROBOT], cluster, texts)}],
     }
     return {"metadata": {"labels": labels, "annotations": {_CONTENT: _digest(plan, process, texts)}}, "spec": spec}
 
@@ -222,10 +224,11 @@ def _probes(plan: Plan, process: PlanProcess) -> dict[str, Any]:
     }
 
 
-def _volume(plan: Plan, process: PlanProcess, robot: str, cluster: Cluster) -> dict[str, Any]:
+def _volume(plan: Plan, process: PlanProcess, robot: str, cluster: Cluster, texts: Mapping[str, str]) -> dict[str, Any]:
     if cluster.folder:
         return {"hostPath": {"path": cluster.folder, "type": "Directory"}}
-    items = [{"key": _key(path), "path": path} for path in files_of(plan, process)]
+    keys = _keys(texts)
+    items = [{"key": keys[path], "path": path} for path in files_of(plan, process)]
     return {"configMap": {"name": f"{robot}-plan", "items": items}}
 
 

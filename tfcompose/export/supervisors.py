@@ -15,7 +15,7 @@ import yaml
 from tfcompose.files import File
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Collection, Mapping
 
     from tfcompose.plan import Plan, PlanProcess
 
@@ -49,15 +49,19 @@ def plain_name(name: str) -> str:
 
 def plain_names(plan: Plan, plain_of: Callable[[str], str] = plain_name) -> dict[str, str]:
     """Return the plain name of each process, by its own: no two are the same, and one that is plain stays."""
-    processes = [process.name for process in plan.processes]
-    names = {name: name for name in processes if plain_of(name) == name}
-    taken = set(names)
-    for name in processes:
-        if name not in names:
+    return distinct([process.name for process in plan.processes], plain_of)
+
+
+def distinct(names: Collection[str], plain_of: Callable[[str], str]) -> dict[str, str]:
+    """Return the plain form of each name, by the name: no two are the same, and one that is plain stays."""
+    made = {name: name for name in names if plain_of(name) == name}
+    taken = set(made)
+    for name in names:
+        if name not in made:
             plain = plain_of(name)
-            names[name] = next(one for n in count(1) if (one := f"{plain}-{n}" if n > 1 else plain) not in taken)
-            taken.add(names[name])
-    return names
+            made[name] = next(one for n in count(1) if (one := f"{plain}-{n}" if n > 1 else plain) not in taken)
+            taken.add(made[name])
+    return made
 
 
 def command_of(process: PlanProcess, python: str, plan_file: str) -> list[str]:

@@ -123,6 +123,10 @@ def test_the_reference_has_every_key_of_the_language_with_its_unit() -> None:
     assert "in metres, or with a unit: 30 cm" in text
 
 
+def test_only_the_reference_of_robots_tells_of_expressions() -> None:
+    assert [name for name in LANGUAGES if "`${…}` computes" in reference(name)] == ["robot"]
+
+
 FAULTS = 2000
 
 

@@ -20,10 +20,10 @@ _HEAD = {
     "preset": "The language of sensor presets",
     "node": "The language of node presets",
 }
-_INTRODUCTION = """\
-A bare number is in SI units and radians; a string may carry a unit: `30 cm`, `15 deg`, `50 Hz`. `${…}` computes from
-`vars`; inside `[ ]` and `{ }` it needs quotes: `[0, 0, "${mast}"]`. Keys without a default are required.
-"""
+_VALUES = "A bare number is in SI units and radians; a string may carry a unit: `30 cm`, `15 deg`, `50 Hz`."
+_EXPRESSIONS = """\
+`${…}` computes from `vars`, `args` and the environment; inside `[ ]` and `{ }` it needs quotes: `[0, 0, "${mast}"]`."""
+_REQUIRED = "Keys without a default are required."
 
 
 def reference(language: str) -> str:
@@ -32,7 +32,8 @@ def reference(language: str) -> str:
     sections: dict[Any, list[str]] = {}
     for pattern, kind in walk(root):
         sections.setdefault(kind, []).append(".".join(pattern).replace("*", "NAME"))
-    lines = [f"# {_HEAD[language]}, version 1", "", _INTRODUCTION]
+    rules = [_VALUES, *([_EXPRESSIONS] if language == "robot" else []), _REQUIRED]
+    lines = [f"# {_HEAD[language]}, version 1", "", *rules, ""]
     for kind, places in sections.items():
         lines += [f"## {_title(kind)}", "", *_places(places), *(inspect.getdoc(kind) or "").splitlines(), ""]
         lines += ["| key | type | default | meaning | example |", "|---|---|---|---|---|"]

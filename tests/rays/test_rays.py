@@ -20,6 +20,7 @@ from tfcompose.findings import Span
 from tfcompose.geometry import Pose, matrix_from_quat, normalised, quat_from_rpy
 from tfcompose.model import Asset, Optics, Robot, Shape
 from tfcompose.rays import Body, View, cast, contains, directions, view_of
+from tfcompose.view.scene import mesh_of
 
 HEAD = "tfcompose: 1\nrobot: r\n"
 SIZES = {"box": (0.6, 0.4, 0.2), "sphere": (0.3,), "cylinder": (0.2, 0.5), "capsule": (0.15, 0.4)}
@@ -156,6 +157,17 @@ def test_a_mesh_is_hit_where_the_same_primitive_is(tmp_path: Path) -> None:
     for one, other in zip(by_mesh.rays, by_shape.rays, strict=True):
         if math.isfinite(one.distance) and math.isfinite(other.distance):
             assert one.distance == pytest.approx(other.distance, abs=0.02)
+
+
+@pytest.mark.filterwarnings("ignore:Setting the shape on a NumPy array:DeprecationWarning")  # of pycollada's writer
+def test_a_collada_file_is_in_its_own_unit_here_and_in_the_view(tmp_path: Path) -> None:
+    file = tmp_path / "box.dae"
+    text = trimesh.creation.box((2, 2, 2)).export(file_type="dae").decode()
+    file.write_text(text.replace("<asset>", '<asset><unit name="centimeter" meter="0.01"/>'), "utf-8")
+    shape = Shape("mesh", (10.0, 10.0, 10.0), Pose(), mesh=Asset("box.dae", path=str(file)))
+    found = cast("s", SCAN, ((1.0, 0.0, 0.0),), [Body("b", shape, Pose((1.0, 0.0, 0.0)))])
+    assert found.rays[0].distance == pytest.approx(0.9)
+    assert mesh_of(shape).extents == pytest.approx([0.2, 0.2, 0.2])
 
 
 def test_a_mesh_that_cannot_be_read_blocks_nothing_and_is_named(tmp_path: Path) -> None:

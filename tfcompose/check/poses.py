@@ -9,6 +9,7 @@ from tfcompose.check.rule import rule
 from tfcompose.findings import Finding, finding
 from tfcompose.geometry import Pose, norm, rotate
 from tfcompose.model import is_optical
+from tfcompose.rays import fixed_to
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -279,7 +280,7 @@ def envelope(robot: Robot, frame: str, without: str | None = None) -> Box | None
     inside = {edge.child for edge in robot.edges if edge.sensor == without} if without else set()
     spheres = [
         (pose @ shape.pose, _radius(shape))
-        for name, pose in _fixed_to(robot, frame).items()
+        for name, pose in fixed_to(robot, frame, only_static=True).items()
         if name in robot.links and name not in inside
         for shape in (*robot.links[name].visuals, *robot.links[name].collisions)
     ]
@@ -288,23 +289,6 @@ def envelope(robot: Robot, frame: str, without: str | None = None) -> Box | None
     least = [min(pose.xyz[axis] - radius for pose, radius in spheres) for axis in range(3)]
     most = [max(pose.xyz[axis] + radius for pose, radius in spheres) for axis in range(3)]
     return least, most
-
-
-def _fixed_to(robot: Robot, frame: str) -> dict[str, Pose]:
-    """Return the pose in ``frame`` of each frame that is fixed to it, up and down the tree."""
-    fixed = [edge for edge in robot.edges if edge.kind == "static" and edge.pose_known]
-    neighbours: dict[str, list[tuple[str, Pose]]] = {}
-    for edge in fixed:
-        neighbours.setdefault(edge.parent, []).append((edge.child, edge.pose))
-        neighbours.setdefault(edge.child, []).append((edge.parent, edge.pose.inverse()))
-    poses, waiting = {frame: Pose()}, [frame]
-    while waiting:
-        here = waiting.pop()
-        for there, pose in neighbours.get(here, ()):
-            if there not in poses:
-                poses[there] = poses[here] @ pose
-                waiting.append(there)
-    return poses
 
 
 def is_near(box: Box, xyz: Vector) -> bool:

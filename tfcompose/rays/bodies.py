@@ -38,15 +38,16 @@ class Body:
         return math.hypot(*size) / 2
 
 
-def fixed_to(robot: Robot, frame: str) -> dict[str, Pose]:
+def fixed_to(robot: Robot, frame: str, *, only_static: bool = False) -> dict[str, Pose]:
     """Return the pose in ``frame`` of each frame that stands still there, up and down the tree.
 
-    What a continuous joint turns counts with its pose at zero, if it is below: a wheel turns on the spot.
+    ``only_static`` keeps to static edges. Otherwise those inside a sensor count too, whoever publishes them, and what a
+    continuous joint turns with its pose at zero, if it is below: a wheel turns on the spot.
     """
     neighbours: dict[str, list[tuple[str, Pose]]] = {}
     for edge in robot.edges:
-        is_fixed = edge.kind == "static" or (edge.sensor is not None and not edge.joint)
-        spins = edge.joint is not None and edge.joint.type == "continuous"
+        is_fixed = edge.kind == "static" or (not only_static and edge.sensor is not None and not edge.joint)
+        spins = not only_static and edge.joint is not None and edge.joint.type == "continuous"
         if not edge.pose_known or not (is_fixed or spins):
             continue
         neighbours.setdefault(edge.parent, []).append((edge.child, edge.pose))

@@ -8,17 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import trimesh
 
+from tfcompose.meshes import read_mesh
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tfcompose.geometry import Vector
 
 
-@lru_cache(maxsize=32)
-def _read(path: str, scale: Vector) -> Any:
-    mesh: Any = trimesh.load(path, force="mesh")
-    mesh.apply_scale(scale)
-    return mesh
+_read = lru_cache(maxsize=32)(read_mesh)
 
 
 def distances(path: str, scale: Vector, origin: Vector, directions: Sequence[Vector]) -> list[float]:

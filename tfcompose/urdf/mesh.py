@@ -3,38 +3,29 @@
 from __future__ import annotations
 
 import math
-import re
 import warnings
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import trimesh
 
+from tfcompose.meshes import read_mesh
 from tfcompose.urdf.inertia import Moments, UnmeasurableError
 
 if TYPE_CHECKING:
     from tfcompose.geometry import Vector
 
-#: A COLLADA file declares its unit in its head, before the first geometry.
-_HEAD = 65_536
-_UNIT = re.compile(rb"""<unit\b[^>]*\bmeter\s*=\s*["']\s*([0-9.eE+-]+)""")
 #: The part of its size cubed below which a volume is what rounding leaves of a plane.
 _FLAT = 1e-12
 
 
 def moments(path: str, scale: Vector) -> Moments:
-    """Return volume, centre and tensor of a closed mesh at a scale.
-
-    A COLLADA file is in the unit that it declares, as RViz and Gazebo read it; its up_axis is ignored, as they do.
+    """Return volume, centre and tensor of a closed mesh at a scale, in the unit of ``read_mesh``.
 
     Raises:
         UnmeasurableError: if the file is no mesh, or the mesh is not closed or has faces turned both ways.
     """
     try:
-        mesh: Any = trimesh.load(path, force="mesh")
-        unit = _collada_unit(path)
-        mesh.apply_scale([factor * unit for factor in scale])
+        mesh = read_mesh(path, scale)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # numpy's, about what is divided by a volume of 0
             why = _why_open(mesh)
@@ -68,16 +59,6 @@ def _why_open(mesh: Any) -> str:
 
 def _why_flat(mesh: Any) -> str:
     return "" if abs(mesh.volume) > _FLAT * mesh.scale**3 else "it is flat, so it has no volume"
-
-
-def _collada_unit(path: str) -> float:
-    """Return the metres in the unit of a COLLADA file; 1 where it declares none, and for other files."""
-    if not path.lower().endswith(".dae"):
-        return 1.0
-    with Path(path).open("rb") as file:
-        found = _UNIT.search(file.read(_HEAD))
-    metres = float(found[1]) if found else 1.0
-    return metres if 0 < metres < math.inf else 1.0
 
 
 def _facing_alike(mesh: Any) -> Any:

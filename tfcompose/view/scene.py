@@ -16,6 +16,7 @@ import viser
 import websockets.asyncio.server
 
 from tfcompose.geometry import Pose
+from tfcompose.meshes import read_mesh
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -84,11 +85,9 @@ def mesh_of(shape: Shape) -> Any:
     if shape.kind == "capsule":
         return trimesh.creation.capsule(radius=size[0], height=size[1], count=[24, 24])
     try:
-        mesh: Any = trimesh.load(shape.mesh.path if shape.mesh else "", force="mesh")
-        mesh.apply_scale(list(size))
+        return read_mesh(shape.mesh.path if shape.mesh else "", (size[0], size[1], size[2]))
     except Exception:  # noqa: BLE001 (readers of a dozen formats: anything can come out of them)
         return None
-    return mesh
 
 
 class RobotScene:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.cli.options import add_file, add_variant
 from tfcompose.cli.terminal import UNREADABLE, fail
+from tfcompose.signals import take_interrupt
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
@@ -145,5 +146,7 @@ def _serve(address: str, arguments: Namespace) -> None:
         import webbrowser
 
         webbrowser.open(address)
+    if take_interrupt():
+        raise KeyboardInterrupt  # trimesh's optional imports had swallowed it
     while True:
         time.sleep(1)

@@ -251,3 +251,20 @@ def test_the_server_answers_until_ctrl_c_and_a_taken_port_names_the_next(rover: 
         assert running.wait(30) == 130
     finally:
         processes.end(running)
+
+
+def test_a_mount_inside_a_part_cannot_be_saved_here_and_stays_moved() -> None:
+    file = ROVER.with_name("two_rovers.yaml")
+    text = file.read_text("utf-8")
+
+    def compiled(texts: Mapping[str, str]) -> Compiled:
+        return compile_robot(texts[str(file)], str(file), PRESETS, read=lambda path: Path(path).read_text("utf-8"))
+
+    session = Session({str(file): text}, compiled, lambda *_: pytest.fail("something was written"))
+    assert session.state.robot
+    child = next(
+        edge.child for edge in session.state.robot.edges if edge.child.startswith("rover1/") and edge.kind == "static"
+    )
+    session.move(child, Pose((1, 2, 3)))
+    assert session.save().elsewhere
+    assert session.moved == {child: Pose((1, 2, 3))}

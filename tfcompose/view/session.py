@@ -103,20 +103,20 @@ class Session:
         Raises:
             OSError: if a file cannot be written, or was changed meanwhile.
         """
-        texts, state, elsewhere = dict(self.texts), self.state, list[Elsewhere]()
+        texts, state, elsewhere = dict(self.texts), self.state, dict[str, Elsewhere]()
         for child, pose in self.moved.items():
             if state.robot is None:
                 break
             change = change_of(state.robot, state.sources[0], texts, child, pose)
             if isinstance(change, Elsewhere):
-                elsewhere.append(change)
+                elsewhere[child] = change
             elif change.edits:
                 texts |= _with(texts, change)
                 state = self.compiled(texts)
         before = Counter((one.code, one.message) for one in self.state.errors)
         refused = tuple(one for one in state.errors if not before[one.code, one.message])
         if refused:
-            return Saved(refused=refused, elsewhere=tuple(elsewhere))
+            return Saved(refused=refused, elsewhere=tuple(elsewhere.values()))
         diff = ""
         for file, text in texts.items():
             old = self.texts[file]
@@ -124,12 +124,11 @@ class Session:
                 self.write(file, old, text)
                 lines = unified_diff(old.splitlines(keepends=True), text.splitlines(keepends=True), file, file)
                 diff += "".join(lines)
-        kept = {one.entry for one in elsewhere}
         self.texts, self.state = texts, state
-        self.moved = {child: pose for child, pose in self.moved.items() if self.mount(child).entry in kept}
+        self.moved = {child: pose for child, pose in self.moved.items() if child in elsewhere}
         self._undo.clear()
         self._redo.clear()
-        return Saved(diff, state.found, elsewhere=tuple(elsewhere))
+        return Saved(diff, state.found, elsewhere=tuple(elsewhere.values()))
 
 
 def _with(texts: Mapping[str, str], change: Change) -> dict[str, str]:

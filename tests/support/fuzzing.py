@@ -23,6 +23,7 @@ from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import printable
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
+from tfcompose.export.kubernetes import Cluster, files_of, kubernetes
 from tfcompose.export.launch import launch
 from tfcompose.export.supervisors import Machine, compose, systemd
 from tfcompose.findings import Finding, RejectedError
@@ -175,7 +176,10 @@ def plan(data: bytes, folder: Path) -> None:
     for line in plan_lines(one, {}):
         line.encode()
         assert printable(line).isprintable(), ascii(line)
-    for made, _ in (systemd(one, Machine("/robot")), compose(one, Machine(".")), launch(one, Machine("."), "<robot/>")):
+    texts = {path: "" for process in one.started for path in files_of(one, process)}
+    pods = kubernetes(one, Cluster("robot:1"), texts)
+    units, services = systemd(one, Machine("/robot")), compose(one, Machine("."))
+    for made, _ in (units, services, launch(one, Machine("."), "<robot/>"), pods):
         for file in made:
             file.text.encode()
 

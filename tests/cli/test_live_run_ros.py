@@ -59,6 +59,8 @@ class Shell:
             command, stdin=slave, stdout=slave, stderr=slave, cwd=folder, env=env
         )
         self._slave = slave
+        self.reads = threading.Event()
+        self.reads.set()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
         self.shows(PROMPT)
@@ -66,6 +68,7 @@ class Shell:
     def _read(self) -> None:
         with contextlib.suppress(OSError):
             while data := os.read(self._master, 1 << 16):
+                self.reads.wait()
                 text = data.decode(errors="replace")
                 self.text += text
                 self._stream.feed(text)
@@ -95,6 +98,7 @@ class Shell:
         return psutil.Process(self.process.pid).children()[0]
 
     def close(self) -> None:
+        self.reads.set()
         with contextlib.suppress(psutil.Error):
             for one in self.below():
                 one.kill()
@@ -207,3 +211,29 @@ def test_without_colours_there_are_none(domain: object, tmp_path: Path) -> None:
         assert colours == {"default"}
     finally:
         shell.close()
+
+
+def test_ctrl_s_stops_neither_the_view_nor_its_end(shell: Shell) -> None:
+    shell.up()
+    shell.shows("all well")
+    started = shell.below()
+    shell.type("\023e")
+    shell.shows("base_link → laser")
+    shell.view().send_signal(signal.SIGTERM)
+    assert until(lambda: all(map(gone, started)))
+    shell.shows("ended", PROMPT)
+
+
+def test_a_terminal_that_takes_nothing_keeps_neither_the_view_nor_the_robot_from_ending(shell: Shell) -> None:
+    shell.up()
+    shell.shows("all well")
+    started = shell.below()
+    shell.reads.clear()
+    for _ in range(100):  # more pictures than a terminal holds
+        shell.type("e\033")
+        shell.resize(200, 60)
+        shell.resize(80, 24)
+    shell.view().send_signal(signal.SIGTERM)
+    assert until(lambda: all(map(gone, started)))
+    shell.reads.set()
+    shell.shows(PROMPT)

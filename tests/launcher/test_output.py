@@ -40,7 +40,8 @@ def test_a_terminal_that_is_stopped_is_not_waited_for_and_the_shell_keeps_its_bl
     for _ in range(5000):  # a write that waits, waits for ever
         stream.write("x" * 100 + "\n", log=True)
     assert os.get_blocking(slave)
-    stream.close(0.01)
+    stream.finish(0.01)
+    stream.close()
     os.close(slave)
     os.close(master)
 

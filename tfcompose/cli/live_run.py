@@ -15,7 +15,7 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.console import Console, StandardOutput
+from tfcompose.cli.console import Console
 from tfcompose.cli.runs import plan_of_run
 from tfcompose.cli.terminal import FAILED, can_redraw, coloured, warn
 from tfcompose.ipc import (
@@ -31,7 +31,7 @@ from tfcompose.ipc import (
     read_notice,
 )
 from tfcompose.launcher.control import connect
-from tfcompose.launcher.output import Follower
+from tfcompose.launcher.output import Follower, NonBlockingOutput
 from tfcompose.launcher.procfs import UsageMeter
 from tfcompose.launcher.supervisor import ENDING, Signals
 from tfcompose.plan.codec import decode
@@ -80,9 +80,11 @@ def follow(place: RuntimeDir, plan: Plan, launcher: int, mask: Iterable[int], wa
         from tfcompose.cli.screen import Screen
 
         view = _View(place, Dashboard(place.name, plan, warnings), launcher, signals)
-        with Screen(sys.stdin.fileno()) as screen:
+        output = NonBlockingOutput(sys.stdout.fileno())
+        with Screen(sys.stdin.fileno(), output) as screen:
             code = view.run(screen)
-    view.print_rest(plan)
+        view.print_rest(plan, output)
+        output.close()
     return code
 
 
@@ -137,7 +139,7 @@ class _View:
         self._meter = UsageMeter()
         self._events: _Connection | None = None
         self._states: _Connection | None = None
-        self._requested = self._stale = False
+        self._requested = self._stale = self._owing = False
         self._follower: Follower | None = None
         self._last: list[Notice] = []
         self._left_out = 0
@@ -155,6 +157,7 @@ class _View:
             try:
                 while self._code is None:
                     self._connect()
+                    self._wait_for_terminal()
                     for key, _ in selector.select(self._sleep_s()):
                         key.data()
                     for number in self._signals.taken():
@@ -169,14 +172,14 @@ class _View:
                         connection.close()
         return self._code
 
-    def print_rest(self, plan: Plan) -> None:
+    def print_rest(self, plan: Plan, output: NonBlockingOutput) -> None:
         """Print on the terminal's own screen what went wrong, and how it ended."""
         if self._fault:
             warn(f"the live view failed: {self._fault}")
-        console = Console(plan, StandardOutput(), colour=coloured(sys.stdout))
+        console = Console(plan, output, colour=coloured(sys.stdout))
         with contextlib.suppress(OSError):
             if self._left_out:
-                print(f"{counted(self._left_out, 'earlier finding')}: tfcompose logs tfcompose")
+                output.write(f"{counted(self._left_out, 'earlier finding')}: tfcompose logs tfcompose\n")
             for notice in self._last:
                 console(notice)
         if not any(isinstance(notice, Ended) for notice in self._last):
@@ -311,16 +314,36 @@ class _View:
     def _draw(self) -> None:
         if not self._stale or self._fault:
             return
-        self._stale = False
         try:
-            self._screen.draw(self._dashboard.lines)
-        except OSError:  # the terminal has gone
-            self._fault = "the terminal has gone"
-            self._pass_on(signal.SIGHUP)
+            self._stale = not self._screen.draw(self._dashboard.lines)
+        except OSError:
+            self._lose_terminal()
         except Exception as error:  # noqa: BLE001 (a fault of the view ends no robot)
             self._fault = f"{type(error).__name__}: {error}"
             self._screen.leave()
             warn(f"the live view failed: {self._fault}; the robot goes on, and Ctrl-C ends it")
+
+    def _wait_for_terminal(self) -> None:
+        """Be woken when the terminal takes more, while it is owed something."""
+        output = self._screen.output
+        if output.owes == self._owing:
+            return
+        self._owing = output.owes
+        if self._owing:
+            self._selector.register(output.fd, selectors.EVENT_WRITE, self._push)
+        else:
+            self._selector.unregister(output.fd)
+
+    def _push(self) -> None:
+        try:
+            self._screen.output.push()
+        except OSError:
+            self._lose_terminal()
+
+    def _lose_terminal(self) -> None:
+        self._fault = "the terminal has gone"
+        self._screen.output.finish(0)
+        self._pass_on(signal.SIGHUP)
 
     def _reap(self) -> None:
         pid, status = os.waitpid(self._launcher, os.WNOHANG)

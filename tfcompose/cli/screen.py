@@ -6,6 +6,7 @@ import contextlib
 import re
 import sys
 import termios
+from io import StringIO
 from typing import TYPE_CHECKING
 
 from rich.console import Console, ConsoleDimensions
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from types import TracebackType
 
     from typing_extensions import Self
+
+    from tfcompose.launcher.output import NonBlockingOutput
 
 #: Keys that send more than one byte, in the forms that terminals use.
 _NAMED = {
@@ -59,14 +62,31 @@ def _keys(text: str) -> list[str]:
     return [_NAMED.get(sequence, "") if sequence else _NAMED.get(char, char) for sequence, char in pairs]
 
 
+class _Stream(StringIO):
+    """A text stream for rich, which writes what it is given to the output when it is flushed."""
+
+    def __init__(self, output: NonBlockingOutput) -> None:
+        super().__init__()
+        self._output = output
+
+    def flush(self) -> None:
+        text = self.getvalue()
+        self.seek(0)
+        self.truncate()
+        if text:
+            self._output.write(text)
+
+
 class Screen:
     """A terminal whose other screen is drawn on, from the ``with`` block's begin to its end.
 
-    Ctrl-C and Ctrl-Z remain signals. What cannot be written since the terminal has gone raises OSError.
+    Ctrl-C and Ctrl-Z remain signals; Ctrl-S is a key like others. A terminal that takes nothing is not waited for. What
+    cannot be written since the terminal has gone raises OSError.
     """
 
-    def __init__(self, keys_fd: int) -> None:
+    def __init__(self, keys_fd: int, output: NonBlockingOutput) -> None:
         self.fd = keys_fd
+        self.output = output
         self._before = termios.tcgetattr(keys_fd)
         self._live: Live | None = None
 
@@ -82,10 +102,12 @@ class Screen:
     def enter(self) -> None:
         """Go to the other screen, and take keys without Enter and without showing them."""
         settings = termios.tcgetattr(self.fd)
+        settings[0] &= ~termios.IXON
         settings[3] &= ~(termios.ICANON | termios.ECHO)
         settings[6][termios.VMIN], settings[6][termios.VTIME] = 1, 0
-        termios.tcsetattr(self.fd, termios.TCSADRAIN, settings)
-        console = Console(file=sys.stdout, force_terminal=True, no_color=not coloured(sys.stdout), highlight=False)
+        termios.tcsetattr(self.fd, termios.TCSANOW, settings)  # the others wait until the terminal has taken all
+        stream = _Stream(self.output)
+        console = Console(file=stream, force_terminal=True, no_color=not coloured(sys.stdout), highlight=False)
         self._live = Live(
             console=console, screen=True, auto_refresh=False, redirect_stdout=False, redirect_stderr=False
         )
@@ -99,13 +121,17 @@ class Screen:
             return
         with contextlib.suppress(OSError):
             live.stop()
+        self.output.finish()
         with contextlib.suppress(termios.error):
-            termios.tcsetattr(self.fd, termios.TCSADRAIN, self._before)
+            termios.tcsetattr(self.fd, termios.TCSANOW, self._before)
 
-    def draw(self, lines: Callable[[int, int], list[Text]]) -> None:
-        """Draw the lines that are returned for these columns and rows."""
+    def draw(self, lines: Callable[[int, int], list[Text]]) -> bool:
+        """Draw the lines that are returned for these columns and rows, unless the terminal has not taken the last."""
         if self._live is None:
-            return
+            return True
+        if self.output.owes:
+            return False
         size = size_of(sys.stdout.fileno())
         self._live.console.size = ConsoleDimensions(*size)
         self._live.update(Text("\n").join(lines(*size)), refresh=True)
+        return True

@@ -94,13 +94,17 @@ class NonBlockingOutput:
             del self._owed[:count]
             self._announced = self._announced if self._owed else 0
 
-    def close(self, patience_s: float = 0.5) -> None:
-        """Write the rest, as far as the reader takes it in that time."""
-        try:
+    def finish(self, patience_s: float = 0.5) -> None:
+        """Write the rest, as far as the reader takes it in that time, and forget what it does not take."""
+        with contextlib.suppress(OSError):
             while self._owed and select.select([], [self.fd], [], patience_s)[1]:
                 self.push()
-        except OSError:
-            pass
+        self._owed.clear()
+
+    def close(self) -> None:
+        """Write the rest, as far as the reader takes it, and let the terminal or pipe go."""
+        try:
+            self.finish()
         finally:
             if self._own and self.fd > 2:  # noqa: PLR2004 (the standard streams stay open)
                 os.close(self.fd)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.support.adversary import GUARDS, OTHER_X, OWNER_X, PlainListener, Robot, foreign, node, running
+from tests.support.adversary import GUARDS, OTHER_X, OWNER_X, Child, PlainListener, Robot, foreign, node, running
 from tfcompose.ros.tf_codec import Transform, encode
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def of_each(*guards: str) -> pytest.MarkDecorator:
 
 @pytest.fixture(scope="module")
 def robot(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
-    with running(tmp_path_factory.mktemp(request.param), request.param, {}) as one:
+    with running(tmp_path_factory.mktemp(request.param), request.param, {"idle": Child(["sleep", "600"])}) as one:
         one.says("tree complete")
         yield one
 
@@ -55,6 +55,7 @@ NODES = {
     "owner's name below": ("slam", "/slam", "/slam/slam"),
     "owner's name as namespace": ("node", "/slam", "/slam/node"),
     "guard's name": ("tfcompose_guard", "/", "/tfcompose_guard"),
+    "name of a process without a node": ("idle", "/", "/idle"),
 }
 
 
@@ -75,6 +76,7 @@ def test_a_node_is_named_with_its_process_and_the_owner_is_not(
     robot.stop(one)
     robot.says("over", "map → odom", after=after)
     assert accused(robot, after) == {one.pid}
+    assert "owner: idle" not in robot.output_after(after), "the plan's idle has nothing to do with it"
 
 
 @of_each(*GUARDS)

@@ -197,8 +197,9 @@ class Cases:
         return True
 
     def _event(self, cases: list[Case], now: float) -> GuardEvent:
-        violations = [case.violation for case in cases]
         where, run = self._senders.where(cases[0].gid), self._senders.run(cases[0].gid)
+        ours = self._senders.process(cases[0].gid)
+        violations = [replace(case.violation, stranger=bool(where) and not ours) for case in cases]
         if any(self._was_first(case, now) for case in cases):
             found = other_robot_finding(violations, run, self._plan) if run else taken_finding(violations, where)
             return Taken(found)
@@ -206,7 +207,7 @@ class Cases:
             return Found(other_robot_finding(violations, run, self._plan))
         driven = sensor_of(violations[0], self._drives)
         found = violation_finding(violations, self._plan, where, driven)
-        if advice := misnamed_help(violations, self._plan, self._senders.process(cases[0].gid)):
+        if advice := misnamed_help(violations, self._plan, ours):
             found = replace(found, help=advice)
         if self._says_fate(violations[0]):
             found = replace(found, notes=(*found.notes, Note(_FATE[self._senders.is_held_back(cases[0].gid)])))

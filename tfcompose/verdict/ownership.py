@@ -62,6 +62,7 @@ class Violation:
         loop: the frames of a loop that the edge closes.
         detail: what was seen of stamps, or who the other publisher is.
         recorded: whether it is from a recording, in which nobody has a name.
+        stranger: whether the publisher is seen to be of no process that the plan starts, whatever its name.
     """
 
     code: str
@@ -74,6 +75,7 @@ class Violation:
     loop: tuple[str, ...] = ()
     detail: str = ""
     recorded: bool = False
+    stranger: bool = False
 
     @property
     def who(self) -> str:
@@ -305,8 +307,9 @@ def _help_about(first: Violation, plan: Plan) -> str:
 
 def _run_by(first: Violation, plan: Plan) -> str:
     """Return which process with programs of the robot's own the publisher is of, if it is surely one."""
+    kinds = {"external"} if first.stranger else {"run", "external"}
     for process in plan.processes if len(first.nodes) == 1 else ():
-        if process.kind in {"run", "external"} and first.nodes[0] in process.nodes:
+        if process.kind in kinds and first.nodes[0] in process.nodes:
             return process.name
     return ""
 

@@ -290,3 +290,14 @@ def test_a_file_name_moves_no_terminals_cursor(folder: Path) -> None:
         done = tfcompose(*words, cwd=folder)
         assert done.returncode in {1, 2}, words
         assert "\x1b" not in done.stdout + done.stderr, words
+
+
+@pytest.mark.parametrize(
+    "words", ["import robot.urdf", "import --bag b", "tree", "tree --bag b", "graph -o g.svg", "verify --bag b"]
+)
+def test_a_duration_is_refused_where_no_running_tree_is_observed(words: str, folder: Path) -> None:
+    done = tfcompose(*words.split(), "--for", "3", cwd=folder)
+    assert done.returncode == 2
+    assert done.stderr.startswith("tfcompose: ")
+    assert "--for" in done.stderr
+    assert not everything_below(folder)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.terminal import UNREADABLE, fail
 
 if TYPE_CHECKING:
-    from argparse import ArgumentParser
+    from argparse import ArgumentParser, Namespace
 
 DEFAULT_FILE = "robot.yaml"
 TF_TOPICS = ("tf", "tf_static")
@@ -84,6 +84,19 @@ def add_bag(parser: ArgumentParser, text: str = "read a recording instead of the
 def add_for(parser: ArgumentParser, text: str, default: float | None = None) -> None:
     """Add --for."""
     parser.add_argument("--for", dest="duration", type=positive, default=default, metavar="S", help=text)
+
+
+def settle_duration(arguments: Namespace, default_s: float) -> None:
+    """Give --for its default; refuse it where the running tree is not observed, as in a recording.
+
+    Raises:
+        SystemExit: after saying so.
+    """
+    if arguments.duration is not None and arguments.bag:
+        fail("a recording is always read to its end: leave out --for", UNREADABLE)
+    if arguments.duration is not None and not arguments.live:
+        fail("--for says how long to observe the running tree: add --live, or leave out --for", UNREADABLE)
+    arguments.duration = arguments.duration or default_s
 
 
 def add_format(parser: ArgumentParser, *others: str, text: str = "default: text") -> None:

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import DEFAULT_FILE, add_bag, add_for, add_namespace, add_variant
+from tfcompose.cli.options import DEFAULT_FILE, add_bag, add_for, add_namespace, add_variant, settle_duration
 from tfcompose.cli.terminal import UNREADABLE, fail, printable
 from tfcompose.geometry import Pose, norm, normalised
 
@@ -44,7 +44,7 @@ def arguments(parser: ArgumentParser) -> None:
         "--live", action="store_true", help="draw the tree that is published now, with FILE also what is missing"
     )
     add_bag(parser, "draw the tree of a recording")
-    add_for(parser, "with --live: observe for S seconds; default: 3", 3.0)
+    add_for(parser, "with --live: observe for S seconds; default: 3")
     add_namespace(parser, "use /NS/tf and /NS/tf_static, without FILE")
     parser.add_argument(
         "--poses", action="store_true", help="show each frame's pose in its parent, in metres and degrees"
@@ -64,6 +64,7 @@ def run(arguments: Namespace) -> int:
     """Draw; exit code 0, 1 with errors in the robot, 2 for another ending or what cannot be read or written."""
     path = Path(arguments.output)
     _check_output(path)
+    settle_duration(arguments, 3.0)
     if arguments.live or arguments.bag:
         graph = _published_graph(arguments)
     else:

@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import add_bag, add_for, namespace, pairs
+from tfcompose.cli.options import add_bag, add_for, namespace, pairs, settle_duration
 from tfcompose.cli.terminal import FAILED, UNREADABLE, fail, print_findings, reject
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--live", action="store_true", help="import the running tree")
     add_bag(parser, "import a recording")
-    add_for(parser, "with --live, observe for S seconds; default: 10", 10.0)
+    add_for(parser, "with --live, observe for S seconds; default: 10")
     parser.add_argument("--namespace", type=namespace, default="", help="of the topics tf and tf_static")
     parser.add_argument("-o", "--output", metavar="FILE", help="write the robot file here; default: print it")
     parser.add_argument("--force", action="store_true", help="overwrite an existing file")
@@ -248,6 +248,7 @@ def _check_use(arguments: Namespace) -> None:
     """
     if bool(arguments.file) + arguments.live + bool(arguments.bag) != 1:
         fail("name one source: a file, --live or --bag", UNREADABLE)
+    settle_duration(arguments, 10.0)
     if not arguments.file:
         _refuse_given(arguments)
     if arguments.file and Path(arguments.file).suffix not in _ENDINGS:

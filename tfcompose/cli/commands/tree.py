@@ -11,7 +11,15 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.cli.options import DEFAULT_FILE, add_bag, add_for, add_format, add_namespace, add_variant
+from tfcompose.cli.options import (
+    DEFAULT_FILE,
+    add_bag,
+    add_for,
+    add_format,
+    add_namespace,
+    add_variant,
+    settle_duration,
+)
 from tfcompose.cli.terminal import coloured, printable, table_width
 from tfcompose.render.text import RED, YELLOW
 
@@ -34,13 +42,14 @@ def arguments(parser: ArgumentParser) -> None:
     add_variant(parser)
     parser.add_argument("--live", action="store_true", help="print the tree that is published now")
     add_bag(parser, "print the tree of a recording")
-    add_for(parser, "with --live: observe for S seconds; default: 3", 3.0)
+    add_for(parser, "with --live: observe for S seconds; default: 3")
     add_namespace(parser, "use /NS/tf and /NS/tf_static, without FILE")
     add_format(parser)
 
 
 def run(arguments: Namespace) -> int:
     """Print the tree; exit code as for build; of a published one 1 if there is none, 2 if a bag cannot be read."""
+    settle_duration(arguments, 3.0)
     if arguments.live or arguments.bag:
         _print_published(arguments)
         return 0

@@ -15,7 +15,7 @@ import time
 from argparse import ArgumentTypeError
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import DEFAULT_FILE, add_bag, add_for, add_format, add_variant
+from tfcompose.cli.options import DEFAULT_FILE, add_bag, add_for, add_format, add_variant, settle_duration
 from tfcompose.cli.terminal import print_findings
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def arguments(parser: ArgumentParser) -> None:
     add_variant(parser)
     parser.add_argument("--live", action="store_true", help="use the running tree (default unless --bag is given)")
     add_bag(parser)
-    add_for(parser, "observe the running tree for S seconds; default: 5", 5.0)
+    add_for(parser, "observe the running tree for S seconds; default: 5")
     parser.add_argument(
         "--tolerance", type=tolerance, default="1mm,0.1deg", metavar="T",
         help="how far a pose may be off: 2mm, 0.5deg, or both as 2mm,0.5deg; default: 1mm,0.1deg",
@@ -59,6 +59,8 @@ def run(arguments: Namespace) -> int:
     from tfcompose.verdict.verify import verify
 
     refuse_live_bag(arguments)
+    arguments.live = not arguments.bag
+    settle_duration(arguments, 5.0)
     plan, places = _running_plan(arguments) or expected_plan(arguments.file or DEFAULT_FILE, arguments)
     observers = {topics: TreeObserver(settle_s=0.0 if arguments.bag else SETTLE_S) for topics in parts_of(plan)}
     # Programs get each missing edge; a robot without edges misses none.

@@ -76,3 +76,13 @@ def test_lint_and_the_other_commands_take_arguments(tmp_path: Path) -> None:
     assert "TF106" in tfcompose("tree", file, "lidar:=c", code=1).stderr
     shown = tfcompose("up", file, "--show-args").stdout
     assert [line.partition(":=")[0] for line in shown.splitlines()] == ["sim", "lidar"]
+
+
+def test_lint_judges_an_integer_at_its_bounds_and_its_default(tmp_path: Path) -> None:
+    file = tmp_path / "r.yaml"
+    rows = "".join(f"  at_{n}: {{parent: gone_{n}, when: '${{args.n == {n}}}'}}\n" for n in (0, 2, 3, 9))
+    file.write_text(
+        f"tfcompose: 1\nrobot: r\nargs: {{n: {{default: 2, min: 0, max: 9}}}}\nframes:\n  base_link: {{}}\n{rows}"
+    )
+    printed = tfcompose("lint", file, code=1).stdout
+    assert [n for n in (0, 2, 3, 9) if f"note: with n:={n}" in printed] == [0, 2, 9]

@@ -10,6 +10,8 @@ from tfcompose.language.values import COLOURS
 
 BASE = "tfcompose: 1\nrobot: r\nlinks: {base_link: {}}\n"
 CAM = BASE + "sensors:\n  cam: {preset: realsense/d435i, parent: base_link, %s}\n"
+ARG = "tfcompose: 1\nrobot: r\nargs: {on: false}\nframes:\n  base_link: {}\n"
+MAST = "  mast: {parent: base_link, when: '${args.on}'}\n"
 FRAME = BASE + "frames:\n  mast: {parent: base_link, %s}\n"
 PROCESS = BASE + "processes:\n  a: {run: [sleep, '9']}\n  b: {run: [sleep, '9'], %s}\n"
 SHAPE = "tfcompose: 1\nrobot: r\nlinks: {base_link: {visual: {box: [1, 1, 1], %s}}}\n"
@@ -36,6 +38,14 @@ MISTAKES = [
     (PROCESS % "env: [A=1]", "6:31 TF103", "env: {RCUTILS_COLORIZED_OUTPUT: '1'}"),
     (PROCESS % "remap: ['/a:=/b']", "6:33 TF103", "remap: {scan: front/scan}"),
     (PROCESS % "ready: {topic: '/sc an'}", "6:41 TF106", ""),
+    # conditions
+    (ARG + MAST + "  tip: {parent: mast}\n", "7:17 TF203", "when: ${args.on};"),
+    (ARG + MAST + "  tip: {parent: base_link, relative_to: mast}\n", "7:41 TF203", "when: ${args.on};"),
+    (
+        ARG + "  tip: {parent: base_link, owner: drive}\nprocesses: {drive: {when: '${args.on}', external: true}}\n",
+        "6:35 TF302",
+        "when: ${args.on};",
+    ),
     # what is new to YAML
     (BASE + "frames:\n  laser\n    parent: base_link\n", "5:3 TF002", "laser:"),
     (BASE + "frames:\n\n  laser  # on top\n    parent: base_link\n", "6:3 TF002", "laser:"),

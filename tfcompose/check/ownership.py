@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.check.rule import rule
 from tfcompose.findings import Finding, Note, did_you_mean, finding
-from tfcompose.model import BUILT_IN
+from tfcompose.model import BUILT_IN, left_out_by
 from tfcompose.text import with_more
 
 if TYPE_CHECKING:
@@ -48,7 +48,8 @@ def unknown_owner(robot: Robot) -> Iterator[Finding]:
     for (owner, at), edges in lost.items():
         declare = f"declare it: processes: {{{owner}: {{external: true}}}}, if it is started elsewhere"
         message = f"unknown owner {owner} of {with_more(edges[0].name, len(edges) - 1)}"
-        yield finding("TF302", message, at, help=did_you_mean(owner, names, declare))
+        advice = left_out_by(robot.conditions, owner) or did_you_mean(owner, names, declare)
+        yield finding("TF302", message, at, help=advice)
 
 
 @rule("TF303")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from tfcompose.check.rule import rule
 from tfcompose.findings import Finding, Note, Span, did_you_mean, finding
+from tfcompose.model import left_out_by
 from tfcompose.tree import below, children_of
 
 if TYPE_CHECKING:
@@ -86,6 +87,8 @@ def unknown_frame(robot: Robot) -> Iterator[Finding]:
     searches = count(1)
 
     def advice(name: str, at: Span, section: str) -> str:
+        if conditional := left_out_by(robot.conditions, name):
+            return conditional
         near = robot.frames if next(searches) <= _MOST_SEARCHES else ()
         declare = f'add <link name="{name}"/>' if robot.is_foreign(at) else f"declare it: {section}: {{{name}: {{}}}}"
         return did_you_mean(name, near, declare)

@@ -84,9 +84,20 @@ class ArgSpec(Checked):
 
     @property
     def alternatives(self) -> tuple[str, ...]:
-        """All values that it can have, as the command line gives them; empty where they are no choice."""
+        """The values that are judged, as the command line gives them: all, or an integer's bounds and default.
+
+        Empty where there is neither a choice nor a bound.
+        """
         if self.choices:
             return tuple(as_given(one) for one in self.choices)
+        if self.kind == "int" and (self.min is not None or self.max is not None):
+            try:
+                known = {
+                    inserted(self.typed(one)): None for one in (self.min, self.default, self.max) if one is not None
+                }
+            except ArgError:
+                return ()  # it is refused for that
+            return tuple(known)
         return ("false", "true") if self.kind == "bool" else ()
 
     @classmethod

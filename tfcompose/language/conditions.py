@@ -34,13 +34,15 @@ Scope = dict[str, "Value"]
 class Unfolded:
     """A source with the entries that there are; ``scopes`` are the values of their loops, by (section, name).
 
-    ``found`` is what is wrong with conditions and loops, and ``refused`` are their paths.
+    ``found`` is what is wrong with conditions and loops, and ``refused`` are their paths. ``conditions`` are those of
+    the entries that they leave out, as they are written, by (section, name).
     """
 
     source: Source
     scopes: dict[Path, Mapping[str, Value]] = field(default_factory=dict)
     found: list[Finding] = field(default_factory=list)
     refused: list[Path] = field(default_factory=list)
+    conditions: dict[tuple[str, str], str] = field(default_factory=dict)
 
 
 def unfolded(source: Source, variables: Variables) -> Unfolded:
@@ -128,6 +130,9 @@ class _Unfolding:
                 continue
             try:
                 if "when" in decided and not _decided(entry["when"], self.variables, scope):
+                    self.done.conditions[section, name] = (
+                        entry["when"] if isinstance(entry["when"], str) else shown(entry["when"])
+                    )
                     continue
             except ExpressionError as error:  # with the entry there, nothing else is missing
                 self._refuse((*at, "when"), error)

@@ -33,7 +33,8 @@ class Validated:
 
     ``refused`` are the paths of what was; ``broken`` the entries, as (section, name), that they are in: what is missing
     because of them is not reported a second time. ``unused`` are the paths of variables and arguments
-    that nothing uses. ``source`` has the entries that conditions and loops leave. ``args`` are the values of the
+    that nothing uses. ``source`` has the entries that conditions and loops leave, and ``conditions`` are those of the
+    others, by (section, name). ``args`` are the values of the
     arguments that were ``given`` or are their defaults, ``environment`` those of the variables that the file names.
     """
 
@@ -45,6 +46,7 @@ class Validated:
     given: Given = _NOTHING
     args: dict[str, ParameterValue] = field(default_factory=dict)
     environment: dict[str, str] = field(default_factory=dict)
+    conditions: dict[tuple[str, str], str] = field(default_factory=dict)
     broken: frozenset[tuple[str, str]] = field(init=False)
 
     @property
@@ -89,7 +91,7 @@ def validate(source: Source, aside: Any = None, given: Given = _NOTHING) -> Vali
         raise RejectedError(found)
     refused = frozenset([*already, *done.refused, *(one.path for one in refusals)])
     args = {name: plain(value) for name, value in variables.args.items() if value is not None}
-    return Validated(spec, source, found, refused, idle, given, args, variables.environment)
+    return Validated(spec, source, found, refused, idle, given, args, variables.environment, done.conditions)
 
 
 def validate_preset(source: Source) -> PresetSpec:

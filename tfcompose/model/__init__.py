@@ -29,6 +29,7 @@ from tfcompose.model.robot import (
     SourceNumbers,
     Zone,
     is_optical,
+    left_out_by,
     may_be_refused,
 )
 
@@ -71,6 +72,7 @@ __all__ = [
     "Zone",
     "colour_name",
     "is_optical",
+    "left_out_by",
     "materials",
     "may_be_refused",
 ]

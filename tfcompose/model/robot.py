@@ -12,7 +12,7 @@ from tfcompose.plan import EdgePattern, GuardPolicy, RosSettings
 from tfcompose.tree import below, children_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
 
     from tfcompose.findings import Note, Span
     from tfcompose.geometry import Vector
@@ -125,6 +125,15 @@ def may_be_refused(name: str, broken: frozenset[tuple[str, str]], known: Iterabl
     return name in names or name.startswith(beginnings)
 
 
+def left_out_by(conditions: Mapping[tuple[str, str], str], name: str) -> str:
+    """Return advice about a name that an entry would have brought which its condition leaves out; empty else."""
+    for entry, condition in conditions.items():
+        names, beginnings = _brought(frozenset({entry}))
+        if name in names or name.startswith(beginnings):
+            return f"{entry[1]} is left out by its when: {condition}; give this entry the same when"
+    return ""
+
+
 @lru_cache(maxsize=8)  # a robot's names are looked up in the same entries
 def _brought(broken: frozenset[tuple[str, str]]) -> tuple[frozenset[str], tuple[str, ...]]:
     """Return the names that refused entries would have brought, and how further ones would have begun."""
@@ -146,7 +155,8 @@ class Robot:
     those that are robots of their own, ``mounted`` the root frame of each part by its name, ``part_notes`` what to add
     to findings in a part's file. ``foreign`` are files of other tools, in which nothing can be fixed here. A robot that
     ``is_variant`` is a file's with profiles or overlays merged over it. ``zones`` are those that sensors have to see,
-    ``limits`` what the file sets instead of the limits of codes.
+    ``limits`` what the file sets instead of the limits of codes, ``conditions`` those of the entries that they leave
+    out, by (section, name).
     """
 
     name: str
@@ -176,6 +186,7 @@ class Robot:
     is_variant: bool = field(default=False, compare=False)
     zones: tuple[Zone, ...] = ()
     limits: dict[str, float] = field(default_factory=dict, compare=False)
+    conditions: dict[tuple[str, str], str] = field(default_factory=dict, compare=False)
 
     def final(self, frame: str) -> str:
         """Return the frame's name on the live tree: with the prefix, unless it is shared."""

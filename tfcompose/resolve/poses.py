@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, Note, did_you_mean, finding
 from tfcompose.geometry import IDENTITY_XYZW, OPTICAL_XYZW, Pose, multiply
-from tfcompose.model import STATIC, is_optical
+from tfcompose.model import STATIC, is_optical, left_out_by
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
+    from collections.abc import Callable, Collection, Mapping
 
     from tfcompose.findings import Span
     from tfcompose.language.pose import Posed, Rotated
@@ -88,13 +88,14 @@ class Solver:
     """Solves the drafts of one robot; ``found`` holds what could not be solved.
 
     ``broken`` are the paths of entries that were refused in part, ``excuses`` tells of a frame whether it, or the edge
-    above it, may be missing because an entry was refused.
+    above it, may be missing because an entry was refused, and ``conditions`` are those of entries that are left out.
     """
 
     drafts: list[Draft]
     frames: dict[str, Span]
     broken: Collection[Path] = ()
     excuses: Callable[[str], bool] = lambda _frame: False
+    conditions: Mapping[tuple[str, str], str] = field(default_factory=dict)
     found: list[Finding] = field(default_factory=list)
     _solved: dict[int, Edge] = field(default_factory=dict)
     _open: list[int] = field(default_factory=list)
@@ -172,7 +173,8 @@ class Solver:
             return frame
         if self.excuses(frame):
             raise _UnsolvableError(None)
-        raise _UnsolvableError(finding("TF203", f"no frame {frame}", at, help=did_you_mean(frame, self.frames)))
+        advice = left_out_by(self.conditions, frame) or did_you_mean(frame, self.frames)
+        raise _UnsolvableError(finding("TF203", f"no frame {frame}", at, help=advice))
 
     def _chain(self, frame: str) -> list[tuple[str, int]]:
         """Return the frame and its ancestors, each with the index of the edge to its parent (the root: −1)."""

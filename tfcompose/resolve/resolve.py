@@ -100,7 +100,9 @@ class _Work:
         self._draft(drafts)
         names = (*drafts.frames, *(process.name for process in self._everybody(own)))
         excuses = partial(may_be_refused, broken=frozenset(self.broken), known=names)
-        solver = Solver(self._measured(drafts), drafts.frames, self.validated.broken, excuses)
+        solver = Solver(
+            self._measured(drafts), drafts.frames, self.validated.broken, excuses, self.validated.conditions
+        )
         edges = solver.solve()
         own += drafts.drivers
         self.found += [*drafts.found, *bodies.found, *solver.found, *self._wrong_names(own)]
@@ -260,6 +262,7 @@ class _Work:
             is_variant=self.source.is_variant,
             zones=zones_of(self.spec, self.source) + tuple(zone for part in in_tree for zone in part.zones),
             limits=self._limits(),
+            conditions=self.validated.conditions,
         )
 
 

@@ -81,6 +81,8 @@ def test_every_integer_reads_back_as_itself(value: int) -> None:
 def test_what_is_not_finite_is_a_finding_at_its_place(number: str) -> None:
     found = load(f"a: {number}\n", "f").found
     assert [(one.code, one.span) for one in found] == [("TF007", Span("f", 1, 4, 1, 4 + len(number)))]
+    assert number[:40] in found[0].message
+    assert len(found[0].message) < 100
 
 
 TEXT = """\

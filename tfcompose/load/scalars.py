@@ -33,6 +33,8 @@ _FIRST = "nN~tTfF-+.0123456789"
 SCALAR_TAGS = frozenset((STR, *(tag for tag, _, _ in IMPLICIT)))
 
 _MOST_DIGITS = 300
+#: Of a number that is not taken so many characters are shown.
+_MOST_SHOWN = 40
 
 
 def implicit_tag(text: str) -> str:
@@ -75,14 +77,23 @@ def scalar(tag: str, text: str) -> str | bool | int | float | None:
 def _number(tag: str, text: str) -> int | float:
     if tag == INT and text[:2] in {"0o", "0x"}:
         number = int(text, 0)  # Python bounds the digits of decimal numbers only
-        return number if len(text) < _MOST_DIGITS else _finite(float(number), text)
+        return number if len(text) < _MOST_DIGITS else _finite(_rounded(number), text)
     if tag == INT and len(text) < _MOST_DIGITS:
         return int(text)
     value = float("nan") if "n" in text.lower().replace("inf", "") else float(text.lower().replace(".inf", "inf"))
     return _finite(value, text)
 
 
+def _rounded(number: int) -> float:
+    """Return the number as a float, infinity where no float is that large."""
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf
+
+
 def _finite(value: float, text: str) -> float:
     if not math.isfinite(value):
-        raise OverflowError(f"{text} is not a finite number")
+        shown = text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}… ({len(text)} characters)"
+        raise OverflowError(f"{shown} is not a finite number")
     return value

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import stat
 import time
 from pathlib import Path
 
@@ -123,3 +124,14 @@ def test_another_users_folder_gets_no_logs(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr(os, "geteuid", lambda: own + 1)
     assert "another user" in (Logs(tmp_path).write("a", "text") or "")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_another_user_could_exchange_gets_no_logs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "robot").mkdir()
+    status, lstat = list((tmp_path / "robot").lstat()), Path.lstat
+    status[stat.ST_UID] = os.geteuid() + 1
+    monkeypatch.setattr(Path, "lstat", lambda path: os.stat_result(status) if path == tmp_path else lstat(path))
+    assert "another user" in (Logs(tmp_path / "robot").write("a", "text") or "")
+    assert list((tmp_path / "robot").iterdir()) == []

@@ -243,6 +243,7 @@ class Logs:
         path.parent.mkdir(parents=True, exist_ok=True)
         for folder in {self.folder, path.parent}:
             _ensure_own(folder)
+        _ensure_kept(self.folder.parent)
         fd = os.open(path, os.O_CREAT | os.O_WRONLY | os.O_APPEND | os.O_NOFOLLOW, 0o640)
         log = self._open[process] = _Log(path, fd, os.fstat(fd).st_size)
         return log
@@ -276,6 +277,16 @@ def _ensure_own(folder: Path) -> None:
         raise OSError(errno.EPERM, "the folder is a link", str(folder))
     if found.st_uid != os.geteuid():
         raise OSError(errno.EPERM, "the folder is another user's", str(folder))
+
+
+def _ensure_kept(folder: Path) -> None:
+    """Refuse a folder of another user than root, who could exchange what is in it for a link at any time.
+
+    Raises:
+        OSError: if it is another user's.
+    """
+    if folder.lstat().st_uid not in {0, os.geteuid()}:
+        raise OSError(errno.EPERM, f"{folder} is another user's", str(folder))
 
 
 def logged(folder: Path) -> list[str]:

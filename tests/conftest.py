@@ -134,6 +134,17 @@ def node(domain: Domain) -> Iterator[Any]:
 
 
 @pytest.fixture
+def nodes(domain: Domain) -> Iterator[Any]:
+    """Real nodes that do what a test wants, in the test's domain."""
+    assert domain.id
+    from tests.support.fake_nodes import FakeNodes  # noqa: PLC0415 (ROS, which may not be there)
+
+    nodes = FakeNodes()
+    yield nodes
+    nodes.close()
+
+
+@pytest.fixture
 def start(domain: Domain) -> Iterator[Callable[..., Started]]:
     """Start ``python -m MODULE ARGUMENT…`` in the test's domain; what still runs at the test's end is killed."""
     running: list[Started] = []

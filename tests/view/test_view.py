@@ -23,7 +23,10 @@ from tfcompose.cli.compiling import library
 from tfcompose.cli.fixing import ChangedError, rewrite
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.geometry import Pose, offset_of, quat_from_rpy
+from tfcompose.plan.file import read_plan
+from tfcompose.urdf.packages import Packages
 from tfcompose.view.panel import Panel
+from tfcompose.view.plan_robot import robot_of_plan
 from tfcompose.view.scene import RobotScene, started, stop
 from tfcompose.view.session import Session, poses_in_roots
 
@@ -268,3 +271,35 @@ def test_a_mount_inside_a_part_cannot_be_saved_here_and_stays_moved() -> None:
     session.move(child, Pose((1, 2, 3)))
     assert session.save().elsewhere
     assert session.moved == {child: Pose((1, 2, 3))}
+
+
+def test_a_built_plan_is_shown_with_its_bodies_and_frames(rover: Path) -> None:
+    assert tfcompose_in(rover.parent, "build", rover.name, "--output", "out").returncode == 0
+    done = tfcompose_in(rover.parent, "view", "out", "--html", "rover.html")
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
+    plan = read_plan((rover.parent / "out" / "plan.json").read_text("utf-8"), "plan.json")
+    urdf = (rover.parent / "out" / plan.description).read_text("utf-8")
+    robot = robot_of_plan(plan, urdf, "robot.full.urdf", Packages().asset)
+    meant = session_of(rover).robot
+    assert robot.frames.keys() == meant.frames.keys()
+    bodies = {frame for frame, link in robot.links.items() if link.visuals or link.collisions}
+    assert bodies == {frame for frame, link in meant.links.items() if link.visuals or link.collisions}
+    there, here = poses_in_roots(robot, {}), poses_in_roots(meant, {})
+    assert all(max(offset_of(here[frame], pose)) < 1e-9 for frame, pose in there.items())
+    limits = {edge.joint.name: edge.joint.limit for edge in meant.edges if edge.joint}
+    assert {edge.joint.name: edge.joint.limit for edge in robot.edges if edge.joint} == limits
+
+
+def test_a_built_plan_is_not_edited(rover: Path) -> None:
+    assert tfcompose_in(rover.parent, "build", rover.name, "--output", "out").returncode == 0
+    done = tfcompose_in(rover.parent, "view", "out/plan.json", "--edit")
+    assert done.returncode == 2
+    assert "built plan" in done.stderr
+
+
+@pytest.mark.parametrize("option", [("--edit",), ("--html", "r.html")])
+def test_a_running_tree_takes_neither_edit_nor_html(rover: Path, option: tuple[str, ...]) -> None:
+    done = tfcompose_in(rover.parent, "view", rover.name, "--live", *option)
+    assert done.returncode == 2
+    assert done.stderr.startswith("tfcompose: --live")
+    assert not (rover.parent / "r.html").exists()

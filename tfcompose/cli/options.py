@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from argparse import ArgumentTypeError
 from typing import TYPE_CHECKING
@@ -10,6 +11,12 @@ from tfcompose.cli.terminal import UNREADABLE, fail
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
+
+    from tfcompose.geometry import Offset
+
+_UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "deg": math.pi / 180, "rad": 1.0}
+_ANGLES = frozenset({"deg", "rad"})
+_QUANTITY = re.compile(r"(\d+\.?\d*|\.\d+)\s*([a-z]+)")
 
 DEFAULT_FILE = "robot.yaml"
 TF_TOPICS = ("tf", "tf_static")
@@ -79,6 +86,32 @@ def add_namespace(parser: ArgumentParser, text: str = "use /NS/tf and /NS/tf_sta
 def add_bag(parser: ArgumentParser, text: str = "read a recording instead of the running tree") -> None:
     """Add --bag."""
     parser.add_argument("--bag", metavar="BAG", help=f"{text}: a rosbag2 folder, .mcap or .db3")
+
+
+def add_tolerance(parser: ArgumentParser) -> None:
+    """Add --tolerance."""
+    parser.add_argument(
+        "--tolerance", type=tolerance, default="1mm,0.1deg", metavar="T",
+        help="how far a pose may be off: 2mm, 0.5deg, or both as 2mm,0.5deg; default: 1mm,0.1deg",
+    )  # fmt: skip
+
+
+def tolerance(text: str) -> Offset:
+    """Read a distance, an angle, or both.
+
+    Raises:
+        ArgumentTypeError: if it is neither.
+    """
+    from tfcompose.geometry import Offset
+    from tfcompose.verdict.publishers import SAME_POSE
+
+    given: dict[bool, float] = {}
+    for part in text.split(","):
+        match = _QUANTITY.fullmatch(part.strip())
+        if match is None or match[2] not in _UNITS or (match[2] in _ANGLES) in given:
+            raise ArgumentTypeError(f"{text} is not a tolerance, such as 2mm or 2mm,0.5deg")
+        given[match[2] in _ANGLES] = float(match[1]) * _UNITS[match[2]]
+    return Offset(given.get(False, SAME_POSE.xyz_m), given.get(True, SAME_POSE.rot_rad))
 
 
 def add_for(parser: ArgumentParser, text: str, default: float | None = None) -> None:

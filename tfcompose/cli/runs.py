@@ -31,6 +31,7 @@ from tfcompose.text import listed
 if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Callable, Iterator
+    from pathlib import Path
     from typing import TextIO
 
     from tfcompose.ipc import Notice, ProcessStatus, Request, Verb
@@ -264,11 +265,15 @@ def other_domains(place: RuntimeDir) -> Iterator[str]:
             )
 
 
+def plan_file(place: RuntimeDir) -> Path:
+    """Return the copy of the plan that a robot runs; raises OSError or ValueError if it is not there any more."""
+    return max(place.plan_folders(), key=lambda folder: folder.stat().st_mtime) / "plan.json"
+
+
 def plan_of_run(place: RuntimeDir) -> Plan | None:
     """Return the plan that a robot runs, or None if it cannot be read any more."""
     try:
-        newest = max(place.plan_folders(), key=lambda folder: folder.stat().st_mtime)
-        return read_plan((newest / "plan.json").read_text("utf-8"), "plan.json")
+        return read_plan(plan_file(place).read_text("utf-8"), "plan.json")
     except (OSError, ValueError, RejectedError):
         return None
 

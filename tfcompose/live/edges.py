@@ -291,6 +291,11 @@ class TreeObserver:
         """Whether there is no graph to query, as with a recording."""
         return not self.publishers.queried
 
+    @property
+    def streams(self) -> tuple[EdgeStream, ...]:
+        """Each edge of each publisher, in the order in which they came first."""
+        return tuple(self._streams.values())
+
     def edges(self, now_ns: int) -> list[EdgeState]:
         """Return what is known of each edge at ``now_ns`` of the receiver's clock, sorted by parent and child."""
         streams = sorted(self._streams.values(), key=_order)

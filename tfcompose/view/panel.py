@@ -14,6 +14,8 @@ from tfcompose.view.scene import RobotScene, wxyz
 from tfcompose.view.session import poses_in_roots
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import viser
 
     from tfcompose.model import Joint, Robot
@@ -25,13 +27,17 @@ _SNAP_MM, _SNAP_DEG = 1.0, 1.0
 
 
 class Panel:
-    """Shows a session on a server; with ``edit`` its mounts can be moved and saved."""
+    """Shows a session on a server; with ``edit`` its mounts can be moved and saved, with ``joints`` its joints moved.
 
-    def __init__(self, server: viser.ViserServer, session: Session, *, edit: bool) -> None:
+    ``published`` are the poses of frames in their roots where something else than the session says where they are.
+    """
+
+    def __init__(self, server: viser.ViserServer, session: Session, *, edit: bool, joints: bool = True) -> None:
         self.session = session
         self._gui = server.gui
         self._server = server
         self.positions: dict[str, float] = {}
+        self.published: Mapping[str, Pose] | None = None
         self.scene = RobotScene(server.scene, session.robot)
         self._gizmo: Any = None
         self._numbers: list[Any] = []
@@ -46,16 +52,20 @@ class Panel:
         if edit:
             self._add_editor()
         self._add_owners()
-        self._add_joints(session.robot)
+        if joints:
+            self._add_joints(session.robot)
         self.refresh()
         self.scene.frame_camera(server, poses_in_roots(session.robot, self.positions))
         self._select()
 
     def refresh(self) -> None:
         """Put the scene where joints and mounts are now."""
-        robot = self.session.robot
-        poses = poses_in_roots(robot, self.positions)
-        self.scene.update(robot, poses)
+        if self.published is None:
+            self.scene.update(self.session.robot, self.poses())
+
+    def poses(self) -> Mapping[str, Pose]:
+        """Return where each frame is shown, in the root of its tree."""
+        return self.published or poses_in_roots(self.session.robot, self.positions)
 
     def _filter(self, _event: Any) -> None:
         names = [name for name in self.session.robot.frames if self._search.value.lower() in name.lower()]
@@ -156,8 +166,7 @@ class Panel:
         given = mount.given(mount.edge.pose)
         self._given.content = f"pose of **{mount.place}** in **{mount.relative_to}**"
         self._fill(given)
-        poses = poses_in_roots(self.session.robot, self.positions)
-        at = poses[mount.place]
+        at = self.poses()[mount.place]
         self._gizmo = self._server.scene.add_transform_controls("/gizmo", scale=0.25, wxyz=wxyz(at), position=at.xyz)
         self._gizmo.on_update(lambda event: self._dragged() if event.phase == "end" else None)
 
@@ -178,7 +187,7 @@ class Panel:
         mount = self.session.mount(self.frames.value)
         w, qx, qy, qz = (float(value) for value in self._gizmo.wxyz)
         px, py, pz = (float(value) for value in self._gizmo.position)
-        base = poses_in_roots(self.session.robot, self.positions)[mount.relative_to]
+        base = self.poses()[mount.relative_to]
         given = base.inverse() @ Pose((px, py, pz), (qx, qy, qz, w))
         if self._snap.value:
             rpy = (math.radians(round(math.degrees(a) / _SNAP_DEG) * _SNAP_DEG) for a in clean_rpy(given.quat_xyzw))

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 _FIRST_HUE, _NEXT_HUE = 0.58, 0.381966
 _GREY = (105, 112, 122)
 _AXES_M = 0.08
+_GHOST = (60, 120, 220)
 #: Where the camera begins, as a direction from the middle of the robot, and how many radii of it away.
 _FROM = np.array([0.62, 0.62, 0.48])
 _RADII = 2.0
@@ -90,6 +91,27 @@ def mesh_of(shape: Shape) -> Any:
         return None
 
 
+def _add_shape(scene: viser.SceneApi, name: str, shape: Shape, colour: tuple[int, int, int], opacity: float) -> Any:
+    """Add a shape to the scene, and return its mesh in the shape's own frame; None if it has none to show."""
+    mesh = mesh_of(shape)
+    if mesh is None or mesh.is_empty:
+        return None
+    scene.add_mesh_simple(
+        name,
+        np.asarray(mesh.vertices, np.float32),
+        np.asarray(mesh.faces, np.uint32),
+        color=colour,
+        opacity=opacity,
+        flat_shading=True,
+        side="double",
+        cast_shadow=False,
+        receive_shadow=False,
+        wxyz=wxyz(shape.pose),
+        position=shape.pose.xyz,
+    )
+    return mesh
+
+
 class RobotScene:
     """What a scene shows of one robot; ``update`` moves it."""
 
@@ -110,26 +132,12 @@ class RobotScene:
     def _add_body(self, frame: str, name: str, shapes: tuple[Shape, ...]) -> None:
         self._bodies[frame] = self._scene.add_frame(name, show_axes=False)
         for number, shape in enumerate(shapes):
-            mesh = mesh_of(shape)
-            if mesh is None or mesh.is_empty:
-                continue
-            corners = itertools.product(*mesh.bounds.T.tolist())
-            self._corners.setdefault(frame, []).extend((shape.pose @ Pose(one)).xyz for one in corners)
             rgba = shape.material.rgba if shape.material else None
             colour = (round(rgba[0] * 255), round(rgba[1] * 255), round(rgba[2] * 255)) if rgba else _GREY
-            self._scene.add_mesh_simple(
-                f"{name}/{number}",
-                np.asarray(mesh.vertices, np.float32),
-                np.asarray(mesh.faces, np.uint32),
-                color=colour,
-                opacity=0.8,
-                flat_shading=True,
-                side="double",
-                cast_shadow=False,
-                receive_shadow=False,
-                wxyz=wxyz(shape.pose),
-                position=shape.pose.xyz,
-            )
+            mesh = _add_shape(self._scene, f"{name}/{number}", shape, colour, 0.8)
+            if mesh is not None:
+                corners = itertools.product(*mesh.bounds.T.tolist())
+                self._corners.setdefault(frame, []).extend((shape.pose @ Pose(one)).xyz for one in corners)
 
     def update(self, robot: Robot, poses: Mapping[str, Pose]) -> None:
         """Put every frame where it is in the root of its tree."""
@@ -182,3 +190,27 @@ class RobotScene:
         w, x, y, z = (float(value) for value in self._bodies[frame].wxyz)
         px, py, pz = (float(value) for value in self._bodies[frame].position)
         return Pose((px, py, pz), (x, y, z, w))
+
+
+class Ghosts:
+    """Bodies and axes where a robot's file has frames that are elsewhere."""
+
+    def __init__(self, scene: viser.SceneApi, robot: Robot) -> None:
+        self._scene = scene
+        self._links = robot.links
+        self._names = {frame: f"/ghost/{index}" for index, frame in enumerate(robot.frames)}
+        self._shown: dict[str, Any] = {}
+
+    def show(self, poses: Mapping[str, Pose]) -> None:
+        """Show these frames, by their poses in the roots of their trees, and no others."""
+        for frame in self._shown.keys() - poses.keys():
+            self._shown.pop(frame).remove()
+        for frame, name in self._names.items():
+            if frame not in poses:
+                continue
+            if frame not in self._shown:
+                self._shown[frame] = self._scene.add_frame(name, axes_length=_AXES_M / 2, axes_radius=_AXES_M / 40)
+                link = self._links.get(frame)
+                for number, shape in enumerate((link.visuals or link.collisions) if link else ()):
+                    _add_shape(self._scene, f"{name}/{number}", shape, _GHOST, 0.25)
+            self._shown[frame].wxyz, self._shown[frame].position = wxyz(poses[frame]), poses[frame].xyz

@@ -8,27 +8,27 @@ by as much as a calibration moves them; more is a warning.
 
 from __future__ import annotations
 
-import math
-import re
 import sys
 import time
-from argparse import ArgumentTypeError
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import DEFAULT_FILE, add_bag, add_for, add_format, add_variant, settle_duration
+from tfcompose.cli.options import (
+    DEFAULT_FILE,
+    add_bag,
+    add_for,
+    add_format,
+    add_tolerance,
+    add_variant,
+    settle_duration,
+)
 from tfcompose.cli.terminal import print_findings
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
 
     from tfcompose.findings import Span
-    from tfcompose.geometry import Offset
     from tfcompose.plan import Plan
     from tfcompose.verdict.verify import Verdict
-
-_UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "deg": math.pi / 180, "rad": 1.0}
-_ANGLES = frozenset({"deg", "rad"})
-_QUANTITY = re.compile(r"(\d+\.?\d*|\.\d+)\s*([a-z]+)")
 
 
 def arguments(parser: ArgumentParser) -> None:
@@ -40,10 +40,7 @@ def arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--live", action="store_true", help="use the running tree (default unless --bag is given)")
     add_bag(parser)
     add_for(parser, "observe the running tree for S seconds; default: 5")
-    parser.add_argument(
-        "--tolerance", type=tolerance, default="1mm,0.1deg", metavar="T",
-        help="how far a pose may be off: 2mm, 0.5deg, or both as 2mm,0.5deg; default: 1mm,0.1deg",
-    )  # fmt: skip
+    add_tolerance(parser)
     add_format(parser, "json", "junit")
     parser.add_argument(
         "--fail-on", choices=("error", "warning"), default="error", help="lowest severity that exits 1; default: error"
@@ -104,21 +101,3 @@ def _report(arguments: Namespace, plan: Plan, verdicts: list[Verdict], seconds: 
         print_findings(found, sys.stdout)
         print(f"{plan.robot}: {summary(verdicts)}, in {arguments.bag or 'the running tree'}")
     return int(any(one.severity in failing for one in found))
-
-
-def tolerance(text: str) -> Offset:
-    """Read a distance, an angle, or both.
-
-    Raises:
-        ArgumentTypeError: if it is neither.
-    """
-    from tfcompose.geometry import Offset
-    from tfcompose.verdict.publishers import SAME_POSE
-
-    given: dict[bool, float] = {}
-    for part in text.split(","):
-        match = _QUANTITY.fullmatch(part.strip())
-        if match is None or match[2] not in _UNITS or (match[2] in _ANGLES) in given:
-            raise ArgumentTypeError(f"{text} is not a tolerance, such as 2mm or 2mm,0.5deg")
-        given[match[2] in _ANGLES] = float(match[1]) * _UNITS[match[2]]
-    return Offset(given.get(False, SAME_POSE.xyz_m), given.get(True, SAME_POSE.rot_rad))

@@ -1,7 +1,9 @@
 """Show a robot in the browser, and edit its mounts.
 
-Show the robot of FILE in 3-D in the browser: bodies, frames, owners, joints. With --edit mounts are dragged, or their
-poses typed, and saved where the values stand in the file.
+Show the robot of FILE (a robot, or a built plan.json) in 3-D in the browser: bodies, frames, owners, joints. With
+--edit mounts are dragged, or their poses typed, and saved where the values stand in the file. With --live frames are
+where they are published: what differs from the robot has a ghost where it should be, edges that are silent or sent by
+somebody else are red.
 """
 
 from __future__ import annotations
@@ -11,16 +13,13 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import add_file, add_variant
-from tfcompose.cli.terminal import UNREADABLE, fail
+from tfcompose.cli.options import DEFAULT_FILE, add_tolerance, add_variant
+from tfcompose.cli.terminal import UNREADABLE, fail, warn
 from tfcompose.signals import take_interrupt
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
-    from collections.abc import Mapping, Sequence
-
-    from tfcompose.compile import Compiled
-    from tfcompose.view.session import Session
+    from collections.abc import Sequence
 
 _HOST, _PORT = "127.0.0.1", 8080
 _LAST_PORT = 65_535
@@ -28,8 +27,12 @@ _LAST_PORT = 65_535
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    add_file(parser)
+    parser.add_argument(
+        "file", nargs="?", metavar="FILE|PLAN", help="default: robot.yaml; with --live the robot that runs here, if any"
+    )
     add_variant(parser)
+    parser.add_argument("--live", action="store_true", help="show the running tree, and what is wrong with it")
+    add_tolerance(parser)
     parser.add_argument("--edit", action="store_true", help="move mounts, and save them in the file")
     parser.add_argument("--html", metavar="FILE", help="write one HTML file that needs nothing else, and end")
     parser.add_argument("--port", type=int, default=_PORT, help=f"the port on this machine (default: {_PORT})")
@@ -44,11 +47,16 @@ def run(arguments: Namespace) -> int:
         from tfcompose.view.session import poses_in_roots
     except ImportError as error:
         fail(f"{error.name} is not installed: pip install 'tfcompose[view]'", UNREADABLE)
+    from tfcompose.cli.view_session import plan_of_session, session_of
     from tfcompose.cli.writing import replace_file
 
+    if arguments.live and (arguments.html or arguments.edit):
+        fail("--live shows what is published: leave out --html and --edit", UNREADABLE)
+    file = arguments.file or _running_plan(arguments) or DEFAULT_FILE
     if arguments.html:
-        _check_output(Path(arguments.html), [arguments.file, *arguments.overlays])
-    session = _session(arguments)
+        _check_output(Path(arguments.html), [file, *arguments.overlays])
+    session = session_of(file, arguments)
+    plan = plan_of_session(session) if arguments.live else None
     port = 0 if arguments.html else _free(arguments.port)
     server = started(_HOST, port, session.robot.name)
     try:
@@ -62,11 +70,29 @@ def run(arguments: Namespace) -> int:
             except OSError as error:
                 fail(f"{arguments.html} cannot be written: {error.strerror}", UNREADABLE)
             return 0
-        Panel(server, session, edit=arguments.edit)
-        _serve(f"http://{_HOST}:{server.get_port()}", arguments)
+        panel = Panel(server, session, edit=arguments.edit, joints=not arguments.live)
+        _announce(f"http://{_HOST}:{server.get_port()}", arguments)
+        if plan is not None:
+            from tfcompose.cli.live_view import follow
+
+            return follow(server, panel, plan, arguments.tolerance)
+        _wait()
     finally:
         stop(server)
     return 0
+
+
+def _running_plan(arguments: Namespace) -> str | None:
+    """Return the plan that the robot runs with that is in this ROS domain; None if there is none, or none is meant."""
+    if not arguments.live or arguments.profiles or arguments.overlays or arguments.settings or arguments.given:
+        return None
+    from tfcompose.cli.runs import plan_file, run_of_domain
+
+    found = run_of_domain()
+    if found is None:
+        return None
+    warn(f"{found[0].name} runs here, so it is shown")
+    return str(plan_file(found[0]))
 
 
 def _check_output(path: Path, files: Sequence[str]) -> None:
@@ -75,45 +101,6 @@ def _check_output(path: Path, files: Sequence[str]) -> None:
         fail(f"{path} cannot be written: no folder {path.parent}", UNREADABLE)
     if path.resolve() in {Path(file).resolve() for file in files}:
         fail(f"--html {path} would replace a file of the robot", UNREADABLE)
-
-
-def _session(arguments: Namespace) -> Session:
-    """Return the robot of the file with what is merged over it; ends where it has none to show."""
-    from tfcompose.cli.compiling import disk, given_by, library, overlays_of
-    from tfcompose.cli.fixing import rewrite
-    from tfcompose.cli.reading import read_text
-    from tfcompose.cli.terminal import print_findings, reject
-    from tfcompose.compile import compile_robot
-    from tfcompose.findings import RejectedError
-    from tfcompose.view.session import Session
-
-    try:
-        texts = {file: read_text(file) for file in (arguments.file, *arguments.overlays)}
-        presets, packages = library(), disk()
-
-        def compiled(now: Mapping[str, str]) -> Compiled:
-            def read(file: str) -> str:
-                return now[file] if file in now else read_text(file)
-
-            overlays = overlays_of(arguments, read)
-            return compile_robot(
-                now[arguments.file],
-                arguments.file,
-                presets,
-                arguments.profiles,
-                overlays=overlays,
-                read=read,
-                disk=packages,
-                given=given_by(arguments),
-            )
-
-        session = Session(texts, compiled, lambda file, old, new: rewrite(Path(file), old, new))
-    except RejectedError as error:
-        reject(error.findings)
-    if session.state.robot is None or not session.robot.frames:
-        reject(session.state.found)
-    print_findings(session.state.found, sys.stderr)
-    return session
 
 
 def _free(port: int) -> int:
@@ -138,8 +125,8 @@ def _is_free(port: int) -> bool:
     return True
 
 
-def _serve(address: str, arguments: Namespace) -> None:
-    """Say where it is, and wait for Ctrl-C."""
+def _announce(address: str, arguments: Namespace) -> None:
+    """Say where the view is, and open the browser where that is wanted."""
     sys.stdout.write(f"{address}; Ctrl-C ends it\n")
     sys.stdout.flush()
     if arguments.open:
@@ -148,5 +135,9 @@ def _serve(address: str, arguments: Namespace) -> None:
         webbrowser.open(address)
     if take_interrupt():
         raise KeyboardInterrupt  # trimesh's optional imports had swallowed it
+
+
+def _wait() -> None:
+    """Wait for Ctrl-C."""
     while True:
         time.sleep(1)

@@ -1,0 +1,98 @@
+"""What ``view`` shows: the robot of a file, or of a built plan, as a session that can be compiled again."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.compiling import disk, given_by, library, overlays_of
+from tfcompose.cli.fixing import rewrite
+from tfcompose.cli.plans import in_folder, is_plan, refuse_variant
+from tfcompose.cli.reading import read_text
+from tfcompose.cli.terminal import UNREADABLE, fail, print_findings, reject
+from tfcompose.compile import Compiled, compile_robot
+from tfcompose.emit.plan import plan_of
+from tfcompose.findings import RejectedError
+from tfcompose.plan.file import read_plan
+from tfcompose.urdf.packages import Packages
+from tfcompose.view.plan_robot import robot_of_plan
+from tfcompose.view.session import Session
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Mapping
+
+    from tfcompose.plan import Plan
+
+
+def session_of(file: str, arguments: Namespace) -> Session:
+    """Return the robot of the file, a built plan or a folder with one, with what is merged over it.
+
+    Raises:
+        SystemExit: after saying why there is none to show.
+    """
+    file = in_folder(file)
+    try:
+        session = _plan_session(file, arguments) if is_plan(file) else _robot_session(file, arguments)
+    except RejectedError as error:
+        reject(error.findings)
+    if session.state.robot is None or not session.robot.frames:
+        reject(session.state.found)
+    print_findings(session.state.found, sys.stderr)
+    return session
+
+
+def _robot_session(file: str, arguments: Namespace) -> Session:
+    texts = {one: read_text(one) for one in (file, *arguments.overlays)}
+    presets, packages = library(), disk()
+
+    def compiled(now: Mapping[str, str]) -> Compiled:
+        def read(one: str) -> str:
+            return now[one] if one in now else read_text(one)
+
+        overlays = overlays_of(arguments, read)
+        return compile_robot(
+            now[file],
+            file,
+            presets,
+            arguments.profiles,
+            overlays=overlays,
+            read=read,
+            disk=packages,
+            given=given_by(arguments),
+        )
+
+    return Session(texts, compiled, lambda one, old, new: rewrite(Path(one), old, new))
+
+
+def _plan_session(file: str, arguments: Namespace) -> Session:
+    refuse_variant(arguments)
+    if arguments.edit:
+        fail("a built plan cannot be edited: give the robot's file", UNREADABLE)
+    packages = Packages(disk())
+
+    def compiled(now: Mapping[str, str]) -> Compiled:
+        try:
+            plan = read_plan(now[file], file)
+            description = Path(file).with_name(plan.description)
+            text = read_text(str(description)) if description.is_file() else None
+            return Compiled(robot_of_plan(plan, text, str(description), packages.asset), ())
+        except RejectedError as error:
+            return Compiled(None, error.findings)
+
+    return Session({file: read_text(file)}, compiled, lambda *_: None)
+
+
+def plan_of_session(session: Session) -> Plan:
+    """Return what the session's robot publishes.
+
+    Raises:
+        SystemExit: after printing the errors for which it has no plan.
+    """
+    file, text = next(iter(session.texts.items()))
+    if is_plan(file):
+        return read_plan(text, file)
+    if session.state.errors:
+        reject(session.state.found)
+    return plan_of(session.robot.with_final_names())

@@ -1,0 +1,131 @@
+"""The panel and the scene of a running tree: frames as published, ghosts, what is wrong, and the robot's processes."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tfcompose.view.scene import Ghosts
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import viser
+
+    from tfcompose.findings import Finding
+    from tfcompose.view.live import LiveTree, Picture
+    from tfcompose.view.panel import Panel
+
+_RED = (220, 30, 30)
+#: Of findings, and of the names of frames that nobody declared, so many are shown.
+_MOST = 40
+_COLOURS = {"error": "rgb(220, 30, 30)", "warning": "rgb(200, 120, 20)"}
+
+
+class LivePanel:
+    """Shows a live tree beside the panel of its robot."""
+
+    def __init__(self, server: viser.ViserServer, panel: Panel, tree: LiveTree) -> None:
+        self.tree = tree
+        self._panel = panel
+        self._scene = server.scene
+        self._ghosts = Ghosts(server.scene, tree.robot)
+        self._wrong = _Lines(server.scene, "/live/wrong", _RED)
+        self._further: dict[str, Any] = {}
+        with server.gui.add_folder("Live", order=-1):
+            self._edge = server.gui.add_html("")
+            self._found = server.gui.add_html("")
+            self._processes = server.gui.add_html("")
+        panel.frames.on_update(lambda _: self.show_text())
+
+    def show(self) -> None:
+        """Put the scene where the tree is now; nothing is sent for what stays."""
+        picture = self.tree.moved()
+        if picture is None:
+            return
+        self._panel.published = picture.poses
+        self._panel.scene.update(picture.robot, picture.poses)
+        self._ghosts.show(picture.ghosts)
+        self._wrong.show(_ends(picture))
+        self._show_further(picture)
+
+    def show_text(self) -> None:
+        """Say what is wrong, and what is known of the selected frame."""
+        frame = self._panel.frames.value
+        _set(self._edge, _paragraphs([f"<b>{escape(frame)}</b>", *map(escape, self.tree.about(frame))]))
+        _set(self._found, findings_html(self.tree.judgement.found))
+
+    def show_processes(self, title: str, rows: Sequence[Sequence[str]]) -> None:
+        """Show the processes of the robot that runs, the first row being the heads of columns."""
+        _set(self._processes, _table(title, rows))
+
+    def _show_further(self, picture: Picture) -> None:
+        """Show frames that nobody declared, by their names."""
+        for frame in self._further.keys() - picture.further.keys():
+            self._further.pop(frame).remove()
+        for number, (frame, pose) in enumerate(picture.further.items()):
+            if frame not in self._further:
+                if len(self._further) >= _MOST:
+                    break
+                self._further[frame] = self._scene.add_label(f"/live/further/{number}", frame)
+            self._further[frame].position = pose.xyz
+
+
+class _Lines:
+    """Lines of one colour, as many as there are just now."""
+
+    def __init__(self, scene: viser.SceneApi, name: str, colour: tuple[int, int, int]) -> None:
+        self._scene = scene
+        self._name = name
+        self._colour = colour
+        self._handle: Any = None
+        self._points = np.zeros((0, 2, 3), np.float32)
+
+    def show(self, points: Any) -> None:
+        """Show lines between these ends, shape (lines, 2, 3)."""
+        if np.array_equal(points, self._points):
+            return
+        if self._handle is not None and len(points) != len(self._points):
+            self._handle.remove()
+            self._handle = None
+        self._points = points
+        if self._handle is not None:
+            self._handle.points = points
+        elif len(points):
+            self._handle = self._scene.add_line_segments(
+                self._name, points, self._colour, thickness=6, thickness_units="screen"
+            )
+
+
+def _ends(picture: Picture) -> Any:
+    poses = {**picture.further, **picture.poses}
+    ends = [(poses[parent].xyz, poses[child].xyz) for parent, child in picture.wrong]
+    return np.array(ends, np.float32).reshape(-1, 2, 3)
+
+
+def findings_html(found: Sequence[Finding]) -> str:
+    """Return findings as a list of HTML, errors in red; names in them come from whoever publishes."""
+    if not found:
+        return _paragraphs(["all edges as expected"])
+    lines = [
+        f'<span style="color: {_COLOURS.get(one.severity, "inherit")}">{escape(one.code)}</span> {escape(one.message)}'
+        for one in found[:_MOST]
+    ]
+    more = [f"and {len(found) - _MOST} more"] if len(found) > _MOST else []
+    return _paragraphs([*lines, *more])
+
+
+def _paragraphs(lines: Sequence[str]) -> str:
+    return f'<div style="padding: 0 0.7em; font-size: 0.85em">{"<br>".join(lines)}</div>'
+
+
+def _table(title: str, rows: Sequence[Sequence[str]]) -> str:
+    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    return f'<div style="padding: 0 0.7em; font-size: 0.8em">{escape(title)}<table>{body}</table></div>'
+
+
+def _set(handle: Any, content: str) -> None:
+    if handle.content != content:
+        handle.content = content

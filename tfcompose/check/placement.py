@@ -56,9 +56,11 @@ class _Views:
 
 
 def _is_placed(robot: Robot, sensor: MountedSensor) -> bool:
-    """Return whether the sensor has a pose; one at the origin of its parent is not mounted yet."""
+    """Return whether the sensor has a pose; one at the origin of the base is not mounted yet."""
     edge = robot.parent_edge(sensor.mount)
-    return edge is not None and edge.pose_known and edge.pose != Pose()
+    if edge is None or not edge.pose_known:
+        return False
+    return edge.pose != Pose() or not (edge.parent == robot.base or edge.parent.endswith("base_link"))
 
 
 _VIEWS = _Views()

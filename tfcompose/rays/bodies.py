@@ -64,8 +64,14 @@ def fixed_to(robot: Robot, frame: str, *, only_static: bool = False) -> dict[str
 
 
 def bodies_around(robot: Robot, sensor: MountedSensor, poses: Mapping[str, Pose]) -> Iterator[Body]:
-    """Yield the shapes of the links at ``poses`` that are not the sensor's own: for collision, else those seen."""
+    """Yield the shapes of the links at ``poses`` that are not the sensor's own: for collision, else those seen.
+
+    A link in whose origin the sensor stands is its housing.
+    """
     own = {sensor.mount, *sensor.frames}
+    above = robot.parent_edge(sensor.mount)
+    if above and above.pose == Pose():
+        own.add(above.parent)
     for name, pose in poses.items():
         link = robot.links.get(name)
         if link and name not in own:

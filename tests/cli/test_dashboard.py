@@ -223,7 +223,17 @@ def test_keys_are_known_in_pieces_and_in_the_forms_that_terminals_send() -> None
 
 def test_what_was_printed_before_the_view_is_among_its_events_after_each_connection() -> None:
     plan = Plan("rover", "", None, RosSettings(), (), ())
-    view = Dashboard("rover@0", plan, ["an earlier run left 77 behind\033[2J"], clock=lambda: NOON)
+    view = Dashboard("rover@0", plan, (), ["an earlier run left 77 behind\033[2J"], clock=lambda: NOON)
     assert "WARNING an earlier run left 77 behind" in shown(view)
     view.forget()
     assert shown(view).count("an earlier run left 77 behind") == 1
+
+
+def test_what_the_build_found_is_among_the_findings_also_after_the_connection_is_made_again() -> None:
+    view = dashboard()
+    view = Dashboard("rover@0", view.plan, [replace(TAKEN, code="TF508", severity="warning")], clock=lambda: NOON)
+    for _ in range(2):
+        assert "1 warning" in shown(view).splitlines()[0]
+        assert "TF508" in shown(view)
+        view.forget()
+    assert "pid 77" in shown(open_page(view, "findings"))

@@ -237,3 +237,13 @@ def test_a_terminal_that_takes_nothing_keeps_neither_the_view_nor_the_robot_from
     assert until(lambda: all(map(gone, started)))
     shell.reads.set()
     shell.shows(PROMPT)
+
+
+def test_what_the_build_found_is_shown_in_the_view(shell: Shell, tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text(f"{ROBOT}vars: {{idle: 1}}\n")
+    shell.up()
+    shell.shows("1 warning", "TF", "idle", "1/1 edges live")
+    shell.type("f")
+    shell.shows("robot.yaml:9")
+    shell.type("\003")
+    shell.shows("ended", PROMPT)

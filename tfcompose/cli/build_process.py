@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import signal
 import sys
@@ -11,6 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.terminal import FAILED, INTERRUPTED, UNREADABLE, fail
+from tfcompose.findings import Finding
+from tfcompose.plan.codec import decode, encode
 from tfcompose.signals import take_interrupt
 
 if TYPE_CHECKING:
@@ -56,8 +59,8 @@ class BuildProcess:
         os.kill(self._pid, signal.SIGINT)
         self._exit_code()
 
-    def plan_file(self) -> Path:
-        """Wait for the end of the build, and return the file of its plan.
+    def built(self) -> tuple[Path, list[Finding]]:
+        """Wait for the end of the build, and return the file of its plan, and the warnings, which it has printed.
 
         Raises:
             SystemExit: with the build's exit code, if it failed, after it said why.
@@ -69,7 +72,8 @@ class BuildProcess:
         if code < 0:
             fail(f"the build was ended by {signal.Signals(-code).name}")
         if code == 0:
-            return Path(os.fsdecode(answer))
+            file, _, found = answer.partition(b"\0")
+            return Path(os.fsdecode(file)), [decode(Finding, one) for one in json.loads(found)]
         if answer:
             raise OSError(int(answer), os.strerror(int(answer)))
         raise SystemExit(code)
@@ -82,7 +86,7 @@ class BuildProcess:
 
 
 def _build(arguments: Namespace, answer: int, mask: Iterable[int]) -> int:
-    """Build and return the exit code; write the plan's file, or the number of an operating system's error.
+    """Build and return the exit code; write the plan's file and the findings, or the number of an OSError.
 
     ``mask`` is the mask of signals of before the fork.
     """
@@ -95,8 +99,9 @@ def _build(arguments: Namespace, answer: int, mask: Iterable[int]) -> int:
         from tfcompose.cli.plans import PLAN
         from tfcompose.cli.writing import build
 
-        folder, _ = build(arguments)
-        os.write(answer, os.fsencode(folder / PLAN))
+        folder, _, found = build(arguments)
+        with open(answer, "wb", closefd=False) as pipe:
+            pipe.write(os.fsencode(folder / PLAN) + b"\0" + json.dumps([encode(one) for one in found]).encode())
         code = 0
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else UNREADABLE

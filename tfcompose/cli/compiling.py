@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import fail, print_findings, reject
-from tfcompose.compile import compile_robot
+from tfcompose.compile import Compiled, compile_robot
 from tfcompose.findings import RejectedError, Span, did_you_mean
 from tfcompose.language import Given, GivenArg, set_value, with_includes
 from tfcompose.load import load
@@ -108,11 +108,11 @@ def compiled_robot(file: str, arguments: Namespace) -> Robot:
     Raises:
         SystemExit: after printing what is wrong with it.
     """
-    return robot_with_sources(file, arguments)[0]
+    return compiled_without_errors(file, arguments)[0]
 
 
-def robot_with_sources(file: str, arguments: Namespace) -> tuple[Robot, tuple[Source, ...]]:
-    """Return the robot, and what it was made from: files with overlays laid over them, those of parts too.
+def compiled_without_errors(file: str, arguments: Namespace) -> tuple[Robot, Compiled]:
+    """Return the robot, and what it was compiled to; warnings are printed.
 
     Raises:
         SystemExit: after printing what is wrong with it.
@@ -128,7 +128,7 @@ def robot_with_sources(file: str, arguments: Namespace) -> tuple[Robot, tuple[So
     if compiled.robot is None or compiled.errors:
         reject(compiled.found)
     print_findings(compiled.found, sys.stderr)
-    return compiled.robot, compiled.sources
+    return compiled.robot, compiled
 
 
 def edges_between(robot: Robot, a: str, b: str) -> tuple[list[Edge], list[Edge]]:

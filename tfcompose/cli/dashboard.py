@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from tfcompose.cli.process_table import Usage
+    from tfcompose.findings import Finding
     from tfcompose.ipc import Notice, ProcessStatus, RobotStatus
     from tfcompose.plan import Plan
 
@@ -114,7 +115,7 @@ class _Scroll:
 class Dashboard:
     """The live view's state. ``name`` is the robot's with its domain; ``clock`` gives seconds since 1970.
 
-    ``warnings`` were printed before the view, and are its first events.
+    The findings of the build and ``warnings`` were printed before the view, and are its first findings and events.
 
     ``status`` and ``used`` are what was learned last; ``log_of`` names the process whose log is to be read for
     ``add_log_lines``, if a log is shown.
@@ -122,6 +123,7 @@ class Dashboard:
 
     name: str
     plan: Plan
+    built_with: Sequence[Finding] = ()
     warnings: Sequence[str] = ()
     clock: Callable[[], float] = time.time
     status: RobotStatus | None = None
@@ -169,6 +171,8 @@ class Dashboard:
         self._events.clear()
         self._events.extend((self._began, f"WARNING {plain(one)}") for one in self.warnings)
         self._counts = dict.fromkeys(self._counts, 0)
+        for found in self.built_with:
+            self.take(FindingShown(found), self._began)
 
     def add_log_lines(self, lines: Iterable[str]) -> None:
         """Add lines to the log that is shown; where it was scrolled back, it stays in place."""

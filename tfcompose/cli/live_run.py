@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
     from tfcompose.cli.dashboard import Dashboard
     from tfcompose.cli.screen import Screen
+    from tfcompose.findings import Finding
     from tfcompose.ipc import Notice, Request
     from tfcompose.launcher.runtime_dir import RuntimeDir
     from tfcompose.plan import Plan
@@ -68,18 +69,26 @@ def can_show_live() -> bool:
         return False
 
 
-def follow(place: RuntimeDir, plan: Plan, launcher: int, mask: Iterable[int], warnings: Sequence[str]) -> int:
+def follow(  # noqa: PLR0913, PLR0917 (the run, and what was printed before it)
+    place: RuntimeDir,
+    plan: Plan,
+    launcher: int,
+    mask: Iterable[int],
+    built_with: Sequence[Finding],
+    warnings: Sequence[str],
+) -> int:
     """Show the run until its launcher, a child of this process, has ended; return its exit code.
 
     Signals that end a plan are passed on to it. They are blocked until here, and ``mask`` is the mask before that.
-    ``warnings`` were printed before, and are behind the view while it is shown: they are among its events.
+    The findings of the build and ``warnings`` were printed before, and are behind the view while it is shown: they are
+    the first of its findings and events.
     """
     with Signals(signal.SIGWINCH, signal.SIGTSTP, signal.SIGQUIT) as signals:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         from tfcompose.cli.dashboard import Dashboard  # rich takes a moment to load, and signals none
         from tfcompose.cli.screen import Screen
 
-        view = _View(place, Dashboard(place.name, plan, warnings), launcher, signals)
+        view = _View(place, Dashboard(place.name, plan, built_with, warnings), launcher, signals)
         output = NonBlockingOutput(sys.stdout.fileno())
         with Screen(sys.stdin.fileno(), output) as screen:
             code = view.run(screen)

@@ -51,15 +51,18 @@ from tfcompose.ros.environment import child_environment, ros_trouble
 
 if TYPE_CHECKING:
     from argparse import Namespace
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from tfcompose.findings import Finding
     from tfcompose.launcher.runtime_dir import RuntimeDir
     from tfcompose.plan import Plan
 
 
-def start(file: Path, arguments: Namespace) -> int:
-    """Check all that the plan in the file needs, and start it; return the exit code as ``up`` does."""
+def start(file: Path, arguments: Namespace, built_with: Sequence[Finding] = ()) -> int:
+    """Check all that the plan in the file needs, and start it; return the exit code as ``up`` does.
+
+    ``built_with`` are the warnings of its build, which were printed.
+    """
     plan = plan_to_start(built_plan(file), arguments)
     if plan.guard.mode == "off" and arguments.settle is not None:
         fail("the guard is off, so --settle has no effect: leave it out", UNREADABLE)
@@ -91,7 +94,7 @@ def start(file: Path, arguments: Namespace) -> int:
             mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
             pid = _fork(plan, place, lock, session, arguments.duration, mask)
             stack.close()  # the lock is the launcher's from now on
-            return follow(place, plan, pid, mask, warnings)
+            return follow(place, plan, pid, mask, built_with, warnings)
         session.output = NonBlockingOutput(sys.stdout.fileno())
         stack.callback(session.output.close)
         return _run(plan, place, session, session.output, arguments.duration)

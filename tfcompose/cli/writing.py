@@ -15,7 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.compiling import compiled_robot
+from tfcompose.cli.compiling import compiled_without_errors
 from tfcompose.cli.terminal import UNREADABLE, fail, reject, warn
 from tfcompose.emit import described, emit
 from tfcompose.files import Target, unaddressed
@@ -168,8 +168,8 @@ def _remove_stale(folder: Path, stale: Sequence[str]) -> None:
             _remove_if_empty(folder / parent)
 
 
-def build(arguments: Namespace) -> tuple[Path, list[str]]:
-    """Build the robot and return the folder and the names of the files.
+def build(arguments: Namespace) -> tuple[Path, list[str], tuple[Finding, ...]]:
+    """Build the robot and return the folder, the names of the files and the warnings, which are printed.
 
     Raises:
         SystemExit: after saying why nothing was written.
@@ -177,7 +177,7 @@ def build(arguments: Namespace) -> tuple[Path, list[str]]:
     reads_back = getattr(arguments, "read_back", False)
     if reads_back and find_spec("yourdfpy") is None:
         fail("--read-back needs the package yourdfpy: pip install 'tfcompose[view]'", UNREADABLE)
-    robot = compiled_robot(arguments.file, arguments)
+    robot, compiled = compiled_without_errors(arguments.file, arguments)
     folder, target = destination(arguments, robot)
     lost = [_without_address(asset, target.form) for asset in unaddressed(robot, target.form)]
     if lost:
@@ -196,7 +196,7 @@ def build(arguments: Namespace) -> tuple[Path, list[str]]:
         fail(f"nothing was written to {folder}: {error.strerror}{where}", UNREADABLE)
     if shared:
         warn(f"{folder} held the build of {shared}; -o builds into another folder")
-    return folder, [file.path for file in files]
+    return folder, [file.path for file in files], compiled.found
 
 
 def _source_file(folder: Path) -> Path:

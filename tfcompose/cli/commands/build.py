@@ -34,6 +34,6 @@ def run(arguments: Namespace) -> int:
     """Build; exit code 0, 1 with errors in the robot, 2 where something cannot be read or written."""
     from tfcompose.cli.writing import build
 
-    folder, names = build(arguments)
+    folder, names, _ = build(arguments)
     print(f"wrote {folder}: {', '.join(names)}")
     return 0

@@ -54,9 +54,10 @@ def run(arguments: Namespace) -> int:
         case [word]:
             _explain_code(word)
         case [file, a, b]:
-            from tfcompose.cli.compiling import robot_with_sources
+            from tfcompose.cli.compiling import compiled_without_errors
 
-            _explain_chain(*robot_with_sources(file, arguments), a, b)
+            robot, compiled = compiled_without_errors(file, arguments)
+            _explain_chain(robot, compiled.sources, a, b)
         case _:
             fail("explain takes a code, or FILE A B", UNREADABLE)
     return 0

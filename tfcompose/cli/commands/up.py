@@ -84,5 +84,5 @@ def run(arguments: Namespace) -> int:
     with BuildProcess(arguments) as build:
         from tfcompose.cli.starting import start  # while it is built
 
-        plan_file = build.plan_file()
-    return start(plan_file, arguments)
+        plan_file, found = build.built()
+    return start(plan_file, arguments, found)

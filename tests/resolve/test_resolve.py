@@ -329,3 +329,15 @@ def test_a_condition_on_several_values_of_an_option_holds_only_for_all_of_them()
     assert not holds(condition, {"streams": ["depth"]}, "driver")
     assert not holds(condition, {"streams": ["color"]}, "driver")
     assert holds({"tf": "driver"}, {}, "driver")
+
+
+def test_an_unknown_name_under_after_is_answered_with_the_processes_that_there_are() -> None:
+    done = compiled(
+        "parts:\n"
+        "  arm: {xacro: arm.xacro, parent: base_link}\n"
+        "  bare: {xacro: bare.xacro, parent: base_link, prefix: ''}\n"
+        "joints: {lift: {type: revolute, parent: base_link, child: tray, axis: z}}\n"
+        "processes: {drive: {run: [drive]}, map: {run: [map], after: {laser_scanner: ready}}}\n"
+    )
+    (unknown,) = [one for one in done.errors if one.code == "TF813"]
+    assert re.findall(r"[\w/]+", unknown.help) == ["there", "is", "drive", "guard", "joints", "static"]

@@ -96,20 +96,28 @@ def _plain(frame: str) -> str:
 
 
 def _of_state_publisher(process: Process, robot: Robot) -> Iterator[Finding]:
-    described = process.params.get("robot_description")
+    params = process.params | _params_on_the_command_line(process)
+    described = params.get("robot_description")
     text = described if isinstance(described, str) and "<robot" in described else None
     mine = {edge.child for edge in robot.edges if edge.owner == process.name}
     refused = any(section in _WITH_OWNERS for section, _ in robot.broken)  # its own edge may be among them
     if text is None and (mine or refused or robot.excuses(process.name)):
         return
     children = {*_CHILD.findall(text)} if text is not None else robot.described()
-    prefix = process.params.get("frame_prefix", "")
+    prefix = params.get("frame_prefix", "")
     known = {robot.final(frame): frame for frame in robot.frames}
-    sent = {known.get(f"{prefix}{name}" if text is not None else robot.final(name)) for name in children}
+    sent = {known.get(f"{prefix}{name}" if prefix or text is not None else robot.final(name)) for name in children}
     others = [edge for edge in robot.edges if edge.child in sent - mine and edge.owner in {STATIC, JOINTS}]
     edges = [edge for edge in others if not robot.excuses(edge.child)]
     if edges:
         yield _publishes_too(process, with_more(edges[0].name, len(edges) - 1), edges[0], sure=text is not None)
+
+
+def _params_on_the_command_line(process: Process) -> dict[str, str]:
+    """Return what ``-p NAME:=VALUE`` among ROS's arguments sets, each value as it is written."""
+    words = itertools.dropwhile(lambda word: word != "--ros-args", process.argv)
+    given = [value for option, value in itertools.pairwise(words) if option in {"-p", "--param"}]
+    return {name: value for name, sign, value in (one.partition(":=") for one in given) if sign}
 
 
 def _publishes_too(process: Process, what: str, edge: Edge, *, sure: bool = True) -> Finding:

@@ -105,13 +105,14 @@ def name_clashes(processes: list[Process], spec: RobotSpec, source: Source) -> l
 
 
 def unknown_names(
-    processes: list[Process], source: Source, known: frozenset[str], missing: tuple[str, ...]
+    processes: list[Process], source: Source, known: Collection[str], broken: Collection[tuple[str, str]]
 ) -> list[Finding]:
     """Return a finding for each name under ``after`` that is no process, and for each end that never comes.
 
-    ``known`` are those that are there or were refused, ``missing`` how the names of those begin that are not known.
+    ``known`` are the names of all processes; an entry among the ``broken`` ones may have brought another.
     """
-    names = sorted(known)
+    refused = {name for _, name in broken}
+    missing = tuple(name for section, name in broken if section == "parts" and name)
     lasting = {process.name: process for process in processes if process.kind != "run"}
     found = []
     for process in processes:
@@ -122,8 +123,9 @@ def unknown_names(
                 place = source.at((section, process.name, *inside, other))
                 message = f"{process.name} waits until {other} is done, which never happens"
                 found.append(finding("TF813", message, place, help=f"after: {{{other}: ready}}, or started"))
-            elif other not in known and not other.startswith(missing):
+            elif other not in known and other not in refused and not other.startswith(missing):
                 place = source.at_key((section, process.name, *inside, other))
+                names = sorted(name for name in known if name != process.name)
                 advice = did_you_mean(other, names, f"there is {', '.join(names)}")
                 found.append(
                     finding("TF813", f"{process.name} waits for {other}, which is not a process", place, help=advice)

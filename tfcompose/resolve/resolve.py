@@ -222,12 +222,10 @@ class _Work:
 
     def _wrong_names(self, own: list[Process]) -> list[Finding]:
         everybody = self._everybody(own)
-        known = frozenset(name for _, name in self.broken) | {process.name for process in everybody}
-        missing = tuple(name for section, name in self.broken if section == "parts" and name)
         return [
             *name_clashes(everybody, self.spec, self.source),
             *idle_keys(self.spec, self.source),
-            *unknown_names(own, self.source, known, missing),
+            *unknown_names(own, self.source, frozenset(process.name for process in everybody), self.broken),
         ]
 
     def _robot(self, drafts: Drafts, edges: tuple[Edge, ...], everybody: list[Process]) -> Robot:

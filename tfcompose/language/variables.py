@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from tfcompose.findings import Finding, Note, Span, did_you_mean, finding
 from tfcompose.language.args import ArgError, ArgSpec, Given, GivenArg, full
 from tfcompose.language.expressions import (
+    A_FILE,
     IDENTIFIER,
     RESERVED,
     EnvironmentText,
@@ -287,6 +288,8 @@ class Variables:
         if name in self.open:
             circle = " → ".join([*self.open[self.open.index(name) :], name])
             raise ExpressionError(f"the variable {self.open[-1]} depends on itself: {circle}")
+        if name in RESERVED:
+            raise ExpressionError(f"{name} is {RESERVED[name]}", A_FILE)
         there = f"vars has {', '.join(self.given)}" if self.given else "the file has no vars"
         raise ExpressionError(f"unknown variable {name}", did_you_mean(name, self.given, there))
 

@@ -85,6 +85,14 @@ def test_its_parameters_hold_robot_urdf_word_for_word_and_the_prefix() -> None:
     assert "frame_prefix" not in built()[1]["params/joints.yaml"]
 
 
+def test_its_frequency_is_a_double_as_it_declares_it_also_where_the_file_has_an_integer() -> None:
+    text = "tfcompose: 1\nrobot: r\nros: {state_publisher: stock}\nlinks: {base_link: {}, a: {parent: base_link}}\n"
+    found = compile_robot(f"{text}processes: {{joints: {{params: {{publish_frequency: 50}}}}}}\n", "r.yaml", library())
+    assert found.robot
+    (params,) = (file.text for file in emit(found.robot) if file.path == "params/joints.yaml")
+    assert type(yaml.safe_load(params)["/robot_state_publisher"]["ros__parameters"]["publish_frequency"]) is float
+
+
 def test_robot_urdf_is_one_tree_whose_root_has_no_inertia_and_foreign_edges_float() -> None:
     _, files = built()
     stock, full = (ET.fromstring(files[name]) for name in ("robot.urdf", "robot.full.urdf"))  # noqa: S314 (ours)

@@ -54,7 +54,7 @@ def with_stock(robot: Robot) -> tuple[Robot, list[Finding]]:
 def _stock(joints: Process, robot: Robot) -> Process:
     """Return the process: its description is its own, and the topic on which it would send that is moved away."""
     params = {"publish_frequency": MOST_HZ} | joints.params
-    params["publish_frequency"] = min(params["publish_frequency"], MOST_HZ)
+    params["publish_frequency"] = min(float(params["publish_frequency"]), MOST_HZ)
     prefix = {"frame_prefix": robot.ros.frame_prefix} if robot.ros.frame_prefix else {}
     node = Node(full_name(robot.ros.namespace, NAME), joints.at, params=params | prefix)
     return replace(

@@ -134,6 +134,16 @@ def test_simulated_time_that_begins_again_takes_the_stamps_with_it() -> None:
     assert running.reports() == []
 
 
+def test_a_clock_that_is_read_twice_at_one_time_takes_no_stamps_with_it() -> None:
+    running = History(clock="sim").clear()
+    drive = running.joins("/drive")
+    for n in range(40):
+        for _ in range(2):
+            running.judge.clock(round((20 + n / 10) * 1e9), running.now)
+        running.send(drive, "odom base", stamp_s=20 + n // 20).wait(0.1)
+    assert [found.code for found in running.found()] == ["TF823"]
+
+
 def test_the_same_stamp_again_and_again_is_a_warning_and_now_and_then_is_nothing(running: History) -> None:
     slam, drive = running.joins("/slam"), running.joins("/drive")
     begun = wall(running)

@@ -1,0 +1,205 @@
+"""What a strict guard passes on and latches, from histories of messages and of the graph, without ROS."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, cast
+
+import pytest
+
+from tests.support.guard_history import EDGES, PROCESSES
+from tfcompose.guard import relay
+from tfcompose.guard.relay import Feedback, Relay
+from tfcompose.live.publishers import Message, Publisher
+from tfcompose.live.topics import TFData
+from tfcompose.plan import Plan, RosSettings
+from tfcompose.ros.node import Received
+from tfcompose.ros.tf_codec import Transform, decode, encode
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+    from tfcompose.live.topics import TFGraph
+
+SLAM, DRIVE, CAMERA = b"s" * 16, b"d" * 16, b"c" * 16
+TOPICS = ("/tf", "/tf_static")
+
+
+class Sender:
+    """One of the relay's publishers: it keeps what it is given."""
+
+    def __init__(self, node: Bus, *, static: bool, topic: str) -> None:
+        node.senders.append(self)
+        self.static, self.topic = static, topic
+        self.publisher = self
+        self.raw_gid = len(node.senders).to_bytes(16, "big")
+        self.sent: list[bytes] = []
+
+    def publish(self, data: bytes) -> None:
+        self.sent.append(data)
+
+
+@dataclass
+class Bus:
+    """The node and the graph of a relay: who sends, and how many listen on each topic."""
+
+    topics: tuple[str, str] = TOPICS
+    says_who: bool = True
+    fenced: dict[bytes, bool | None] = field(default_factory=dict)
+    senders: list[Sender] = field(default_factory=list)
+    listeners: dict[str, int] = field(default_factory=dict)
+
+    def destroy_publisher(self, sender: Sender) -> None:
+        self.senders.remove(sender)
+
+    def count_subscribers(self, topic: str) -> int:
+        return self.listeners.get(topic, 1)
+
+    def may_pass(self, gid: bytes) -> bool | None:
+        return self.fenced.get(gid, True)
+
+    def latched(self, topic: str = TOPICS[1]) -> list[set[tuple[str, str]]]:
+        """Return the edges of the newest message of each latched publisher on the topic."""
+        return [edges_of(one.sent[-1]) for one in self.senders if one.static and one.topic == topic and one.sent]
+
+    def moving(self, topic: str = TOPICS[0]) -> list[set[tuple[str, str]]]:
+        return [edges_of(data) for one in self.senders if not one.static and one.topic == topic for data in one.sent]
+
+
+@pytest.fixture(autouse=True)
+def _senders_that_remember(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(relay, "TFPublisher", Sender)
+
+
+def edges_of(data: bytes) -> set[tuple[str, str]]:
+    return {(one.parent, one.child) for one in decode(data)}
+
+
+def pairs(edges: str) -> tuple[tuple[str, str], ...]:
+    return tuple((names.split()[0], names.split()[1]) for names in edges.split(", "))
+
+
+def message_of(gid: bytes, edges: str, *, static: bool) -> Message:
+    return Message(pairs(edges), static, gid, 0, 1)
+
+
+def data_of(gid: bytes, edges: str, *, static: bool, fenced: bool = True, process: str = "") -> TFData:
+    transforms = [Transform(0, parent, child, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)) for parent, child in pairs(edges)]
+    return TFData(Received(encode(transforms), gid, 0, 0, 1, gid), static, fenced, process)
+
+
+def publisher(gid: bytes, node: str, *, static: bool = True, fenced: bool = True) -> Publisher:
+    return Publisher(gid, node, static, fenced=fenced)
+
+
+@dataclass
+class Passing:
+    """A relay, and who is in its graph."""
+
+    remapped: dict[str, tuple[str, str]] | None = None
+    bus: Bus = field(default_factory=Bus)
+    own: set[bytes | None] = field(default_factory=set)
+    here: list[Publisher] = field(default_factory=list)
+    now: float = 100.0
+
+    def __post_init__(self) -> None:
+        plan = Plan("rover", "0", "base", RosSettings(), EDGES, PROCESSES)
+        node, graph = cast("Node", self.bus), cast("TFGraph", self.bus)
+        feedback = None if self.remapped is None else Feedback(node, self.remapped, self.own)
+        self.relay = Relay(node, graph, plan, self.own, feedback)
+
+    def send(self, gid: bytes, edges: str, admitted: str | None = None, *, who: str = "/x", **more: Any) -> Passing:
+        """Let a message come, of which these edges are admitted; None: all."""
+        static = more.pop("static", True)
+        may = None if admitted is None else frozenset(pairs(admitted) if admitted else ())
+        data = data_of(gid, edges, static=static, **more)
+        self.relay.pass_on(data, message_of(gid, edges, static=static), may, who)
+        return self
+
+    def observe(self, *here: Publisher) -> Passing:
+        self.relay.update(here, self.now)
+        return self
+
+
+def test_fixed_edges_of_one_who_has_left_are_latched_no_more() -> None:
+    running = Passing().send(SLAM, "map odom").send(CAMERA, "base camera")
+    running.observe(publisher(SLAM, "/slam"), publisher(CAMERA, "/camera"))
+    assert running.bus.latched() == [{("map", "odom")}, {("base", "camera")}]
+    before = running.relay.changes
+    running.observe(publisher(CAMERA, "/camera"))
+    assert running.bus.latched() == [{("base", "camera")}]
+    assert running.relay.changes > before
+    assert list(running.relay.memory()) == [f"latched:{CAMERA.hex()}"]
+    running.send(SLAM, "map odom").observe(publisher(SLAM, "/slam"), publisher(CAMERA, "/camera"))
+    assert running.bus.latched() == [{("base", "camera")}, {("map", "odom")}]
+
+
+def test_fixed_edges_of_one_sender_come_together_and_what_is_not_admitted_is_left_out_and_counted() -> None:
+    running = Passing().send(CAMERA, "base camera", who="/camera").send(CAMERA, "base lidar, map odom", "base lidar")
+    assert running.bus.latched() == [{("base", "camera"), ("base", "lidar")}]
+    assert running.relay.held.counts == {("/x", "map", "odom"): 1}
+    running.send(SLAM, "map odom", "")
+    assert len(running.bus.latched()) == 1
+    assert running.relay.held.report() == "2 × map → odom from /x"
+    assert not running.relay.held.report()
+
+
+def test_a_guard_that_follows_latches_again_what_may_still_pass_and_forgets_nobody_before_all_are_found() -> None:
+    memory = Passing().send(CAMERA, "base camera, base lidar").send(SLAM, "map odom").relay.memory()
+    following = Passing()
+    following.relay.recall(memory, lambda message: {("base", "camera")} & {*message.edges}, until=105.0)
+    assert following.bus.latched() == [{("base", "camera")}]
+    following.observe()
+    assert following.bus.latched() == [{("base", "camera")}]
+    following.now = 105.0
+    following.observe()
+    assert following.bus.latched() == []
+
+
+def test_moving_edges_pass_byte_for_byte_or_without_what_is_not_admitted() -> None:
+    running = Passing()
+    sent = data_of(DRIVE, "odom base, base arm", static=False)
+    running.relay.pass_on(sent, message_of(DRIVE, "odom base, base arm", static=False), None, "/drive")
+    assert running.bus.senders[0].sent == [sent.received.data]
+    running.send(DRIVE, "odom base, base arm", "odom base", static=False).send(DRIVE, "base arm", "", static=False)
+    assert running.bus.moving() == [{("odom", "base"), ("base", "arm")}, {("odom", "base")}]
+
+
+def test_names_that_were_not_all_that_was_sent_are_sent_as_they_were_judged() -> None:
+    running = Passing()
+    message = replace(message_of(DRIVE, "odom base", static=False), exact=False)
+    sent = data_of(DRIVE, "odom base_more", static=False)
+    sent = replace(sent, received=replace(sent.received, data=sent.received.data.replace(b"base_more", b"base\0more")))
+    running.relay.pass_on(sent, message, None, "/drive")
+    assert running.bus.moving() == [{("odom", "base")}]
+    assert running.bus.senders[0].sent != [sent.received.data]
+
+
+def test_what_comes_past_the_fence_or_from_nobody_that_is_known_is_not_passed_on() -> None:
+    running = Passing()
+    running.send(DRIVE, "odom base", fenced=False, static=False)
+    running.bus.fenced[SLAM] = False
+    running.send(SLAM, "map odom", static=False, who="/slam").send(SLAM, "map odom")
+    running.send(DRIVE, "odom base", who="", static=False)
+    assert running.bus.moving() == [] == running.relay.waiting
+    running.send(CAMERA, "base camera", who="")
+    running.bus.fenced[CAMERA] = None
+    running.send(CAMERA, "base lidar", who="/camera")
+    assert [message.edges for _, message in running.relay.waiting] == [pairs("base camera"), pairs("base lidar")]
+
+
+def test_a_remapped_process_receives_the_rest_of_the_tree_and_nothing_of_its_own() -> None:
+    private = {"slam": ("/slam/tf", "/slam/tf_static"), "drive": ("/drive/tf", "/drive/tf_static")}
+    running = Passing(private)
+    running.bus.listeners |= dict.fromkeys((*private["slam"], *private["drive"]), 2)
+    running.observe().send(SLAM, "map odom", process="slam").send(CAMERA, "base camera", fenced=False)
+    running.observe(publisher(SLAM, "/slam"), publisher(CAMERA, "/camera", fenced=False))
+    assert running.bus.latched("/slam/tf_static") == [{("base", "camera")}]
+    assert running.bus.latched("/drive/tf_static") == [{("map", "odom"), ("base", "camera")}]
+    running.send(DRIVE, "odom base", process="drive", static=False)
+    assert running.bus.moving("/slam/tf") == [{("odom", "base")}]
+    assert running.bus.moving("/drive/tf") == []
+    running.observe(publisher(SLAM, "/slam"))  # a stranger's edges, too, are those of who is there
+    assert running.bus.latched("/drive/tf_static") == [{("map", "odom")}]
+    running.observe()
+    assert running.bus.latched("/drive/tf_static") == [set()]

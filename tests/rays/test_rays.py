@@ -93,6 +93,14 @@ def test_a_body_around_the_origin_says_how_deep_that_is() -> None:
     assert view.blocked == 0
 
 
+@pytest.mark.parametrize("kind", KINDS_OF_SHAPES)
+def test_a_body_that_a_sensor_is_mounted_flush_on_blocks_nothing(kind: ShapeKind) -> None:
+    size = SIZES[kind]
+    surface = size[0] / 2 if kind == "box" else size[0]
+    flush = Body("b", Shape(kind, size, Pose()), Pose((-surface, 0.0, 0.0)))
+    assert cast("s", SCAN, directions(SCAN), [flush]).blocked == 0
+
+
 def robot_of(text: str) -> Robot:
     return robot_in(compile_robot(HEAD + text, "r.yaml", library(), read=read_text, disk=disk()))
 

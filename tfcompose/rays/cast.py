@@ -34,8 +34,9 @@ class Ray:
 class View:
     """The rays of one stream, from the origin of its frame.
 
-    ``inside`` are the links that the origin is in, and how deep in metres; their bodies block no ray. ``left_out`` are
-    the links of which a mesh could not be read: trimesh is not installed, or the file is no mesh.
+    ``inside`` are the links that the origin is in or on, and how deep in metres; their bodies block no ray: a sensor
+    that is mounted flush looks away from what it is mounted on. ``left_out`` are the links of which a mesh could not be
+    read: trimesh is not installed, or the file is no mesh.
     """
 
     sensor: str
@@ -81,7 +82,7 @@ def cast(sensor: str, optics: Optics, into: Sequence[Vector], bodies: Sequence[B
         depth, hits = _read_hits(body, into)
         if depth is None:
             left_out[body.link] = None
-        elif depth > 0:
+        elif depth >= 0:
             inside[body.link] = max(depth, inside.get(body.link, 0.0))
         for index, far in hits:
             if far < found[index][0] and far <= reach:
@@ -101,7 +102,7 @@ def _read_hits(body: Body, into: Sequence[Vector]) -> tuple[float | None, Hits]:
     to_shape = body.pose.inverse()
     if body.shape.kind != "mesh":
         depth = depth_in(body.shape, to_shape.xyz)
-        return depth, [] if depth > 0 else _hits(body, to_shape, into)
+        return depth, [] if depth >= 0 else _hits(body, to_shape, into)
     path = body.shape.mesh.path if body.shape.mesh else ""
     x, y, z = body.shape.size
     turned = [rotate(to_shape.quat_xyzw, direction) for direction in into]
@@ -109,7 +110,7 @@ def _read_hits(body: Body, into: Sequence[Vector]) -> tuple[float | None, Hits]:
         from tfcompose.rays import meshes  # noqa: PLC0415 (numpy and trimesh: 0.3 s that most robots need not wait for)
 
         depth = meshes.depth_in(path, (x, y, z), to_shape.xyz)
-        far = meshes.distances(path, (x, y, z), to_shape.xyz, turned) if depth <= 0 else []
+        far = meshes.distances(path, (x, y, z), to_shape.xyz, turned) if depth < 0 else []
     except Exception:  # noqa: BLE001 (readers of a dozen formats: anything can come out of them)
         return None, []
     return depth, [(index, one) for index, one in enumerate(far) if math.isfinite(one)]

@@ -27,9 +27,7 @@ def depth_in(shape: Shape, point: Vector) -> float:
 
 
 def distance(shape: Shape, origin: Vector, direction: Vector) -> float:
-    """Return how far along the ray the shape begins: 0 from inside, endless if it is missed. Not for meshes."""
-    if depth_in(shape, origin) >= 0:
-        return 0.0
+    """Return how far along the ray the shape begins, from outside; endless if it is missed. Not for meshes."""
     size = shape.size
     match shape.kind:
         case "sphere":
@@ -82,6 +80,10 @@ def _box(size: tuple[float, ...], origin: Vector, direction: Vector) -> float:
             if abs(start) > extent / 2:
                 return math.inf
             continue
-        first, last = sorted(((-extent / 2 - start) / step, (extent / 2 - start) / step))
-        enters, leaves = max(enters, first), min(leaves, last)
-    return enters if enters <= leaves else math.inf
+        half = extent / 2 if step > 0 else -extent / 2
+        first, last = (-half - start) / step, (half - start) / step
+        enters = max(enters, first)
+        leaves = min(leaves, last)
+        if enters > leaves:
+            return math.inf
+    return enters

@@ -112,6 +112,7 @@ ONLY_IN: dict[str, set[str]] = {
     "xacro": {"urdf"},
     "trimesh": {"meshes", "rays", "view"},
     "viser": {"view"},
+    "watchfiles": {"view"},
     "websockets": {"view"},
     "yourdfpy": {"urdf"},
     "pypdfium2": {"draw"},

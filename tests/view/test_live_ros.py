@@ -18,9 +18,9 @@ from tfcompose.emit.plan import plan_of
 from tfcompose.geometry import Offset, Pose, offset_of
 from tfcompose.signals import Stop
 from tfcompose.view.live import LiveTree
-from tfcompose.view.live_panel import LivePanel
 from tfcompose.view.panel import Panel
-from tfcompose.view.scene import started, stop
+from tfcompose.view.reload import Files, ReloadedPanel
+from tfcompose.view.server import started, stop
 
 pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
 
@@ -39,26 +39,25 @@ class View:
 
 
 @pytest.fixture
-def view(tmp_path: Path, domain: Any) -> Iterator[View]:
+def view(tmp_path: Path) -> Iterator[View]:
     """A view that follows the tree of a rover whose owners are the test's."""
     file = tmp_path / "rover.yaml"
     file.write_text(EXTERNAL, "utf-8")
     session = session_of(file)
+    files = Files(lambda one: Path(one).read_text("utf-8"))
     from tfcompose.live.listener import listen  # noqa: PLC0415 (ROS, which may not be there)
 
     server, ending = started("127.0.0.1", 0, "test"), Stop()
-    panel = Panel(server, session, edit=False, joints=False)
-    plan = plan_of(session.robot)
-    observers = observers_of(plan)
-    tree = LiveTree(session.robot, plan, observers, Offset(1e-3, 1e-3))
-    following = Following(LivePanel(server, panel, tree), plan.robot, domain.environment)
+    shown = ReloadedPanel(server, session, files, edit=False, joints=False)
+    observers = observers_of(plan_of(session.robot))
+    following = Following(server, shown, observers, Offset(1e-3, 1e-3), threading.Event())
 
     def run() -> None:
         listen("tfcompose_view", observers, ending, duration_s=None, every_s=0.04, show=following.show)
 
     thread = threading.Thread(target=run)
     thread.start()
-    yield View(server, panel, tree)
+    yield View(server, shown.panel, following.tree)
     ending.request()
     thread.join()
     stop(server)

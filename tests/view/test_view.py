@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+import urllib.error
 import urllib.request
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -27,7 +28,8 @@ from tfcompose.plan.file import read_plan
 from tfcompose.urdf.packages import Packages
 from tfcompose.view.panel import Panel
 from tfcompose.view.plan_robot import robot_of_plan
-from tfcompose.view.scene import RobotScene, started, stop
+from tfcompose.view.scene import RobotScene
+from tfcompose.view.server import started, stop
 from tfcompose.view.session import Session, poses_in_roots
 
 ROVER = Path(__file__).parents[2] / "robots" / "field_rover.yaml"
@@ -65,12 +67,15 @@ def test_a_page_of_another_site_may_not_connect(server: viser.ViserServer, origi
     assert not joins(server.get_port(), origin)
 
 
-def joins(port: int, origin: str | None) -> bool:
+def joins(port: int, origin: str | None, host: str = "127.0.0.1", cookie: str = "") -> bool:
     """Return whether a page of this origin gets a websocket."""
     own = Origin(origin.format(port=port)) if origin else None
     protocol = Subprotocol(f"viser-v{viser.__version__}")
     try:
-        connection = connect(f"ws://127.0.0.1:{port}", origin=own, subprotocols=[protocol], open_timeout=20)
+        connection = connect(
+            f"ws://{host}:{port}", origin=own, subprotocols=[protocol], open_timeout=20,
+            additional_headers={"Cookie": cookie} if cookie else None,
+        )  # fmt: skip
     except InvalidStatus as error:
         if error.response.status_code == http.HTTPStatus.FORBIDDEN:
             return False
@@ -288,6 +293,39 @@ def test_a_built_plan_is_shown_with_its_bodies_and_frames(rover: Path) -> None:
     assert all(max(offset_of(here[frame], pose)) < 1e-9 for frame, pose in there.items())
     limits = {edge.joint.name: edge.joint.limit for edge in meant.edges if edge.joint}
     assert {edge.joint.name: edge.joint.limit for edge in robot.edges if edge.joint} == limits
+
+
+def test_elsewhere_than_on_this_machine_a_token_lets_in(rover: Path) -> None:
+    command = [sys.executable, "-m", "tfcompose", "view", rover.name, "--port", "0", "--host", "127.0.0.2"]
+    running = processes.start(command, cwd=rover.parent, stdout=subprocess.PIPE)
+    try:
+        assert running.stdout
+        address = running.stdout.readline().partition(";")[0]
+        page, _, token = address.partition("?token=")
+        assert len(token) > 20
+        port = int(page.rpartition(":")[2].strip("/"))
+        for refused in (page, f"{page}?token=", f"{page}?token={token[:-1]}", f"{page}index.html"):
+            with pytest.raises(urllib.error.HTTPError) as caught:
+                urllib.request.urlopen(refused, timeout=30)  # noqa: S310 (on this machine)
+            assert caught.value.code == http.HTTPStatus.FORBIDDEN
+        with urllib.request.urlopen(address, timeout=30) as answer:  # noqa: S310
+            assert answer.status == http.HTTPStatus.OK
+            cookie = answer.headers["Set-Cookie"].partition(";")[0]
+        host = "127.0.0.2"
+        assert not joins(port, f"http://{host}:{port}", host)
+        assert not joins(port, None, host)
+        assert joins(port, f"http://{host}:{port}", host, cookie)
+        assert not joins(port, "http://example.org", host, cookie)
+        running.send_signal(signal.SIGINT)
+        assert running.wait(30) == 130
+    finally:
+        processes.end(running)
+
+
+def test_an_address_that_is_not_this_machines_is_refused(rover: Path) -> None:
+    done = tfcompose_in(rover.parent, "view", rover.name, "--host", "192.0.2.1")
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1].startswith("tfcompose: --host 192.0.2.1 is no address of this machine")
 
 
 def test_a_built_plan_is_not_edited(rover: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ from tfcompose.cli.live import set_up_ros
 from tfcompose.cli.process_table import HEAD, row, uptime
 from tfcompose.cli.runs import is_meant, running
 from tfcompose.cli.terminal import INTERRUPTED, reject
+from tfcompose.cli.view_session import plan_of_session
 from tfcompose.findings import finding
 from tfcompose.ipc import RobotStatus, StatusRequest
 from tfcompose.launcher.control import RefusedError, ask
@@ -22,13 +24,14 @@ from tfcompose.view.live import LiveTree
 from tfcompose.view.live_panel import LivePanel
 
 if TYPE_CHECKING:
+    import threading
     from collections.abc import Mapping
 
     import viser
 
     from tfcompose.geometry import Offset
     from tfcompose.plan import Plan
-    from tfcompose.view.panel import Panel
+    from tfcompose.view.reload import ReloadedPanel
 
     Topics = tuple[str, str]
 
@@ -44,21 +47,44 @@ def observers_of(plan: Plan) -> dict[Topics, TreeObserver]:
 
 
 class Following:
-    """Moves the scene, judges and asks, each as often as it is due."""
+    """Moves the scene, judges and asks, each as often as it is due; of a file that changed it shows the new robot."""
 
-    def __init__(self, panel: LivePanel, name: str, environment: Mapping[str, str]) -> None:
-        self._panel = panel
-        self._name = name
-        self._environment = environment
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        shown: ReloadedPanel,
+        observers: Mapping[Topics, TreeObserver],
+        tolerance: Offset,
+        changed: threading.Event,
+    ) -> None:
+        self._server = server
+        self._shown = shown
+        self._observers = observers
+        self._tolerance = tolerance
+        self._changed = changed
         self._meter = UsageMeter()
         self._begun = time.monotonic()
+        self._follow()
+
+    def _follow(self) -> None:
+        """Follow the robot that the session has now."""
+        session = self._shown.session
+        plan = plan_of_session(session)
+        observers = {topics: self._observers.get(topics) or TreeObserver() for topics in parts_of(plan)}
+        self.tree = LiveTree(session.robot, plan, observers, self._tolerance)
+        self._panel = LivePanel(self._server, self._shown.panel, self.tree)
+        self._name = plan.robot
         self._judge_at = self._ask_at = 0.0
 
     def show(self) -> None:
         """Show what came since the last time."""
         now = time.monotonic()
+        if self._changed.is_set():
+            self._changed.clear()
+            if self._shown.reload():
+                self._follow()
         if now >= self._judge_at:
-            self._panel.tree.judge(now - self._begun)
+            self.tree.judge(now - self._begun)
             self._panel.show_text()
             self._judge_at = time.monotonic() + _JUDGE_EVERY_S
         self._panel.show()
@@ -67,7 +93,7 @@ class Following:
             self._show_processes()
 
     def _show_processes(self) -> None:
-        status = _status(self._name, self._environment)
+        status = _status(self._name)
         if status is None:
             self._panel.show_processes(f"no robot {self._name} runs here", [])
             return
@@ -77,30 +103,28 @@ class Following:
         self._panel.show_processes(f"{self._name}: {state}, since {uptime(status.uptime)}", rows)
 
 
-def _status(name: str, environment: Mapping[str, str]) -> RobotStatus | None:
+def _status(name: str) -> RobotStatus | None:
     """Return the state of the robot that runs in this domain, or None."""
     try:
-        domain = domain_of(environment)
+        domain = domain_of(os.environ)
         places = [place for place, _ in running() if place.domain == domain and is_meant(place, name)]
         return ask(places[0], StatusRequest(), RobotStatus) if places else None
     except (RuntimeDirError, RefusedError, OSError):
         return None
 
 
-def follow(server: viser.ViserServer, panel: Panel, plan: Plan, tolerance: Offset) -> int:
+def follow(server: viser.ViserServer, shown: ReloadedPanel, changed: threading.Event, tolerance: Offset) -> int:
     """Show the running tree until a signal comes; return the exit code.
 
     Raises:
         SystemExit: after saying why ROS cannot be started.
     """
-    import os
-
+    plan = plan_of_session(shown.session)
     set_up_ros(plan.ros)
     from tfcompose.live.listener import listen  # rclpy reads the environment when it is loaded
 
     observers = observers_of(plan)
-    tree = LiveTree(panel.session.robot, plan, observers, tolerance)
-    following = Following(LivePanel(server, panel, tree), plan.robot, os.environ)
+    following = Following(server, shown, observers, tolerance, changed)
     with Stop() as stop:
         try:
             listen("tfcompose_view", observers, stop, duration_s=None, every_s=_SHOW_EVERY_S, show=following.show)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.cli.compiling import disk, given_by, library, overlays_of
 from tfcompose.cli.fixing import rewrite
 from tfcompose.cli.plans import in_folder, is_plan, refuse_variant
-from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import UNREADABLE, fail, print_findings, reject
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.emit.plan import plan_of
@@ -24,17 +24,18 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from tfcompose.plan import Plan
+    from tfcompose.view.reload import Files
 
 
-def session_of(file: str, arguments: Namespace) -> Session:
-    """Return the robot of the file, a built plan or a folder with one, with what is merged over it.
+def session_of(file: str, arguments: Namespace, files: Files) -> Session:
+    """Return the robot of the file, a built plan or a folder with one, with what is merged over it, read by ``files``.
 
     Raises:
         SystemExit: after saying why there is none to show.
     """
     file = in_folder(file)
     try:
-        session = _plan_session(file, arguments) if is_plan(file) else _robot_session(file, arguments)
+        session = (_plan_session if is_plan(file) else _robot_session)(file, arguments, files)
     except RejectedError as error:
         reject(error.findings)
     if session.state.robot is None or not session.robot.frames:
@@ -43,13 +44,13 @@ def session_of(file: str, arguments: Namespace) -> Session:
     return session
 
 
-def _robot_session(file: str, arguments: Namespace) -> Session:
-    texts = {one: read_text(one) for one in (file, *arguments.overlays)}
-    presets, packages = library(), disk()
+def _robot_session(file: str, arguments: Namespace, files: Files) -> Session:
+    texts = {one: files(one) for one in (file, *arguments.overlays)}
+    presets, packages = library(), replace(disk(), read=files)
 
     def compiled(now: Mapping[str, str]) -> Compiled:
         def read(one: str) -> str:
-            return now[one] if one in now else read_text(one)
+            return now[one] if one in now else files(one)
 
         overlays = overlays_of(arguments, read)
         return compile_robot(
@@ -63,10 +64,14 @@ def _robot_session(file: str, arguments: Namespace) -> Session:
             given=given_by(arguments),
         )
 
-    return Session(texts, compiled, lambda one, old, new: rewrite(Path(one), old, new))
+    def write(one: str, old: str, new: str) -> None:
+        rewrite(Path(one), old, new)
+        files.wrote(one, new)
+
+    return Session(texts, compiled, write)
 
 
-def _plan_session(file: str, arguments: Namespace) -> Session:
+def _plan_session(file: str, arguments: Namespace, files: Files) -> Session:
     refuse_variant(arguments)
     if arguments.edit:
         fail("a built plan cannot be edited: give the robot's file", UNREADABLE)
@@ -76,12 +81,12 @@ def _plan_session(file: str, arguments: Namespace) -> Session:
         try:
             plan = read_plan(now[file], file)
             description = Path(file).with_name(plan.description)
-            text = read_text(str(description)) if description.is_file() else None
+            text = files(str(description)) if description.is_file() else None
             return Compiled(robot_of_plan(plan, text, str(description), packages.asset), ())
         except RejectedError as error:
             return Compiled(None, error.findings)
 
-    return Session({file: read_text(file)}, compiled, lambda *_: None)
+    return Session({file: files(file)}, compiled, lambda *_: None)
 
 
 def plan_of_session(session: Session) -> Plan:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tfcompose.view.findings import findings_html, paragraphs
 from tfcompose.view.scene import Ghosts
 
 if TYPE_CHECKING:
@@ -14,14 +15,12 @@ if TYPE_CHECKING:
 
     import viser
 
-    from tfcompose.findings import Finding
     from tfcompose.view.live import LiveTree, Picture
     from tfcompose.view.panel import Panel
 
 _RED = (220, 30, 30)
-#: Of findings, and of the names of frames that nobody declared, so many are shown.
+#: Of the names of frames that nobody declared so many are shown.
 _MOST = 40
-_COLOURS = {"error": "rgb(220, 30, 30)", "warning": "rgb(200, 120, 20)"}
 
 
 class LivePanel:
@@ -54,8 +53,8 @@ class LivePanel:
     def show_text(self) -> None:
         """Say what is wrong, and what is known of the selected frame."""
         frame = self._panel.frames.value
-        _set(self._edge, _paragraphs([f"<b>{escape(frame)}</b>", *map(escape, self.tree.about(frame))]))
-        _set(self._found, findings_html(self.tree.judgement.found))
+        _set(self._edge, paragraphs([f"<b>{escape(frame)}</b>", *map(escape, self.tree.about(frame))]))
+        _set(self._found, findings_html(self.tree.judgement.found, "all edges as expected"))
 
     def show_processes(self, title: str, rows: Sequence[Sequence[str]]) -> None:
         """Show the processes of the robot that runs, the first row being the heads of columns."""
@@ -103,22 +102,6 @@ def _ends(picture: Picture) -> Any:
     poses = {**picture.further, **picture.poses}
     ends = [(poses[parent].xyz, poses[child].xyz) for parent, child in picture.wrong]
     return np.array(ends, np.float32).reshape(-1, 2, 3)
-
-
-def findings_html(found: Sequence[Finding]) -> str:
-    """Return findings as a list of HTML, errors in red; names in them come from whoever publishes."""
-    if not found:
-        return _paragraphs(["all edges as expected"])
-    lines = [
-        f'<span style="color: {_COLOURS.get(one.severity, "inherit")}">{escape(one.code)}</span> {escape(one.message)}'
-        for one in found[:_MOST]
-    ]
-    more = [f"and {len(found) - _MOST} more"] if len(found) > _MOST else []
-    return _paragraphs([*lines, *more])
-
-
-def _paragraphs(lines: Sequence[str]) -> str:
-    return f'<div style="padding: 0 0.7em; font-size: 0.85em">{"<br>".join(lines)}</div>'
 
 
 def _table(title: str, rows: Sequence[Sequence[str]]) -> str:

@@ -29,14 +29,23 @@ _SNAP_MM, _SNAP_DEG = 1.0, 1.0
 class Panel:
     """Shows a session on a server; with ``edit`` its mounts can be moved and saved, with ``joints`` its joints moved.
 
+    ``positions`` are where joints begin, in rad or m.
     ``published`` are the poses of frames in their roots where something else than the session says where they are.
     """
 
-    def __init__(self, server: viser.ViserServer, session: Session, *, edit: bool, joints: bool = True) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        session: Session,
+        *,
+        edit: bool,
+        joints: bool = True,
+        positions: Mapping[str, float] | None = None,
+    ) -> None:
         self.session = session
         self._gui = server.gui
         self._server = server
-        self.positions: dict[str, float] = {}
+        self.positions: dict[str, float] = dict(positions or {})
         self.published: Mapping[str, Pose] | None = None
         self.scene = RobotScene(server.scene, session.robot)
         self._gizmo: Any = None
@@ -114,7 +123,7 @@ class Panel:
             upper = joint.limit.upper if joint.limit.upper is not None else upper
         upper = max(lower, upper)
         scale, unit = (1000.0, "mm") if slides else (math.degrees(1), "deg")
-        start = min(max(0.0, lower), upper)
+        start = min(max(self.positions.get(joint.name, 0.0), lower), upper)
         slider = self._gui.add_slider(
             f"{joint.name} ({unit})", lower * scale, max(upper, lower + 1e-6) * scale, 0.1, start * scale
         )

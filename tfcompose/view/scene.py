@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import colorsys
-import contextlib
-import io
 import itertools
-import re
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import trimesh
-import viser
-import websockets.asyncio.server
 
 from tfcompose.geometry import Pose
 from tfcompose.meshes import read_mesh
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    import viser
 
     from tfcompose.model import Robot, Shape
 
@@ -31,31 +27,6 @@ _GHOST = (60, 120, 220)
 #: Where the camera begins, as a direction from the middle of the robot, and how many radii of it away.
 _FROM = np.array([0.62, 0.62, 0.48])
 _RADII = 2.0
-
-
-#: Pages that may talk to the server: its own, which this machine has. Programs that are no browser name no origin.
-_OWN_PAGES = (re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?"), None)
-
-
-def started(host: str, port: int, name: str) -> viser.ViserServer:
-    """Return a server at a port that is free; 0 takes any.
-
-    It refuses pages of other sites, which could otherwise move and save mounts while they are open in a browser here.
-    viser has no setting for that, so it starts with websockets' own.
-    """
-    serve = websockets.asyncio.server.serve
-    websockets.asyncio.server.serve = partial(serve, origins=_OWN_PAGES)  # type: ignore[assignment,misc]
-    try:
-        with contextlib.redirect_stdout(io.StringIO()):  # its banner
-            return viser.ViserServer(host, port, label=name, verbose=False)
-    finally:
-        websockets.asyncio.server.serve = serve  # type: ignore[misc]
-
-
-def stop(server: viser.ViserServer) -> None:
-    """End a server."""
-    with contextlib.redirect_stdout(io.StringIO()):
-        server.stop()
 
 
 def wxyz(pose: Pose) -> tuple[float, float, float, float]:

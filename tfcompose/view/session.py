@@ -64,6 +64,14 @@ class Session:
         edges = (replace(edge, pose=moved.get(edge.child, edge.pose)) for edge in self.state.robot.edges)
         return replace(self.state.robot, edges=tuple(edges))
 
+    def replace(self, texts: Mapping[str, str], state: Compiled) -> None:
+        """Go on with files that changed on disk, and what they compile to; moves of frames that are gone are lost."""
+        self.texts, self.state = texts, state
+        frames = state.robot.frames if state.robot else {}
+        self.moved = {child: pose for child, pose in self.moved.items() if child in frames}
+        self._undo.clear()
+        self._redo.clear()
+
     def mount(self, child: str) -> Mount:
         """Return what the file gives of the edge above a frame; raises ImmovableError.
 

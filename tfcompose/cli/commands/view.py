@@ -8,8 +8,8 @@ somebody else are red.
 
 from __future__ import annotations
 
+import secrets
 import sys
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,13 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from collections.abc import Sequence
 
+    import viser
+
+    from tfcompose.view.session import Session
+
 _HOST, _PORT = "127.0.0.1", 8080
+_LOOPBACK = frozenset({_HOST, "localhost", "::1"})
+_EVERYWHERE = frozenset({"0.0.0.0", "::"})  # noqa: S104 (what a user may give)
 _LAST_PORT = 65_535
 
 
@@ -35,51 +41,70 @@ def arguments(parser: ArgumentParser) -> None:
     add_tolerance(parser)
     parser.add_argument("--edit", action="store_true", help="move mounts, and save them in the file")
     parser.add_argument("--html", metavar="FILE", help="write one HTML file that needs nothing else, and end")
-    parser.add_argument("--port", type=int, default=_PORT, help=f"the port on this machine (default: {_PORT})")
+    parser.add_argument(
+        "--host", default=_HOST, metavar="ADDRESS",
+        help=f"listen there; elsewhere than on this machine only who has the token is let in (default: {_HOST})",
+    )  # fmt: skip
+    parser.add_argument("--port", type=int, default=_PORT, help=f"the port (default: {_PORT})")
     parser.add_argument("--open", action="store_true", help="open the browser")
 
 
 def run(arguments: Namespace) -> int:
     """Serve the view until Ctrl-C, or write it; exit code 1 if the file gives no robot, 2 if it cannot be shown."""
     try:
-        from tfcompose.view.panel import Panel
-        from tfcompose.view.scene import RobotScene, started, stop
-        from tfcompose.view.session import poses_in_roots
+        from tfcompose.view.reload import Files, ReloadedPanel, Watcher
+        from tfcompose.view.server import started, stop
     except ImportError as error:
         fail(f"{error.name} is not installed: pip install 'tfcompose[view]'", UNREADABLE)
+    from tfcompose.cli.reading import read_text
     from tfcompose.cli.view_session import plan_of_session, session_of
-    from tfcompose.cli.writing import replace_file
 
     if arguments.live and (arguments.html or arguments.edit):
         fail("--live shows what is published: leave out --html and --edit", UNREADABLE)
     file = arguments.file or _running_plan(arguments) or DEFAULT_FILE
     if arguments.html:
         _check_output(Path(arguments.html), [file, *arguments.overlays])
-    session = session_of(file, arguments)
-    plan = plan_of_session(session) if arguments.live else None
-    port = 0 if arguments.html else _free(arguments.port)
-    server = started(_HOST, port, session.robot.name)
+    files = Files(read_text)
+    session = session_of(file, arguments, files)
+    if arguments.live:
+        plan_of_session(session)
+    here = arguments.html or arguments.host in _LOOPBACK
+    token = "" if here else secrets.token_urlsafe(16)
+    port = 0 if arguments.html else _free(arguments.host, arguments.port)
+    server = started(_HOST if arguments.html else arguments.host, port, session.robot.name, token)
     try:
         if arguments.html:
-            robot, poses = session.robot, poses_in_roots(session.robot, {})
-            scene = RobotScene(server.scene, robot)
-            scene.update(robot, poses)
-            scene.frame_camera(server, poses)
-            try:
-                replace_file(Path(arguments.html), server.scene.as_html().encode())
-            except OSError as error:
-                fail(f"{arguments.html} cannot be written: {error.strerror}", UNREADABLE)
+            _write(server, session, Path(arguments.html))
             return 0
-        panel = Panel(server, session, edit=arguments.edit, joints=not arguments.live)
-        _announce(f"http://{_HOST}:{server.get_port()}", arguments)
-        if plan is not None:
-            from tfcompose.cli.live_view import follow
+        shown = ReloadedPanel(server, session, files, edit=arguments.edit, joints=not arguments.live)
+        _announce(_address(arguments.host, server.get_port(), token), arguments)
+        with Watcher(files) as watcher:
+            if arguments.live:
+                from tfcompose.cli.live_view import follow
 
-            return follow(server, panel, plan, arguments.tolerance)
-        _wait()
+                return follow(server, shown, watcher.changed, arguments.tolerance)
+            while True:
+                if watcher.changed.wait(1):
+                    watcher.changed.clear()
+                    shown.reload()
     finally:
         stop(server)
-    return 0
+
+
+def _write(server: viser.ViserServer, session: Session, path: Path) -> None:
+    """Write the scene as one file; ends where it cannot be written."""
+    from tfcompose.cli.writing import replace_file
+    from tfcompose.view.scene import RobotScene
+    from tfcompose.view.session import poses_in_roots
+
+    robot, poses = session.robot, poses_in_roots(session.robot, {})
+    scene = RobotScene(server.scene, robot)
+    scene.update(robot, poses)
+    scene.frame_camera(server, poses)
+    try:
+        replace_file(path, server.scene.as_html().encode())
+    except OSError as error:
+        fail(f"{path} cannot be written: {error.strerror}", UNREADABLE)
 
 
 def _running_plan(arguments: Namespace) -> str | None:
@@ -103,26 +128,38 @@ def _check_output(path: Path, files: Sequence[str]) -> None:
         fail(f"--html {path} would replace a file of the robot", UNREADABLE)
 
 
-def _free(port: int) -> int:
+def _free(host: str, port: int) -> int:
     """Return the port; ends with the next free one named where it is taken."""
     if not 0 <= port <= _LAST_PORT:
         fail(f"there is no port {port}: --port takes 0 to {_LAST_PORT}, 0 for any that is free", UNREADABLE)
-    following = next((other for other in range(port, _LAST_PORT + 1) if _is_free(other)), None)
+    if trouble := _trouble(host, 0):
+        fail(f"--host {host} is no address of this machine: {trouble}", UNREADABLE)
+    following = next((other for other in range(port, _LAST_PORT + 1) if not _trouble(host, other)), None)
     if following != port:
         fail(f"port {port} is taken" + (f"; --port {following} is free" if following else ""), UNREADABLE)
     return port
 
 
-def _is_free(port: int) -> bool:
+def _trouble(host: str, port: int) -> str:
+    """Return why nobody can listen there, empty if somebody can."""
     import socket
 
-    with socket.socket() as one:
-        one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            one.bind((_HOST, port))
-        except OSError:
-            return False
-    return True
+    try:
+        family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind) as one:
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            one.bind(address)
+    except OSError as error:
+        return error.strerror or str(error)
+    return ""
+
+
+def _address(host: str, port: int, token: str) -> str:
+    """Return what to open; from elsewhere a machine that listens at all its addresses is reached by its name."""
+    import socket
+
+    name = socket.gethostname() if host in _EVERYWHERE else f"[{host}]" if ":" in host else host
+    return f"http://{name}:{port}" + (f"/?token={token}" if token else "")
 
 
 def _announce(address: str, arguments: Namespace) -> None:
@@ -135,9 +172,3 @@ def _announce(address: str, arguments: Namespace) -> None:
         webbrowser.open(address)
     if take_interrupt():
         raise KeyboardInterrupt  # trimesh's optional imports had swallowed it
-
-
-def _wait() -> None:
-    """Wait for Ctrl-C."""
-    while True:
-        time.sleep(1)

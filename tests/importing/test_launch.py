@@ -2,6 +2,7 @@
 
 import io
 import os
+import platform
 import random
 import re
 import signal
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from tests.support.bringups import compiled, import_of, places, printed_errors
 from tests.support.importing import PRESETS
@@ -410,6 +412,57 @@ def test_a_launch_file_that_would_do_harm_is_contained_and_named(
     assert places(printed, "TF020").count("hostile.launch.py:3") == 1
     for word in ("os.system", "subprocess.Popen", "os.fork", "os.posix_spawn", "socket.", "open for writing", "rmtree"):
         assert word in printed
+
+
+#: It takes the hook off, by which Python refuses, and calls the C library.
+NATIVE = """
+import ctypes, os, sys
+import tfcompose.importing.launch_process as reader
+reader._REFUSED = frozenset()
+libc = ctypes.CDLL(None)
+made = {{
+    "open": libc.open(b"{folder}/made", os.O_WRONLY | os.O_CREAT, 0o644), "creat": libc.creat(b"{folder}/made", 0o644),
+    "unlink": libc.unlink(b"{folder}/kept"), "chmod": libc.chmod(b"{folder}/kept", 0), "socket": libc.socket(2, 1, 0),
+    "rename": libc.rename(b"{folder}/kept", b"{folder}/made"), "kill": libc.kill(os.getppid(), 0), "fork": libc.fork(),
+    "execv": libc.execl(b"/bin/true", b"true", None),
+}}
+libc.system(b"touch {folder}/made")
+reads = open("{folder}/kept").read()
+import threading
+thread = threading.Thread(target=lambda: made.update(thread=0))
+thread.start()
+thread.join()
+open(os.devnull, "w").write("nothing")
+from launch import LaunchDescription
+from launch_ros.actions import Node
+def generate_launch_description():
+    return LaunchDescription([Node(package="a", executable="b", arguments=[reads, str(made)])])
+"""
+
+
+@pytest.mark.skipif(platform.machine() not in {"x86_64", "aarch64"}, reason="the kernel confines on these two")
+def test_the_kernel_confines_a_launch_file_that_calls_the_c_library(tmp_path: Path) -> None:
+    (tmp_path / "kept").write_text("what is in it", encoding="utf-8")
+    _, data = import_of(source(tmp_path, "native.launch.py", NATIVE.format(folder=tmp_path)), code=None)
+    reads, made = data["processes"]["b"]["run"]["args"]
+    assert reads == (tmp_path / "kept").read_text("utf-8") == "what is in it"
+    assert not (tmp_path / "made").exists()
+    answers = yaml.safe_load(made)
+    assert answers.pop("thread") == 0
+    assert set(answers.values()) == {-1}
+
+
+def test_a_launch_file_that_calls_the_c_library_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = "import ctypes\n\nctypes.CDLL(None)\n"
+    assert main(["import", str(source(tmp_path, "native.launch.py", text))]) == 1
+    assert places(printed_errors(capsys), "TF020") == ["native.launch.py:3"]
+
+
+def test_a_launch_file_that_aborts_is_not_called_slow(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["import", str(source(tmp_path, "a.launch.py", "import os; os.abort()"))]) == 1
+    printed = printed_errors(capsys)
+    assert "SIGABRT" in printed
+    assert "long" not in printed
 
 
 @pytest.mark.parametrize("text", ["while True: pass", "x = [0]\nwhile True: x = x * 2", "import os; os.abort()"])

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import RejectedError, Span, finding
+from tfcompose.importing.confinement import MOST_CPU_S
 from tfcompose.importing.launch_substitutions import marks, scalar_of
 from tfcompose.importing.programs import (
     JOINT_PUBLISHERS,
@@ -108,11 +109,20 @@ def _answered(launch: Launch) -> dict[str, Any]:
     except json.JSONDecodeError:
         message = f"the launch file ends the process that reads it, with code {done.returncode}"
         if done.returncode < 0:
-            ended = signal.Signals(-done.returncode).name
-            message = f"the launch file was ended by {ended}: it takes too long, or too much memory"
+            message = f"the launch file {_ended_by(-done.returncode)}"
     else:
         return answer
     raise RejectedError([finding("TF008", message, launch.span())])
+
+
+def _ended_by(number: int) -> str:
+    """Return what a signal says of the launch file whose process it ended."""
+    if number == signal.SIGXCPU:
+        return f"takes more than {MOST_CPU_S} s of processor time"
+    if number == signal.SIGKILL:
+        return "was killed by the system, or by somebody: it may have needed too much memory"
+    name = signal.Signals(number).name if number in set(signal.Signals) else f"signal {number}"
+    return f"was ended by {name}, which it raised itself, or a module that it loads"
 
 
 class _Work:

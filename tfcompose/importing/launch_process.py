@@ -1,22 +1,20 @@
 """Reads launch files in a process of its own, which is confined: a launch file is a program, and may do anything.
 
-It gets one request on standard input and answers on standard output, both JSON. It has no network where the system lets
-it leave it, bounded time and memory, and cannot start programs nor write files: what a launch file tries of that is
-named. Modules that are not installed give values that do nothing, and are named too.
+It gets one request on standard input and answers on standard output, both JSON. It has bounded time and memory. It has
+no network, and cannot start programs, write files or signal others: the kernel refuses that (``confinement``), and a
+hook of Python's names what a launch file tries of it. Modules that are not installed give values that do nothing, and
+are named too.
 """
 
 from __future__ import annotations
 
 import builtins
-import contextlib
-import ctypes
 import importlib.abc
 import importlib.machinery
 import io
 import json
 import os
 import re
-import resource
 import subprocess
 import sys
 import tempfile
@@ -27,15 +25,13 @@ from typing import Any
 from tfcompose.importing import launch_actions as actions
 from tfcompose.importing import launch_substitutions as substitutions
 from tfcompose.importing import launch_texts as texts
+from tfcompose.importing.confinement import confine, limit
 from tfcompose.importing.launch_substitutions import PACKAGE, Context, FailedError, Missing, place
 
-MOST_CPU_S = 30
-MOST_MEMORY_BYTES = 2 << 30
 MOST_RECORDS = 20_000
 #: The function of a Python launch file.
 _MAKE = "generate_launch_description"
 _HIGHEST = 12
-_CLONE_NEWUSER, _CLONE_NEWNET = 0x10000000, 0x40000000
 _NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 
 #: What a launch file is not let do, by the names of Python's audit events.
@@ -44,7 +40,8 @@ _REFUSED = frozenset({
     "subprocess.Popen", "socket.connect", "socket.bind", "socket.sendto", "socket.sendmsg", "socket.getaddrinfo",
     "socket.gethostbyname", "socket.gethostbyaddr", "os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.link",
     "os.symlink", "os.truncate", "os.chmod", "os.chown", "os.kill", "os.killpg", "shutil.rmtree", "shutil.move",
-    "shutil.copyfile", "shutil.copytree",
+    "shutil.copyfile", "shutil.copytree", "socket.__new__", "ctypes.dlopen", "ctypes.dlsym", "ctypes.dlsym/handle",
+    "ctypes.call_function", "ctypes.cdata", "ctypes.cdata/buffer", "ctypes.string_at", "ctypes.addressof",
 })  # fmt: skip
 #: Packages of ROS's that the stand-in is in the place of, and what xacro and the ament index are.
 _LAUNCH = ("launch", "launch_ros", "launch_xml", "launch_yaml", "nav2_common", "ament_index_python", "xacro",
@@ -254,19 +251,7 @@ def _fill_index(module: types.ModuleType, reader: Reader) -> None:
 # Confinement
 
 
-def _limit() -> None:
-    """Bound this process by the system, and leave the network where that is allowed."""
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    for kind, most in ((resource.RLIMIT_CPU, MOST_CPU_S), (resource.RLIMIT_AS, MOST_MEMORY_BYTES)):
-        hard = resource.getrlimit(kind)[1]
-        resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
-    with contextlib.suppress(OSError, AttributeError):
-        libc = ctypes.CDLL(None, use_errno=True)
-        if libc.unshare(_CLONE_NEWNET) != 0:
-            libc.unshare(_CLONE_NEWUSER | _CLONE_NEWNET)
-
-
-def _confine(context: Context) -> None:  # noqa: C901 (one hook after another)
+def _watch(context: Context, null: int) -> None:  # noqa: C901 (one hook after another)
     """Refuse and name what a launch file may not do; what is often done and often needless is passed over."""
     noted: set[str] = set()
 
@@ -278,7 +263,7 @@ def _confine(context: Context) -> None:  # noqa: C901 (one hook after another)
     def audit(event: str, args: tuple[Any, ...]) -> None:
         writes = event == "open" and isinstance(args[1], str) and set(args[1]) & set("wax+")
         flags = event == "open" and isinstance(args[2], int) and args[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT)
-        if event in _REFUSED or ((writes or flags) and args[0] != os.devnull):
+        if event in _REFUSED or ((writes or flags) and not isinstance(args[0], int)):
             what = next((str(one) for one in args if isinstance(one, (str, bytes, os.PathLike, list, tuple))), "")
             note(f"{'open for writing' if event == 'open' else event} {what}".strip())
             raise PermissionError(f"{event} is not done while launch files are read")
@@ -303,6 +288,8 @@ def _confine(context: Context) -> None:  # noqa: C901 (one hook after another)
 
     def opened(file: Any, mode: str = "r", *args: Any, **more: Any) -> Any:
         path = substitutions.with_package(os.fspath(file)) if isinstance(file, (str, os.PathLike)) else ""
+        if path == os.devnull:
+            return plain_open(os.dup(null), mode, *args, **more)
         if str(path).startswith(PACKAGE):
             return io.StringIO(substitutions.file_text(str(path)))
         return plain_open(file, mode, *args, **more)
@@ -337,7 +324,9 @@ def answer(request: dict[str, Any]) -> dict[str, Any]:
         del sys.modules[name]
     sys.dont_write_bytecode = True
     tempfile.gettempdir()  # finds out now, by writing there, what is asked for later
-    _confine(context)
+    null = os.open(os.devnull, os.O_RDWR)  # no file can be opened for writing after this
+    confine()
+    _watch(context, null)
     stopped, line = "", 0
     context.file = request["file"]
     try:
@@ -361,7 +350,7 @@ def main() -> None:
     channel = os.dup(1)
     os.dup2(2, 1)  # what a launch file prints is for people
     with os.fdopen(channel, "w") as out:  # before files may no more be opened for writing
-        _limit()
+        limit()
         out.write(json.dumps(answer(request), default=str))
         out.flush()
         os._exit(0)

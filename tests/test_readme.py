@@ -14,7 +14,7 @@ from tests.support.cli import tfcompose_in
 from tests.support.tables import for_each
 from tfcompose.catalogue import CATALOGUE
 from tfcompose.cli.compiling import library
-from tfcompose.cli.documentation import FOLDER, TOPICS, topic
+from tfcompose.cli.documentation import FOLDER, TOPICS, for_terminal, page, topic
 from tfcompose.cli.parser import COMMANDS, parser_of
 
 ROOT = Path(__file__).parent.parent
@@ -48,7 +48,8 @@ def test_every_command_and_topic_that_is_named_is_there() -> None:
     for text in (README, *PAGES.values()):
         named = set(re.findall(r"(?:^\$ |`)tfcompose ([a-z]+)\b", text, re.MULTILINE))
         assert named <= COMMANDS.keys()
-        assert set(re.findall(r"tfcompose help ([a-z]+)", text)) <= TOPICS.keys() | COMMANDS.keys()
+        for word in re.findall(r"tfcompose help ([a-z.]+[a-z])", text):
+            assert page(word, COMMANDS), word
 
 
 def test_help_prints_topics_and_commands_and_all_of_them_as_html(tmp_path: Path) -> None:
@@ -60,13 +61,13 @@ def test_help_prints_topics_and_commands_and_all_of_them_as_html(tmp_path: Path)
     near = tfcompose_in(tmp_path, "help", "calibraton")
     assert (near.returncode, "calibration?" in near.stderr) == (2, True)
     assert tfcompose_in(tmp_path, "help", "--html", "docs.html").returncode == 0
-    page = (tmp_path / "docs.html").read_text("utf-8")
-    assert all(f'id="topic-{word}"' in page for word in TOPICS)
-    assert all(f'id="command-{name}"' in page for name in COMMANDS)
-    addresses = re.findall(r'id="([^"]+)"', page)
+    html = (tmp_path / "docs.html").read_text("utf-8")
+    assert all(f'id="topic-{word}"' in html for word in TOPICS)
+    assert all(f'id="command-{name}"' in html for name in COMMANDS)
+    addresses = re.findall(r'id="([^"]+)"', html)
     assert len(set(addresses)) == len(addresses)
-    assert CATALOGUE.keys() <= set(re.findall(r'href="#([^"]+)"', page)) <= set(addresses)
-    assert not re.search(r'<\w+ [^>]*(src|href)="(?!#)', page), "it needs no other file"
+    assert CATALOGUE.keys() <= set(re.findall(r'href="#([^"]+)"', html)) <= set(addresses)
+    assert not re.search(r'<\w+ [^>]*(src|href)="(?!#)', html), "it needs no other file"
 
 
 def run(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -78,6 +79,15 @@ def run(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
 def rover(tmp_path: Path) -> Path:
     (tmp_path / "rover.yaml").write_text(blocks("yaml")[0], encoding="utf-8")
     return tmp_path
+
+
+@pytest.mark.parametrize("columns", [60, 80, 120])
+def test_pages_fit_a_terminal(columns: int) -> None:
+    for word in ("sensors", "processes", "hosts", "verify"):
+        text = for_terminal(page(word, COMMANDS) or "", columns)
+        assert max(map(len, text.splitlines())) <= max(columns, 80)  # argparse's usage
+        assert "|---" not in text
+        assert "](#" not in text
 
 
 def test_its_robot_has_no_findings(rover: Path) -> None:

@@ -9,7 +9,7 @@ from pydantic_core import core_schema
 from tfcompose.language import calibration
 from tfcompose.language.json_schema import LANGUAGES
 from tfcompose.language.reading import UNKNOWN_KEYS, WORDS, read
-from tfcompose.language.reference import reference
+from tfcompose.language.reference import key_page, keys, reference
 from tfcompose.language.robot import RobotSpec
 from tfcompose.language.spec import Spec, described, examples_of, fields_of, walk
 
@@ -146,3 +146,30 @@ def test_thousands_of_faults_are_all_found_with_two_readings(monkeypatch: pytest
     assert spec
     assert len(spec.frames) == FAULTS
     assert count == 2
+
+
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [
+        ("sensors", ["sensors on their mounts", "## Sensor", "`place`"]),
+        ("sensors.place", ["## sensors.NAME.place", "`camera_color_optical_frame`"]),
+        ("sensors.front_camera.place", ["## sensors.NAME.place"]),
+        ("place", ["## sensors.NAME.place", "## parts.NAME.place"]),
+        ("process", ["## Process", "`max_restarts`"]),
+        ("processes.ready", ["## processes.NAME.ready", "## Ready", "`topic`"]),
+        ("processes.ready.topic", ["## processes.NAME.ready.topic"]),
+        ("guard.mode", ["`watch`"]),
+        ("vars", ["## vars"]),
+    ],
+)
+def test_a_key_is_explained_by_its_path_with_names_or_without(path: str, words: list[str]) -> None:
+    text = key_page(path) or ""
+    assert [word for word in words if word not in text] == []
+
+
+def test_a_key_is_explained_where_it_is_and_nowhere_else() -> None:
+    assert key_page("sensors.plaice") is None
+    assert key_page("sensors.mimic") is None
+    assert "ros2_control" not in (key_page("sensors") or "")
+    for key in keys():
+        assert key_page(key), key

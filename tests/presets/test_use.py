@@ -467,3 +467,12 @@ def test_an_oak_without_its_imu_has_it_switched_off(release: str, key: str) -> N
         assert {name: value for name, value in driver.params.items() if "imu" in name} == {key: imu}
         assert any(word.startswith("params_file:=") for word in driver.argv)
         assert ("s_imu_frame" in robot.frames) is imu
+
+
+@pytest.mark.parametrize(
+    ("word", "kinds"),
+    [("camera", {"camera", "rgbd", "stereo"}), ("depth", {"rgbd", "stereo"}), ("lidar", {"lidar2d", "lidar3d"})],
+)
+def test_a_word_lists_every_kind_that_it_names(word: str, kinds: set[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["presets", word, "--format", "json"]) == 0
+    assert {row["kind"] for row in json.loads(capsys.readouterr().out)} == kinds

@@ -32,18 +32,39 @@ TOPICS = {
     "costs": "what it costs, measured",
     "codes": "every code that tfcompose finds",
 }
+#: A link within the documentation.
+_LINK = re.compile(r"\[([^\]]+)\]\(#\w+\)")
 _COMMENT = re.compile(r"<!--.*?-->\n*", re.DOTALL)
 #: Commands with a page under another name.
 _PAGES = {"export": "exports"}
 
 
 def page(word: str, commands: Mapping[str, Command]) -> str | None:
-    """Return the page of a topic, or a command's options with its page; None if there is neither."""
+    """Return the page of a topic, a command's options with its page, or what a key means; None if there is none."""
     if word in commands:
         options = command_parser(word, commands[word]).format_help()
         about = _read(_PAGES.get(word, word))
         return f"{options}\n{about}" if about else options
-    return topic(word) if word in TOPICS else None
+    if word in TOPICS:
+        return topic(word)
+    from tfcompose.language.reference import key_page
+
+    return key_page(word)
+
+
+def for_terminal(markdown: str, columns: int) -> str:
+    """Return the page with tables and paragraphs that fit the columns, as plain text."""
+    from io import StringIO
+
+    from rich.console import Console
+    from rich.markdown import Markdown
+
+    options, begin, page = markdown.partition("\n# ") if markdown.startswith("usage: ") else ("", "", markdown)
+    stream = StringIO()
+    text = _LINK.sub(r"\1", f"# {page}" if begin else page)
+    Console(file=stream, width=columns).print(Markdown(text, hyperlinks=False))
+    lines = [line.rstrip() for line in stream.getvalue().splitlines()]
+    return f"{options}{begin[:1]}" + "\n".join(lines) + "\n"
 
 
 def topic(word: str) -> str:

@@ -15,6 +15,8 @@ from tfcompose.units import Measure
 if TYPE_CHECKING:
     from pydantic.fields import FieldInfo
 
+    from tfcompose.language.spec import Pattern
+
 _HEAD = {
     "robot": "The language of robot files",
     "preset": "The language of sensor presets",
@@ -31,15 +33,73 @@ def reference(language: str) -> str:
     root = LANGUAGES[language]
     sections: dict[Any, list[str]] = {}
     for pattern, kind in walk(root):
-        sections.setdefault(kind, []).append(".".join(pattern).replace("*", "NAME"))
+        sections.setdefault(kind, []).append(_place(pattern))
     rules = [_VALUES, *([_EXPRESSIONS] if language == "robot" else []), _REQUIRED]
     lines = [f"# {_HEAD[language]}, version 1", "", *rules, ""]
     for kind, places in sections.items():
-        lines += [f"## {_title(kind)}", "", *_places(places), *(inspect.getdoc(kind) or "").splitlines(), ""]
-        lines += ["| key | type | default | meaning | example |", "|---|---|---|---|---|"]
-        lines += [_row(name, field) for name, field in fields_of(kind).items()]
-        lines.append("")
+        lines += _section(kind, places)
     return "\n".join(lines).rstrip() + "\n"
+
+
+def key_page(path: str) -> str | None:
+    """Return what a robot file's key means, as Markdown; None where there is no such key.
+
+    ``path`` names it with its sections, with names or without: ``sensors.place`` or ``sensors.laser.place``; or the
+    kind of a section: ``sensor``; or it is a key alone, of which every place is explained.
+    """
+    words = tuple(path.split("."))
+    root = LANGUAGES["robot"]
+    places = [(pattern, kind) for pattern, kind in walk(root) if pattern]
+    holders: list[tuple[Pattern, Any]] = [((), root), *places]
+    if words[0] in fields_of(root) and len(words) == 1:
+        holders = holders[:1]
+    elif len(words) > 1:
+        holders = [(at, kind) for at, kind in holders if _is_at(at, words[:-1])]
+    found: dict[tuple[str, ...], list[str]] = {}
+    for at, kind in holders:
+        field = fields_of(kind).get(words[-1])
+        if field is not None:
+            default, example = _default(field), _examples(field)
+            lines = [described(field), "", f"- type: {_type(field.rebuild_annotation())}"]
+            lines += [f"- default: {default}"] * bool(default) + [f"- example: {example}"] * bool(example)
+            found.setdefault(tuple(lines), []).append(_place((*at, words[-1])))
+    lines = [line for about, at in found.items() for line in (f"## {_listed(at)}", "", *about, "")]
+    sections = [(at, kind) for at, kind in places if at[-1] != "*" and _is_at(at, words)]
+    sections += [(at, kind) for at, kind in places if at[-1] == "*" and _is_at(at[:-1], words)]
+    sections = sections or [(at, kind) for at, kind in places if words == (_title(kind).lower(),)]
+    if sections:
+        lines += _section(sections[0][1], [_place(at) for at, kind in places if kind is sections[0][1]])
+    return "\n".join(lines).rstrip() + "\n" if lines else None
+
+
+def keys() -> list[str]:
+    """Return the names of all keys of a robot file, and the kinds of its sections."""
+    kinds = dict.fromkeys(kind for _, kind in walk(LANGUAGES["robot"]))
+    return [*dict.fromkeys(name for kind in kinds for name in fields_of(kind)), *(_title(one).lower() for one in kinds)]
+
+
+def _is_at(pattern: Pattern, words: tuple[str, ...]) -> bool:
+    """Return whether words name the place, in which a name may be left out."""
+    if not pattern or not words:
+        return not words and all(step == "*" for step in pattern)
+    if pattern[0] == "*":
+        return _is_at(pattern[1:], words) or _is_at(pattern[1:], words[1:])
+    return pattern[0] == words[0] and _is_at(pattern[1:], words[1:])
+
+
+def _place(pattern: Pattern) -> str:
+    return ".".join(pattern).replace("*", "NAME")
+
+
+def _listed(places: list[str]) -> str:
+    more = [f"{len(places) - _MOST_PLACES} more places"] if len(places) > _MOST_PLACES else []
+    return ", ".join([*places[:_MOST_PLACES], *more])
+
+
+def _section(kind: Any, places: list[str]) -> list[str]:
+    lines = [f"## {_title(kind)}", "", *_places(places), *(inspect.getdoc(kind) or "").splitlines(), ""]
+    lines += ["| key | type | default | meaning | example |", "|---|---|---|---|---|"]
+    return [*lines, *(_row(name, field) for name, field in fields_of(kind).items()), ""]
 
 
 def _title(kind: Any) -> str:
@@ -52,18 +112,18 @@ _MOST_PLACES = 6
 def _places(places: list[str]) -> list[str]:
     """Return where a mapping stands; the whole file needs no word."""
     named = [f"`{place}`" for place in places if place]
-    more = [f"{len(named) - _MOST_PLACES} more places"] if len(named) > _MOST_PLACES else []
-    return [f"At {', '.join([*named[:_MOST_PLACES], *more])}.", ""] if named else []
+    return [f"At {_listed(named)}.", ""] if named else []
 
 
 def _row(name: str, field: FieldInfo) -> str:
-    examples = " or ".join(f"`{_yaml(one)}`" for one in examples_of(field)) if field.examples else _example(field)
-    cells = (f"`{name}`", _type(field.rebuild_annotation()), _default(field), described(field), examples)
+    cells = (f"`{name}`", _type(field.rebuild_annotation()), _default(field), described(field), _examples(field))
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
-def _example(field: FieldInfo) -> str:
-    """Return an example where the type itself does not list what there is."""
+def _examples(field: FieldInfo) -> str:
+    """Return examples where the type itself does not list what there is."""
+    if field.examples:
+        return " or ".join(f"`{_yaml(one)}`" for one in examples_of(field))
     measure = measure_of(field.rebuild_annotation())
     return f"`{measure.example}`" if measure else ""
 
@@ -124,4 +184,4 @@ def _annotated(inner: Any, metadata: tuple[Any, ...]) -> str:
 
 def _plural(word: str) -> str:
     known = {"string": "strings", "number": "numbers", "quantity": "quantities", "whole number": "whole numbers"}
-    return known.get(word, word)
+    return known.get(word, f"lists{word.removeprefix('list')}" if word.startswith("list of ") else word)

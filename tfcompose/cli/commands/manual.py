@@ -1,7 +1,7 @@
 """Explain a topic or a command, or write the whole documentation as one HTML file.
 
-Print the page of a topic, such as language or guard, or the options of a command and what there is to say about it.
-Without a word, list commands and topics.
+Print the page of a topic, such as language or guard; the options of a command, with its page; or what a key of a robot
+file means: help sensors, help sensors.place. Without a word, list commands and topics.
 """
 
 from __future__ import annotations
@@ -16,16 +16,18 @@ if TYPE_CHECKING:
 
 def arguments(parser: ArgumentParser) -> None:
     """Add the command's arguments."""
-    parser.add_argument("word", nargs="?", metavar="TOPIC|COMMAND", help="what to explain")
+    parser.add_argument("word", nargs="?", metavar="TOPIC|COMMAND|KEY", help="what to explain")
     parser.add_argument("--html", metavar="FILE", help="write all topics and commands to FILE, as one page")
 
 
 def run(arguments: Namespace) -> int:
     """Print the page or write the file; exit code 2 where there is no such topic."""
     import pydoc
+    import sys
     from pathlib import Path
 
-    from tfcompose.cli.documentation import TOPICS, html, page
+    from tfcompose.cli.documentation import TOPICS, for_terminal, html, page
+    from tfcompose.cli.terminal import table_width
     from tfcompose.findings import did_you_mean
 
     if arguments.html:
@@ -39,7 +41,11 @@ def run(arguments: Namespace) -> int:
         return 0
     text = page(arguments.word, arguments.commands)
     if text is None:
-        advice = did_you_mean(arguments.word, [*TOPICS, *arguments.commands], f"the topics are {', '.join(TOPICS)}")
-        fail(f"no topic or command {arguments.word}; {advice}", UNREADABLE)
-    pydoc.pager(text)
+        from tfcompose.language.reference import keys
+
+        known = [*TOPICS, *arguments.commands, *keys()]
+        advice = did_you_mean(arguments.word.rpartition(".")[2], known, f"the topics are {', '.join(TOPICS)}")
+        fail(f"no topic, command or key {arguments.word}; {advice}", UNREADABLE)
+    columns = table_width(sys.stdout)
+    pydoc.pager(text if columns is None else for_terminal(text, columns))
     return 0

@@ -77,7 +77,8 @@ def _list(only: str | None, known: Library, form: str) -> int:
     ]
     rows += preset_page.node_rows()
     words = sorted({word for row in rows for word in _words(row)})
-    exact = [row for row in rows if not only or only in _words(row)]
+    wanted = {only, *_KINDS.get(only or "", ())}
+    exact = [row for row in rows if not only or not wanted.isdisjoint(_words(row))]
     rows = exact or [row for row in rows if only and any(only.lower() in word for word in _words(row))]
     if not rows:
         warn(f"no preset, vendor or kind {only}; {did_you_mean(only or '', words, 'tfcompose presets lists them')}")
@@ -108,6 +109,10 @@ def _likeness(preset: PresetSpec, known: Library) -> dict[str, str]:
 def _about(row: dict[str, str]) -> str:
     like = f" (= {row['same_as']})" if "same_as" in row else f" (from {row['made_from']})" if "made_from" in row else ""
     return f"{row['model']}: {row['about']}{like}"
+
+
+#: What kinds of sensors are called together.
+_KINDS = {"camera": ("rgbd", "stereo"), "lidar": ("lidar2d", "lidar3d"), "depth": ("rgbd", "stereo")}
 
 
 def _words(row: dict[str, str]) -> tuple[str, ...]:

@@ -125,6 +125,7 @@ ONLY_IN: dict[str, set[str]] = {
     "sensor_msgs": {"ros"},
     "nav_msgs": {"ros"},
     "lifecycle_msgs": {"ros"},
+    "composition_interfaces": {"ros"},
     "rcl_interfaces": {"ros"},
     "launch": {"launcher"},
     "launch_ros": {"launcher"},

@@ -251,6 +251,8 @@ CATALOGUE: dict[str, Code] = {
         Code("TF852", "past_the_fence", "guard", "error"),
         Code("TF853", "too_much_tf", "guard", "error"),
         Code("TF854", "other_robot", "guard", "error"),
+        Code("TF855", "component_elsewhere", "processes", "error"),
+        Code("TF856", "container_without_components", "processes", "warning"),
         # ROS, plans, bags, extras
         Code("TF901", "no_ros", "environment", "error"),
         Code("TF902", "bad_plan", "environment", "error"),

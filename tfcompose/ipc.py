@@ -106,6 +106,32 @@ class Remember:
 
 
 @dataclass(frozen=True, slots=True)
+class Loaded:
+    """A container has loaded a component; ``number`` is that of the order."""
+
+    process: str
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class NotLoaded:
+    """A container has not loaded a component, for this reason; ``number`` is that of the order."""
+
+    process: str
+    number: int
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Unloaded:
+    """A component is not in its container any more, or the container does not answer: then ``why`` says so."""
+
+    process: str
+    number: int
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Alive:
     """The guard looks; it says so once a second."""
 
@@ -124,6 +150,9 @@ GuardEvent = (
     | GateOpen
     | GateShut
     | Remember
+    | Loaded
+    | NotLoaded
+    | Unloaded
 )
 
 GUARD_EVENTS = TaggedUnion[GuardEvent]("event", get_args(GuardEvent))
@@ -163,7 +192,29 @@ class Gate:
     writers: tuple[str, ...] = ()
 
 
-GuardOrder = Absent | Present | Gate
+@dataclass(frozen=True, slots=True)
+class Load:
+    """Have a container load a component, as the file says; it is answered by ``Loaded`` or ``NotLoaded``.
+
+    The answer has the order's ``number``. ``again`` says that a guard before this one may have had it loaded.
+    """
+
+    process: str
+    number: int
+    file: str
+    again: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Unload:
+    """Have a container unload a component, as the file says; it is answered by ``Unloaded``, with ``number``."""
+
+    process: str
+    number: int
+    file: str
+
+
+GuardOrder = Absent | Present | Gate | Load | Unload
 
 GUARD_ORDERS = TaggedUnion[GuardOrder]("order", get_args(GuardOrder))
 

@@ -6,19 +6,21 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from tfcompose.geometry import Pose
-from tfcompose.ipc import FindingShown, Notice, ProcessState
+from tfcompose.ipc import FindingShown, Loaded, Notice, NotLoaded, ProcessState, Unloaded
 from tfcompose.launcher.events import (
     Action,
     Begin,
     Event,
     Finish,
     Kill,
+    LoadComponent,
     Notify,
     NotifyLate,
     Order,
     Start,
     Started,
     Tick,
+    UnloadComponent,
 )
 from tfcompose.launcher.machine import step, wake_time
 from tfcompose.launcher.state import State, initial
@@ -63,6 +65,7 @@ class History:
     killed: list[tuple[str, int]] = field(default_factory=list)
     notices: list[Any] = field(default_factory=list)
     orders: list[GuardOrder] = field(default_factory=list)
+    requested: list[LoadComponent | UnloadComponent] = field(default_factory=list)
     late: list[Finding] = field(default_factory=list)
     exit_code: int | None = None
     starts: bool = True
@@ -86,6 +89,8 @@ class History:
                     self.feed(Started(name, 1000 + len(self.started)))
             case Kill(name, number):
                 self.killed.append((name, number))
+            case LoadComponent() | UnloadComponent() as requested:
+                self.requested.append(requested)
             case Notify(notice):
                 self.notices.append(notice)
             case Order(order):
@@ -94,6 +99,20 @@ class History:
                 self.late.append(found)
             case Finish(code):
                 self.exit_code = code
+
+    def answer(self, *names: str, why: str = "") -> History:
+        """Have containers answer what they were requested last about these components."""
+        for name in names:
+            last = next(one for one in reversed(self.requested) if one.name == name)
+            if isinstance(last, UnloadComponent):
+                self.feed(Unloaded(name, last.number, why))
+            else:
+                self.feed(NotLoaded(name, last.number, why) if why else Loaded(name, last.number))
+        return self
+
+    def loads(self) -> list[str]:
+        """Return the components that containers were requested to load, in order."""
+        return [one.name for one in self.requested if isinstance(one, LoadComponent)]
 
     def wait(self, seconds: float) -> History:
         self.now += seconds

@@ -63,7 +63,12 @@ def process_without_role(robot: Robot) -> Iterator[Finding]:
     moving = any(edge.joint for edge in robot.edges)
     states = any(process.simulate and process.simulate.kind == "joints" for process in robot.processes)
     for process in robot.processes:
-        if process.kind not in {"external", "simulate"} or process.name in needed or robot.excuses(process.name):
+        if (
+            process.kind not in {"external", "simulate"}
+            or process.name in needed
+            or process.loads
+            or robot.excuses(process.name)
+        ):
             continue
         if process.kind == "external" and moving and not states:
             continue
@@ -125,3 +130,34 @@ def gate_never_opens(robot: Robot) -> Iterator[Finding]:
         elif kind == "exit" and process.restart == "always":
             message = f"{process.name} is ready when it has ended, but restart: always starts it again"
             yield finding("TF848", message, process.at, help="write restart: on-failure, or remove restart")
+
+
+@rule("TF855")
+def component_elsewhere(robot: Robot) -> Iterator[Finding]:
+    """A component is to run on another computer than its container.
+
+    A component has no process of its own: it runs where its container does. Remove its ``host``.
+    """
+    processes = {process.name: process for process in robot.processes}
+    for process in robot.processes:
+        container = processes.get(process.component.container) if process.component else None
+        if container and process.host != container.host:
+            message = f"{process.name} is on {process.host}, but its container {container.name} is on {container.host}"
+            if container.host is None:
+                message = f"{process.name} is on {process.host}, and its container {container.name} names no host"
+            notes = [Note(f"{container.name} is defined here", container.at)]
+            yield finding("TF855", message, process.at, notes=notes, help=f"remove host from {process.name}")
+
+
+@rule("TF856")
+def container_without_components(robot: Robot) -> Iterator[Finding]:
+    """A container has no components.
+
+    Nothing is ever loaded into it. Name it as the ``container`` of a component, or remove it. Other files that this one
+    is merged with, or profiles, may have its components.
+    """
+    used = {process.component.container for process in robot.processes if process.component}
+    for process in robot.processes:
+        if process.loads and process.name not in used:
+            advice = f"processes: {{NAME: {{component: PACKAGE/CLASS, container: {process.name}}}}}, or remove it"
+            yield finding("TF856", f"the container {process.name} has no components", process.at, help=advice)

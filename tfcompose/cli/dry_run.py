@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from argparse import Namespace
     from collections.abc import Iterator
 
-    from tfcompose.plan import Plan, PlanProcess
+    from tfcompose.plan import Component, Plan, PlanProcess
 
 
 def dry_run(arguments: Namespace) -> int:
@@ -78,8 +79,7 @@ def _lines(plan: Plan, files: dict[str, str]) -> Iterator[str]:
 
 def _process(plan: Plan, process: PlanProcess, files: dict[str, str]) -> Iterator[str]:
     yield f"{process.name} ({process.kind})"
-    if process.kind != "external":
-        yield f"  command  {' '.join(map(_quoted, (*process.prefix, *process.argv)))}"
+    yield from _what(process)
     if plan.guard.mode == "strict" and process.kind not in ("external", "guard"):
         yield f"  fence    {_fence(plan, process)}"
     nodes = [name + (f" → {process.lifecycle[name]}" if name in process.lifecycle else "") for name in process.nodes]
@@ -94,10 +94,28 @@ def _process(plan: Plan, process: PlanProcess, files: dict[str, str]) -> Iterato
     if process.params_file is not None:
         yield f"  params   {process.params_file}"
         yield from (f"    | {line}" for line in files.get(process.params_file, "").splitlines())
+    yield from _component(process.component)
     yield from _times(process)
     for edge in plan.edges_of(process.name):
         rate = f", {edge.rate:g} Hz" if edge.rate else ""
         yield f"  edge     {edge.name} ({edge.kind}{rate})"
+
+
+def _what(process: PlanProcess) -> Iterator[str]:
+    """Yield what is started or loaded."""
+    component = process.component
+    if component:
+        yield f"  loads    {component.package}/{component.plugin}, in {component.container}"
+    elif process.kind != "external":
+        yield f"  command  {' '.join(map(_quoted, (*process.prefix, *process.argv)))}"
+
+
+def _component(component: Component | None) -> Iterator[str]:
+    """Yield what a component is given."""
+    for name, value in component.params.items() if component else ():
+        yield f"  param    {name}: {json.dumps(value)}"
+    for name, value in component.extra_arguments.items() if component else ():
+        yield f"  extra    {name}: {json.dumps(value)}"
 
 
 def _fence(plan: Plan, process: PlanProcess) -> str:
@@ -137,7 +155,7 @@ def _times(process: PlanProcess) -> Iterator[str]:
 
 def _environment(plan: Plan, process: PlanProcess) -> dict[str, str]:
     """Return what is added to the environment."""
-    if process.kind == "external":
+    if process.kind in {"external", "component"}:
         return {}
     env = child_environment({}, plan.ros, own=process.kind != "run") | process.env
     folder = str(FASTDDS_PROFILE.parent)

@@ -67,7 +67,7 @@ def start(file: Path, arguments: Namespace, built_with: Sequence[Finding] = ()) 
     if plan.guard.mode == "off" and arguments.settle is not None:
         fail("the guard is off, so --settle has no effect: leave it out", UNREADABLE)
     trouble = ros_trouble(child_environment(os.environ, plan.ros, own=True))
-    found = [trouble] if trouble else commands_of(plan, plan.started, file, os.environ, child_environment)[1]
+    found = [trouble] if trouble else commands_of(plan, plan.managed, file, os.environ, child_environment)[1]
     if found:
         reject([_with_profiles(one, arguments) for one in found])
     try:
@@ -171,7 +171,7 @@ def _starts_with(profile: str, arguments: Namespace) -> bool:
     if compiled.robot is None or compiled.errors:
         return False
     plan = plan_of(compiled.robot)
-    return not commands_of(plan, plan.started, Path(file), os.environ, child_environment)[1]
+    return not commands_of(plan, plan.managed, Path(file), os.environ, child_environment)[1]
 
 
 def _detach(plan: Plan, place: RuntimeDir, lock: Lock, session: Session, arguments: Namespace) -> int:

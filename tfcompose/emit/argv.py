@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.model import AsInFile
@@ -32,7 +33,7 @@ def argv_of(process: Process, robot: Robot, *, has_params: bool, owns: bool) -> 
 
     ``owns`` says that it has edges, ``has_params`` that a file of parameters is written for it.
     """
-    if process.kind == "external":
+    if process.kind in {"external", "component"}:
         return ()
     if process.kind != "run":
         arguments = [word for name, value in _own_params(process) for word in ("-p", f"{name}:={json.dumps(value)}")]
@@ -116,6 +117,31 @@ def file_params(process: Process) -> dict[str, dict[str, Any]]:
         return {}
     nodes = {node.name: _known(node.params) for node in process.ros_nodes}
     return {node: params for node, params in nodes.items() if params}
+
+
+def component_params(process: Process, robot: Robot) -> dict[str, Any]:
+    """Return the parameters of a component, by their full names, as values that ROS has."""
+    clock = {"use_sim_time": True} if robot.ros.clock == "sim" else {}
+    return clock | {name: _typed(value) for name, value in process.ros_nodes[0].flat_texts.items()}
+
+
+def _typed(value: Any) -> Any:
+    """Return the value of a parameter; a word of a parameter file is what ROS reads there."""
+    if isinstance(value, list):
+        items = [_typed(item) for item in value]
+        return [float(item) for item in items] if {type(item) for item in items} == {int, float} else items
+    if not isinstance(value, AsInFile):
+        return value
+    if value.lower() in _TRUTH:
+        return _TRUTH[value.lower()]
+    for kind in (lambda text: int(text, 0), float):
+        with suppress(ValueError):
+            return kind(str(value))
+    return str(value)
+
+
+#: The words that ROS reads as true and false in a parameter file.
+_TRUTH = dict.fromkeys(("true", "yes", "on", "y"), True) | dict.fromkeys(("false", "no", "off", "n"), False)
 
 
 def _known(params: dict[str, Any]) -> dict[str, Any]:

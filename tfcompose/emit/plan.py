@@ -9,7 +9,7 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.emit.argv import argv_of, file_params
+from tfcompose.emit.argv import argv_of, component_params, file_params
 from tfcompose.files import AS_IN_SOURCE, Target
 from tfcompose.model import JOINTS, STATIC
 from tfcompose.numbers import clean
@@ -116,6 +116,7 @@ def _process(process: Process, robot: Robot, owned: list[tuple[str, str]], names
         description=f"{process.part}/{DESCRIPTION}" if process.part and process.kind in _PUBLISHERS else None,
         drives=driven_of(process, robot),
         switches=switches_of(process, robot),
+        component=process.component and replace(process.component, params=component_params(process, robot)),
     )
 
 
@@ -125,9 +126,15 @@ def _at(target: Target, process: PlanProcess) -> PlanProcess:
     def placed(text: str) -> str:
         return _FILE.sub(lambda found: f"${{build_dir}}/{target.from_folder(found[1])}", text)
 
+    def placed_in(value: Any) -> Any:
+        return placed(value) if isinstance(value, str) else value
+
     env = {name: placed(value) for name, value in process.env.items()}
+    component = process.component
+    if component:
+        component = replace(component, params={name: placed_in(one) for name, one in component.params.items()})
     cwd = process.cwd and placed(process.cwd)
-    return replace(process, argv=tuple(placed(word) for word in process.argv), env=env, cwd=cwd)
+    return replace(process, argv=tuple(placed(word) for word in process.argv), env=env, cwd=cwd, component=component)
 
 
 def _on(main: str | None, process: PlanProcess) -> PlanProcess:
@@ -146,7 +153,7 @@ def switches_of(process: Process, robot: Robot) -> dict[str, dict[str, Any]]:
     """Return, by node, the parameters that are written for it and decide what it publishes."""
     keys = {key for sensor in _sensors(process, robot) for key in _switch(sensor)}
     found = {}
-    for node in process.ros_nodes if process.kind in {"run", "external"} else ():
+    for node in process.ros_nodes if process.kind in {"run", "external", "component"} else ():
         wanted = keys | {key for claim in robot.claims if claim.node == node.name for key in claim.off}
         switches = {key: value for key, value in node.params.items() if key in wanted}
         if switches:

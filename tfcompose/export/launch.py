@@ -169,6 +169,7 @@ def launch(plan: Plan, machine: Machine, urdf: str) -> tuple[tuple[File, ...], l
         if unheeded and process.kind != "guard":
             gaps.append(f"{process.name} does not wait for {', '.join(unheeded)}: launch knows no readiness")
         gaps += _unlike(process)
+    gaps += [f"{process.name} is a component, and left out: tfcompose up loads it" for process in plan.components]
     head = _HEAD.replace("{robot}", plan.robot).replace("{folder!r}", repr(machine.folder))
     text = head + "".join(f"{line}\n" for action in actions for line in _element(action)) + "    ])\n"
     return (File(f"{plain_name(plan.robot)}.launch.py", text),), gaps

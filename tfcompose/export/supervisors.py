@@ -75,8 +75,17 @@ def restart_of(process: PlanProcess) -> str:
 
 
 def after(plan: Plan, process: PlanProcess) -> dict[str, str]:
-    """Return which processes come first here, and what of them is waited for; a strict guard is among them."""
-    waits = {name: what for name, what in process.after.items() if plan.process(name).kind != "external"}
+    """Return which processes come first here, and what of them is waited for; a strict guard is among them.
+
+    In place of a component comes its container.
+    """
+    waits: dict[str, str] = {}
+    for name, what in process.after.items():
+        component = plan.process(name).component
+        if component and plan.process(component.container).kind != "external":
+            waits.setdefault(component.container, "started")
+        elif not component and plan.process(name).kind != "external":
+            waits[name] = what
     guards = [one.name for one in plan.started if one.kind == "guard" and plan.guard.mode == "strict"]
     return dict.fromkeys(() if process.kind == "guard" else guards, "started") | waits
 
@@ -99,6 +108,14 @@ def gaps_of(plan: Plan) -> list[str]:
             gaps.append(f"{process.name} is external, and not started")
         if process.required:
             gaps.append(f"{process.name} is required: its end does not end the others here")
+        component = process.component
+        for name in process.after:
+            if component and name != component.container:
+                gaps.append(
+                    f"{process.name} does not wait for {name}: the guard loads it once {component.container} runs"
+                )
+            elif not component and (other := plan.process(name).component):
+                gaps.append(f"{process.name} waits for the container {other.container}, and not until it has {name}")
     return gaps
 
 

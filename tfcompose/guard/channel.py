@@ -27,10 +27,15 @@ from tfcompose.ipc import (
     GateShut,
     GuardEvent,
     Live,
+    Load,
+    Loaded,
+    NotLoaded,
     OwnerReady,
     Present,
     Remember,
     Silent,
+    Unload,
+    Unloaded,
 )
 from tfcompose.plan.codec import encode
 from tfcompose.process import say
@@ -39,12 +44,15 @@ from tfcompose.variables import EVENTS_FD, MEMORY_FD, ORDERS_FD
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from tfcompose.guard.components import Components
     from tfcompose.guard.gates import Gates, Switches
     from tfcompose.guard.judge import Judge
     from tfcompose.guard.relay import Relay
 
 #: What a guard reports that is switched off: it looks, and judges nobody.
-_OBSERVATIONS = (Alive, Clear, Live, OwnerReady, Complete, GateOpen, GateShut, Remember, Silent)
+_OBSERVATIONS = (
+    Alive, Clear, Live, OwnerReady, Complete, GateOpen, GateShut, Remember, Silent, Loaded, NotLoaded, Unloaded,
+)  # fmt: skip
 #: How often the launcher hears that the guard looks, in seconds.
 ALIVE_EVERY_S = 1.0
 #: A longer part of the memory is not handed on: the launcher takes no longer lines; characters.
@@ -56,16 +64,17 @@ _SWITCHES, _ANSWERED = "switches", "answered"
 class OrderReader:
     """Follows the launcher's orders as they come."""
 
-    def __init__(self, judges: list[Judge], gates: Gates) -> None:
+    def __init__(self, judges: list[Judge], gates: Gates, components: Components) -> None:
         self._judges = judges
         self._gates = gates
+        self._components = components
         self._fd = int(os.environ[ORDERS_FD]) if ORDERS_FD in os.environ else None
         self._rest = b""
         if self._fd is not None:
             os.set_blocking(self._fd, False)
 
     def take(self) -> None:
-        """Carry out the orders that have come, and check the gates."""
+        """Carry out the orders that have come, and check the gates and the components that are to be loaded."""
         for line in self._lines():
             match GUARD_ORDERS.read(line):
                 case Absent(process):
@@ -77,7 +86,10 @@ class OrderReader:
                         judge.live.present(process)
                 case Gate() as gate:
                     self._gates.add(gate)
+                case Load() | Unload() as order:
+                    self._components.take(order)
         self._gates.check()
+        self._components.check()
 
     def _lines(self) -> list[str]:
         try:

@@ -14,6 +14,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tfcompose.guard.channel import EventWriter, Memory, OrderReader, SilentEdges, SwitchMemory, recalled
+from tfcompose.guard.components import ComponentDriver, Components
 from tfcompose.guard.diagnostics import DiagnosticsPage
 from tfcompose.guard.flood import WAIT_S, FloodReader
 from tfcompose.guard.gates import Gates, LifecycleDriver, Switches
@@ -82,7 +83,7 @@ class TopicWatch:
         self._clock = SimClock(node) if judge.clocks.simulated else None
         self._reader = MessageReader(judge.compared)
         profile = PROFILE_VARIABLES[0] if self._by_partition else ""
-        marks = RunMarks(RUN_ID, os.environ[RUN_ID], PROCESS, profile, LAUNCHER) if RUN_ID in os.environ else None
+        marks = _run_marks(judge.plan, profile) if RUN_ID in os.environ else None
         self._graph = TFGraph(node, topics, None if private is None else tuple(private.values()), ours=marks)
         feedback = None if private is None else Feedback(node, private, self.data.own)
         self.relay = Relay(node, self._graph, judge.plan, self.data.own, feedback) if strict else None
@@ -199,6 +200,17 @@ class TopicWatch:
             self._emit(event)
 
 
+def _run_marks(plan: Plan, profile: str) -> RunMarks:
+    """Return what the environments of this run's processes say; a component is where its container is."""
+    inside = {
+        (process.component.container, node): process.name
+        for process in plan.components
+        if process.component
+        for node in process.nodes
+    }
+    return RunMarks(RUN_ID, os.environ[RUN_ID], PROCESS, profile, LAUNCHER, inside)
+
+
 def _with_id(data: TFData) -> TFData:
     """Return it with the id that it has instead, where the rmw does not say who sent it: that tells senders apart."""
     received = data.received
@@ -270,7 +282,8 @@ def guard(own: Own, stop: Stop) -> None:
         events.flush()
         ready()
         diagnostics = DiagnosticsPage(node, own.plan.robot)
-        steps = [OrderReader(judged, Gates(node, emit)).take, *(watch.step for watch in watches)]
+        orders = OrderReader(judged, Gates(node, emit), Components(node, emit))
+        steps = [orders.take, *(watch.step for watch in watches)]
         steps += [memory.hand_on for memory in memories]
         steps += [
             SilentEdges(judged, emit).report,
@@ -279,7 +292,9 @@ def guard(own: Own, stop: Stop) -> None:
             lambda: diagnostics.publish(judged, lambda: held_back(watches)),
         ]
         steps += [switches.check] if switches else []
-        steps += [] if ORDERS_FD in os.environ else [LifecycleDriver(node, own.plan).check]
+        if ORDERS_FD not in os.environ:
+            steps += [LifecycleDriver(node, own.plan).check]
+            steps += [ComponentDriver(node, own, private=REMAPPED in os.environ).check] if own.plan.components else []
         steps += [ClockWatch(node, say, sim=own.plan.ros.clock == "sim").check, *(watch.report for watch in watches)]
         wait_set = WaitSet(node, [each for watch in watches for each in watch.data.readers], stop)
         while not stop.requested:

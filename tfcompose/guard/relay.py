@@ -66,7 +66,7 @@ class Relay:
         self._moving = TFPublisher(node, static=False, topic=graph.topics[0])
         own.add(self._moving.raw_gid)
         self._fixed: dict[bytes, _Latched] = {}
-        self._nodes = {name for process in plan.started for name in process.nodes}
+        self._nodes = {name for process in plan.managed for name in process.nodes}
         self._finds_until = 0.0
         self.changes = 0
         self.waiting: list[tuple[TFData, Message]] = []

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tfcompose.load import Path, Place, Source
 
 #: The sections whose entries may have ``when`` and ``for``.
-SECTIONS = ("links", "joints", "ros2_control", "frames", "sensors", "parts", "processes")
+SECTIONS = ("links", "joints", "ros2_control", "frames", "sensors", "parts", "containers", "processes")
 _KEYS = frozenset({"when", "for"})
 Scope = dict[str, "Value"]
 
@@ -213,13 +213,13 @@ class _Unfolding:
 
     def _drop_waits(self, data: dict[str, Any]) -> None:
         """Let nothing wait for what is not there only because of its condition or its loop."""
-        there = {name for section in ("sensors", "processes") for name in data.get(section, ())}
+        there = {name for section in ("sensors", "containers", "processes") for name in data.get(section, ())}
         parts = tuple(f"{name}/" for name in data.get("parts", ()))
 
         def is_gone(name: str) -> bool:
             return name not in there and not name.startswith(parts) and any(one.fullmatch(name) for one in self.gone)
 
-        for section, inside in (("sensors", ("driver",)), ("processes", ())):
+        for section, inside in (("sensors", ("driver",)), ("containers", ()), ("processes", ())):
             entries = data.get(section)
             for name, entry in list(entries.items()) if isinstance(entries, dict) else ():
                 around = entry

@@ -271,57 +271,40 @@ class NamedNode(Spec):
     preset: Text | None = key(None, _PRESET, "slam_toolbox")
 
 
-RUNNING = frozenset({"run", "simulate", "external"})
-Way = Literal["run", "simulate", "external", "built-in"]
+#: Whether components share an executor, and how many threads one has.
+Isolation = Literal["shared", "isolated"]
+Executor = Literal["single", "multi"]
+
+RUNNING = frozenset({"run", "simulate", "external", "component"})
+Way = Literal["run", "simulate", "external", "component", "container", "built-in"]
 """How a process runs, by the key that says so; built-in: one of tfcompose's own."""
 #: To which processes a key applies, if not only to those that ``run``.
-ALL: tuple[Way, ...] = ("run", "simulate", "external", "built-in")
-NOT_OWN: tuple[Way, ...] = ("run", "simulate", "external")
-NOT_EXTERNAL: tuple[Way, ...] = ("run", "simulate", "built-in")
-NOT_SIMULATED: tuple[Way, ...] = ("run", "external")
-KEPT_ALIVE: tuple[Way, ...] = ("run", "simulate")
+ALL: tuple[Way, ...] = ("run", "simulate", "external", "component", "container", "built-in")
+NOT_OWN: tuple[Way, ...] = ("run", "simulate", "external", "component", "container")
+REMAPPED: tuple[Way, ...] = ("run", "simulate", "component", "container", "built-in")
+NOT_EXTERNAL: tuple[Way, ...] = ("run", "simulate", "container", "built-in")
+NOT_SIMULATED: tuple[Way, ...] = ("run", "external", "component", "container")
+NAMED: tuple[Way, ...] = ("run", "simulate", "external")
+OF_NODES: tuple[Way, ...] = ("run", "external", "component")
+PROGRAM: tuple[Way, ...] = ("run", "container")
+KEPT_ALIVE: tuple[Way, ...] = ("run", "simulate", "component", "container")
+ENDED: tuple[Way, ...] = ("run", "simulate", "container")
+LOADED: tuple[Way, ...] = ("component",)
 OWN: tuple[Way, ...] = ("built-in",)
 
 
-class Started(Checked):
-    """What is started, simulated, or expected to run."""
+class Supervised(Checked):
+    """What every process has: its place, its start, and what follows its end."""
 
-    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (RUNNING,)
-
-    run: Command | None = key(
-        None,
-        "{package, executable, args}, {launch, args}, or a command as a list",
-        {"package": "slam_toolbox", "executable": "async_slam_toolbox_node"},
-    )
-    simulate: Simulate | None = key(None, "a simulation of it", {"circle": {"radius": "1 m"}, "rate": "50 Hz"})
-    external: OnlyTrue | None = key(None, "true: tfcompose does not start it", True)
-    shell: OnlyTrue | None = key(None, "true: run is one string, which /bin/sh reads", True)
-    node: Annotated[NamedNode, short("name", NamedNode)] | None = key(
-        None,
-        "its node's name, or {preset, name}; below its namespace unless it begins with /",
-        "slam_toolbox",
-        {"preset": "slam_toolbox"},
-        to=NOT_OWN,
-    )
-    namespace: Namespace | None = key(
-        None, "the namespace of its nodes; below ros.namespace unless it begins with /", "front", to=NOT_OWN
-    )
-    publishes: tuple[ClaimSpec, ...] = key(
-        (), _PUBLISHES, [{"parent": "map", "child": "odom", "off": "none"}], to=NOT_SIMULATED
-    )
     params: Parameters = key({}, _PARAMS, {"use_sim_time": False}, to=NOT_SIMULATED)
-    lifecycle: LifecycleState | None = key(
-        None, "the state that its lifecycle node is brought into after the start", to=NOT_SIMULATED
-    )
-    log_level: LogLevel | None = key(None, "the level of its nodes' loggers")
+    log_level: LogLevel | None = key(None, "the level of its nodes' loggers", to=PROGRAM)
     remap: dict[str, Text] = key(
-        {}, "topics, services and actions under other names", {"scan": "front/scan"}, to=NOT_EXTERNAL
+        {}, "topics, services and actions under other names", {"scan": "front/scan"}, to=REMAPPED
     )
     env: dict[VariableName, Word] = key({}, "environment variables", {"RCUTILS_COLORIZED_OUTPUT": "1"}, to=NOT_EXTERNAL)
     cwd: Text | None = key(
-        None, "the folder that it runs in, relative to this file; default: where up is called", "maps"
+        None, "the folder that it runs in, relative to this file; default: where up is called", "maps", to=PROGRAM
     )
-    rate: Rate | None = key(None, "of joints alone: how often joint states come", "50 Hz", to=OWN)
     host: Text | None = key(None, "the computer that it runs on", "jetson", to=ALL)
     required: Boolean | None = key(
         None,
@@ -337,16 +320,61 @@ class Started(Checked):
         None, "how long after its end it is started again; default: 1 s, doubled each time, up to 30 s", to=KEPT_ALIVE
     )
     prefix: Prefix = key(
-        (), "a program that runs it, with its arguments: gdb, valgrind, nice, …", ["nice", "-n", "10"],
-    )  # fmt: skip
+        (), "a program that runs it, with its arguments: gdb, valgrind, nice, …", ["nice", "-n", "10"], to=PROGRAM
+    )
     schedule: ScheduleSpec | None = key(
         None, "its processors and real-time priority", {"cpus": [2, 3], "priority": 80}, to=NOT_EXTERNAL
     )
-    stop: StopSpec | None = key(None, "how it is stopped", {"signal": "SIGTERM", "timeout": "5 s"}, to=KEPT_ALIVE)
+    stop: StopSpec | None = key(None, "how it is stopped", {"signal": "SIGTERM", "timeout": "5 s"}, to=ENDED)
     ready: Ready | None = key(None, "when it counts as ready", {"topic": "scan"}, to=NOT_SIMULATED)
     after: dict[str, StartCondition] = key(
         {}, "what must have happened before it is started", {"base_drive": "ready"}, to=ALL
     )
+
+
+#: A component: the package that has it, and its class.
+Plugin = Annotated[
+    Text, Matches(r"[A-Za-z][A-Za-z0-9_]*/[A-Za-z_][A-Za-z0-9_:]*", "package/class, such as image_proc/ns::RectifyNode")
+]
+
+
+class Started(Supervised):
+    """What is started, simulated, or expected to run."""
+
+    EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (RUNNING,)
+
+    run: Command | None = key(
+        None,
+        "{package, executable, args}, {launch, args}, or a command as a list",
+        {"package": "slam_toolbox", "executable": "async_slam_toolbox_node"},
+    )
+    simulate: Simulate | None = key(None, "a simulation of it", {"circle": {"radius": "1 m"}, "rate": "50 Hz"})
+    external: OnlyTrue | None = key(None, "true: tfcompose does not start it", True)
+    component: Plugin | None = key(
+        None, "a node that a container loads, as package/class", "image_proc/image_proc::RectifyNode"
+    )
+    container: Text | None = key(None, "the container that loads the component", "perception", to=LOADED)
+    extra_arguments: Parameters = key(
+        {}, "what the container is told about the component", {"use_intra_process_comms": True}, to=LOADED
+    )
+    shell: OnlyTrue | None = key(None, "true: run is one string, which /bin/sh reads", True)
+    node: Annotated[NamedNode, short("name", NamedNode)] | None = key(
+        None,
+        "its node's name, or {preset, name}; below its namespace unless it begins with /",
+        "slam_toolbox",
+        {"preset": "slam_toolbox"},
+        to=NOT_OWN,
+    )
+    namespace: Namespace | None = key(
+        None, "the namespace of its nodes; below ros.namespace unless it begins with /", "front", to=NOT_OWN
+    )
+    publishes: tuple[ClaimSpec, ...] = key(
+        (), _PUBLISHES, [{"parent": "map", "child": "odom", "off": "none"}], to=OF_NODES
+    )
+    lifecycle: LifecycleState | None = key(
+        None, "the state that its lifecycle node is brought into after the start", to=OF_NODES
+    )
+    rate: Rate | None = key(None, "of joints alone: how often joint states come", "50 Hz", to=OWN)
 
     @classmethod
     def check(cls, data: dict[str, Any]) -> Iterator[tuple[Path, PydanticCustomError]]:
@@ -359,6 +387,12 @@ class Started(Checked):
         elif shell and run is not None and not isinstance(run, str):
             advice = "run: one string, for example 'zcat log.gz | player'"
             yield ("shell",), refused("TF107", "shell: true, but run is not a string", advice, on_key=True, keeps=True)
+        if "component" in data and "container" not in data:
+            yield ("component",), refused("TF102", "a component without a container", "container: NAME", on_key=True)
+        for name in ("container", "extra_arguments") if "component" not in data else ():
+            if name in data:
+                advice = "component: PACKAGE/CLASS"
+                yield (name,), refused("TF102", f"{name} without a component", advice, on_key=True, keeps=True)
 
 
 class ProcessSpec(Started, Entry):
@@ -373,7 +407,7 @@ class ProcessSpec(Started, Entry):
         {},
         "the nodes of a process that holds several, by name; node, params and lifecycle are the short form for one",
         {"planner_server": {"lifecycle": "active"}, "controller_server": {"lifecycle": "active"}},
-        to=NOT_OWN,
+        to=NAMED,
     )
 
 
@@ -382,6 +416,25 @@ def keys_of(way: Way) -> frozenset[str]:
     """Return the keys that apply to processes that run so, but for those that say how it runs."""
     known = fields_of(ProcessSpec).items()
     return frozenset(name for name, field in known if way in more_of(field, "to", ("run",))) - RUNNING
+
+
+class ContainerSpec(Supervised, Entry):
+    """A process that loads components: one of rclcpp_components' containers, or one that is started elsewhere."""
+
+    isolation: Isolation = key(
+        "shared", "isolated: each component has an executor of its own; shared: one executor runs all of them"
+    )
+    executor: Executor = key("single", "with how many threads an executor runs")
+    package: Text = key("rclcpp_components", "the package of the container's program", "my_containers")
+    executable: Text | None = key(
+        None, "the container's program; default: component_container, and by isolation and executor", "my_container"
+    )
+    args: Words = key((), "further arguments of the program", ["--verbose"])
+    external: OnlyTrue | None = key(None, "true: tfcompose does not start it, and loads components into it", True)
+    node: NodeName | None = key(None, "its node's name; default: the container's", "perception_container")
+    namespace: Namespace | None = key(
+        None, "the namespace of its node; below ros.namespace unless it begins with /", "front"
+    )
 
 
 class DriverSpec(Started):

@@ -14,7 +14,7 @@ from tfcompose.language.args import Args
 from tfcompose.language.bodies import LinkSpec
 from tfcompose.language.optics import OpticsSpec
 from tfcompose.language.pose import EdgeKeys, MountKeys, Parents, Posed, Rotated
-from tfcompose.language.process import Driver, ProcessSpec
+from tfcompose.language.process import ContainerSpec, Driver, ProcessSpec
 from tfcompose.language.rules import RuleSetting, ZoneSpec
 from tfcompose.language.spec import Entry, Spec, below, inherited, key, measure_of, several
 from tfcompose.language.values import (
@@ -397,6 +397,9 @@ class RobotSpec(Spec):
     )
     parts: dict[str, PartSpec] = key(
         {}, "other robots as subtrees, or beside each other", {"arm": {"urdf": "arm.urdf", "parent": "base_link"}}
+    )
+    containers: dict[str, ContainerSpec] = key(
+        {}, "processes that load components", {"perception": {"isolation": "isolated"}}
     )
     processes: dict[str, ProcessSpec] = key(
         {}, "what is started, simulated, or expected to run", {"base_drive": {"external": True}}

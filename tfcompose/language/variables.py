@@ -113,7 +113,7 @@ _LITERALLY = """what others fill in: ${dollar}{…}, with vars: {dollar: "$"}"""
 
 
 def _is_of_a_process(path: Path) -> bool:
-    return path[0] == "processes" or (path[0] == "sensors" and path[2:3] == ("driver",))
+    return path[0] in {"processes", "containers"} or (path[0] == "sensors" and path[2:3] == ("driver",))
 
 
 def _is_for_xacro(path: Path) -> bool:

@@ -113,7 +113,7 @@ def _update(
     if state.stop:
         return Refusal("everything is being stopped"), None, None
     try:
-        commands, found = commands_of(plan, plan.started, file, base, environment, Path(request.base))
+        commands, found = commands_of(plan, plan.managed, file, base, environment, Path(request.base))
     except ValueError as error:  # a NUL in the folder's name
         return Refusal(f"{request.base!r} cannot be used: {error}"), None, None
     if found:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from typing import IO
 
     from tfcompose.plan import Schedule
+    from tfcompose.plan.components import LoadRequest
 
 #: A line longer than this comes in pieces; bytes.
 LINE_LIMIT = 64 * 1024
@@ -53,8 +54,8 @@ class Command:
     """Program and arguments, environment, and folder.
 
     ``own`` says that it is one of tfcompose's; ``schedule`` is how the kernel schedules it. ``fence`` is a file that
-    must be there first, and what it holds. ``missing`` says, of a process that the run goes on without, why it cannot
-    be started.
+    must be there first, and what it holds. ``load`` is what a container is asked instead of starting anything.
+    ``missing`` says, of a process that the run goes on without, why it cannot be started.
     """
 
     argv: tuple[str, ...]
@@ -64,6 +65,7 @@ class Command:
     schedule: Schedule | None = None
     fence: tuple[Path, str] | None = None
     missing: str = ""
+    load: LoadRequest | None = None
 
 
 class Lines:

@@ -55,7 +55,7 @@ def remapped(plan: Plan, process: PlanProcess) -> PlanProcess:
     ROS takes the first remapping that fits, so these come first.
     """
     private = private_topics(plan).get(process.name)
-    if private is None:
+    if private is None or process.component:  # what its container is asked says it
         return process
     rules = dict([*zip(GLOBAL, private, strict=True), *zip(process.topics, private, strict=True)])
     if process.argv[0].startswith("${launch:"):
@@ -86,6 +86,8 @@ def by_partition(plan: Plan, commands: Mapping[str, Command], folder: Path) -> t
     wrong: dict[tuple[str, str], list[str]] = {}
     for name, command in commands.items():
         process = plan.process(name)
+        if process.component:
+            continue  # its writers are its container's
         reads = process.kind == "guard"
         topics = [topic for pair in (sorted(judged) if reads else judged & {process.topics}) for topic in pair]
         if not topics:

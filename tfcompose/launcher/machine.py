@@ -23,7 +23,9 @@ from tfcompose.ipc import (
     GateOpen,
     GateShut,
     Live,
+    Loaded,
     Missing,
+    NotLoaded,
     OwnerLive,
     OwnerReady,
     Present,
@@ -35,8 +37,10 @@ from tfcompose.ipc import (
     Taken,
     TreeComplete,
     Unfenced,
+    Unloaded,
     Waiting,
 )
+from tfcompose.launcher.components import component_answered, order_components
 from tfcompose.launcher.events import Begin, Event, Exited, Kill, LogMatched, NewPlan, Order, Started, StartFailed
 from tfcompose.launcher.failures import guard_hangs, never_clear, not_started
 from tfcompose.launcher.readiness import (
@@ -109,6 +113,9 @@ def _react(step: Transition, event: Event) -> None:
             _not_started(step, name, why)
         case Exited():
             process_exited(step, event)
+        case Loaded(name, number) | NotLoaded(name, number) | Unloaded(name, number):
+            if name in step.state.tracked and step.state.tracked[name].order == number:
+                component_answered(step, event)
         case Taken(found):
             edge_taken(step, found)
         case _:
@@ -159,6 +166,7 @@ def _started(step: Transition, name: str, pid: int) -> None:
         return
     _expect_no_sign_of_life(step)
     step.update(silent=frozenset())  # it reports itself what is
+    order_components(step)
     if step.state.clear is not None:  # it joins the others
         for other in step.state.tracked.values():
             _introduce(step, other)

@@ -14,6 +14,7 @@ import re
 import shutil
 import sys
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -21,6 +22,8 @@ from tfcompose.findings import Finding, Note, did_you_mean, finding
 from tfcompose.launcher.child import Command
 from tfcompose.launcher.fence import by_partition, not_remapped, remapped, way_of
 from tfcompose.launcher.schedule import refused_schedule
+from tfcompose.plan.components import load_request
+from tfcompose.ros.environment import missing_composition
 from tfcompose.variables import REMAPPED
 
 if TYPE_CHECKING:
@@ -69,7 +72,13 @@ def commands_of(  # noqa: PLR0913, PLR0917 (what a command is made of)
     if way == "remap":
         found += not_remapped(plan)
         processes = [remapped(plan, process) for process in processes]
+    found += _not_loadable(plan, processes)
     for process in processes:
+        if process.component:
+            fill = partial(_filled, process=process, plan_file=plan_file, build_dir=folder)
+            request = load_request(plan, process, fill, private=way == "remap")
+            commands[process.name] = Command((), {}, folder, load=request)
+            continue
         command = _command_of(process, plan.ros, (plan_file.absolute(), folder), base, environment)
         if isinstance(command, Finding):
             found.append(command)
@@ -147,6 +156,17 @@ def _never_started(plan: Plan) -> list[Finding]:
     if waiting:
         found.append(finding("TF812", f"{', '.join(waiting)} wait for each other", None))
     return found
+
+
+def _not_loadable(plan: Plan, processes: Sequence[PlanProcess]) -> list[Finding]:
+    """Return why nothing can be loaded into containers, where the plan has components."""
+    names = [process.name for process in processes if process.component]
+    if not names:
+        return []
+    if not any(process.kind == "guard" for process in plan.processes):
+        return [finding("TF902", f"the plan has no guard, which would load {', '.join(names)}", None)]
+    trouble = missing_composition()
+    return [trouble] if trouble else []
 
 
 def _promises(process: PlanProcess) -> tuple[str, ...]:

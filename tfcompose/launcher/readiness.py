@@ -108,12 +108,12 @@ def open_gate(step: Transition, name: str, observed: str = "") -> None:
 def check_gates(step: Transition) -> None:
     """Open the gates that no guard watches, and report those that are late."""
     for name, one in step.state.tracked.items():
-        if one.ready or one.state not in ("RUNNING", "EXPECTED"):
+        if one.ready or not _is_awaited(one):
             continue
         kind, ready = gate_of(one.process), one.process.ready
-        if kind == "started" or (kind in _GUARDED and step.state.guard is None):
+        if one.state != "STARTING" and (kind == "started" or (kind in _GUARDED and step.state.guard is None)):
             open_gate(step, name, "started")
-        elif kind == "time" and ready and step.now >= one.began + ready.number:
+        elif kind == "time" and ready and one.state != "STARTING" and step.now >= one.began + ready.number:
             open_gate(step, name, f"{ready.number:g} s have passed")
         elif not one.late and (due := late_at(step.state, one)) is not None and step.now >= due:
             step.track(name, replace(one, late=True))
@@ -124,13 +124,18 @@ def check_gates(step: Transition) -> None:
 
 def late_at(state: State, one: Tracked) -> float | None:
     """Return when the process is late; None if it may take its time."""
-    if one.ready or one.late or not has_own_gate(one.process) or one.state not in ("RUNNING", "EXPECTED"):
+    if one.ready or one.late or not _is_awaited(one):
         return None
     ready = one.process.ready
-    if ready and ready.kind == "time":
+    if one.state != "STARTING" and (not has_own_gate(one.process) or (ready and ready.kind == "time")):
         return None
     timeout_s = ready.timeout_s if ready else None
     return one.began + (state.times.ready_s if timeout_s is None else timeout_s)
+
+
+def _is_awaited(one: Tracked) -> bool:
+    """Return whether it is expected to become ready by itself; of a component, whether its container was asked."""
+    return one.state in ("RUNNING", "EXPECTED") or (one.state == "STARTING" and one.process.component is not None)
 
 
 def opens_at(one: Tracked) -> float | None:
@@ -144,8 +149,10 @@ def waits_for(state: State, one: Tracked) -> str:
     """Return what a process is still without, in words; "" if it is ready, or is not to run."""
     if one.state == "STOPPED" and one.wanted and not one.failed and (others := unmet_in_words(state, one)):
         return f"waits for {others}"
-    if one.ready or one.state not in ("RUNNING", "EXPECTED"):
+    if one.ready or not _is_awaited(one):
         return ""
+    if one.state == "STARTING" and one.process.component:
+        return f"{one.process.component.container} has not answered"
     ready = one.process.ready
     text = ready.text if ready else ""
     missing = [edge.name for edge in state.plan.edges_of(one.process.name) if edge.child not in state.live]

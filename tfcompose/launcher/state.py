@@ -17,7 +17,7 @@ from tfcompose.ipc import (
     StateName,
     Stopping,
 )
-from tfcompose.launcher.events import Action, Finish, Notify, Order, Start
+from tfcompose.launcher.events import Action, Finish, LoadComponent, Notify, Order, Start
 from tfcompose.variables import SETTLE
 
 if TYPE_CHECKING:
@@ -153,6 +153,14 @@ class State:
         """The missing edges that may still come: their owners have not failed."""
         return tuple(edge for edge in self.missing if not self.tracked[edge.owner].failed)
 
+    def components_of(self, container: str) -> tuple[Tracked, ...]:
+        """Return the components of a container, in the order of the plan."""
+        return tuple(
+            one
+            for one in self.tracked.values()
+            if one.process.component and one.process.component.container == container
+        )
+
     @property
     def given_up(self) -> tuple[str, ...]:
         """The processes that have failed, and without which the run goes on."""
@@ -216,10 +224,12 @@ class Transition:
         order = 1 + max(one.order for one in self.state.tracked.values())
         before = self.state.tracked[name]
         again = before.order > 0
-        self.enter(name, "STARTING", order=order, level=0, restarts=before.restarts + again)
+        component = before.process.component
+        began = self.now if component else before.began
+        self.enter(name, "STARTING", order=order, level=0, restarts=before.restarts + again, began=began)
         if again and before.process.owns and self.state.guard not in (None, name):
             self.actions.append(Order(Present(name)))
-        self.actions.append(Start(name))
+        self.actions.append(LoadComponent(name, order) if component else Start(name))
 
     def report(self, found: Finding) -> None:
         """Show the finding, and remember an error."""

@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING
 
 from tfcompose.findings import did_you_mean
 from tfcompose.ipc import Absent, DownRequest, Replanned
-from tfcompose.launcher.events import Kill, Order, OutputLost, Signalled, TimeUp
+from tfcompose.launcher.events import Kill, Order, OutputLost, Signalled, TimeUp, UnloadComponent
 from tfcompose.launcher.failures import ended_by_itself, guard_lost, how_ended, never_published, signal_name
 from tfcompose.launcher.state import MAX_RESTARTS, UNREAD, Stop, Tracked, by_owner
 from tfcompose.text import counted
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from tfcompose.findings import Finding
     from tfcompose.ipc import ProcessRequest, StateName, Verb
     from tfcompose.launcher.events import Event, Exited, NewPlan
@@ -36,7 +38,12 @@ def backoff_s(times: Times, process: PlanProcess, failures: int) -> float:
 
 
 def process_exited(step: Transition, event: Exited) -> None:
-    """Take the end of a process: meant, to be followed by a restart, or a failure."""
+    """Take the end of a process: meant, to be followed by a restart, or a failure; components go with a container."""
+    _take_end(step, event)
+    lose_components(step, event.name)
+
+
+def _take_end(step: Transition, event: Exited) -> None:
     name, how = event.name, how_ended(event.returncode)
     one = step.state.tracked[name]
     if step.state.stop:
@@ -49,13 +56,13 @@ def process_exited(step: Transition, event: Exited) -> None:
     lose_edges(step, one)
     one = step.state.tracked[name]
     if one.leaving:
-        _left(step, one, how)
+        left(step, one, how)
         return
     process, ready = one.process, one.process.ready
     meant = int(ready.number) if ready and ready.kind == "exit" else 0
     done = event.returncode == meant and process.kind == "run"
     if name != step.state.guard and (process.restart == "always" or (process.restart == "on-failure" and not done)):
-        _schedule_restart(step, one, event)
+        _restart_after(step, one, event)
         return
     step.enter(name, "EXITED", how)
     # What others wait for has come, and does not go with the process.
@@ -80,7 +87,7 @@ def _guard_exited(step: Transition, one: Tracked, event: Exited) -> None:
         lose_edges(step, one)
     unwatched = step.now if step.state.unwatched is None else step.state.unwatched
     step.update(unwatched=unwatched)
-    _schedule_restart(step, step.state.tracked[event.name], event)
+    _restart_after(step, step.state.tracked[event.name], event)
     if step.state.stop is None:
         step.report(guard_lost(event.name, event, strict=step.state.plan.guard.mode == "strict"))
 
@@ -100,8 +107,19 @@ def lose_edges(step: Transition, one: Tracked) -> None:
             step.actions.append(Order(Absent(name)))
 
 
-def _left(step: Transition, one: Tracked, how: str) -> None:
+def lose_components(step: Transition, container: str) -> None:
+    """Take the components of a container as gone with it; those that are wanted come again when it is ready again."""
+    for one in step.state.components_of(container):
+        if one.alive or one.state == "BACKOFF":
+            lose_edges(step, one)
+            one = step.state.tracked[one.process.name]  # noqa: PLW2901 (the same, without its edges)
+            left(step, replace(one, leaving=one.leaving or ("again" if one.wanted else "stop")), f"with {container}")
+
+
+def left(step: Transition, one: Tracked, how: str) -> None:
+    """Take a process that was meant to end as ended: it stays so, is started again, or leaves the plan."""
     name = one.process.name
+    step.track(name, one)
     step.enter(name, "STOPPED", how, level=0, failures=0)
     if one.leaving == "drop":
         step.update(tracked={other: each for other, each in step.state.tracked.items() if other != name})
@@ -109,15 +127,23 @@ def _left(step: Transition, one: Tracked, how: str) -> None:
         step.track(name, replace(step.state.tracked[name], leaving="", wanted=one.leaving == "again"))
 
 
-def _schedule_restart(step: Transition, one: Tracked, event: Exited) -> None:
-    name, times = event.name, step.state.times
+def _restart_after(step: Transition, one: Tracked, event: Exited) -> None:
+    schedule_restart(
+        step,
+        one,
+        how_ended(event.returncode),
+        lambda when: ended_by_itself(event.name, event.returncode, when, event.last_lines),
+    )
+
+
+def schedule_restart(step: Transition, one: Tracked, how: str, failure: Callable[[str], Finding]) -> None:
+    """Have a process started again after a while, unless it was too often; ``failure`` makes the finding then."""
+    name, times = one.process.name, step.state.times
     most = MAX_RESTARTS if one.process.max_restarts is None else one.process.max_restarts
     failures = 1 if step.now - one.since >= times.steady_s else one.failures + 1
-    how = how_ended(event.returncode)
     if failures > most:
         step.enter(name, "FATAL", how)
-        when = f", after {counted(most, 'restart')}"
-        step.fail_process(name, ended_by_itself(name, event.returncode, when, event.last_lines))
+        step.fail_process(name, failure(f", after {counted(most, 'restart')}"))
         return
     delay = backoff_s(times, one.process, failures)
     step.enter(name, "BACKOFF", f"{how}; restart {failures} of {most} in {delay:g} s", failures=failures)
@@ -254,7 +280,12 @@ def edge_taken(step: Transition, found: Finding) -> None:
 
 
 def stop_signals(process: PlanProcess) -> tuple[Signals, ...]:
-    """Return what the process is sent, each when the one before did not help: its own signal, SIGTERM, SIGKILL."""
+    """Return what the process is sent, each when the one before did not help: its own signal, SIGTERM, SIGKILL.
+
+    To unload a component is one step, too.
+    """
+    if process.component:
+        return (Signals[process.stop.signal],)
     return tuple(dict.fromkeys((Signals[process.stop.signal], SIGTERM, SIGKILL)))[
         : 1 + 2 * (process.stop.signal != "SIGKILL")
     ]
@@ -263,16 +294,35 @@ def stop_signals(process: PlanProcess) -> tuple[Signals, ...]:
 def send_due_signals(step: Transition) -> None:
     """Signal processes that are to end, in reverse order of their start, and more firmly where that did not help."""
     alive = [one for one in step.state.tracked.values() if one.alive]
-    for one in sorted(alive, key=lambda one: -one.order):
+    for name in [one.process.name for one in sorted(alive, key=lambda one: -one.order)]:
+        one = step.state.tracked.get(name)
+        if one is None or not one.alive:  # it went with its container
+            continue
         level = _due_level(step.state, one, step.now)
+        if one.process.component:
+            _end_component(step, one, level, one.process.component.container)
+            continue
         if one.state == "STARTING" or level <= one.level:
             continue
-        name, signals = one.process.name, stop_signals(one.process)
+        signals = stop_signals(one.process)
         if one.level == 0 and one.leaving:
             lose_edges(step, one)
+            lose_components(step, name)
         step.actions.append(Kill(name, signals[level - 1]))
         before = f"still there after {signals[one.level - 1].name}: " if one.level else ""
         step.enter(name, "STOPPING", before + signals[level - 1].name, pid=one.pid, level=level)
+
+
+def _end_component(step: Transition, one: Tracked, level: int, container: str) -> None:
+    """Have a component unloaded, if it is time; where everything is stopped, it ends with its container."""
+    name, state = one.process.name, step.state
+    if level and state.stop and state.tracked[container].state != "EXPECTED":
+        step.enter(name, "STOPPED", f"with {container}")
+    if level <= one.level or not step.state.tracked[name].alive:
+        return
+    lose_edges(step, one)
+    step.actions.append(UnloadComponent(name, one.order))
+    step.enter(name, "STOPPING", "unloaded", pid=one.pid, level=1)
 
 
 def firmer_at(times: Times, one: Tracked) -> float | None:

@@ -8,6 +8,7 @@ here.
 from __future__ import annotations
 
 import contextlib
+import json
 import math
 import os
 import selectors
@@ -19,7 +20,7 @@ from functools import partial
 from typing import TYPE_CHECKING, final
 
 from tfcompose.findings import Note
-from tfcompose.ipc import Ended, FindingShown
+from tfcompose.ipc import Ended, FindingShown, Load, NotLoaded, Unload
 from tfcompose.launcher.answers import answer
 from tfcompose.launcher.child import subreaper
 from tfcompose.launcher.children import Children, GuardPipes
@@ -27,6 +28,7 @@ from tfcompose.launcher.events import (
     Begin,
     Finish,
     Kill,
+    LoadComponent,
     Notify,
     NotifyLate,
     Order,
@@ -36,11 +38,14 @@ from tfcompose.launcher.events import (
     StartFailed,
     Tick,
     TimeUp,
+    UnloadComponent,
 )
 from tfcompose.launcher.machine import step, wake_time
 from tfcompose.launcher.output import Notifier
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.state import initial
+from tfcompose.plan.codec import encode
+from tfcompose.plan.components import load_file
 from tfcompose.ros.environment import child_environment
 from tfcompose.signals import take_interrupt
 
@@ -135,6 +140,7 @@ class _Supervisor:
         self._exit_code: int | None = None
         self._due: float | None = None
         self._check_at = 0.0
+        self._loads: dict[str, Path] = {}
         selector = stack.enter_context(selectors.DefaultSelector())
         self._selector = selector
         self._signals = stack.enter_context(Signals())
@@ -218,6 +224,10 @@ class _Supervisor:
                 self._start(name)
             case Kill(name, number):
                 self._children.kill(name, number)
+            case LoadComponent(name, number, again):
+                self._load(name, number, again=again)
+            case UnloadComponent(name, number):
+                self._children.order(Unload(name, number, str(self._loads[name])))
             case Notify(notice):
                 self._notify(notice)
             case Order(order):
@@ -239,6 +249,18 @@ class _Supervisor:
             self._events.append(StartFailed(name, str(error)))
             return
         self._events.append(self._children.start(state.tracked[name].process, self._commands[name], guard))
+
+    def _load(self, name: str, number: int, *, again: bool) -> None:
+        """Write what the container is asked beside the plan, and have the guard ask it."""
+        request = self._commands[name].load
+        file = self._loads[name] = load_file(self._session.plan_file.parent, name)
+        try:
+            file.parent.mkdir(exist_ok=True)
+            file.write_text(json.dumps(encode(request), ensure_ascii=False), encoding="utf-8")
+        except OSError as error:
+            self._events.append(NotLoaded(name, number, str(error)))
+        else:
+            self._children.order(Load(name, number, str(file), again))
 
     def _notify_late(self, name: str, found: Finding) -> None:
         notes = [Note(f"{name}: {line}") for line in self._children.last_lines(name)]

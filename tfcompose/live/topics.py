@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from hashlib import blake2b
 from typing import TYPE_CHECKING
 
@@ -151,6 +151,7 @@ class RunMarks:
     ``launcher`` holds a run's launcher: its process number, and when it began, in clock ticks since the start of the
     machine.
     ``profile`` names the profile file that fences the process off; empty: there is no such fence.
+    ``components`` are the plan's processes that run inside of another one, by its name and their nodes'.
     """
 
     variable: str
@@ -158,6 +159,11 @@ class RunMarks:
     process: str
     profile: str = ""
     launcher: str = ""
+    components: Mapping[tuple[str, str], str] = field(default_factory=dict)
+
+    def process_of(self, known: Identity, node: str) -> str:
+        """Return the plan's process that a node is of, in an operating system's process that is known."""
+        return self.components.get((known.process, node), known.process)
 
     def identify(self, found: Sequence[Mapping[str, str]] | None) -> Identity:
         """Return whose process it is of which one of these is the environment; None: nobody can say."""
@@ -292,7 +298,7 @@ class TFGraph:
             self._where[one.gid],
             known.ours,
             fenced if fenced is not None else False if one.gid in self._public else known.fenced,
-            process=known.process,
+            process=self._marks.process_of(known, one.node) if self._marks else "",
             run=known.run,
             profile=known.profile,
         )

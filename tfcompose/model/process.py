@@ -48,13 +48,18 @@ class Node:
     @property
     def flat_params(self) -> dict[str, Any]:
         """The parameters by their full names, with dots."""
+        return {name: _meant(value) for name, value in self.flat_texts.items()}
+
+    @property
+    def flat_texts(self) -> dict[str, Any]:
+        """The same, with what a parameter file says as it stands there."""
         return _flat(self.params)
 
 
 def _flat(params: dict[str, Any], above: str = "") -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key, value in params.items():
-        found |= _flat(value, f"{above}{key}.") if isinstance(value, dict) else {f"{above}{key}": _meant(value)}
+        found |= _flat(value, f"{above}{key}.") if isinstance(value, dict) else {f"{above}{key}": value}
     return found
 
 
@@ -73,8 +78,9 @@ class Process(PlanProcess):
 
     It runs a ``package``'s ``executable``, a ``launch`` file (``package/file``), or else the command ``argv``, which
     for the others holds the arguments, until ``planned`` makes the whole command of them. ``part`` is the ``Part`` that
-    it belongs to, if any. ``describes`` says that its parameter ``robot_description`` is the URDF for a stock
-    robot_state_publisher. ``rate`` is that of the joint states that it sends.
+    it belongs to, if any. ``loads`` says that it is a container of components, ``describes`` that its parameter
+    ``robot_description`` is the URDF for a stock robot_state_publisher. ``rate`` is that of the joint states that
+    it sends.
     """
 
     nodes: tuple[str, ...] = field(init=False)
@@ -87,6 +93,7 @@ class Process(PlanProcess):
     rate: float | None = field(default=None, kw_only=True)
     part: str = field(default="", kw_only=True)
     describes: bool = field(default=False, kw_only=True)
+    loads: bool = field(default=False, kw_only=True)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "nodes", tuple(node.name for node in self.ros_nodes))

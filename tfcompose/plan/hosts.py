@@ -21,7 +21,7 @@ _UNSEEN = ("log", "exit")
 
 def hosts_of(plan: Plan) -> tuple[str, ...]:
     """Return the machines that the plan names, in its order."""
-    named = (process.host for process in plan.started)
+    named = (process.host for process in plan.managed)
     return tuple(dict.fromkeys(host for host in named if host is not None))
 
 
@@ -63,7 +63,7 @@ def describe_share(plan: Plan) -> tuple[str, ...]:
     for process in plan.processes:
         if process.kind == "external":
             others.setdefault(f"of {process.host}" if process.host else "from elsewhere", []).append(process.name)
-    own = ", ".join(process.name for process in plan.started)
+    own = ", ".join(process.name for process in plan.managed)
     here = f"host {plan.host}" if plan.host else "this machine, which the plan does not name,"
     return (f"{here} starts {own}", *(f"expected {where}: {', '.join(names)}" for where, names in others.items()))
 
@@ -97,4 +97,6 @@ def _elsewhere(process: PlanProcess) -> PlanProcess:
         ready = None
     elif ready is None and len(states) == 1 and set(process.nodes) == set(process.lifecycle):
         ready = Ready("lifecycle", states.pop())
-    return replace(process, kind="external", argv=(), params_file=None, lifecycle={}, after={}, ready=ready)
+    return replace(
+        process, kind="external", argv=(), component=None, params_file=None, lifecycle={}, after={}, ready=ready
+    )

@@ -19,8 +19,8 @@ EdgeKind = Literal["static", "joint", "dynamic"]
 #: How a joint moves; of planar and floating ones joint states say nothing.
 JointType = Literal["revolute", "continuous", "prismatic", "planar", "floating"]
 
-#: What a process is: one of tfcompose's own, one that is started elsewhere, or a program.
-ProcessKind = Literal["static", "joints", "guard", "simulate", "external", "run"]
+#: What a process is: one of tfcompose's own, one that is started elsewhere, a program, or a node in a container.
+ProcessKind = Literal["static", "joints", "guard", "simulate", "external", "run", "component"]
 #: After which ends a process is started again.
 RestartPolicy = Literal["no", "on-failure", "always"]
 #: The first signal that ends a process.
@@ -248,8 +248,24 @@ class Driven:
 
 
 @dataclass(frozen=True, slots=True)
+class Component:
+    """A node that a container loads: it has no operating system's process of its own.
+
+    ``container`` is the process that loads it, ``plugin`` the class, of ``package``. ``params`` are by their full
+    names, with dots; a value is true or false, a number, a text, or a list of one kind. ``extra_arguments`` are for
+    the container: ``use_intra_process_comms``.
+    """
+
+    container: str
+    package: str
+    plugin: str
+    params: dict[str, Any] = field(default_factory=dict)
+    extra_arguments: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
 class PlanProcess:
-    """What is started, or, with kind ``external``, expected to run.
+    """What is started, or, with kind ``external``, expected to run; of kind ``component``, what a container loads.
 
     ``nodes`` are full names; ``lifecycle`` says of some of them into which state they are brought after the start.
     ``required`` says what ends the plan: True, this process's end; None, its failure; False, neither.
@@ -289,6 +305,7 @@ class PlanProcess:
     restart_delay: float | None = field(default=None, metadata=OMITTED)
     prefix: tuple[str, ...] = field(default=(), metadata=OMITTED)
     schedule: Schedule | None = field(default=None, metadata=OMITTED)
+    component: Component | None = field(default=None, metadata=OMITTED)
 
     @property
     def topics(self) -> tuple[str, str]:
@@ -394,8 +411,18 @@ class Plan:
 
     @property
     def started(self) -> tuple[PlanProcess, ...]:
-        """The processes that are started, in the plan's order: all but external ones."""
+        """The processes that are started, in the plan's order: all but external ones, and what containers load."""
+        return tuple(process for process in self.processes if process.kind not in ("external", "component"))
+
+    @property
+    def managed(self) -> tuple[PlanProcess, ...]:
+        """What is started or loaded, in the plan's order: all but external processes."""
         return tuple(process for process in self.processes if process.kind != "external")
+
+    @property
+    def components(self) -> tuple[PlanProcess, ...]:
+        """What containers load, in the plan's order."""
+        return tuple(process for process in self.processes if process.component)
 
     def guards_of(self, host: str | None) -> tuple[str, ...]:
         """Return the nodes of the guard of a host's share; None or empty: of the machine that has no name here."""

@@ -89,7 +89,7 @@ def takes_remappings(process: PlanProcess) -> bool:
     follows a text that a shell reads does not reach the program.
     """
     if process.kind != "run":
-        return process.kind in ("static", "joints", "simulate")
+        return process.kind in ("static", "joints", "simulate", "component")
     if not process.argv or process.argv[:2] == ("/bin/sh", "-c"):
         return False
     return process.argv[0].startswith("${") or bool(process.owns) or "--ros-args" in process.argv

@@ -42,7 +42,7 @@ class _Work:
 
     def process(self, process: Process) -> Process:
         """Return the process with the parameters of its nodes."""
-        if process.name not in self.spec.processes or process.kind not in {"run", "external"}:
+        if process.name not in self.spec.processes or process.kind not in {"run", "external", "component"}:
             return process
         claimants = [self._node(process, node) for node in process.ros_nodes]
         if all(one is not None for one in claimants):
@@ -268,7 +268,7 @@ class Claimant:
         """Return whether parameters that tfcompose writes reach the node: launch files and shells have to pass them."""
         process = self.process
         if process.kind != "run":
-            return False
+            return process.component is not None
         return process.takes_ros_arguments or "${params_file}" in " ".join(process.argv)
 
 

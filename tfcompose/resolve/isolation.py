@@ -80,7 +80,9 @@ class _Filler:
     def filled(self, process: Process) -> Process:
         """Return the process with every ``${frame(NAME)}`` and ``${file(PATH)}`` replaced."""
         section: Path = ("processes", process.name)
-        if not self.source.has(section):
+        if self.source.has(("containers", process.name)):
+            section = ("containers", process.name)
+        elif not self.source.has(section):
             section = ("sensors", process.name, "driver")
         done = replace(
             process,
@@ -137,7 +139,7 @@ class _Filler:
 
     def _check_paths(self, process: Process, node: Node) -> None:
         """Find parameters with a path that only the launcher knows, where it has no way to tell the node."""
-        can = process.kind == "run" and process.package is not None and len(process.nodes) == 1
+        can = process.component or (process.kind == "run" and process.package is not None and len(process.nodes) == 1)
         for key, value in node.params.items() if not can else ():
             if known_at_launch(value):
                 message = f"the parameter {key} of {process.name} holds a path that is known at the start only"

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from tfcompose.findings import Span
     from tfcompose.language import Validated
-    from tfcompose.language.process import ProcessSpec, ReadySpec, Run, Simulate, Started, Way
+    from tfcompose.language.process import ContainerSpec, ProcessSpec, ReadySpec, Run, Simulate, Started, Way
     from tfcompose.language.robot import RobotSpec
     from tfcompose.load import Path, Source
     from tfcompose.model import Edge, Joint, Robot
@@ -45,16 +45,19 @@ def user_process(name: str, declared: ProcessSpec, validated: Validated) -> tupl
         process, refused = _simulated(Process(name, "simulate", at=place, ros_nodes=one), declared.simulate, validated)
         keys = how(declared, namespace, "simulate")
         return process and replace(process, **keys), [*found, *refused]
+    if declared.component and declared.container:
+        process = Process(name, "component", at=place, ros_nodes=nodes)
+        return replace(process, **how(declared, namespace, "component")), found
     if declared.run and declared.run.is_startable:
         process = Process(name, "run", at=place, ros_nodes=nodes)
         return replace(process, **how(declared, namespace), **program(declared.run, shell=bool(declared.shell))), found
-    if _is_run_refused(name, validated):
+    if _is_run_refused(name, validated) or {(*at, "component"), (*at, "container")} & validated.refused:
         return None, found
     if declared.run:
         advice = "run: {package: …, executable: …}, or {launch: package/file.launch.py}"
         at = (*at, "run")
         return None, [finding("TF102", f"{name}: run needs package and executable", source.at_key(at), help=advice)]
-    advice = "run: {package: …, executable: …}, simulate: {…}, or external: true"
+    advice = "run: {package: …, executable: …}, component: PACKAGE/CLASS, simulate: {…}, or external: true"
     return None, [finding("TF102", f"{name} does not say how it runs", place, help=advice)]
 
 
@@ -116,13 +119,15 @@ def unknown_names(
     lasting = {process.name: process for process in processes if process.kind != "run"}
     found = []
     for process in processes:
-        section = "processes" if source.has(("processes", process.name)) else "sensors"
-        inside = ("after",) if section == "processes" else ("driver", "after")
+        section = next((one for one in ("processes", "containers") if source.has((one, process.name))), "sensors")
+        inside = ("driver", "after") if section == "sensors" else ("after",)
         for other, what in process.after.items():
             if what == "done" and other in lasting:
                 place = source.at((section, process.name, *inside, other))
                 message = f"{process.name} waits until {other} is done, which never happens"
                 found.append(finding("TF813", message, place, help=f"after: {{{other}: ready}}, or started"))
+            elif process.component and other == process.component.container:
+                continue  # it was not written here
             elif other not in known and other not in refused and not other.startswith(missing):
                 place = source.at_key((section, process.name, *inside, other))
                 names = sorted(name for name in known if name != process.name)
@@ -151,7 +156,7 @@ def unnamed_nodes(
 _FIELDS = frozenset(one.name for one in fields(Process) if one.init)
 
 
-def how(declared: Started, namespace: str, way: Way = "run") -> dict[str, Any]:
+def how(declared: Started | ContainerSpec, namespace: str, way: Way = "run") -> dict[str, Any]:
     """Return the fields of a process that runs in this way, by the keys that have their names."""
     found = {key: getattr(declared, key) for key in _FIELDS & keys_of(way)}
     stop, ready, schedule = (found.pop(key, None) for key in ("stop", "ready", "schedule"))
@@ -269,13 +274,22 @@ def idle_keys(spec: RobotSpec, source: Source) -> list[Finding]:
     """Return a finding for each key of a process that does nothing there."""
     declared: dict[Path, tuple[str, Started | None]] = {}
     declared |= {("processes", name): (name, process) for name, process in spec.processes.items()}
+    found: list[Finding] = [*_idle_of_containers(spec, source)]
     declared |= {("sensors", name, "driver"): (f"the driver of {name}", s.driver) for name, s in spec.sensors.items()}
-    found: list[Finding] = []
     for path, (name, process) in declared.items():
         if process is not None:
             found += _idle_rate(path, name, process, source)
             found += _idle(path, name, process, source)
     return found
+
+
+def _idle_of_containers(spec: RobotSpec, source: Source) -> Iterator[Finding]:
+    """Yield a finding for each key of a container that is started elsewhere, and has no effect therefore."""
+    for name, container in spec.containers.items():
+        works = keys_of("external") | {"external"}
+        for key in container.model_fields_set - works if container.external else ():
+            message, advice = f"{name} is external, so {key} has no effect", "remove it: it is for whoever starts it"
+            yield finding("TF851", message, source.at_key(("containers", name, key)), help=advice)
 
 
 def _idle_rate(path: Path, name: str, process: Started, source: Source) -> Iterator[Finding]:
@@ -297,11 +311,14 @@ def _idle(path: Path, name: str, process: Started, source: Source) -> Iterator[F
     Where an overlay puts that in the place of something else, the keys below it are meant for what they stood beside.
     """
     way: Way = "external" if process.external else "simulate" if process.simulate else "run"
+    way = "component" if process.component else way
     if way == "run" or (*path, way) in source.replaced or (way == "simulate" and path[0] == "sensors"):
         return  # no driver is simulated: that is refused
     what, whom = "simulated", "the real process"
     if way == "external":
         what, whom = "external", "whoever starts the process"
+    elif way == "component":
+        what, whom = "a component", f"the container {process.container}"
     for key in process.model_fields_set - keys_of(way) - RUNNING - {"rate"}:  # which are refused elsewhere
         message, advice = f"{name} is {what}, so {key} has no effect", f"remove it: it is for {whom}"
         yield finding("TF851", message, source.at_key((*path, key)), help=advice)
@@ -350,7 +367,7 @@ def full_name(namespace: str, name: str) -> str:
     return "/" + "/".join(part for part in (namespace.strip("/"), name) if part)
 
 
-def namespace_of(declared: Started | None, namespace: str) -> str:
+def namespace_of(declared: Started | ContainerSpec | None, namespace: str) -> str:
     """Return the namespace of a process's nodes, without a leading slash: its own, or the robot's ``namespace``."""
     if declared is None or declared.namespace is None:
         return namespace

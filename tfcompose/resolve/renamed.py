@@ -139,7 +139,7 @@ def _calibration(calibration: Calibration, names: Names) -> Calibration:
 
 
 def _process(process: Process, names: Names) -> Process:
-    simulate = process.simulate
+    simulate, component = process.simulate, process.component
     if simulate and not (names.alone or process.part):  # joint states have the names that joints have in the whole
         joints = {names.joint(name): q for name, q in simulate.joints.items()}
         sweep = {names.joint(name): how for name, how in simulate.sweep.items()}
@@ -149,6 +149,7 @@ def _process(process: Process, names: Names) -> Process:
         name=names.process(process.name),
         after={names.process(name): what for name, what in process.after.items()},
         simulate=simulate,
+        component=component and replace(component, container=names.process(component.container)),
         part=f"{names.part}/{process.part}".rstrip("/") if names.alone or process.part else "",
     )
 
@@ -186,4 +187,5 @@ def _policy(policy: GuardPolicy, robot: Robot, names: Names) -> GuardPolicy:
 
 def _names_of(section: str, name: str, names: Names) -> tuple[str, ...]:
     """Return the names that what an entry should have brought may be looked for under."""
-    return (names.frame(name), names.process(name)) if section in {"sensors", "processes"} else (names.frame(name),)
+    has_process = section in {"sensors", "containers", "processes"}
+    return (names.frame(name), names.process(name)) if has_process else (names.frame(name),)

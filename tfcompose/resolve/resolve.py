@@ -15,6 +15,7 @@ from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.load import path_named
 from tfcompose.model import Edge, Process, Robot, may_be_refused
 from tfcompose.resolve.bodies import Bodies, with_colours
+from tfcompose.resolve.containers import component_findings, component_process, container_process
 from tfcompose.resolve.edges import Drafts, source_numbers
 from tfcompose.resolve.isolation import isolate, settings_of
 from tfcompose.resolve.poses import Solver
@@ -36,11 +37,11 @@ from tfcompose.resolve.sensors import add_sensor
 from tfcompose.urdf.packages import Packages
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from tfcompose.language import Validated
     from tfcompose.language.robot import RobotSpec
-    from tfcompose.load import Source
+    from tfcompose.load import Path, Source
     from tfcompose.model.hardware import Block
     from tfcompose.plan import GuardPolicy
     from tfcompose.resolve.part import Joined
@@ -128,7 +129,14 @@ class _Work:
 
             robot = self._take(settled(robot, self.spec, self.source))
         self.found += [one for process in robot.processes for one in unreached(process, self.source)]
+        self.found += self._wrong_components(robot)
         return Resolved(robot, (*self.of_parts, *self.found), self.collected)
+
+    def _wrong_components(self, robot: Robot) -> Iterator[Finding]:
+        for process in robot.processes:
+            section: Path = ("processes", process.name)
+            path = section if process.name in self.spec.processes else ("sensors", process.name, "driver")
+            yield from component_findings(path, process, self.validated)
 
     def _take(self, done: tuple[Robot, list[Finding]]) -> Robot:
         robot, found = done
@@ -280,9 +288,13 @@ def _has_calibrations(spec: RobotSpec) -> bool:
 
 def _processes(validated: Validated, found: list[Finding]) -> list[Process]:
     processes = built_in(validated.spec, validated.source)
-    for name, declared in validated.spec.processes.items():
+    spec = validated.spec
+    processes += [container_process(name, declared, validated) for name, declared in spec.containers.items()]
+    for name, declared in spec.processes.items():
         process, refused = user_process(name, declared, validated)
         found += refused
+        if process and process.kind == "component":
+            process = component_process(process, declared, spec)
         if process:
             processes.append(process)
     return processes

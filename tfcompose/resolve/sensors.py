@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from tfcompose.findings import Finding, did_you_mean, finding
 from tfcompose.geometry import Pose
 from tfcompose.language.preset import Chosen
 from tfcompose.model import BUILT_IN, STATIC, Edge, Link, MountedSensor, Node, Process
 from tfcompose.plan import switch_text
+from tfcompose.resolve.containers import component_process
 from tfcompose.resolve.isolation import settings_of
 from tfcompose.resolve.optics import optics_of
 from tfcompose.resolve.poses import Draft, rotation_of
@@ -229,22 +230,24 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
         advice = "driver: none, and tf: tfcompose, where there is no device"
         return None, [finding("TF604", "a driver cannot be simulated", source.at_key((*at, "simulate")), help=advice)]
     run, external = (declared.run, bool(declared.external)) if declared else (None, False)
+    loaded = declared if declared and declared.component and declared.container else None
     if driver is None and declared is None:
         return None, []
-    if not external and not (run and run.is_startable) and (run or driver is None):
-        place, advice = source.at_key((*at, "run")), "run: {package: …, executable: …}, or external: true"
-        return None, [finding("TF102", f"the driver of {sensor.name} does not say how it runs", place, help=advice)]
-    launched = driver is not None and driver.launch is not None and run is None
+    if not external and not loaded and not (run and run.is_startable) and (run or driver is None):
+        return None, _says_not_how(sensor.name, validated)
+    launched = driver is not None and driver.launch is not None and run is None and loaded is None
     computed = driver_parameters(sensor, settings_of(spec.ros).frame_prefix)
     params = (declared.params if declared else {}) | _node_parameters(sensor, computed, launched=launched)
     place = source.at_key(at[:2])
     state = driver.lifecycle if driver and run is None else None
     node = Node(driver_node(sensor, spec), place, at, params, (declared.lifecycle if declared else None) or state)
-    process = Process(sensor.name, "external" if external else "run", at=place, ros_nodes=(node,))
+    way: Literal["external", "component", "run"] = "external" if external else "component" if loaded else "run"
+    process = Process(sensor.name, way, at=place, ros_nodes=(node,))
     if declared:
-        namespace = namespace_of(declared, spec.ros.namespace)
-        process = replace(process, **how(declared, namespace, "external" if external else "run"))
-    if run:
+        process = replace(process, **how(declared, namespace_of(declared, spec.ros.namespace), way))
+    if loaded:
+        process = component_process(process, loaded, spec)
+    elif run:
         process = replace(process, **program(run, shell=bool(declared and declared.shell)))
     elif driver and launched:
         args = {key: value for key, value in computed.items() if params or value != PARAMS_FILE}
@@ -252,6 +255,16 @@ def driver_process(sensor: Sensor, validated: Validated) -> tuple[Process | None
     elif driver:
         process = replace(process, package=driver.package, executable=driver.executable)
     return process, [*_given_parameters(sensor, computed, source), *_unreached(sensor, spec, source)]
+
+
+def _says_not_how(name: str, validated: Validated) -> list[Finding]:
+    """Return a finding about a driver that does not say how it runs, unless what says it was refused."""
+    at: Path = ("sensors", name, "driver")
+    if {(*at, "component"), (*at, "container")} & validated.refused:
+        return []
+    advice = "run: {package: …, executable: …}, component: PACKAGE/CLASS, or external: true"
+    place = validated.source.at_key((*at, "run"))
+    return [finding("TF102", f"the driver of {name} does not say how it runs", place, help=advice)]
 
 
 def further_processes(sensor: Sensor, validated: Validated) -> Iterator[Process]:

@@ -78,6 +78,15 @@ def no_ros() -> Finding | None:
     return finding("TF901", message, None, help=advice)
 
 
+def missing_composition() -> Finding | None:
+    """Return the finding that nothing can be loaded into containers here, or None."""
+    if find_spec("composition_interfaces") is not None:
+        return None
+    advice = "install the package rclcpp_components (on Ubuntu: sudo apt install ros-jazzy-rclcpp-components)"
+    message = "composition_interfaces cannot be imported: it comes with the ROS installation that has the containers"
+    return finding("TF901", message, None, help=advice)
+
+
 def _domain(domain: str) -> Finding | None:
     if not domain or (domain.isascii() and domain.isdigit() and int(domain) <= LAST_DOMAIN):
         return None

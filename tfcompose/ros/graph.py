@@ -19,6 +19,7 @@ from rclpy.utilities import get_rmw_implementation_identifier
 from std_msgs.msg import String
 
 from tfcompose.ros.environment import RosError
+from tfcompose.ros.processes import has_ended
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -82,7 +83,7 @@ def _sorted(infos: Iterable[TopicEndpointInfo]) -> list[Writer]:
 
 def volatile_readers(node: Node, topic: str) -> list[str]:
     """Return the names of other nodes that listen to the topic and do not ask for what was sent before they came."""
-    own = _full_name(node.get_namespace(), node.get_name())
+    own = _own_name(node)
     infos = node.get_subscriptions_info_by_topic(topic)
     volatile = [info for info in infos if info.qos_profile.durability == DurabilityPolicy.VOLATILE]
     return sorted({_full_name(info.node_namespace, info.node_name) for info in volatile} - {own, UNKNOWN_NODE})
@@ -130,8 +131,19 @@ _OF_EACH_NODE = frozenset(
 
 
 def is_offered(node: Node, service: str) -> bool:
-    """Return whether ``node`` has discovered a server of the service, and not only clients."""
-    return bool(node.count_services(service))
+    """Return whether ``node`` has discovered a server of the service, and not only clients.
+
+    One whose process was killed stays known for many seconds, and does not count.
+    """
+    if not node.count_services(service):
+        return False
+    found = node.get_subscriptions_info_by_topic(f"rq{service}Request", no_mangle=True)  # its name in DDS
+    own = next((one.gid for one in writers(node, "/parameter_events") if one.node == _own_name(node)), b"")
+    return not found or not all(has_ended(bytes(one.endpoint_gid[:16]), own) for one in found)
+
+
+def _own_name(node: Node) -> str:
+    return _full_name(node.get_namespace(), node.get_name())
 
 
 def services(node: Node) -> list[str]:
@@ -150,7 +162,7 @@ def ends(node: Node, topic: str) -> list[tuple[str, str, bool]]:
 
     ``topic`` is a full name; the node's own ends are left out.
     """
-    own = _full_name(node.get_namespace(), node.get_name())
+    own = _own_name(node)
     infos = [(info, True) for info in node.get_publishers_info_by_topic(topic)]
     infos += [(info, False) for info in node.get_subscriptions_info_by_topic(topic)]
     named = [(_full_name(info.node_namespace, info.node_name), info.topic_type, sends) for info, sends in infos]
@@ -159,7 +171,7 @@ def ends(node: Node, topic: str) -> list[tuple[str, str, bool]]:
 
 def nodes(node: Node) -> list[str]:
     """Return the full names of the other nodes that ``node`` has discovered until now, sorted."""
-    own = _full_name(node.get_namespace(), node.get_name())
+    own = _own_name(node)
     names = {_full_name(namespace, name) for name, namespace in node.get_node_names_and_namespaces()}
     return sorted(names - {own, UNKNOWN_NODE})
 

@@ -77,6 +77,12 @@ def environments(gid: bytes, own_gid: bytes) -> list[dict[str, str]] | None:
         return None
 
 
+def has_ended(gid: bytes, own_gid: bytes) -> bool:
+    """Return whether the process that an id is of ran on this machine, and has surely ended."""
+    is_here = _is_known(gid, own_gid) and gid[2:4] == own_gid[2:4]
+    return is_here and not any(_command(pid) for pid in _candidates(gid))
+
+
 def began_at(ticks: int) -> float:
     """Return when a process began, in seconds since 1970, of clock ticks since the machine's start."""
     return time.time() - time.clock_gettime(time.CLOCK_BOOTTIME) + ticks / os.sysconf("SC_CLK_TCK")

@@ -301,13 +301,15 @@ def _help_about(first: Violation, plan: Plan) -> str:
         return f"correct what {first.who} publishes, or the parent in the robot's file"
     if process := _run_by(first, plan):
         owns = f", or own it: owner: {process}" if first.code == "TF801" else ""
-        return f"let {first.who} leave {first.child} out{owns}"
+        component = plan.process(process).component
+        which = f", a component of {component.container}," if component else ""
+        return f"let {first.who}{which} leave {first.child} out{owns}"
     return f"end {first.whom}, or switch its TF off; tf2 takes whatever came last"
 
 
 def _run_by(first: Violation, plan: Plan) -> str:
     """Return which process with programs of the robot's own the publisher is of, if it is surely one."""
-    kinds = {"external"} if first.stranger else {"run", "external"}
+    kinds = {"external"} if first.stranger else {"run", "external", "component"}
     for process in plan.processes if len(first.nodes) == 1 else ():
         if process.kind in kinds and first.nodes[0] in process.nodes:
             return process.name

@@ -1,0 +1,198 @@
+"""Histories of containers and their components, replayed to the process machine."""
+
+from dataclasses import replace
+from signal import SIGINT, SIGKILL
+from typing import Any
+
+import pytest
+
+from tests.support.findings import expect
+from tests.support.machine_history import GUARD, History, begin, run_process
+from tfcompose.ipc import Absent, Clear, DownRequest, GateOpen, Live, OwnerReady, Present, ProcessRequest
+from tfcompose.launcher.events import Exited, LoadComponent, NewPlan, UnloadComponent
+from tfcompose.launcher.readiness import waits_for
+from tfcompose.plan import Component, PlanProcess, Ready
+
+BOX = PlanProcess("box", "run", ("box",), nodes=("/box",), ready=Ready("service", "/box/_container/load_node"))
+
+
+def component(name: str, **more: Any) -> PlanProcess:
+    after = {"box": "ready"} | more.pop("after", {})
+    return PlanProcess(
+        name, "component", nodes=(f"/{name}",), component=Component("box", "demo", f"demo::{name}"), after=after, **more
+    )
+
+
+def loaded(*components: PlanProcess, box: PlanProcess = BOX) -> History:
+    """Return a history in which the container has loaded all of them."""
+    history = begin(GUARD, box, *components).feed(Clear(), GateOpen("box", "there"))
+    return history.answer(*(one.name for one in components))
+
+
+def test_components_are_loaded_in_the_plans_order_once_their_container_is_ready() -> None:
+    history = begin(GUARD, component("b"), component("a"), BOX).feed(Clear())
+    assert history.started == ["guard", "box"]
+    assert history.loads() == []
+    history.feed(GateOpen("box", "there"))
+    assert history.loads() == ["b", "a"]
+    assert history.started == ["guard", "box"], "no process of the operating system is started for them"
+    assert history.answer("a", "b").states("a") == ["STARTING", "RUNNING"]
+    assert history.state.tracked["a"].pid == history.state.tracked["box"].pid
+
+
+def test_what_waits_for_a_component_follows_it_and_its_edges_make_it_ready() -> None:
+    owner = component("odo", owns=(("odom", "base_link"),))
+    history = begin(GUARD, BOX, owner, run_process("nav", after={"odo": "ready"})).feed(Clear())
+    history.feed(GateOpen("box", "there")).answer("odo")
+    assert history.started == ["guard", "box"]
+    history.feed(Live("odo", ("base_link",)), OwnerReady("odo"))
+    assert history.started == ["guard", "box", "nav"]
+
+
+def test_a_component_that_fails_to_load_ends_everything_with_the_containers_words() -> None:
+    history = begin(GUARD, BOX, component("a")).feed(Clear(), GateOpen("box", "there"))
+    history.answer("a", why="/box did not load demo/demo::a: no such class")
+    expect(history.only(), "TF808", "a", "/box", "no such class")
+    assert [name for name, _ in history.killed] == ["box"]
+    assert history.feed(Exited("box", 0), Exited("guard", 0)).exit_code == 1
+
+
+def test_an_optional_component_that_fails_leaves_the_rest_running() -> None:
+    history = begin(GUARD, BOX, component("a", required=False), component("b")).feed(Clear(), GateOpen("box", "there"))
+    history.answer("a", why="no device").answer("b")
+    assert history.only().severity == "warning"
+    assert history.state.tracked["b"].state == "RUNNING"
+    assert history.killed == []
+
+
+@pytest.mark.parametrize("policy", ["on-failure", "always"])
+def test_a_component_is_loaded_again_after_a_while_as_its_policy_says(policy: Any) -> None:
+    history = begin(GUARD, BOX, component("a", restart=policy, max_restarts=1)).feed(Clear(), GateOpen("box", "there"))
+    history.answer("a", why="no device")
+    assert history.states("a")[-1] == "BACKOFF"
+    assert history.sleep_until_due() == pytest.approx(1.0)
+    assert history.loads() == ["a", "a"]
+    history.answer("a", why="no device")
+    expect(history.only(), "TF808", "no device", "1 restart")
+
+
+def test_a_container_that_dies_comes_back_with_its_components_in_order() -> None:
+    box = replace(BOX, restart="on-failure")
+    history = loaded(component("b", owns=(("odom", "base_link"),)), component("a"), box=box)
+    history.feed(Live("b", ("base_link",)), OwnerReady("b"), Exited("box", -SIGKILL))
+    assert history.states("a")[-1] == history.states("b")[-1] == "STOPPED"
+    assert Absent("b") in history.orders, "its silence is nobody's fault"
+    history.wait(1.0)
+    assert history.loads() == ["b", "a"], "not before the container is ready again"
+    history.feed(GateOpen("box", "there"))
+    assert history.loads() == ["b", "a", "b", "a"]
+    assert history.orders.count(Present("b")) == 1
+    history.answer("b", "a")
+    assert [history.state.tracked[name].restarts for name in ("box", "a", "b")] == [1, 1, 1]
+    assert history.found() == []
+
+
+def test_an_answer_of_the_container_before_says_nothing_about_the_one_after() -> None:
+    box = replace(BOX, restart="on-failure")
+    history = begin(GUARD, box, component("a")).feed(Clear(), GateOpen("box", "there"))
+    before = history.requested[-1]
+    history.feed(Exited("box", -SIGKILL)).wait(1.0).feed(GateOpen("box", "there"))
+    assert history.requested[-1].number != before.number
+    history.requested.append(before)
+    history.answer("a", why="went away")
+    assert history.state.tracked["a"].state == "STARTING"
+
+
+def test_a_container_that_ends_for_good_takes_its_components_with_it() -> None:
+    history = loaded(component("a", required=False), box=replace(BOX, required=False))
+    history.feed(Exited("box", 3))
+    codes = [(found.code, found.severity) for found in history.found()]
+    assert codes == [("TF808", "warning"), ("TF808", "warning")]
+    expect(history.found()[1], "TF808", "a", "box")
+
+
+def test_a_component_is_stopped_started_and_restarted_alone() -> None:
+    history = loaded(component("a"), component("b"))
+    number = history.requested[-1].number
+    history.feed(ProcessRequest("stop", "b"))
+    assert history.requested[-1] == UnloadComponent("b", number)
+    assert history.answer("b").states("b")[-2:] == ["STOPPING", "STOPPED"]
+    history.wait(60).feed(ProcessRequest("start", "b")).answer("b")
+    assert history.states("b")[-1] == "RUNNING"
+    history.feed(ProcessRequest("restart", "b")).answer("b").answer("b")
+    assert history.states("b")[-4:] == ["STOPPING", "STOPPED", "STARTING", "RUNNING"]
+    assert history.killed == []
+    assert history.states("a") == ["STARTING", "RUNNING"]
+
+
+def test_a_component_that_is_stopped_while_it_is_loaded_is_unloaded() -> None:
+    history = begin(GUARD, BOX, component("a")).feed(Clear(), GateOpen("box", "there"), ProcessRequest("stop", "a"))
+    assert isinstance(history.requested[-1], UnloadComponent)
+    assert history.answer("a").state.tracked["a"].state == "STOPPED"
+
+
+def test_a_container_is_restarted_with_its_components_but_not_with_one_that_was_stopped() -> None:
+    history = loaded(component("a"), component("b")).feed(ProcessRequest("stop", "b")).answer("b")
+    history.feed(ProcessRequest("restart", "box"))
+    assert history.killed == [("box", SIGINT)]
+    assert history.states("a")[-1] == "STOPPED"
+    history.feed(Exited("box", 0), GateOpen("box", "there")).answer("a")
+    assert history.loads() == ["a", "b", "a"]
+    assert history.state.tracked["b"].state == "STOPPED"
+
+
+def test_a_stop_of_everything_asks_no_container_to_unload_and_ends_in_order() -> None:
+    history = loaded(component("a"), component("b", after={"a": "ready"})).feed(GateOpen("box", "there"))
+    history.answer("b")
+    history.feed(DownRequest())
+    assert not any(isinstance(one, UnloadComponent) for one in history.requested)
+    assert history.killed == [("box", SIGINT)]
+    assert history.feed(Exited("box", 0), Exited("guard", 0)).exit_code == 0
+
+
+def test_a_stop_of_everything_waits_for_no_answer_of_a_container() -> None:
+    history = begin(GUARD, BOX, component("a"), component("b")).feed(Clear(), GateOpen("box", "there")).answer("b")
+    history.feed(ProcessRequest("stop", "b"), DownRequest())
+    assert history.killed == [("box", SIGINT)]
+    assert history.feed(Exited("box", 0), Exited("guard", 0)).exit_code == 0
+
+
+def test_components_of_a_container_that_is_external_are_unloaded_at_the_end() -> None:
+    box = replace(BOX, kind="external", argv=())
+    history = loaded(component("a"), box=box).feed(DownRequest())
+    assert history.requested[-1] == UnloadComponent("a", history.requested[0].number)
+    assert history.killed == []
+    history.answer("a")
+    assert history.feed(Exited("guard", 0)).exit_code == 0
+
+
+def test_a_guard_that_follows_another_is_given_what_is_not_answered_yet() -> None:
+    history = begin(GUARD, BOX, component("a"), component("b")).feed(Clear(), GateOpen("box", "there")).answer("b")
+    first = history.requested[0]
+    history.feed(Exited("guard", 1)).wait(1.0)
+    assert history.requested[2:] == [LoadComponent("a", first.number, again=True)]
+
+
+def test_a_component_that_its_container_does_not_answer_for_is_reported_once() -> None:
+    history = begin(GUARD, BOX, component("a")).feed(Clear(), GateOpen("box", "there"))
+    history.wait(31).wait(31)
+    (found,) = history.late
+    expect(found, "TF817", "a", "box")
+    assert waits_for(history.state, history.state.tracked["a"]).startswith("box")
+
+
+def test_a_changed_component_is_unloaded_and_loaded_and_one_that_vanished_is_unloaded() -> None:
+    history = loaded(component("a"), component("b"))
+    plan = replace(history.plan, processes=tuple(one for one in history.plan.processes if one.name != "b"))
+    history.feed(NewPlan(plan, frozenset({"a"})))
+    assert [(type(one), one.name) for one in history.requested[2:]] == [(UnloadComponent, "b"), (UnloadComponent, "a")]
+    history.answer("b", "a")
+    assert "b" not in history.state.tracked
+    assert history.loads() == ["a", "b", "a"]
+
+
+def test_a_container_of_another_plan_that_is_gone_takes_its_components_along() -> None:
+    history = loaded(component("a"))
+    history.feed(NewPlan(replace(history.plan, processes=(GUARD,)), frozenset()))
+    history.feed(Exited("box", 0))
+    assert set(history.state.tracked) == {"guard"}

@@ -1,0 +1,247 @@
+"""Containers and components as real processes: a container of the tests' own, and rclcpp_components where it is."""
+
+import json
+import os
+import shutil
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from signal import SIGKILL
+from typing import Any
+
+import pytest
+
+from tests.support.composition import can_build, composition_interfaces
+from tests.support.fake_nodes import FakeNodes
+from tests.support.findings import expect
+from tfcompose.cli.compiling import library
+from tfcompose.compile import compile_robot
+from tfcompose.emit.plan import plan_of
+from tfcompose.findings import Finding
+from tfcompose.ipc import AllReady, FindingShown, Notice, ProcessState, TreeComplete
+from tfcompose.launcher.supervisor import supervise
+from tfcompose.plan.file import write_plan
+
+pytestmark = [
+    pytest.mark.ros,
+    pytest.mark.skipif(not can_build(), reason="there is no compiler for composition_interfaces"),
+]
+
+ROBOT = """
+tfcompose: 1
+robot: rover
+ros: {namespace: robot1}
+frames: {odom: {}, base_link: {parent: odom, owner: odometry}}
+containers: {box: {restart: on-failure, restart_delay: 0.2 s}}
+processes:
+  rectify:
+    component: image_proc/demo::Empty
+    container: box
+    namespace: front
+    params: {queue: 5, rate: 2.0, name: left, on: true, list: [1, 2.5], words: [a, b], deep: {er: 1}}
+    remap: {image: camera/image_raw}
+    extra_arguments: {use_intra_process_comms: true}
+  odometry:
+    component: drive/demo::Moving
+    container: box
+    params: {edge: odom base_link}
+    publishes: [{parent: odom, child: base_link, off: none}]
+"""
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder with composition_interfaces, which all workers share."""
+    base = tmp_path_factory.getbasetemp()
+    shared = base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base
+    return composition_interfaces(shared / "composition")
+
+
+@pytest.fixture
+def stand_in(package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The file with what the containers of a ROS installation are requested; they are the stand-in."""
+    for name in ("component_container", "component_container_isolated"):
+        program = tmp_path / "ros/lib/rclcpp_components" / name
+        program.parent.mkdir(parents=True, exist_ok=True)
+        program.write_text(f'#!/bin/sh\nexec {sys.executable} -m tests.support.stand_in_container "$@"\n')
+        program.chmod(0o755)
+    log = tmp_path / "requested.jsonl"
+    path = os.pathsep.join(dict.fromkeys((str(package), str(Path.cwd()), *sys.path)))
+    for name, value in (("CONTAINER_LOG", log), ("AMENT_PREFIX_PATH", tmp_path / "ros"), ("PYTHONPATH", path)):
+        monkeypatch.setenv(name, str(value))
+    monkeypatch.syspath_prepend(str(package))
+    return log
+
+
+Step = Callable[[list[Notice]], bool | None]
+
+
+def run(folder: Path, text: str, *steps: Step) -> list[Notice]:
+    """Run a robot until each step in turn has returned True; a step is given all notices, after each."""
+    compiled = compile_robot(text, str(folder / "robot.yaml"), library())
+    assert compiled.robot is not None
+    file = folder / "plan.json"
+    file.write_text(write_plan(plan_of(compiled.robot)))
+    notices: list[Notice] = []
+    left = list(steps)
+
+    def report(notice: Notice) -> None:
+        notices.append(notice)
+        while left and left[0](notices):
+            left.pop(0)
+        if not left:
+            raise BrokenPipeError  # enough was seen
+
+    supervise(plan_of(compiled.robot), file, report=report, duration_s=120)
+    return notices
+
+
+def requested(log: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in log.read_text().splitlines()]
+
+
+def found(notices: list[Notice]) -> list[Finding]:
+    return [notice.found for notice in notices if isinstance(notice, FindingShown)]
+
+
+def states(notices: list[Notice], name: str) -> list[str]:
+    return [one.state for one in notices if isinstance(one, ProcessState) and one.process == name]
+
+
+def are_ready(notices: list[Notice]) -> bool:
+    return isinstance(notices[-1], AllReady)
+
+
+def has_found(code: str) -> Step:
+    return lambda notices: any(one.code == code for one in found(notices))
+
+
+@pytest.mark.usefixtures("domain")
+def test_components_are_loaded_with_names_parameters_and_remappings_as_launch_gives_them(
+    tmp_path: Path, stand_in: Path
+) -> None:
+    notices = run(tmp_path, ROBOT, are_ready)
+    rectify, odometry = requested(stand_in)
+    assert rectify["node"] == "/robot1/front/rectify"
+    assert rectify["plugin"] == "image_proc/demo::Empty"
+    assert rectify["remap"] == ["image:=camera/image_raw"]
+    assert rectify["extra"] == {"use_intra_process_comms": True}
+    params = {
+        "queue": 5,
+        "rate": 2.0,
+        "name": "left",
+        "on": True,
+        "list": [1.0, 2.5],
+        "words": ["a", "b"],
+        "deep.er": 1,
+    }
+    assert {name: (type(value), value) for name, value in rectify["params"].items()} == {
+        name: (type(value), value) for name, value in params.items()
+    }
+    assert odometry["node"] == "/robot1/odometry"
+    assert found(notices) == [], "an edge of a component is its owner's, though the container sends it"
+
+
+@pytest.mark.usefixtures("domain")
+def test_a_container_that_is_killed_comes_back_with_its_components(tmp_path: Path, stand_in: Path) -> None:
+    def kill(notices: list[Notice]) -> bool:
+        if are_ready(notices):
+            os.kill(requested(stand_in)[-1]["pid"], SIGKILL)
+        return are_ready(notices)
+
+    def is_back(notices: list[Notice]) -> bool:
+        return (
+            sum(isinstance(one, TreeComplete) for one in notices) == 2 and states(notices, "rectify")[-1] == "RUNNING"
+        )
+
+    notices = run(tmp_path, ROBOT, kill, is_back)
+    first, second = requested(stand_in)[:2], requested(stand_in)[2:]
+    assert [one | {"pid": 0} for one in second] == [one | {"pid": 0} for one in first]
+    assert {one["pid"] for one in first}.isdisjoint(one["pid"] for one in second)
+    for name in ("rectify", "odometry"):
+        assert states(notices, name) == ["STARTING", "RUNNING", "STOPPED", "STARTING", "RUNNING"]
+    assert found(notices) == []
+
+
+@pytest.mark.usefixtures("domain")
+def test_a_component_that_cannot_be_loaded_is_named_with_the_containers_words(tmp_path: Path, stand_in: Path) -> None:
+    notices = run(tmp_path, ROBOT.replace("demo::Empty", "demo::Missing"), has_found("TF808"))
+    assert requested(stand_in)
+    expect(found(notices)[0], "TF808", "rectify", "/robot1/box", "image_proc/demo::Missing", "requested plugin name.")
+
+
+@pytest.mark.usefixtures("domain")
+def test_a_component_is_tried_again_until_its_constructor_succeeds(tmp_path: Path, stand_in: Path) -> None:
+    broken = stand_in.with_name("BROKEN")
+    broken.touch()
+
+    def mend(notices: list[Notice]) -> bool:
+        if "BACKOFF" in states(notices, "rectify"):
+            broken.unlink()
+        return not broken.exists()
+
+    restart = "container: box\n    restart: on-failure\n    restart_delay: 0.3 s\n"
+    notices = run(tmp_path, ROBOT.replace("container: box\n", restart), mend, are_ready)
+    assert states(notices, "rectify")[:4] == ["STARTING", "BACKOFF", "STARTING", "RUNNING"]
+    assert found(notices) == []
+
+
+@pytest.mark.usefixtures("domain")
+def test_a_component_that_takes_its_time_is_loaded_once_and_another_container_does_not_wait(
+    tmp_path: Path, stand_in: Path
+) -> None:
+    other = "  other: {component: demo/demo::Empty, container: second}\n"
+    text = ROBOT.replace("demo::Empty", "demo::Slow").replace("containers: {", "containers: {second: {}, ") + other
+    notices = run(tmp_path, text, are_ready)
+    plugins = [one["plugin"] for one in requested(stand_in)]
+    assert sorted(plugins) == ["demo/demo::Empty", "drive/demo::Moving", "image_proc/demo::Slow"]
+    running = [one.process for one in notices if isinstance(one, ProcessState) and one.state == "RUNNING"]
+    assert running.index("other") < running.index("rectify") < running.index("odometry")
+
+
+@pytest.mark.usefixtures("domain")
+def test_who_sends_the_edge_of_a_component_is_named(tmp_path: Path, stand_in: Path) -> None:
+    fakes = FakeNodes()
+
+    def steal(notices: list[Notice]) -> bool:
+        if are_ready(notices):
+            fakes.moving(fakes.node("thief"), "odom base_link")
+        return are_ready(notices)
+
+    try:
+        notices = run(tmp_path, ROBOT, steal, has_found("TF801"))
+    finally:
+        fakes.close()
+    assert requested(stand_in)
+    expect(found(notices)[0], "TF801", "/thief", "odometry", "(/robot1/odometry)")
+
+
+@pytest.mark.usefixtures("domain")
+def test_a_component_that_sends_another_ones_edge_is_named_with_its_container(tmp_path: Path, stand_in: Path) -> None:
+    thief = "  thief: {component: d/demo::Moving, container: box, params: {edge: odom base_link}}\n"
+    notices = run(tmp_path, ROBOT + thief, has_found("TF801"))
+    assert requested(stand_in)
+    expect(found(notices)[0], "TF801", "/robot1/thief", "odometry", "thief", "box")
+
+
+STOCK = """
+tfcompose: 1
+robot: rover
+frames: {base_link: {}, laser: {parent: base_link, owner: mount}}
+containers: {box: {isolation: isolated}}
+processes:
+  mount:
+    component: tf2_ros/tf2_ros::StaticTransformBroadcasterNode
+    container: box
+    params: {frame_id: base_link, child_frame_id: laser, translation.x: 0.5}
+    publishes: [{parent: base_link, child: laser, off: none}]
+"""
+
+
+@pytest.mark.skipif(not shutil.which("component_container_isolated", path=os.pathsep.join(
+    f"{prefix}/lib/rclcpp_components" for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+)), reason="rclcpp_components comes with a distribution only")  # fmt: skip
+@pytest.mark.usefixtures("domain")
+def test_the_containers_of_rclcpp_components_load_a_component(tmp_path: Path) -> None:
+    notices = run(tmp_path, STOCK, are_ready)
+    assert found(notices) == []

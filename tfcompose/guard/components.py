@@ -1,0 +1,212 @@
+"""What the guard has containers load and unload: by orders of the launcher, or, where there is none, by itself.
+
+A container is asked one thing at a time, in the order of the orders. Where no launcher gives orders, in units and
+containers of an export, the guard looks at each container now and then, and loads what it does not have: also into one
+that was started again.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections import deque
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tfcompose.ipc import Load, Loaded, NotLoaded, Unload, Unloaded
+from tfcompose.plan.codec import decode
+from tfcompose.plan.components import LoadRequest, load_request
+from tfcompose.process import say
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rclpy.node import Node
+
+    from tfcompose.ipc import GuardEvent
+    from tfcompose.process import Own
+    from tfcompose.ros.composition import Container
+
+#: A container that is to unload something, and does not answer for so long, is left alone; seconds.
+ANSWER_S = 5.0
+#: An answer that is not there by then may be lost: what the container has says it, too; seconds.
+LIST_AFTER_S = 2.0
+#: A component that was to be loaded and is not there so often, without an answer: the request was lost.
+ABSENT_AT_MOST = 1
+#: How often the guard looks, without a launcher, whether a container has its components; seconds.
+CHECK_EVERY_S = 2.0
+
+
+@dataclass(slots=True)
+class _Job:
+    """One order, how far it is, and since when; ``step`` is empty until the container was asked.
+
+    ``listed`` is when the container was asked what it has, ``absent`` how often the component was not there.
+    """
+
+    order: Load | Unload
+    request: LoadRequest
+    step: str = ""
+    since: float = 0.0
+    listed: float = 0.0
+    absent: int = 0
+
+
+class Components:
+    """The orders that are not carried out yet, by container."""
+
+    def __init__(self, node: Node, emit: Callable[[GuardEvent], None]) -> None:
+        self._node = node
+        self._emit = emit
+        self._containers: dict[str, Container] = {}
+        self._jobs: dict[str, deque[_Job]] = {}
+
+    def take(self, order: Load | Unload) -> None:
+        """Carry out an order of the launcher: it replaces one for the same component."""
+        try:
+            request = decode(LoadRequest, json.loads(Path(order.file).read_text(encoding="utf-8")))
+        except (OSError, ValueError) as error:
+            self._answer(order, f"{order.file} cannot be read: {error}")
+            return
+        self.add(order, request)
+
+    def add(self, order: Load | Unload, request: LoadRequest) -> None:
+        """Carry out an order about a component; where nothing can be loaded at all, answer so."""
+        try:
+            self._container(request.container)
+        except ImportError:
+            self._answer(order, "composition_interfaces cannot be imported, which comes with the containers")
+            return
+        jobs = self._jobs.setdefault(request.container, deque())
+        for job in [job for job in jobs if job.order.process == order.process]:
+            jobs.remove(job)
+        jobs.append(_Job(order, request, since=time.monotonic()))
+
+    def has(self, process: str) -> bool:
+        """Return whether an order about the component is not carried out yet."""
+        return any(job.order.process == process for jobs in self._jobs.values() for job in jobs)
+
+    def check(self) -> None:
+        """Take the answers that have come, and ask on."""
+        now = time.monotonic()
+        for name, jobs in self._jobs.items():
+            while jobs and self._is_done(jobs[0], self._containers[name], now):
+                jobs.popleft()
+
+    def _container(self, name: str) -> Container:
+        from tfcompose.ros.composition import Container  # noqa: PLC0415 (its messages come with containers only)
+
+        if name not in self._containers:
+            self._containers[name] = Container(self._node, name)
+        return self._containers[name]
+
+    def _is_done(self, job: _Job, container: Container, now: float) -> bool:
+        """Do what is due for an order; return whether it is answered."""
+        if isinstance(job.order, Load):
+            return self._is_loaded(job, job.order, container, now)
+        return self._is_unloaded(job, job.order, container, now)
+
+    def _is_loaded(self, job: _Job, order: Load, container: Container, now: float) -> bool:
+        if not container.load.is_there:
+            if job.step:
+                self._answer(order, f"{container.name} went away")
+            return bool(job.step)
+        if not job.step:
+            return not self._begins(job, container, now, "look" if order.again else "load")
+        if job.step == "load" and (answer := container.load.answer()) is not None:
+            words = answer.error_message or "it does not say why"
+            self._answer(order, "" if answer.success else f"{container.name} did not load {job.request.what}: {words}")
+            return True
+        if (there := container.list.answer()) is not None:
+            if job.request.node in there.full_node_names:
+                self._answer(order, "")
+                return True
+            job.absent += 1
+            if job.step == "look" or job.absent > ABSENT_AT_MOST:  # it carries out one request after the other
+                return not self._begins(job, container, now, "load")
+        elif now - max(job.since, job.listed) > LIST_AFTER_S and container.list.is_there:
+            job.listed = now
+            container.list.ask()
+        return False
+
+    def _begins(self, job: _Job, container: Container, now: float, step: str) -> bool:
+        """Look whether the component is there, or load it; return False where that cannot be asked, and is answered."""
+        if step == "look" and not container.list.is_there:
+            return True
+        job.step, job.since, job.absent = step, now, 0
+        try:
+            if step == "look":
+                container.list.ask()
+            else:
+                container.ask_to_load(job.request)
+        except ValueError as error:
+            self._answer(job.order, str(error))
+            return False
+        return True
+
+    def _is_unloaded(self, job: _Job, order: Unload, container: Container, now: float) -> bool:
+        if now - job.since > ANSWER_S:
+            self._answer(order, f"{container.name} does not answer")
+            return True
+        if not job.step:
+            if container.list.is_there:
+                job.step = "list"
+                container.list.ask()
+        elif job.step == "list" and (there := container.list.answer()) is not None:
+            named = dict(zip(there.full_node_names, there.unique_ids, strict=False))
+            if job.request.node not in named:
+                self._answer(order, "")
+                return True
+            job.step = "unload"
+            container.unload.ask(unique_id=named[job.request.node])
+        elif job.step == "unload" and (answer := container.unload.answer()) is not None:
+            self._answer(order, "" if answer.success else f"{container.name}: {answer.error_message}")
+            return True
+        return False
+
+    def _answer(self, order: Load | Unload, why: str) -> None:
+        if isinstance(order, Unload):
+            self._emit(Unloaded(order.process, order.number, why))
+        else:
+            done = NotLoaded(order.process, order.number, why) if why else Loaded(order.process, order.number)
+            self._emit(done)
+
+
+class ComponentDriver:
+    """The plan's components, where no launcher gives orders."""
+
+    def __init__(self, node: Node, own: Own, *, private: bool) -> None:
+        def fill(text: str) -> str:
+            return text.replace("${build_dir}", str(own.file.absolute().parent))
+
+        self._requests = {
+            process.name: load_request(own.plan, process, fill, private=private) for process in own.plan.components
+        }
+        self._components = Components(node, self._hear)
+        self._due = 0.0
+        self._printed: dict[str, str] = {}
+
+    def check(self) -> None:
+        """Have each container load what it does not have, and print what has changed."""
+        now = time.monotonic()
+        if now >= self._due:
+            self._due = now + CHECK_EVERY_S
+            for name, request in self._requests.items():
+                if not self._components.has(name):
+                    self._components.add(Load(name, 0, "", again=True), request)
+        self._components.check()
+
+    def _hear(self, event: GuardEvent) -> None:
+        match event:
+            case Loaded(name):
+                self._say(name, f"{name} is in {self._requests[name].container}")
+            case NotLoaded(name, _, why):
+                self._say(name, why)
+            case _:
+                pass
+
+    def _say(self, name: str, what: str) -> None:
+        if self._printed.get(name) != what:
+            self._printed[name] = what
+            say(what)

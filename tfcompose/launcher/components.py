@@ -1,0 +1,61 @@
+"""What becomes of components: nodes that the guard has containers load and unload.
+
+A component has no operating system's process of its own. It is started by an order to the guard, runs once its
+container has answered, and goes with the container; a guard that follows another is told again.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.ipc import Loaded, NotLoaded, Unloaded
+from tfcompose.launcher.events import LoadComponent, UnloadComponent
+from tfcompose.launcher.failures import not_started
+from tfcompose.launcher.readiness import order_gate
+from tfcompose.launcher.stopping import left, lose_edges, schedule_restart
+
+if TYPE_CHECKING:
+    from tfcompose.launcher.state import Tracked, Transition
+
+
+def component_answered(step: Transition, event: Loaded | NotLoaded | Unloaded) -> None:
+    """Take what a container has answered to the last order about a component."""
+    one = step.state.tracked[event.process]
+    match event:
+        case Loaded() if one.state == "STARTING":
+            container = one.process.component and step.state.tracked[one.process.component.container]
+            step.enter(event.process, "RUNNING", pid=container.pid if container else None, began=step.now)
+            order_gate(step, step.state.tracked[event.process])
+        case NotLoaded(why=why) if one.state == "STARTING":
+            _not_loaded(step, one, why)
+        case Unloaded(why=why) if one.state == "STOPPING" and step.state.stop:
+            step.enter(event.process, "STOPPED", why)
+        case Unloaded(why=why) if one.state == "STOPPING":
+            left(step, one, why or "unloaded")
+        case _:
+            pass
+
+
+def _not_loaded(step: Transition, one: Tracked, why: str) -> None:
+    name = one.process.name
+    if step.state.stop:
+        step.enter(name, "STOPPED", why)
+        return
+    lose_edges(step, one)
+    one = step.state.tracked[name]
+    if one.leaving:
+        left(step, one, why)
+    elif one.process.restart == "no":
+        step.enter(name, "FATAL", why)
+        step.fail_process(name, not_started(name, why))
+    else:
+        schedule_restart(step, one, why, lambda when: not_started(name, f"{why}{when}"))
+
+
+def order_components(step: Transition) -> None:
+    """Tell a guard that has just started what the one before it may have been told, and not done."""
+    for name, one in step.state.tracked.items():
+        if one.process.component and one.state == "STARTING":
+            step.actions.append(LoadComponent(name, one.order, again=True))
+        elif one.process.component and one.state == "STOPPING":
+            step.actions.append(UnloadComponent(name, one.order))

@@ -13,7 +13,7 @@ from tests.support.skips import ACCEPTED
 TEXT = GUIDE.read_text("utf-8")
 #: What the examples would add.
 NEW = {
-    "tfcompose/presets/hokuyo/ust-30lx.yaml",
+    "tfcompose/presets/hokuyo/uam-05lp.yaml",
     "tfcompose/cli/commands/frames.py",
     "tfcompose/export/procfile.py",
 }

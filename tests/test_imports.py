@@ -93,6 +93,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "plan",
         "ros",
         "text",
+        "tf2",
         "units",
         "urdf",
         "verdict",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -15,25 +16,29 @@ if TYPE_CHECKING:
 
     import viser
 
-    from tfcompose.view.live import LiveTree, Picture
+    from tfcompose.view.bag import BagTree
+    from tfcompose.view.live import LiveTree
     from tfcompose.view.panel import Panel
+    from tfcompose.view.picture import Picture
 
 _RED = (220, 30, 30)
+#: What the slider of a recording moves by, in seconds.
+_STEP_S = 0.01
 #: Of the names of frames that nobody declared so many are shown.
 _MOST = 40
 
 
 class LivePanel:
-    """Shows a live tree beside the panel of its robot."""
+    """Shows a tree that runs, or was recorded, beside the panel of its robot."""
 
-    def __init__(self, server: viser.ViserServer, panel: Panel, tree: LiveTree) -> None:
+    def __init__(self, server: viser.ViserServer, panel: Panel, tree: LiveTree | BagTree, title: str = "Live") -> None:
         self.tree = tree
         self._panel = panel
         self._scene = server.scene
         self._ghosts = Ghosts(server.scene, tree.robot)
         self._wrong = _Lines(server.scene, "/live/wrong", _RED)
         self._further: dict[str, Any] = {}
-        with server.gui.add_folder("Live", order=-1):
+        with server.gui.add_folder(title, order=-1):
             self._edge = server.gui.add_html("")
             self._found = server.gui.add_html("")
             self._processes = server.gui.add_html("")
@@ -70,6 +75,28 @@ class LivePanel:
                     break
                 self._further[frame] = self._scene.add_label(f"/live/further/{number}", frame)
             self._further[frame].position = pose.xyz
+
+
+class BagPanel:
+    """Shows a recording at the time of a slider, in seconds after its first transform."""
+
+    def __init__(self, server: viser.ViserServer, panel: Panel, tree: BagTree, length_s: float) -> None:
+        self.tree = tree
+        self._lock = threading.Lock()
+        with server.gui.add_folder("Recording", order=-2):
+            self.slider: Any = server.gui.add_slider(
+                "time (s)", 0.0, max(length_s, _STEP_S), _STEP_S, min(tree.at_s, length_s)
+            )
+        self._panel = LivePanel(server, panel, tree, "Tree")
+        self.slider.on_update(lambda _: self.show())
+        self.show()
+
+    def show(self) -> None:
+        """Show the time of the slider."""
+        with self._lock:
+            self.tree.at_s = self.slider.value
+            self._panel.show()
+            self._panel.show_text()
 
 
 class _Lines:

@@ -3,17 +3,18 @@
 Show the robot of FILE (a robot, or a built plan.json) in 3-D in the browser: bodies, frames, owners, joints. With
 --edit mounts are dragged, or their poses typed, and saved where the values stand in the file. With --live frames are
 where they are published: what differs from the robot has a ghost where it should be, edges that are silent or sent by
-somebody else are red.
+somebody else are red. With --bag they are where they were recorded, at the time of a slider.
 """
 
 from __future__ import annotations
 
 import secrets
 import sys
+from argparse import ArgumentTypeError
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tfcompose.cli.options import DEFAULT_FILE, add_tolerance, add_variant
+from tfcompose.cli.options import DEFAULT_FILE, add_bag, add_tolerance, add_variant
 from tfcompose.cli.terminal import UNREADABLE, fail, warn
 from tfcompose.signals import take_interrupt
 
@@ -21,13 +22,14 @@ if TYPE_CHECKING:
     from argparse import ArgumentParser, Namespace
     from collections.abc import Sequence
 
-    import viser
-
+    from tfcompose.cli.bag_view import BagView
+    from tfcompose.view.reload import Files
     from tfcompose.view.session import Session
 
 _HOST, _PORT = "127.0.0.1", 8080
 _LOOPBACK = frozenset({_HOST, "localhost", "::1"})
 _EVERYWHERE = frozenset({"0.0.0.0", "::"})  # noqa: S104 (what a user may give)
+_LATEST_S = 1e11
 _LAST_PORT = 65_535
 
 
@@ -38,6 +40,11 @@ def arguments(parser: ArgumentParser) -> None:
     )
     add_variant(parser)
     parser.add_argument("--live", action="store_true", help="show the running tree, and what is wrong with it")
+    add_bag(parser)
+    parser.add_argument(
+        "--at", type=_seconds, default=0.0, metavar="S",
+        help="with --bag: the time to begin with, in seconds after its first transform, or since the epoch; default: 0",
+    )  # fmt: skip
     add_tolerance(parser)
     parser.add_argument("--edit", action="store_true", help="move mounts, and save them in the file")
     parser.add_argument("--html", metavar="FILE", help="write one HTML file that needs nothing else, and end")
@@ -52,31 +59,40 @@ def arguments(parser: ArgumentParser) -> None:
 def run(arguments: Namespace) -> int:
     """Serve the view until Ctrl-C, or write it; exit code 1 if the file gives no robot, 2 if it cannot be shown."""
     try:
-        from tfcompose.view.reload import Files, ReloadedPanel, Watcher
-        from tfcompose.view.server import started, stop
+        from tfcompose.view.reload import Files
     except ImportError as error:
         fail(f"{error.name} is not installed: pip install 'tfcompose[view]'", UNREADABLE)
     from tfcompose.cli.reading import read_text
-    from tfcompose.cli.view_session import plan_of_session, session_of
+    from tfcompose.cli.view_session import session_of
 
-    if arguments.live and (arguments.html or arguments.edit):
-        fail("--live shows what is published: leave out --html and --edit", UNREADABLE)
+    if arguments.live and arguments.bag:
+        fail("--live uses the running tree and --bag a recording: give one of them", UNREADABLE)
+    if (arguments.live or arguments.bag) and (arguments.html or arguments.edit):
+        given = "--live" if arguments.live else "--bag"
+        fail(f"{given} shows what is published: leave out --html and --edit", UNREADABLE)
     file = arguments.file or _running_plan(arguments) or DEFAULT_FILE
     if arguments.html:
         _check_output(Path(arguments.html), [file, *arguments.overlays])
     files = Files(read_text)
     session = session_of(file, arguments, files)
-    if arguments.live:
-        plan_of_session(session)
-    here = arguments.html or arguments.host in _LOOPBACK
-    token = "" if here else secrets.token_urlsafe(16)
-    port = 0 if arguments.html else _free(arguments.host, arguments.port)
-    server = started(_HOST if arguments.html else arguments.host, port, session.robot.name, token)
+    if arguments.html:
+        _write(session, Path(arguments.html))
+        return 0
+    return _serve(session, files, arguments)
+
+
+def _serve(session: Session, files: Files, arguments: Namespace) -> int:
+    """Show the session in the browser until Ctrl-C; return the exit code."""
+    from tfcompose.view.reload import ReloadedPanel, Watcher
+    from tfcompose.view.server import started, stop
+
+    bag = _bag_view(session, arguments) if arguments.bag else None
+    token = "" if arguments.host in _LOOPBACK else secrets.token_urlsafe(16)
+    server = started(arguments.host, _free(arguments.host, arguments.port), session.robot.name, token)
     try:
-        if arguments.html:
-            _write(server, session, Path(arguments.html))
-            return 0
-        shown = ReloadedPanel(server, session, files, edit=arguments.edit, joints=not arguments.live)
+        shown = ReloadedPanel(server, session, files, edit=arguments.edit, joints=not (arguments.live or arguments.bag))
+        if bag is not None:
+            bag.show(server, shown)
         _announce(_address(arguments.host, server.get_port(), token), arguments)
         with Watcher(files) as watcher:
             if arguments.live:
@@ -84,27 +100,38 @@ def run(arguments: Namespace) -> int:
 
                 return follow(server, shown, watcher.changed, arguments.tolerance)
             while True:
-                if watcher.changed.wait(1):
-                    watcher.changed.clear()
-                    shown.reload()
+                watcher.changed.wait()
+                watcher.changed.clear()
+                if shown.reload() and bag is not None:
+                    bag.show(server, shown)
     finally:
         stop(server)
 
 
-def _write(server: viser.ViserServer, session: Session, path: Path) -> None:
+def _bag_view(session: Session, arguments: Namespace) -> BagView:
+    from tfcompose.cli.bag_view import BagView
+
+    return BagView(arguments.bag, arguments.at, session, arguments.tolerance)
+
+
+def _write(session: Session, path: Path) -> None:
     """Write the scene as one file; ends where it cannot be written."""
     from tfcompose.cli.writing import replace_file
     from tfcompose.view.scene import RobotScene
+    from tfcompose.view.server import started, stop
     from tfcompose.view.session import poses_in_roots
 
     robot, poses = session.robot, poses_in_roots(session.robot, {})
-    scene = RobotScene(server.scene, robot)
-    scene.update(robot, poses)
-    scene.frame_camera(server, poses)
+    server = started(_HOST, 0, robot.name)
     try:
+        scene = RobotScene(server.scene, robot)
+        scene.update(robot, poses)
+        scene.frame_camera(server, poses)
         replace_file(path, server.scene.as_html().encode())
     except OSError as error:
         fail(f"{path} cannot be written: {error.strerror}", UNREADABLE)
+    finally:
+        stop(server)
 
 
 def _running_plan(arguments: Namespace) -> str | None:
@@ -160,6 +187,17 @@ def _address(host: str, port: int, token: str) -> str:
 
     name = socket.gethostname() if host in _EVERYWHERE else f"[{host}]" if ":" in host else host
     return f"http://{name}:{port}" + (f"/?token={token}" if token else "")
+
+
+def _seconds(text: str) -> float:
+    """Read a time; raises ArgumentTypeError."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 <= value < _LATEST_S:
+        raise ArgumentTypeError(f"{text} is not a time in seconds")
+    return value
 
 
 def _announce(address: str, arguments: Namespace) -> None:

@@ -1,0 +1,51 @@
+"""``view --bag``: the browser view shows a recording at a time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tfcompose.cli.live import from_bag
+from tfcompose.cli.terminal import UNREADABLE, fail
+from tfcompose.cli.view_session import plan_of_session
+from tfcompose.plan.topics import parts_of
+from tfcompose.view.bag import BagTree, Recorded
+from tfcompose.view.live_panel import BagPanel
+
+if TYPE_CHECKING:
+    import viser
+
+    from tfcompose.geometry import Offset
+    from tfcompose.view.reload import ReloadedPanel
+    from tfcompose.view.session import Session
+
+#: A larger time counts from the epoch.
+_LONGEST_S = 1e8
+
+
+class BagView:
+    """A bag, at a time, with the robot that a session has.
+
+    Raises:
+        SystemExit: after saying why the bag cannot be shown, or not at that time.
+    """
+
+    def __init__(self, path: str, at_s: float, session: Session, tolerance: Offset) -> None:
+        plan = plan_of_session(session)
+        self._recorded = from_bag(lambda: Recorded(path, parts_of(plan)))
+        self._tolerance = tolerance
+        self._at_s = at_s - self._recorded.begin_ns / 1e9 if at_s > _LONGEST_S else at_s
+        if not 0 <= self._at_s <= self._recorded.length_s:
+            length = f"{self._recorded.length_s:.2f}"
+            fail(f"--at {at_s:g} is not in {path}: it lasts {length} s from its first transform", UNREADABLE)
+
+    def show(self, server: viser.ViserServer, shown: ReloadedPanel) -> BagPanel:
+        """Show the recording with the robot as it is now."""
+        session = shown.session
+        tree = BagTree(session.robot, plan_of_session(session), self._recorded, self._tolerance)
+        tree.at_s = self._at_s
+        panel = BagPanel(server, shown.panel, tree, self._recorded.length_s)
+        panel.slider.on_update(lambda _: self._keep(panel))
+        return panel
+
+    def _keep(self, panel: BagPanel) -> None:
+        self._at_s = panel.tree.at_s

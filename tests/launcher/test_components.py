@@ -9,6 +9,7 @@ import pytest
 from tests.support.findings import expect
 from tests.support.machine_history import GUARD, History, begin, run_process
 from tfcompose.ipc import Absent, Clear, DownRequest, GateOpen, Live, OwnerReady, Present, ProcessRequest
+from tfcompose.launcher.components import writer_of
 from tfcompose.launcher.events import Exited, LoadComponent, NewPlan, UnloadComponent
 from tfcompose.launcher.readiness import waits_for
 from tfcompose.plan import Component, PlanProcess, Ready
@@ -196,3 +197,17 @@ def test_a_container_of_another_plan_that_is_gone_takes_its_components_along() -
     history.feed(NewPlan(replace(history.plan, processes=(GUARD,)), frozenset()))
     history.feed(Exited("box", 0))
     assert set(history.state.tracked) == {"guard"}
+
+
+def test_a_line_of_a_container_is_of_the_component_whose_logger_wrote_it() -> None:
+    state = loaded(component("a"), replace(component("b"), nodes=("/front/b",))).state
+    lines = {
+        "[INFO] [1795427604.518547811] [a]: up": "a",
+        "[WARN] [1795427604.518547811] [front.b]: hot": "b",
+        "\x1b[33m[WARN] [1795427604.5] [front.b.rclcpp_lifecycle]: late\x1b[0m": "b",
+        "[INFO] [1795427604.518547811] [box]: Load Library: liba.so": "box",
+        "[INFO] [1795427604.518547811] [ab]: another": "box",
+        "terminate called": "box",
+    }
+    assert {line: writer_of(state, "box", line) for line in lines} == lines
+    assert writer_of(state, "guard", "[a]") == "guard"

@@ -11,16 +11,21 @@ from typing import Any
 
 import pytest
 
+from tests.support import processes
 from tests.support.composition import can_build, composition_interfaces
+from tests.support.domains import Domain
 from tests.support.fake_nodes import FakeNodes
 from tests.support.findings import expect
+from tests.support.waiting import until
 from tfcompose.cli.compiling import library
 from tfcompose.compile import compile_robot
 from tfcompose.emit.plan import plan_of
 from tfcompose.findings import Finding
-from tfcompose.ipc import AllReady, FindingShown, Notice, ProcessState, TreeComplete
+from tfcompose.ipc import AllReady, FindingShown, LogLine, Notice, ProcessState, TreeComplete
 from tfcompose.launcher.supervisor import supervise
+from tfcompose.plan.components import LoadRequest
 from tfcompose.plan.file import write_plan
+from tfcompose.ros.node import open_node
 
 pytestmark = [
     pytest.mark.ros,
@@ -139,6 +144,8 @@ def test_components_are_loaded_with_names_parameters_and_remappings_as_launch_gi
         name: (type(value), value) for name, value in params.items()
     }
     assert odometry["node"] == "/robot1/odometry"
+    lines = {one.process: one.text for one in notices if isinstance(one, LogLine) and "is up" in one.text}
+    assert lines.keys() == {"rectify", "odometry"}, "what a component logs is its own"
     assert found(notices) == [], "an edge of a component is its owner's, though the container sends it"
 
 
@@ -222,6 +229,37 @@ def test_a_component_that_sends_another_ones_edge_is_named_with_its_container(tm
     notices = run(tmp_path, ROBOT + thief, has_found("TF801"))
     assert requested(stand_in)
     expect(found(notices)[0], "TF801", "/robot1/thief", "odometry", "thief", "box")
+
+
+@pytest.fixture
+def theirs(stand_in: Path, domain: Domain) -> Path:  # noqa: ARG001 (the container is in that domain)
+    """A container that somebody else started, with the node ``/robot1/box``."""
+    names = ("--ros-args", "-r", "__node:=box", "-r", "__ns:=/robot1")
+    processes.start([sys.executable, "-m", "tests.support.stand_in_container", *names])
+    return stand_in
+
+
+EXTERNAL = ROBOT.replace("{restart: on-failure, restart_delay: 0.2 s}", "{external: true}")
+
+
+def test_components_are_unloaded_from_a_container_that_is_external(tmp_path: Path, theirs: Path) -> None:
+    notices = run(tmp_path, EXTERNAL, are_ready)
+    assert [one["unloaded"] for one in requested(theirs) if "unloaded" in one] == [2, 1]
+    assert found(notices) == []
+
+
+def test_a_component_whose_node_a_container_has_already_is_refused(tmp_path: Path, theirs: Path) -> None:
+    from tfcompose.ros.composition import Container  # noqa: PLC0415 (its messages are built by then)
+
+    with open_node("somebody", "") as node:
+        container = Container(node, "/robot1/box")
+        assert until(lambda: container.load.is_there)
+        container.ask_to_load(LoadRequest("/robot1/box", "/robot1/front/rectify", "image_proc", "demo::Empty"))
+        assert until(container.load.answer)
+        container.close()
+    notices = run(tmp_path, EXTERNAL, has_found("TF808"))
+    expect(found(notices)[0], "TF808", "rectify", "/robot1/front/rectify", "/robot1/box", "unload", "1")
+    assert len(requested(theirs)) == 1
 
 
 STOCK = """

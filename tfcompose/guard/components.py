@@ -12,7 +12,7 @@ import time
 from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tfcompose.ipc import Load, Loaded, NotLoaded, Unload, Unloaded
 from tfcompose.plan.codec import decode
@@ -113,14 +113,15 @@ class Components:
                 self._answer(order, f"{container.name} went away")
             return bool(job.step)
         if not job.step:
-            return not self._begins(job, container, now, "look" if order.again else "load")
+            return not self._begins(job, container, now, "look")
         if job.step == "load" and (answer := container.load.answer()) is not None:
             words = answer.error_message or "it does not say why"
             self._answer(order, "" if answer.success else f"{container.name} did not load {job.request.what}: {words}")
             return True
         if (there := container.list.answer()) is not None:
             if job.request.node in there.full_node_names:
-                self._answer(order, "")
+                before = job.step == "look" and not order.again
+                self._answer(order, _already(job.request, there) if before else "")
                 return True
             job.absent += 1
             if job.step == "look" or job.absent > ABSENT_AT_MOST:  # it carries out one request after the other
@@ -171,6 +172,13 @@ class Components:
         else:
             done = NotLoaded(order.process, order.number, why) if why else Loaded(order.process, order.number)
             self._emit(done)
+
+
+def _already(request: LoadRequest, there: Any) -> str:
+    """Return why a component is not loaded whose node the container has already: two would have one name."""
+    number = there.unique_ids[list(there.full_node_names).index(request.node)]
+    unload = f"ros2 component unload {request.container} {number}"
+    return f"{request.container} has a node {request.node} already, which is not of this run: {unload}"
 
 
 class ComponentDriver:

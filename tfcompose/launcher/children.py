@@ -51,12 +51,19 @@ EVENT_LIMIT = 1024 * 1024
 class Children:
     """The processes that run. ``happened`` is given what becomes of them, ``notify`` what they write.
 
+    ``writer`` says, of a process and a line that it wrote, whose line it is: a container writes its components'.
     With a run's id, what they leave behind is this process's to reap and to end.
     """
 
     def __init__(
-        self, selector: BaseSelector, run_id: str, happened: Callable[[Event], None], notify: Callable[[Notice], None]
+        self,
+        selector: BaseSelector,
+        run_id: str,
+        happened: Callable[[Event], None],
+        notify: Callable[[Notice], None],
+        writer: Callable[[str, str], str],
     ) -> None:
+        self._writer = writer
         self._selector = selector
         self._run_id = run_id
         self._happened = happened
@@ -218,7 +225,7 @@ class Children:
         def log(text: str) -> None:
             nonlocal matches
             last.append(text[:LAST_LINE_LENGTH])
-            self._notify(LogLine(child.name, stream, text))
+            self._notify(LogLine(self._writer(child.name, text), stream, text))
             if matches is None or child.gate_matched:
                 return
             try:

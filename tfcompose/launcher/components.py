@@ -6,6 +6,7 @@ container has answered, and goes with the container; a guard that follows anothe
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from tfcompose.ipc import Loaded, NotLoaded, Unloaded
@@ -15,7 +16,7 @@ from tfcompose.launcher.readiness import order_gate
 from tfcompose.launcher.stopping import left, lose_edges, schedule_restart
 
 if TYPE_CHECKING:
-    from tfcompose.launcher.state import Tracked, Transition
+    from tfcompose.launcher.state import State, Tracked, Transition
 
 
 def component_answered(step: Transition, event: Loaded | NotLoaded | Unloaded) -> None:
@@ -59,3 +60,21 @@ def order_components(step: Transition) -> None:
             step.actions.append(LoadComponent(name, one.order, again=True))
         elif one.process.component and one.state == "STOPPING":
             step.actions.append(UnloadComponent(name, one.order))
+
+
+#: What may be a logger's name: ROS writes it in brackets, in a line's beginning.
+_LOGGER = re.compile(r"\[([\w.]+)\]")
+_BEGINNING = 300
+
+
+def writer_of(state: State, process: str, line: str) -> str:
+    """Return whose a line is that a process wrote: of a container, the component's whose logger is named in it."""
+    components = state.components_of(process)
+    if not components:
+        return process
+    loggers = {node.strip("/").replace("/", "."): one.process.name for one in components for node in one.process.nodes}
+    for name in _LOGGER.findall(line[:_BEGINNING]):
+        found = next((one for one in loggers if name == one or name.startswith(f"{one}.")), None)
+        if found:
+            return loggers[found]
+    return process

@@ -24,6 +24,7 @@ from tfcompose.ipc import Ended, FindingShown, Load, NotLoaded, Unload
 from tfcompose.launcher.answers import answer
 from tfcompose.launcher.child import subreaper
 from tfcompose.launcher.children import Children, GuardPipes
+from tfcompose.launcher.components import writer_of
 from tfcompose.launcher.events import (
     Begin,
     Finish,
@@ -155,7 +156,7 @@ class _Supervisor:
         stack.callback(self._notifier.close)
         if session.run_id:
             stack.enter_context(subreaper())
-        self._children = Children(selector, session.run_id, self._handle, self._notify)
+        self._children = Children(selector, session.run_id, self._handle, self._notify, self._writer)
         stack.callback(self._children.close)
 
     def run(self, duration_s: float | None) -> int:
@@ -262,8 +263,13 @@ class _Supervisor:
         else:
             self._children.order(Load(name, number, str(file), again))
 
+    def _writer(self, process: str, line: str) -> str:
+        return writer_of(self._state, process, line)
+
     def _notify_late(self, name: str, found: Finding) -> None:
-        notes = [Note(f"{name}: {line}") for line in self._children.last_lines(name)]
+        component = self._state.tracked[name].process.component
+        writes = component.container if component else name
+        notes = [Note(f"{writes}: {line}") for line in self._children.last_lines(writes)]
         self._notify(FindingShown(replace(found, notes=(*found.notes, *notes))))
 
 

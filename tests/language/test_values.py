@@ -110,6 +110,27 @@ def test_an_expression_has_its_value(text: str) -> None:
     assert found.value == pytest.approx(EXPRESSIONS[text], abs=1e-15)
 
 
+CHOICES = {
+    "1 m if 2 > 1 else 2 m": 1.0,
+    "0.3 if side == 'left' else -0.3": -0.3,
+    "1 if side == 'left' else 2 if side == 'right' else 3": 2.0,
+    "2 * (1 if not true else 3) + 1": 7.0,
+    "1 if 1 == 2 or 2 == 2 else 0": 1.0,
+}
+NO_CHOICES = ("1 if true", "1 else 2", "1 if 2 else 3", "if true else 1", "1 if true else", "true if if else 1")
+
+
+def test_an_expression_chooses_between_two_values() -> None:
+    for text, expected in CHOICES.items():
+        found = evaluate(text, lambda _name: "right")
+        assert isinstance(found, Quantity), text
+        assert found.value == expected, text
+    assert evaluate("'a' if side == 'right' else 'b'", lambda _name: "right") == "a"
+    for text in NO_CHOICES:
+        with pytest.raises(ExpressionError):
+            evaluate(text, lambda _name: "right")
+
+
 numbers = st.integers(0, 99).map(str)
 expressions = st.recursive(
     numbers,

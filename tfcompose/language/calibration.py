@@ -287,7 +287,7 @@ def read_calibration(text: str, file: str, form: str, at: Span) -> CalibrationFi
     chosen = known if form == "auto" else form
     if chosen is None or not documents:
         what = "is empty" if not documents else "is in no known format"
-        advice = f"formats: {', '.join(FORMATS)}; format: names one"
+        advice = f"formats: {', '.join(FORMATS)}; tfcompose help calibration shows them"
         return CalibrationFile(file, form, (), (_of_no_format(file, what, at, advice),))
     if chosen != known and (kind != "yaml" or chosen == "moveit"):
         advice = f"leave format out; it reads like {known}" if known else f"formats: {', '.join(FORMATS)}"

@@ -82,4 +82,6 @@ def never_published(owner: Tracked, edges: tuple[PlanEdge, ...]) -> Finding:
     if owner.state in ("STOPPED", "EXITED", "FATAL", "BACKOFF"):
         why = f"{owner.state.lower()}: {owner.detail}" if owner.detail else owner.state.lower()
         return finding("TF811", f"nobody publishes {names}: {name} is {why}", None)
-    return finding("TF811", f"{name} never published {names}", None)
+    host = owner.process.host if owner.process.kind == "external" else None
+    advice = f"start its share on {host}: tfcompose up --host {host}; a profile with host: null starts it here"
+    return finding("TF811", f"{name} never published {names}", None, help=advice if host else "")

@@ -1,8 +1,10 @@
 """The view of a tree that really runs, beside a tf listener as the oracle."""
 
+import math
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,11 +18,12 @@ from tests.view.test_view import session_of
 from tfcompose.cli.live_view import Following, observers_of
 from tfcompose.emit.plan import plan_of
 from tfcompose.geometry import Offset, Pose, offset_of
+from tfcompose.plan.file import write_plan
 from tfcompose.signals import Stop
-from tfcompose.view.live import LiveTree
 from tfcompose.view.panel import Panel
 from tfcompose.view.reload import Files, ReloadedPanel
 from tfcompose.view.server import started, stop
+from tfcompose.view.session import Session
 
 pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
 
@@ -31,11 +34,37 @@ class View:
 
     server: viser.ViserServer
     panel: Panel
-    tree: LiveTree
+    following: Following
 
     @property
     def is_red(self) -> bool:
         return self.server.scene.get_handle_by_name("/live/wrong") is not None
+
+
+WHEEL = """
+tfcompose: 1
+robot: r
+links: {base_link: {}, wheel: {}}
+joints: {w: {type: continuous, parent: base_link, child: wheel, xyz: [0, 0.2, 0], axis: [0, 1, 0]}}
+"""
+
+
+@contextmanager
+def following(session: Session, *, joints: bool = False) -> Iterator[View]:
+    """Show the robot that runs in the test's domain."""
+    files = Files(lambda one: Path(one).read_text("utf-8"))
+    server, ending = started("127.0.0.1", 0, "test"), Stop()
+    shown = ReloadedPanel(server, session, files, edit=False, joints=joints)
+    follows = Following(server, shown, threading.Event(), Offset(1e-3, 1e-3), joints=joints)
+    observers = observers_of(plan_of(session.robot))
+    thread = threading.Thread(target=follows.run, args=(observers, ending))
+    thread.start()
+    try:
+        yield View(server, shown.panel, follows)
+    finally:
+        ending.request()
+        thread.join()
+        stop(server)
 
 
 @pytest.fixture
@@ -43,24 +72,8 @@ def view(tmp_path: Path) -> Iterator[View]:
     """A view that follows the tree of a rover whose owners are the test's."""
     file = tmp_path / "rover.yaml"
     file.write_text(EXTERNAL, "utf-8")
-    session = session_of(file)
-    files = Files(lambda one: Path(one).read_text("utf-8"))
-    from tfcompose.live.listener import listen  # noqa: PLC0415 (ROS, which may not be there)
-
-    server, ending = started("127.0.0.1", 0, "test"), Stop()
-    shown = ReloadedPanel(server, session, files, edit=False, joints=False)
-    observers = observers_of(plan_of(session.robot))
-    following = Following(server, shown, observers, Offset(1e-3, 1e-3), threading.Event())
-
-    def run() -> None:
-        listen("tfcompose_view", observers, ending, duration_s=None, every_s=0.04, show=following.show)
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    yield View(server, shown.panel, following.tree)
-    ending.request()
-    thread.join()
-    stop(server)
+    with following(session_of(file)) as shown:
+        yield shown
 
 
 def test_frames_are_where_a_tf_listener_has_them(view: View, nodes: Any) -> None:
@@ -102,8 +115,40 @@ def test_a_rogue_publisher_makes_its_edge_red_within_a_second(view: View, nodes:
             assert until(lambda: view.is_red)
             took_s = time.monotonic() - begun
             assert sent()
-            assert [one.code for one in view.tree.judgement.found] == ["TF801"]
-            assert f"/rogue{number}" in view.tree.judgement.found[0].message
+            assert [one.code for one in view.following.tree.judgement.found] == ["TF801"]
+            assert f"/rogue{number}" in view.following.tree.judgement.found[0].message
         return took_s < 1
 
     assert in_one_of_a_few(is_found)
+
+
+def test_a_slider_moves_the_wheel_as_a_tf_listener_has_it_until_somebody_else_moves_it(
+    tmp_path: Path, start: Callable[..., Any], nodes: Any
+) -> None:
+    from rclpy.time import Time  # noqa: PLC0415 (as above)
+    from sensor_msgs.msg import JointState  # noqa: PLC0415 (as above)
+
+    from tfcompose.tf2 import Buffer, TransformListener  # noqa: PLC0415 (as above)
+
+    file, angle = tmp_path / "rover.yaml", math.radians(40)
+    file.write_text(WHEEL, "utf-8")
+    session = session_of(file)
+    (tmp_path / "plan.json").write_text(write_plan(plan_of(session.robot)), "utf-8")
+    (tmp_path / "robot.full.urdf").write_text("<robot name='r'/>", "utf-8")
+    start("tfcompose.publishers.joints", tmp_path / "plan.json", "joints")
+    with following(session, joints=True) as view, TransformListener(buffer := Buffer()):
+
+        def is_at(expected: float) -> bool:
+            if not buffer.can_transform("base_link", "wheel", Time()) or view.panel.published is None:
+                return False
+            found = buffer.lookup_transform("base_link", "wheel", Time()).transform
+            turned = 2 * math.atan2(found.rotation.y, found.rotation.w)
+            shown = view.panel.published["wheel"]
+            return abs(turned - expected) < 1e-6 and abs(shown.rpy[1] - expected) < 1e-6
+
+        view.panel.set_joint("w", angle)
+        assert until(lambda: is_at(angle))
+        assert buffer.lookup_transform("base_link", "wheel", Time()).transform.translation.y == 0.2
+        nodes.typed(nodes.node("jsp"), JointState, "/joint_states", lambda _: JointState(name=["w"], position=[-0.5]))
+        assert until(lambda: [one.state for one in view.following.senders] == ["stopped"])
+        assert view.following.senders[0].others_found == ("/jsp",)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from tfcompose.cli.live import set_up_ros
 from tfcompose.cli.process_table import HEAD, row, uptime
 from tfcompose.cli.runs import is_meant, running
-from tfcompose.cli.terminal import INTERRUPTED, reject
+from tfcompose.cli.terminal import INTERRUPTED, reject, warn
 from tfcompose.cli.view_session import plan_of_session
 from tfcompose.findings import finding
 from tfcompose.ipc import RobotStatus, StatusRequest
@@ -20,6 +20,7 @@ from tfcompose.live.edges import SETTLE_S, TreeObserver
 from tfcompose.plan.topics import parts_of
 from tfcompose.ros.environment import RosError
 from tfcompose.signals import Stop
+from tfcompose.view.joints import JointSender, joint_topics
 from tfcompose.view.live import LiveTree
 from tfcompose.view.live_panel import LivePanel
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import viser
+    from rclpy.node import Node
 
     from tfcompose.geometry import Offset
     from tfcompose.plan import Plan
@@ -47,44 +49,79 @@ def observers_of(plan: Plan) -> dict[Topics, TreeObserver]:
 
 
 class Following:
-    """Moves the scene, judges and asks, each as often as it is due; of a file that changed it shows the new robot."""
+    """Moves the scene, judges and asks, each as often as it is due; of a file that changed it shows the new robot.
+
+    With ``joints`` the panel's sliders publish joint states.
+    """
 
     def __init__(
         self,
         server: viser.ViserServer,
         shown: ReloadedPanel,
-        observers: Mapping[Topics, TreeObserver],
-        tolerance: Offset,
         changed: threading.Event,
+        tolerance: Offset,
+        *,
+        joints: bool,
     ) -> None:
         self._server = server
         self._shown = shown
-        self._observers = observers
-        self._tolerance = tolerance
         self._changed = changed
+        self._tolerance = tolerance
+        self._joints = joints
         self._meter = UsageMeter()
-        self._begun = time.monotonic()
-        self._follow()
+        self.senders: list[JointSender] = []
 
-    def _follow(self) -> None:
+    def run(self, observers: Mapping[Topics, TreeObserver], stop: Stop) -> None:
+        """Follow the tree on the topics (moving, fixed) until ``stop`` is requested.
+
+        Raises:
+            RosError: if ROS cannot start a node, or take messages.
+        """
+        from tfcompose.live.listener import TreeListener  # rclpy reads the environment when it is loaded
+        from tfcompose.ros.node import open_node
+
+        with open_node("tfcompose_view", "") as node:
+            listeners = [TreeListener(node, observer, topics) for topics, observer in observers.items()]
+            begun, show_at = time.monotonic(), 0.0
+            self._follow(observers, node)
+            while not stop.requested:
+                for listener in listeners:
+                    listener.listen(_SHOW_EVERY_S / len(listeners), stop)
+                if not listeners:
+                    stop.wait(_SHOW_EVERY_S)
+                now = time.monotonic()
+                if now < show_at:
+                    continue
+                show_at = now + _SHOW_EVERY_S
+                if self._changed.is_set():
+                    self._changed.clear()
+                    if self._shown.reload():
+                        self._follow(observers, node)
+                self._show(now, now - begun)
+                self._send(now, next((one.clock_ns for one in listeners), None))
+            for sender in self.senders:
+                sender.close()
+
+    def _follow(self, observers: Mapping[Topics, TreeObserver], node: Node) -> None:
         """Follow the robot that the session has now."""
         session = self._shown.session
         plan = plan_of_session(session)
-        observers = {topics: self._observers.get(topics) or TreeObserver() for topics in parts_of(plan)}
-        self.tree = LiveTree(session.robot, plan, observers, self._tolerance)
+        known = {topics: observers.get(topics) or TreeObserver() for topics in parts_of(plan)}
+        self.tree = LiveTree(session.robot, plan, known, self._tolerance)
         self._panel = LivePanel(self._server, self._shown.panel, self.tree)
-        self._name = plan.robot
+        self._plan = plan
         self._judge_at = self._ask_at = 0.0
+        for sender in self.senders:
+            sender.close()
+        self.senders = []
+        if self._joints:
+            topics = joint_topics(session.robot, plan)
+            self.senders = [_sender(node, topic, names) for topic, names in topics.items()]
 
-    def show(self) -> None:
+    def _show(self, now: float, listened_s: float) -> None:
         """Show what came since the last time."""
-        now = time.monotonic()
-        if self._changed.is_set():
-            self._changed.clear()
-            if self._shown.reload():
-                self._follow()
         if now >= self._judge_at:
-            self.tree.judge(now - self._begun)
+            self.tree.judge(listened_s)
             self._panel.show_text()
             self._judge_at = time.monotonic() + _JUDGE_EVERY_S
         self._panel.show()
@@ -92,15 +129,27 @@ class Following:
             self._ask_at = now + _ASK_EVERY_S
             self._show_processes()
 
+    def _send(self, now: float, clock_ns: int | None) -> None:
+        """Let sliders publish, by the plan's clock."""
+        stamp_ns = clock_ns if self._plan.ros.clock == "sim" else time.time_ns()
+        panel = self._shown.panel
+        for sender in self.senders:
+            before = sender.state
+            sender.step(now, stamp_ns, panel.session.robot, panel.positions)
+            if sender.state != before and sender.others_found:
+                warn(sender.text)
+        if self.senders:
+            self._panel.show_joints([sender.text for sender in self.senders])
+
     def _show_processes(self) -> None:
-        status = _status(self._name)
+        status = _status(self._plan.robot)
         if status is None:
-            self._panel.show_processes(f"no robot {self._name} runs here", [])
+            self._panel.show_processes(f"no robot {self._plan.robot} runs here", [])
             return
         used = self._meter.usage([one.pid for one in status.processes if one.pid])
         state = "stopping" if status.stopping else "tree complete" if status.complete else "tree not complete"
         rows = [HEAD, *(row(process, used) for process in status.processes)]
-        self._panel.show_processes(f"{self._name}: {state}, since {uptime(status.uptime)}", rows)
+        self._panel.show_processes(f"{self._plan.robot}: {state}, since {uptime(status.uptime)}", rows)
 
 
 def _status(name: str) -> RobotStatus | None:
@@ -113,7 +162,27 @@ def _status(name: str) -> RobotStatus | None:
         return None
 
 
-def follow(server: viser.ViserServer, shown: ReloadedPanel, changed: threading.Event, tolerance: Offset) -> int:
+def _sender(node: Node, topic: str, names: Mapping[str, str]) -> JointSender:
+    from tfcompose.ros.graph import ids_say_who, writers
+    from tfcompose.ros.sensor_data import JointStatePublisher
+
+    own: set[bytes] = set()
+
+    def make() -> JointStatePublisher:
+        publisher = JointStatePublisher(node, tuple(names), topic)
+        own.add(publisher.gid)
+        return publisher
+
+    def others() -> list[str]:
+        name = "" if ids_say_who(node) else node.get_fully_qualified_name()
+        return sorted({one.node for one in writers(node, topic) if one.gid not in own and one.node != name})
+
+    return JointSender(topic, names, make, others)
+
+
+def follow(
+    server: viser.ViserServer, shown: ReloadedPanel, changed: threading.Event, tolerance: Offset, *, joints: bool
+) -> int:
     """Show the running tree until a signal comes; return the exit code.
 
     Raises:
@@ -121,13 +190,10 @@ def follow(server: viser.ViserServer, shown: ReloadedPanel, changed: threading.E
     """
     plan = plan_of_session(shown.session)
     set_up_ros(plan.ros)
-    from tfcompose.live.listener import listen  # rclpy reads the environment when it is loaded
-
-    observers = observers_of(plan)
-    following = Following(server, shown, observers, tolerance, changed)
+    following = Following(server, shown, changed, tolerance, joints=joints)
     with Stop() as stop:
         try:
-            listen("tfcompose_view", observers, stop, duration_s=None, every_s=_SHOW_EVERY_S, show=following.show)
+            following.run(observers_of(plan), stop)
         except RosError as error:
             reject([finding("TF901", str(error), None)])
     return INTERRUPTED

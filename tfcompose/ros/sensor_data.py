@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
+from tfcompose.ros.graph import gid_of
 from tfcompose.ros.joint_codec import encode_names, fill
 from tfcompose.ros.node import JOINT_STATES, Subscription, qos
 from tfcompose.ros.tf_codec import BIG_ENDIAN, LITTLE_ENDIAN
@@ -38,8 +39,9 @@ class JointStateSubscription(Subscription):
 class JointStatePublisher:
     """Publishes the positions (rad or m) of the same joints again and again."""
 
-    def __init__(self, node: Node, names: Sequence[str]) -> None:
-        self._publisher: Any = node.create_publisher(JointState, JOINT_STATES_TOPIC, 10)
+    def __init__(self, node: Node, names: Sequence[str], topic: str = JOINT_STATES_TOPIC) -> None:
+        self._node = node
+        self._publisher: Any = node.create_publisher(JointState, topic, 10)
         self._message = encode_names(names)
 
     @property
@@ -48,10 +50,19 @@ class JointStatePublisher:
         name: str = self._publisher.topic_name
         return name
 
+    @property
+    def gid(self) -> bytes:
+        """The id that comes with its messages."""
+        return gid_of(self._publisher)
+
     def publish(self, stamp_ns: int, positions: Sequence[float]) -> None:
         """Publish them, in the names' order, with this time in nanoseconds."""
         fill(self._message, stamp_ns, positions)
         self._publisher.publish(bytes(self._message))
+
+    def close(self) -> None:
+        """Leave the topic before the node does."""
+        self._node.destroy_publisher(self._publisher)
 
 
 #: Messages that have a header, and are looked up in TF. Images are left out: their CameraInfo has the same header.

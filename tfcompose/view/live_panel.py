@@ -41,6 +41,7 @@ class LivePanel:
         with server.gui.add_folder(title, order=-1):
             self._edge = server.gui.add_html("")
             self._found = server.gui.add_html("")
+            self._joints = server.gui.add_html("")
             self._processes = server.gui.add_html("")
         panel.frames.on_update(lambda _: self.show_text())
 
@@ -60,6 +61,10 @@ class LivePanel:
         frame = self._panel.frames.value
         _set(self._edge, paragraphs([f"<b>{escape(frame)}</b>", *map(escape, self.tree.about(frame))]))
         _set(self._found, findings_html(self.tree.judgement.found, "all edges as expected"))
+
+    def show_joints(self, lines: Sequence[str]) -> None:
+        """Say whether sliders publish joint states, or who does instead."""
+        _set(self._joints, paragraphs([escape(line) for line in lines]))
 
     def show_processes(self, title: str, rows: Sequence[Sequence[str]]) -> None:
         """Show the processes of the robot that runs, the first row being the heads of columns."""

@@ -145,12 +145,11 @@ def _with(texts: Mapping[str, str], change: Change) -> dict[str, str]:
     return {file: text for file, text in new.items() if text is not None}
 
 
-def poses_in_roots(robot: Robot, positions: Mapping[str, float]) -> dict[str, Pose]:
-    """Return the pose of each frame in the root of its tree; ``positions`` are those of joints, in rad or m.
+def joint_positions(robot: Robot, positions: Mapping[str, float]) -> dict[str, float]:
+    """Return where each joint is, in rad or m, from the ``positions`` of some.
 
     A joint that mimics another follows it; one without a position is at 0.
     """
-    above = {edge.child: edge for edge in reversed(robot.edges)}  # of several parents the first
     joints = {edge.joint.name: edge.joint for edge in robot.edges if edge.joint}
 
     def position(name: str, passed: frozenset[str] = frozenset()) -> float:
@@ -161,6 +160,13 @@ def poses_in_roots(robot: Robot, positions: Mapping[str, float]) -> dict[str, Po
             return positions.get(name, 0.0)
         return joint.offset + joint.multiplier * position(joint.mimic, passed | {name})
 
+    return {name: position(name) for name in joints}
+
+
+def poses_in_roots(robot: Robot, positions: Mapping[str, float]) -> dict[str, Pose]:
+    """Return the pose of each frame in the root of its tree; ``positions`` are as for ``joint_positions``."""
+    above = {edge.child: edge for edge in reversed(robot.edges)}  # of several parents the first
+    joints = joint_positions(robot, positions)
     poses: dict[str, Pose] = {}
     for frame in robot.frames:
         chain: list[str] = []
@@ -173,7 +179,7 @@ def poses_in_roots(robot: Robot, positions: Mapping[str, float]) -> dict[str, Po
             edge = above[name]
             motion = Pose()
             if edge.joint is not None:
-                value = position(edge.joint.name)
+                value = joints[edge.joint.name]
                 x, y, z = edge.joint.axis
                 slides = edge.joint.type == "prismatic"
                 motion = (

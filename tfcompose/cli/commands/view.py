@@ -40,6 +40,9 @@ def arguments(parser: ArgumentParser) -> None:
     )
     add_variant(parser)
     parser.add_argument("--live", action="store_true", help="show the running tree, and what is wrong with it")
+    parser.add_argument(
+        "--joints", action="store_true", help="with --live: sliders publish /joint_states, if nobody else does"
+    )
     add_bag(parser)
     parser.add_argument(
         "--at", type=_seconds, default=0.0, metavar="S",
@@ -67,6 +70,11 @@ def run(arguments: Namespace) -> int:
 
     if arguments.live and arguments.bag:
         fail("--live uses the running tree and --bag a recording: give one of them", UNREADABLE)
+    if arguments.joints and not arguments.live:
+        fail(
+            "--joints publishes for a running robot: give --live, too; without it sliders move what is shown",
+            UNREADABLE,
+        )
     if (arguments.live or arguments.bag) and (arguments.html or arguments.edit):
         given = "--live" if arguments.live else "--bag"
         fail(f"{given} shows what is published: leave out --html and --edit", UNREADABLE)
@@ -90,7 +98,8 @@ def _serve(session: Session, files: Files, arguments: Namespace) -> int:
     token = "" if arguments.host in _LOOPBACK else secrets.token_urlsafe(16)
     server = started(arguments.host, _free(arguments.host, arguments.port), session.robot.name, token)
     try:
-        shown = ReloadedPanel(server, session, files, edit=arguments.edit, joints=not (arguments.live or arguments.bag))
+        joints = arguments.joints or not (arguments.live or arguments.bag)
+        shown = ReloadedPanel(server, session, files, edit=arguments.edit, joints=joints)
         if bag is not None:
             bag.show(server, shown)
         _announce(_address(arguments.host, server.get_port(), token), arguments)
@@ -98,7 +107,7 @@ def _serve(session: Session, files: Files, arguments: Namespace) -> int:
             if arguments.live:
                 from tfcompose.cli.live_view import follow
 
-                return follow(server, shown, watcher.changed, arguments.tolerance)
+                return follow(server, shown, watcher.changed, arguments.tolerance, joints=arguments.joints)
             while True:
                 watcher.changed.wait()
                 watcher.changed.clear()

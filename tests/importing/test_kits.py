@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+import yaml
 from scipy.spatial.transform import Rotation
 
 from tests.support.bringups import compiled, import_of, places, printed_errors
@@ -113,6 +114,39 @@ def test_clearpaths_robot_has_the_frames_of_its_macros(tmp_path: Path, capsys: p
         CLEARPATH[: CLEARPATH.index(words)].count("\n") + 1 for words in ("hosts", "model: hokuyo", "{model: sick")
     ]
     assert sorted(places(printed_errors(capsys), "TF020")) == sorted(f"robot.yaml:{line}" for line in lines)
+
+
+ARM = """serial_number: a200-0000
+version: 0
+system:
+  ros2: {namespace: /a200_0000/, domain_id: 5}
+platform:
+  attachments:
+  - {name: arch, type: a200.sensor_arch, enabled: false, parent: default_mount, xyz: [0, 0, 0], rpy: [0, 0, 0]}
+  - {name: bumper, type: a200.bumper, parent: front_bumper_mount, xyz: [0, 0, 0], rpy: [0, 0, 0]}
+manipulators:
+  arms:
+  - model: kinova_gen3_6dof
+    parent: top
+    xyz: [0.1, 0.0, 0.05]
+    rpy: [0.0, 0.0, 0.0]
+    gripper: {model: robotiq_2f_85, xyz: [0, 0, 0.01], rpy: [0, 0, 0]}
+"""
+
+
+def test_an_arm_of_clearpaths_has_its_gripper_at_its_end_and_what_is_not_enabled_is_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / "robot.yaml"
+    source.write_text(ARM, encoding="utf-8")
+    main(["import", str(source), "--keep-going", "-o", str(tmp_path / "out.yaml")])
+    data = yaml.safe_load((tmp_path / "out.yaml").read_text(encoding="utf-8"))
+    assert data["ros"] == {"namespace": "a200_0000", "isolate": "topics", "domain_id": 5}
+    assert list(data["parts"]) == ["platform", "bumper", "arm_0", "arm_0_gripper"]
+    gripper = data["parts"]["arm_0_gripper"]
+    assert gripper["params"]["parent_link"] == "arm_0_end_effector_link"
+    assert gripper["macro"] == "robotiq_2f_85"
+    assert "robot.yaml:7" in places(printed_errors(capsys), "TF020")
 
 
 def test_another_yaml_file_is_refused(tmp_path: Path) -> None:

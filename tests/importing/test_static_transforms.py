@@ -24,6 +24,9 @@ ARGUMENTS = [
      (0, 0, 0), (0, 0, 0)),
     ("--qx 1 --qw 0 --frame-id base_link --child-frame-id lidar_link", "ros2", (0, 0, 0), (math.pi, 0, 0)),
     ("1 2 3 90 0 0 base_link lidar_link __name:=tf", "ros2", (1, 2, 3), (0, 0, 90)),
+    ("--qz 0.05 --frame-id base_link --child-frame-id lidar_link", "ros2", (0, 0, 0), (0, 0, 2 * math.atan(0.05))),
+    ("--ros-args -r __node:=a -- --x 2 --frame-id base_link --child-frame-id lidar_link", "ros2", (2, 0, 0),
+     (0, 0, 0)),
 ]  # fmt: skip
 
 
@@ -45,6 +48,7 @@ REFUSED = [
     ("--x", "ros2"),
     ("--x nan --frame-id a --child-frame-id b", "ros2"),
     ("0 0 0 90deg 0 0 a b", "ros2"),
+    ("0 0 0 0 0 0 -- a b", "ros2"),
     ("0 0 0 --yaw 1 0 0 a b --frame-id a", "ros2"),
     ("", "ros2"),
 ]

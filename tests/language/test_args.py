@@ -238,3 +238,31 @@ def test_entries_of_a_loop_choose_their_values() -> None:
     robot = built(CAMERAS.replace("${i * 10 cm}", "${0.1 if i == 0 else 0.2}")).robot
     assert robot
     assert {edge.pose.xyz for edge in robot.edges if edge.child.startswith("camera")} >= {(0, 0.1, 0), (0, 0.2, 0)}
+
+
+def test_a_process_waits_on_for_one_of_a_part_that_a_loop_makes() -> None:
+    arm = "tfcompose: 1\nrobot: arm\nlinks: {base: {}}\nprocesses: {drive: {run: [drive]}}\n"
+    text = (
+        "parts: {'arm_${i}': {for: {i: [1, 2]}, spec: arm.yaml, prefix: 'arm_${i}_', parent: base_link}}\n"
+        "processes:\n"
+        "  'other_${i}': {for: {i: [1]}, when: false, run: [other]}\n"
+        "  plan: {run: [plan], after: {arm_1/drive: started, other_1: started}}\n"
+    )
+    made = robot(built(text, files={"arm.yaml": arm}))
+    (plan,) = [one for one in made.processes if one.name == "plan"]
+    assert plan.after == {"arm_1/drive": "started"}
+
+
+def test_loops_in_each_other_make_no_more_entries_than_one_may() -> None:
+    text = 'frames: {"f_${i}_${j}": {for: {i: "${range(200)}", j: "${range(200)}"}, parent: base_link}}\n'
+    assert [one.code for one in built(text).errors] == ["TF105"]
+
+
+def test_what_a_profile_replaced_in_an_entry_that_a_loop_makes_is_noted() -> None:
+    text = (
+        "frames: {'f_${i}': {for: {i: [1]}, parent: base_link, xyz: [1, 0, 0]}}\n"
+        "profiles: {high: {frames: {'f_${i}': {xyz: [900, 0, 0]}}}}\n"
+    )
+    (far,) = [one for one in built(text, profiles=("high",)).found if one.code == "TF414"]
+    assert far.span
+    assert (far.span.line, [note.span.line for note in far.notes if note.span]) == (5, [4])

@@ -1,0 +1,36 @@
+"""A real browser without a screen: Debian's Chromium, drawing by software."""
+
+from __future__ import annotations
+
+import shutil
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import pytest
+from playwright.sync_api import sync_playwright
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from playwright.sync_api import Page
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+#: How long a page may take to do something, in milliseconds: software draws slowly.
+TIMEOUT_MS = 60_000
+_SOFTWARE = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+
+
+@contextmanager
+def page_of(address: str) -> Iterator[Page]:
+    """Open the address in a browser; the test is skipped where there is none."""
+    if CHROMIUM is None:
+        pytest.skip("there is no Chromium: apt install chromium")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=_SOFTWARE)
+        try:
+            page = browser.new_page(viewport={"width": 1400, "height": 900})
+            page.set_default_timeout(TIMEOUT_MS)
+            page.goto(address, wait_until="load")
+            yield page
+        finally:
+            browser.close()

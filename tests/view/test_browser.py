@@ -1,0 +1,77 @@
+"""What a person does in the browser reaches the robot, and its file."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import viser
+from playwright.sync_api import Page
+
+from tests.support.browser import page_of
+from tests.support.cli import tfcompose_in
+from tests.support.waiting import until
+from tests.view.test_view import ROVER, session_of
+from tfcompose.geometry import Pose, offset_of, quat_from_rpy
+from tfcompose.view.panel import Panel
+from tfcompose.view.server import started, stop
+
+pytestmark = pytest.mark.xdist_group("browser")
+
+
+@pytest.fixture
+def server() -> Iterator[viser.ViserServer]:
+    one = started("127.0.0.1", 0, "field_rover")
+    yield one
+    stop(one)
+
+
+@pytest.fixture
+def rover(tmp_path: Path) -> Path:
+    file = tmp_path / "field_rover.yaml"
+    file.write_bytes(ROVER.read_bytes())
+    return file
+
+
+def enter(page: Page, label: str, value: str) -> None:
+    """Type a value into the control of that label, and leave it; of a slider it is the number beside it."""
+    control = "xpath=ancestor::div[1]/following-sibling::div"
+    field = page.locator("label").get_by_text(label, exact=True).locator(control).locator("input:visible").last
+    field.fill(value)
+    field.press("Enter")
+    field.blur()
+
+
+def test_a_mount_that_is_moved_in_the_browser_is_saved_as_one_line(rover: Path, server: viser.ViserServer) -> None:
+    session = session_of(rover)
+    panel = Panel(server, session, edit=True)
+    with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
+        enter(page, "search", "front_link")
+        until(lambda: panel.frames.value == "front_link")
+        page.get_by_text("pose of front_link in base_link").wait_for()
+        enter(page, "x (mm)", "512.5")
+        until(lambda: bool(session.moved))
+        page.get_by_role("button", name="save").click()
+        page.get_by_text("+    xyz: [0.5125,").first.wait_for()
+    before, after = ROVER.read_text("utf-8").splitlines(), rover.read_text("utf-8").splitlines()
+    assert [(old, new) for old, new in zip(before, after, strict=True) if old != new] == [
+        (
+            "    xyz: [0.48, 0.0475, 0.30]         # so the camera's middle is in the rover's",
+            "    xyz: [0.5125, 0.0475, 0.30]         # so the camera's middle is in the rover's",
+        )
+    ]
+    assert tfcompose_in(rover.parent, "lint", rover.name).returncode == 0
+
+
+def test_a_slider_in_the_browser_moves_its_wheel_only(rover: Path, server: viser.ViserServer) -> None:
+    panel = Panel(server, session_of(rover), edit=False)
+    wheels = ("front_left_wheel_link", "front_right_wheel_link")
+    left, right = (panel.scene.body_pose(wheel) for wheel in wheels)
+    with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
+        enter(page, "front_left_wheel_joint (deg)", "30")
+        until(lambda: panel.positions["front_left_wheel_joint"] != 0)
+    off = offset_of(
+        left @ Pose(quat_xyzw=quat_from_rpy(0, 0, math.radians(30))), panel.scene.body_pose("front_left_wheel_link")
+    )
+    assert max(off.xyz_m, off.rot_rad) < 1e-6
+    assert panel.scene.body_pose("front_right_wheel_link") == right

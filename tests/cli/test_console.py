@@ -9,7 +9,7 @@ from tfcompose.cli.commands import tree
 from tfcompose.cli.console import Console
 from tfcompose.findings import Note, finding
 from tfcompose.ipc import Ended, FindingShown, LogLine
-from tfcompose.plan import Plan, PlanProcess, RosSettings
+from tfcompose.plan import OutputPlace, Plan, PlanProcess, RosSettings
 
 PLAN = Plan("rover", "", None, RosSettings(), (), (PlanProcess("drive", "run"),))
 FAILED = finding("TF808", "drive ended with exit code 1", None, notes=[Note("drive: boom"), Note("it ran for 2 s")])
@@ -52,3 +52,18 @@ def test_a_tree_on_a_terminal_does_not_wrap_and_in_a_pipe_is_in_full(monkeypatch
         short.removesuffix("…") == line[: len(short.removesuffix("…"))]
         for short, line in zip(fitted, full, strict=True)
     )
+
+
+def test_a_process_writes_to_the_terminal_or_into_its_log_as_its_output_says() -> None:
+    outputs: tuple[OutputPlace, ...] = ("both", "log", "screen")
+    processes = tuple(PlanProcess(f"to_{place}", "run", output=place) for place in outputs)
+    output, kept = Printed(), dict[str, str]()
+    plan = Plan("rover", "", None, RosSettings(), (), processes)
+    console = Console(plan, output, colour=False, keep=lambda name, text: kept.update({name: text}))
+    for one in processes:
+        console(LogLine(one.name, "stdout", f"line of {one.name}"))
+    assert kept == {name: f"line of {name}" for name in ("to_both", "to_log")}
+    assert [name for name in ("to_both", "to_log", "to_screen") if f"line of {name}" in output.text] == [
+        "to_both",
+        "to_screen",
+    ]

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.support.waiting import TIMEOUT_S
 from tfcompose.launcher.child import BURST, LINE_LIMIT, Bucket, Command, Lines, Pipe, spawn
 from tfcompose.launcher.children import Reaper
 from tfcompose.launcher.supervisor import Signals
@@ -121,3 +122,28 @@ def test_a_process_that_is_not_our_own_is_started_with_no_signal_blocked(tmp_pat
     popen.send_signal(signal.SIGTERM)
     assert popen.wait(60) == -signal.SIGTERM
     popen.communicate()
+
+
+def test_a_process_with_a_pseudo_terminal_writes_there_line_by_line_and_its_last_words_are_read(tmp_path: Path) -> None:
+    code = (
+        "import os, sys\n"
+        "print(sys.stdout.isatty(), sys.stderr.isatty(), os.get_terminal_size(1).columns)\n"
+        "print('error', file=sys.stderr)\n"
+        "os._exit(3)  # nothing is flushed: a terminal has its lines already\n"
+    )
+    popen = spawn(Command((sys.executable, "-I", "-c", code), dict(os.environ), tmp_path, emulate_tty=True), ())
+    assert popen.stdout
+    assert popen.stderr
+    assert popen.wait(TIMEOUT_S) == 3
+    texts: list[str] = []
+    for stream in (popen.stdout, popen.stderr):
+        Pipe(stream, texts.append).drain()
+    assert texts == ["True True 120", "error"]
+    assert (popen.stdout.closed, popen.stderr.closed) == (True, True)
+
+
+def test_a_program_that_cannot_be_started_leaves_no_pseudo_terminal_open(tmp_path: Path) -> None:
+    before = sorted(Path("/proc/self/fd").iterdir())
+    with pytest.raises(OSError, match="nowhere"):
+        spawn(Command(("/nowhere/program",), {}, tmp_path, emulate_tty=True), ())
+    assert sorted(Path("/proc/self/fd").iterdir()) == before

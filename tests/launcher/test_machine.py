@@ -41,7 +41,7 @@ from tfcompose.launcher.events import (
 )
 from tfcompose.launcher.machine import step, wake_time
 from tfcompose.launcher.state import initial
-from tfcompose.plan import GuardPolicy, PlanProcess, Ready
+from tfcompose.plan import GuardPolicy, PlanProcess, Ready, StopRule
 from tfcompose.variables import SETTLE
 
 DRIVE = PlanProcess("drive", "external", owns=(("odom", "base_link"),))
@@ -461,3 +461,13 @@ def test_a_step_leaves_the_state_it_was_given_as_it_was() -> None:
     step(before, Begin(), 0.0)
     assert before == initial(plan_of(GUARD, STATIC, DRIVE))
     assert before.tracked == tracked
+
+
+def test_a_stubborn_process_is_killed_after_the_time_that_is_its_own() -> None:
+    rule = StopRule("SIGINT", 2.0, kill_timeout_s=7.0)
+    history = begin(run_process("slow", stop=rule)).feed(Signalled(SIGINT))
+    assert history.sleep_until_due() == pytest.approx(2.0)
+    assert history.sleep_until_due() == pytest.approx(7.0)
+    assert history.killed == [("slow", SIGINT), ("slow", SIGTERM), ("slow", SIGKILL)]
+    history = begin(run_process("slow", stop=replace(rule, signal="SIGTERM"))).feed(Signalled(SIGINT))
+    assert history.sleep_until_due() == pytest.approx(7.0)

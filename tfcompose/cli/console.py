@@ -96,7 +96,8 @@ class Nowhere:
 class Console:
     """Writes notices as lines: ``name | text``, coloured on a terminal.
 
-    ``keep`` gets each line without colours, and may return a complaint to print; ``status`` stays below the lines.
+    ``keep`` gets each line without colours, and may return a complaint to print; ``status`` stays below the lines. A
+    process's own lines are only kept, or only written, where its ``output`` says so.
     """
 
     def __init__(
@@ -116,6 +117,7 @@ class Console:
         self._width = prefix_width([*names, LAUNCHER])
         self._colours = {name: COLOURS[index % len(COLOURS)] for index, name in enumerate(names)}
         self._nodes = {process.name: process.nodes for process in plan.processes}
+        self._outputs = {process.name: process.output for process in plan.processes if process.output != "both"}
         #: The last lines of each process, as findings quote them: what was printed is not printed again.
         self._printed: dict[str, deque[str]] = {}
         self._hosts = {process.name: f"host {process.host}" for process in plan.processes if process.host}
@@ -147,7 +149,13 @@ class Console:
 
     @_write.register
     def _(self, notice: LogLine) -> None:
-        self._line(notice.process, notice.text, self._colours.get(notice.process, ""), log=True)
+        where = self._outputs.get(notice.process, "both")
+        if where == "log":
+            if fault := self._kept(notice.process, notice.text):
+                self._complain(fault)
+            return
+        colour = self._colours.get(notice.process, "")
+        self._line(notice.process, notice.text, colour, log=True, keep=where == "both")
         last = self._printed.setdefault(notice.process, deque(maxlen=QUOTED_AT_MOST))
         last.append(f"{notice.process}: {notice.text}")
 
@@ -239,14 +247,20 @@ class Console:
     def _say(self, text: str) -> None:
         self._line(LAUNCHER, text, BOLD)
 
-    def _line(self, name: str, text: str, colour: str, *, log: bool = False) -> None:
-        fault = self._keep(name, plain(text)) if self._keep else None
+    def _kept(self, name: str, text: str) -> str | None:
+        return self._keep(name, plain(text)) if self._keep else None
+
+    def _line(self, name: str, text: str, colour: str, *, log: bool = False, keep: bool = True) -> None:
+        fault = self._kept(name, text) if keep else None
         clear = self._status.cleared() if self._status else ""
         shown = coloured_only(text) if self._colour else plain(text)
         self._output.write(f"{clear}{self._paint(prefix_of(name, self._width), colour)} {shown}\n", log=log)
         if fault:
-            head = self._paint(prefix_of(LAUNCHER, self._width), BOLD)
-            self._output.write(f"{head} {self._paint(fault, YELLOW)}\n")
+            self._complain(fault)
+
+    def _complain(self, fault: str) -> None:
+        head = self._paint(prefix_of(LAUNCHER, self._width), BOLD)
+        self._output.write(f"{head} {self._paint(fault, YELLOW)}\n")
 
     def _paint(self, text: str, *codes: str) -> str:
         return f"{''.join(codes)}{text}{PLAIN}" if self._colour else text

@@ -11,6 +11,7 @@ from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import printable
 from tfcompose.findings import RejectedError
 from tfcompose.launcher.state import MAX_RESTARTS
+from tfcompose.plan import StopRule
 from tfcompose.plan.file import read_plan
 from tfcompose.plan.hosts import describe_share
 from tfcompose.plan.topics import partition_of, private_topics
@@ -142,9 +143,13 @@ def _times(process: PlanProcess) -> Iterator[str]:
         yield f"  restart  {process.restart}, {counted(most, 'time')} in a row{delay}"
     if process.required is not None:
         yield "  required its end ends everything" if process.required else "  optional the rest goes on when it fails"
-    if process.stop.signal != "SIGINT" or process.stop.timeout_s is not None:
+    if process.stop != StopRule():
         patience = "" if process.stop.timeout_s is None else f", {process.stop.timeout_s:g} s"
+        kills_s = process.stop.kill_timeout_s
+        patience += "" if kills_s is None else f", {kills_s:g} s from SIGTERM to SIGKILL"
         yield f"  stop     {process.stop.signal}{patience}"
+    if process.output != "both" or process.emulate_tty:
+        yield f"  output   {process.output}{', from a pseudo-terminal' if process.emulate_tty else ''}"
     schedule = process.schedule
     if schedule:
         cpus = f"CPU {', '.join(map(str, schedule.cpus))}" if schedule.cpus else "any CPU"

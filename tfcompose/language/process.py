@@ -31,6 +31,7 @@ from tfcompose.load import Path
 from tfcompose.plan import (
     LifecycleState,
     LogLevel,
+    OutputPlace,
     PlanProcess,
     ReadyKind,
     RestartPolicy,
@@ -196,6 +197,7 @@ class StopSpec(Spec):
 
     signal: StopSignal = key(DEFAULTS.stop.signal, "the first signal")
     timeout: Duration | None = key(None, "how long until the next, firmer one", "5 s")
+    kill_timeout: Duration | None = key(None, "how long from SIGTERM to SIGKILL; default: timeout", "10 s")
 
 
 def _is_regular(value: str) -> str:
@@ -288,6 +290,7 @@ NAMED: tuple[Way, ...] = ("run", "simulate", "external")
 OF_NODES: tuple[Way, ...] = ("run", "external", "component")
 PROGRAM: tuple[Way, ...] = ("run", "container")
 KEPT_ALIVE: tuple[Way, ...] = ("run", "simulate", "component", "container")
+STARTED: tuple[Way, ...] = ("run", "simulate", "component", "container", "built-in")
 ENDED: tuple[Way, ...] = ("run", "simulate", "container")
 LOADED: tuple[Way, ...] = ("component",)
 OWN: tuple[Way, ...] = ("built-in",)
@@ -304,6 +307,12 @@ class Supervised(Checked):
     env: dict[VariableName, Word] = key({}, "environment variables", {"RCUTILS_COLORIZED_OUTPUT": "1"}, to=NOT_EXTERNAL)
     cwd: Text | None = key(
         None, "the folder that it runs in, relative to this file; default: where up is called", "maps", to=PROGRAM
+    )
+    output: OutputPlace = key(
+        DEFAULTS.output, "where its output goes: to the terminal of up and into its log, or to one of them", to=STARTED
+    )
+    emulate_tty: Boolean = key(
+        DEFAULTS.emulate_tty, "true: it writes to a pseudo-terminal, line by line and in colours", to=PROGRAM
     )
     host: Text | None = key(None, "the computer that it runs on", "jetson", to=ALL)
     required: Boolean | None = key(

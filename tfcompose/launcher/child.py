@@ -8,9 +8,13 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import errno
+import fcntl
 import os
 import signal
+import struct
 import subprocess
+import termios
 import time
 from collections import deque
 from dataclasses import dataclass, field
@@ -40,6 +44,9 @@ TAIL = 4096
 #: What is read from a process that has ended, at most: more than a pipe holds, less than for ever; bytes.
 DRAIN_LIMIT = 1024 * 1024
 
+#: The size of a pseudo-terminal: lines and columns.
+TERMINAL_SIZE = (40, 120)
+
 #: How much of its log goes into the finding for a process that failed: lines, and characters of each.
 LAST_LINES = 8
 LAST_LINE_LENGTH = 300
@@ -55,6 +62,7 @@ class Command:
 
     ``own`` says that it is one of tfcompose's; ``schedule`` is how the kernel schedules it. ``fence`` is a file that
     must be there first, and what it holds. ``load`` is what a container is asked instead of starting anything.
+    ``emulate_tty`` gives it pseudo-terminals in place of pipes.
     ``missing`` says, of a process that the run goes on without, why it cannot be started.
     """
 
@@ -66,6 +74,7 @@ class Command:
     fence: tuple[Path, str] | None = None
     missing: str = ""
     load: LoadRequest | None = None
+    emulate_tty: bool = False
 
 
 class Lines:
@@ -140,7 +149,12 @@ class Pipe:
 
     def read(self) -> int | None:
         """Pass on some of what is there to read: how many bytes, 0 at the end, None if nothing is there now."""
-        data = self.file.read(READ_SIZE)
+        try:
+            data = self.file.read(READ_SIZE)
+        except OSError as error:  # what a pseudo-terminal says when nobody has its other end
+            if error.errno != errno.EIO:
+                raise
+            data = b""
         if data is None:
             return None
         bucket = self._bucket
@@ -226,6 +240,8 @@ def spawn(command: Command, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes
         if command.own:
             signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
 
+    if command.emulate_tty:
+        return _on_terminals(command, before_the_program, pass_fds)
     return subprocess.Popen(
         command.argv,
         bufsize=0,
@@ -238,6 +254,40 @@ def spawn(command: Command, pass_fds: tuple[int, ...]) -> subprocess.Popen[bytes
         start_new_session=True,
         preexec_fn=before_the_program,  # noqa: PLW1509 (the launcher has one thread)
     )
+
+
+def _on_terminals(
+    command: Command, before_the_program: Callable[[], None], pass_fds: tuple[int, ...]
+) -> subprocess.Popen[bytes]:
+    """Start the command with a pseudo-terminal each for output and errors, which are read as pipes are.
+
+    Raises:
+        OSError: if it cannot be started.
+    """
+    (out, its_out), (err, its_err) = os.openpty(), os.openpty()
+    for fd in (out, err):
+        fcntl.ioctl(fd, termios.TIOCSWINSZ, struct.pack("HHHH", *TERMINAL_SIZE, 0, 0))
+    try:
+        popen = subprocess.Popen(
+            command.argv,
+            cwd=command.folder,
+            env=command.env,
+            stdin=subprocess.DEVNULL,
+            stdout=its_out,
+            stderr=its_err,
+            pass_fds=pass_fds,
+            start_new_session=True,
+            preexec_fn=before_the_program,  # noqa: PLW1509 (the launcher has one thread)
+        )
+    except BaseException:
+        os.close(out)
+        os.close(err)
+        raise
+    finally:
+        os.close(its_out)
+        os.close(its_err)
+    popen.stdout, popen.stderr = os.fdopen(out, "rb", 0), os.fdopen(err, "rb", 0)
+    return popen
 
 
 def has_ended(pid: int) -> bool:

@@ -120,6 +120,8 @@ def _command_of(
     else:
         program = executable_of(process, argv[0], folder, env)
         command = program if isinstance(program, NotFound) else Command((program, *argv[1:]), env, folder, own)
+    if isinstance(command, Command):
+        command = replace(command, emulate_tty=process.emulate_tty)
     if isinstance(command, Command) and process.prefix:
         runner = executable_of(process, process.prefix[0], folder, env)
         words = (runner, *process.prefix[1:], *command.argv) if isinstance(runner, str) else ()

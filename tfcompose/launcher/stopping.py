@@ -329,7 +329,8 @@ def firmer_at(times: Times, one: Tracked) -> float | None:
     """Return when the next signal is due: the plan's time counts for each, or else the launcher's."""
     if one.state != "STOPPING" or not 0 < one.level < len(stop_signals(one.process)):
         return None
-    own = one.process.stop.timeout_s
+    rule, kills = one.process.stop, one.level + 1 == len(stop_signals(one.process))
+    own = rule.kill_timeout_s if kills and rule.kill_timeout_s is not None else rule.timeout_s
     default = times.interrupt_s if one.level == 1 else times.terminate_s
     return one.since + (default if own is None else own)
 

@@ -35,6 +35,8 @@ LifecycleState = Literal["inactive", "active"]
 LogLevel = Literal["debug", "info", "warn", "error", "fatal"]
 #: What a stand-in does.
 SimulationKind = Literal["circle", "fixed", "joints"]
+#: Where a process's output goes: to the terminal of up and into its log, or to one of them.
+OutputPlace = Literal["both", "log", "screen"]
 #: How the kernel schedules a process (sched(7)); fifo and rr are real-time policies.
 SchedulingPolicy = Literal["other", "batch", "idle", "fifo", "rr"]
 #: How well the pose of a frame is known that a driver publishes.
@@ -210,10 +212,14 @@ class Ready:
 
 @dataclass(frozen=True, slots=True)
 class StopRule:
-    """How a process is ended: the first signal, and the time until a firmer one; None: the launcher's own."""
+    """How a process is ended: the first signal, and the time until a firmer one; None: the launcher's own.
+
+    ``kill_timeout_s`` is the time between SIGTERM and SIGKILL; None: ``timeout_s``.
+    """
 
     signal: StopSignal = "SIGINT"
     timeout_s: float | None = None
+    kill_timeout_s: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,7 +282,7 @@ class PlanProcess:
     ``description`` is the file beside the plan that a publisher sends as ``robot_description``; None: the plan's.
     ``namespace`` is that of its nodes, without a leading slash; None: the plan's.
     ``restart_delay`` is how long after its end it is started again, in seconds; None: longer each time. ``prefix`` are
-    the words before its command, a program that runs it.
+    the words before its command, a program that runs it. ``emulate_tty`` says that it writes to a pseudo-terminal.
     """
 
     name: str
@@ -306,6 +312,8 @@ class PlanProcess:
     prefix: tuple[str, ...] = field(default=(), metadata=OMITTED)
     schedule: Schedule | None = field(default=None, metadata=OMITTED)
     component: Component | None = field(default=None, metadata=OMITTED)
+    output: OutputPlace = field(default="both", metadata=OMITTED)
+    emulate_tty: bool = field(default=False, metadata=OMITTED)
 
     @property
     def topics(self) -> tuple[str, str]:

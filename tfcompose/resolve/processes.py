@@ -166,7 +166,7 @@ def how(declared: Started | ContainerSpec, namespace: str, way: Way = "run") -> 
     if declared.namespace is not None:
         found["namespace"] = namespace
     if stop:
-        found["stop"] = StopRule(stop.signal, stop.timeout)
+        found["stop"] = StopRule(stop.signal, stop.timeout, stop.kill_timeout)
     if ready:
         found["ready"] = _ready(ready, namespace)
     return found

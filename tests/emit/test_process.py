@@ -13,6 +13,7 @@ from tests.support.tables import for_each
 from tfcompose.cli.compiling import disk, library
 from tfcompose.compile import compile_robot
 from tfcompose.emit import emit
+from tfcompose.emit.plan import plan_of
 from tfcompose.files import Target
 from tfcompose.findings import Finding, RejectedError
 from tfcompose.language.process import keys_of
@@ -314,3 +315,101 @@ def test_a_ros2_command_is_started_as_the_package_or_launch_file_that_it_is(word
 def test_a_launch_file_that_is_left_to_ros2_gets_no_ros_arguments(words: str) -> None:
     head = HEAD.replace("frames: {map: {}}", "frames: {map: {}, odom: {parent: map, owner: a, rate: 9}}")
     assert process_of(f"run: [ros2, launch, {words}], node: b", head).argv == ("ros2", "launch", *words.split(", "))
+
+
+COMPONENT = "component: p/ns::C, container: box"
+
+
+def with_box(keys: str = "", head: str = HEAD) -> str:
+    return head.replace("processes:", f"containers: {{box: {{{keys}}}}}\nprocesses:")
+
+
+def component_of(keys: str = "", box: str = "", head: str = HEAD) -> PlanProcess:
+    return process_of(f"{COMPONENT}{keys}", with_box(box, head))
+
+
+@pytest.mark.parametrize(
+    ("keys", "command"),
+    [
+        ("", ("component_container",)),
+        ("executor: multi", ("component_container_mt",)),
+        ("isolation: isolated", ("component_container_isolated",)),
+        (
+            "isolation: isolated, executor: multi, args: [-v]",
+            ("component_container_isolated", "--use_multi_threaded_executor", "-v"),
+        ),
+        ("executable: mine, args: [-v]", ("mine", "-v")),
+    ],
+)
+def test_a_container_is_the_stock_program_by_isolation_and_executor(keys: str, command: tuple[str, ...]) -> None:
+    plan = read_plan(files_of(f"a: {{{COMPONENT}}}", with_box(keys))["plan.json"], "plan.json")
+    box = plan.process("box")
+    named = ("--ros-args", "-r", "__node:=box", "-r", "__ns:=/r1")
+    assert box.argv == (f"${{executable:rclcpp_components/{command[0]}}}", *command[1:], *named)
+    assert box.ready == Ready("service", "/r1/box/_container/load_node")
+
+
+def test_a_component_is_loaded_with_typed_parameters_and_started_by_nobody() -> None:
+    params = ", namespace: front, params: {n: 1, r: 2.0, deep: {er: true}, l: [1, 2.5], t: '1'}, remap: {a: b}"
+    process = component_of(f"{params}, extra_arguments: {{use_intra_process_comms: true}}")
+    assert (process.kind, process.argv, process.params_file) == ("component", (), None)
+    assert process.nodes == ("/r1/front/a",)
+    assert process.component
+    assert (process.component.package, process.component.plugin) == ("p", "ns::C")
+    assert process.component.params == {"n": 1, "r": 2.0, "deep.er": True, "l": [1.0, 2.5], "t": "1"}
+    assert isinstance(process.component.params["r"], float)
+    assert process.component.extra_arguments == {"use_intra_process_comms": True}
+    assert process.remap == {"a": "b"}
+    assert process.after == {"box": "ready"}
+
+
+def test_a_component_has_the_clock_and_the_topics_of_the_robot_since_no_command_line_gives_them() -> None:
+    process = component_of(head=HEAD.replace("{namespace: r1}", "{namespace: r1, clock: sim, isolate: topics}"))
+    assert process.component
+    assert process.component.params == {"use_sim_time": True}
+    assert process.remap == {"/tf": "/r1/tf", "/tf_static": "/r1/tf_static"}
+
+
+def test_a_component_runs_where_its_container_does_and_is_as_needed() -> None:
+    process = component_of(box="host: jetson, required: false")
+    assert (process.host, process.required) == ("jetson", False)
+    assert component_of(", required: true", "host: jetson, required: false").required is True
+
+
+def test_words_of_a_parameter_file_are_values_as_ros_reads_them(tmp_path: Path) -> None:
+    file = tmp_path / "params.yaml"
+    file.write_text("/**:\n  ros__parameters: {n: 7, r: 1e3, on: yes, t: '7', w: word, l: [1, 2.0], h: 0x10}\n")
+    text = f"{with_box()}  a: {{{COMPONENT}, params: {{file: params.yaml, n: 8}}}}\n"
+    compiled = compile_robot(text, str(tmp_path / "r.yaml"), library(), read=lambda path: Path(path).read_text())
+    assert compiled.robot
+    (component,) = [one.component for one in plan_of(compiled.robot).processes if one.component]
+    assert component.params == {"n": 8, "r": 1000.0, "on": True, "t": "7", "w": "word", "l": [1.0, 2.0], "h": 16}
+
+
+def test_a_component_of_a_part_is_in_the_parts_container(tmp_path: Path) -> None:
+    (tmp_path / "arm.yaml").write_text(f"{with_box()}  a: {{{COMPONENT}}}\n".replace("robot: r\n", "robot: arm\n"))
+    text = "tfcompose: 1\nrobot: r\nframes: {base: {}}\nparts: {left: {spec: arm.yaml, parent: base}}\n"
+    compiled = compile_robot(text, str(tmp_path / "r.yaml"), library(), read=lambda path: Path(path).read_text())
+    assert compiled.robot
+    process = plan_of(compiled.robot).process("left/a")
+    assert process.component
+    assert process.component.container == "left/box"
+    assert process.after == {"left/box": "ready"}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "word"),
+    [
+        ('"container": "box"', '"container": "bax"', "bax"),
+        ('"container": "box"', '"container": "a"', "a"),
+        ('"kind": "component"', '"kind": "run"', "run"),
+        ('"nodes": ["/r1/a"]', '"nodes": []', "node"),
+    ],
+)
+def test_a_plan_whose_component_nobody_can_load_is_refused(old: str, new: str, word: str) -> None:
+    text = files_of(f"a: {{{COMPONENT}}}", with_box())["plan.json"]
+    assert old in text
+    with pytest.raises(RejectedError) as error:
+        read_plan(text.replace(old, new), "plan.json")
+    assert [one.code for one in error.value.findings] == ["TF902"]
+    assert word in error.value.findings[0].message

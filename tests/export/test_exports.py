@@ -525,3 +525,27 @@ def test_a_name_with_a_slash_is_a_name_for_everyone() -> None:
     plan = replace(plan, processes=(*plan.processes, part))
     assert "rover-arm-ekf.service" in units(plan)
     assert "arm-ekf" in yaml.safe_load(compose(plan, Machine(".."))[0][0].text)["services"]
+
+
+CONTAINER = """tfcompose: 1
+robot: r
+frames: {base_link: {}}
+containers: {box: {}}
+processes:
+  a: {component: p/C, container: box, after: {first: started}}
+  first: {run: [sleep, '9']}
+  last: {run: [sleep, '9'], after: {a: ready}}
+"""
+
+
+def test_a_container_is_the_unit_and_what_it_loads_is_none() -> None:
+    plan = compiled_plan(CONTAINER)
+    files, gaps = systemd(plan, Machine("/opt/r", "/usr/bin/python3"))
+    names = {file.path for file in files}
+    assert "r-box.service" in names
+    assert "r-a.service" not in names
+    assert "r-box.service" in " ".join(unit(next(f.text for f in files if f.path == "r-last.service"))["Unit"]["After"])
+    assert {word for gap in gaps for word in words_of(gap)} >= {"a", "first", "last", "box"}
+    services = yaml.safe_load(compose(plan, Machine("/opt/r", "/usr/bin/python3"))[0][0].text)["services"]
+    assert "box" in services
+    assert "a" not in services

@@ -5,6 +5,7 @@ import os
 import shutil
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from signal import SIGKILL
 from typing import Any
@@ -103,6 +104,10 @@ def run(folder: Path, text: str, *steps: Step) -> list[Notice]:
 
 def requested(log: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in log.read_text().splitlines()]
+
+
+def has_requests(log: Path, count: int) -> bool:
+    return log.exists() and len(requested(log)) == count
 
 
 def found(notices: list[Notice]) -> list[Finding]:
@@ -260,6 +265,28 @@ def test_a_component_whose_node_a_container_has_already_is_refused(tmp_path: Pat
     notices = run(tmp_path, EXTERNAL, has_found("TF808"))
     expect(found(notices)[0], "TF808", "rectify", "/robot1/front/rectify", "/robot1/box", "unload", "1")
     assert len(requested(theirs)) == 1
+
+
+def test_without_a_launcher_the_guard_loads_also_into_a_container_that_was_started_again(
+    tmp_path: Path, stand_in: Path, domain: Domain
+) -> None:
+    del domain
+    compiled = compile_robot(ROBOT, str(tmp_path / "robot.yaml"), library())
+    assert compiled.robot
+    file = tmp_path / "plan.json"
+    file.write_text(write_plan(plan_of(compiled.robot)))
+
+    def started(name: str) -> Any:
+        return processes.start([sys.executable, "-m", "tfcompose.launcher.exec", str(file), name])
+
+    started("guard")
+    for count in (2, 4):
+        box = started("box")
+        assert until(partial(has_requests, stand_in, count))
+        box.kill()
+        box.wait()
+    nodes = [one["node"] for one in requested(stand_in)]
+    assert nodes == ["/robot1/front/rectify", "/robot1/odometry"] * 2
 
 
 STOCK = """

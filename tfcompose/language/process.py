@@ -286,7 +286,6 @@ NOT_OWN: tuple[Way, ...] = ("run", "simulate", "external", "component", "contain
 REMAPPED: tuple[Way, ...] = ("run", "simulate", "component", "container", "built-in")
 NOT_EXTERNAL: tuple[Way, ...] = ("run", "simulate", "container", "built-in")
 NOT_SIMULATED: tuple[Way, ...] = ("run", "external", "component", "container")
-NAMED: tuple[Way, ...] = ("run", "simulate", "external")
 OF_NODES: tuple[Way, ...] = ("run", "external", "component")
 PROGRAM: tuple[Way, ...] = ("run", "container")
 KEPT_ALIVE: tuple[Way, ...] = ("run", "simulate", "component", "container")
@@ -409,14 +408,14 @@ class ProcessSpec(Started, Entry):
 
     EXCLUSIVE: ClassVar[tuple[frozenset[str], ...]] = (
         *Started.EXCLUSIVE,
-        *(frozenset({"nodes", name}) for name in ("node", "lifecycle")),
+        *(frozenset({"nodes", name}) for name in ("node", "lifecycle", "component")),
     )
 
     nodes: dict[NodeName, NodeSpec] = key(
         {},
         "the nodes of a process that holds several, by name; node, params and lifecycle are the short form for one",
         {"planner_server": {"lifecycle": "active"}, "controller_server": {"lifecycle": "active"}},
-        to=NAMED,
+        to=NOT_OWN,
     )
 
 

@@ -42,6 +42,8 @@ def command_of(argv: Sequence[str], base: Mapping[str, str]) -> Command | int:
         return _fail(f"the plan {file} has no process {name}", 2)
     if process.kind == "external":
         return _fail(f"{name} is external, and started elsewhere", 2)
+    if process.component:
+        return _fail(f"{name} is a component, which the guard has {process.component.container} load", 2)
     # What is sent in a partition is known to be ours by the launcher's run; topics of each process's own need none.
     plan = replace(plan, guard=replace(plan.guard, fence="remap"))
     commands, found = commands_of(plan, [process], file, base, child_environment)

@@ -22,7 +22,7 @@ _PROCESS = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(?:/[A-Za-z0-9_][A-Za-z0-9_.-
 #: Control characters, and halves of characters.
 _CONTROL = re.compile("[\\x00-\\x1f\\x7f-\\x9f\\ud800-\\udfff]")
 #: Keys below which text may hold lines and tabs: what programs are given.
-_FOR_PROGRAMS = frozenset({"argv", "env", "switches"})
+_FOR_PROGRAMS = frozenset({"argv", "env", "switches", "component"})
 
 
 def write_plan(plan: Plan) -> str:
@@ -102,7 +102,21 @@ def _wrong_names(plan: Plan) -> Iterator[str]:
     for ready, name in ((process.ready, process.name) for process in plan.processes):
         if ready and ready.kind == "log" and (error := _regex_error(ready.text)):
             yield f"{name} is ready at {shown(ready.text)}, not a regular expression: {error}"
+    yield from _wrong_components(plan)
     yield from _wrong_files(plan)
+
+
+def _wrong_components(plan: Plan) -> Iterator[str]:
+    """Yield what is wrong with components: their containers must be processes with a node."""
+    containers = {process.name for process in plan.processes if process.nodes and not process.component}
+    for process in plan.processes:
+        component = process.component
+        if (process.kind == "component") != (component is not None):
+            yield f"{process.name} is of kind {process.kind}, and {'a' if component else 'no'} component"
+        elif component and component.container not in containers:
+            yield f"the container of {process.name} is {shown(component.container)}, which is no process with a node"
+        elif component and not process.nodes:
+            yield f"{process.name} is a component without a node"
 
 
 def _wrong_order(plan: Plan) -> Iterator[str]:

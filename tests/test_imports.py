@@ -91,6 +91,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "model",
         "numbers",
         "plan",
+        "rays",
         "ros",
         "text",
         "tf2",

@@ -42,3 +42,13 @@ def test_what_leaves_nothing_to_build_always_counts(text: str, code: str) -> Non
     text = f"tfcompose: 1\nrobot: r\nrules: {{{code}: off}}\n{text}  # tfcompose: allow {code} because I say so\n"
     found = {one.code: one.severity for one in compile_robot(text, "r.yaml", PRESETS).found}
     assert (found[code], found["TF017"]) == ("error", "error")
+
+
+@for_each(["TF641: {limit: 10 %}", "view_blocked: {limit: 10 %}", "TF641: {limit: 10 %, severity: error}"])
+def test_a_limit_alone_switches_nothing_off(entry: str) -> None:
+    wall = "wall: {parent: base_link, xyz: [0.3, 0, 0.3], collision: {box: [0.02, 0.15, 0.4]}}"
+    camera = "{preset: realsense/d455, parent: base_link, xyz: [0.1, 0, 0.3], driver: none}"
+    text = f"tfcompose: 1\nrobot: r\nlinks: {{base_link: {{}}, {wall}}}\nsensors: {{eye: {camera}}}\n"
+    assert compile_robot(text, "r.yaml", PRESETS).found == ()
+    (found,) = compile_robot(f"{text}rules: {{{entry}}}\n", "r.yaml", PRESETS).found
+    assert (found.code, found.severity) == ("TF641", "error" if "error" in entry else "warning")

@@ -94,8 +94,8 @@ def silenced(
 ) -> tuple[list[Finding], Used]:
     """Return what neither a comment nor an entry of ``rules`` silences, and which comments silenced something.
 
-    ``rules`` holds a severity or ``off`` for codes and names, each with its place; an entry that is neither, or cannot
-    be set, is a finding too.
+    ``rules`` holds for codes and names a severity, ``off``, or nothing, each with its place; an entry that is neither a
+    code nor a name, or cannot be set, is a finding too.
     """
     unknown = _unknown_rules({word: at for word, (_, at) in rules.items()})
     return apply([*_with_severities(found, {word: level for word, (level, _) in rules.items()}), *unknown], allows)
@@ -122,7 +122,7 @@ def _with_severities(found: Iterable[Finding], rules: Mapping[str, str]) -> list
         match levels.get(one.code):
             case "error" | "warning" as severity:
                 result.append(replace(one, severity=severity))
-            case None:
+            case None | "":  # as of an entry that sets a limit only
                 result.append(one)
     return result
 

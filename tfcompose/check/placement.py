@@ -12,7 +12,7 @@ from tfcompose.catalogue import CATALOGUE
 from tfcompose.check.rule import rule
 from tfcompose.findings import Finding, Note, did_you_mean, finding
 from tfcompose.geometry import Pose, rotate
-from tfcompose.rays import bodies_around, cast, contains, fixed_to, is_plane, view_of
+from tfcompose.rays import bodies_around, cast, contains, different_streams, fixed_to, is_plane, view_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -29,16 +29,6 @@ def _limit(robot: Robot, code: str) -> float:
     return robot.limits.get(code, known[0] if known else 0.0)
 
 
-def _different(sensor: MountedSensor) -> Iterator[Optics]:
-    """Yield the sensor's streams; of those that see the same from the same frame, the first."""
-    known = set()
-    for one in sensor.optics:
-        sight = (one.frame, one.kind, one.projection, one.backward, one.horizontal, one.vertical, one.diagonal)
-        if sight not in known:
-            known.add(sight)
-            yield one
-
-
 @dataclass(slots=True)
 class _Views:
     """The views of the robot that was asked for last: several rules need them, one after the other."""
@@ -50,7 +40,7 @@ class _Views:
         if self.robot is not robot:
             self.robot, self.of_sensors = robot, {}
         if sensor.name not in self.of_sensors:
-            streams = _different(sensor) if robot.links and _is_placed(robot, sensor) else ()
+            streams = different_streams(sensor) if robot.links and _is_placed(robot, sensor) else ()
             self.of_sensors[sensor.name] = [view_of(robot, sensor, one) for one in streams]
         return self.of_sensors[sensor.name]
 
@@ -338,7 +328,7 @@ def _covered(robot: Robot, zone: Zone) -> tuple[float, list[str]]:
     ]
     visible, unknown = [False] * len(points), []
     for sensor in robot.sensors:
-        for optics in _different(sensor):
+        for optics in different_streams(sensor):
             if zone.by and optics.kind not in zone.by and sensor.name not in zone.by:
                 continue
             poses = fixed_to(robot, optics.frame)

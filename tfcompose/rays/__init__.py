@@ -6,6 +6,18 @@ is installed. Must not import ``language``, ``load``, ``resolve``, ``check``.
 
 from tfcompose.rays.bodies import Body, bodies_around, fixed_to
 from tfcompose.rays.cast import Ray, View, cast, view_of
-from tfcompose.rays.directions import contains, directions, is_plane
+from tfcompose.rays.directions import contains, different_streams, directions, is_plane
 
-__all__ = ["Body", "Ray", "View", "bodies_around", "cast", "contains", "directions", "fixed_to", "is_plane", "view_of"]
+__all__ = [
+    "Body",
+    "Ray",
+    "View",
+    "bodies_around",
+    "cast",
+    "contains",
+    "different_streams",
+    "directions",
+    "fixed_to",
+    "is_plane",
+    "view_of",
+]

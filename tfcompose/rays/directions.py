@@ -6,8 +6,10 @@ import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from tfcompose.geometry import Vector
-    from tfcompose.model import Optics
+    from tfcompose.model import MountedSensor, Optics
 
 #: How many rays a stream is sampled with, at most: columns and rows of a grid; of a lidar, steps of a turn and rows.
 _IMAGE = (24, 16)
@@ -17,6 +19,16 @@ _DISC = 300
 _GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 #: How far from the plane of a scanner, in radians, is still in it.
 _FLAT_RAD = 1e-6
+
+
+def different_streams(sensor: MountedSensor) -> Iterator[Optics]:
+    """Yield the sensor's streams; of those that see the same from the same frame, the first."""
+    known = set()
+    for one in sensor.optics:
+        sight = (one.frame, one.kind, one.projection, one.backward, one.horizontal, one.vertical, one.diagonal)
+        if sight not in known:
+            known.add(sight)
+            yield one
 
 
 def is_plane(optics: Optics) -> bool:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.numbers import clean_rpy
 from tfcompose.view.edit import ImmovableError
+from tfcompose.view.fields import REACH_M
 from tfcompose.view.scene import RobotScene, wxyz
 from tfcompose.view.session import poses_in_roots
 
@@ -51,6 +52,7 @@ class Panel:
         self._gizmo: Any = None
         self._numbers: list[Any] = []
         self._showing = False
+        self._blocked: Any = None
         server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
         with server.gui.add_folder("Frame"):
             self._search = server.gui.add_text("search", "")
@@ -61,6 +63,8 @@ class Panel:
         if edit:
             self._add_editor()
         self._add_owners()
+        if self.scene.fields.sensors:
+            self._add_sensors()
         if joints:
             self._add_joints(session.robot)
         self.refresh()
@@ -106,6 +110,28 @@ class Panel:
 
     def _show_owner(self, owner: str, box: Any, _event: Any) -> None:
         self.scene.show_owner(owner, visible=box.value)
+
+    def _add_sensors(self) -> None:
+        """Let the fields of view be shown, and the rays in them that the robot blocks."""
+        fields = self.scene.fields
+        with self._gui.add_folder("Fields of view"):
+            for sensor in fields.sensors:
+                box = self._gui.add_checkbox(sensor, initial_value=fields.shown[sensor])
+                box.on_update(partial(self._show_field, sensor, box))
+            reach = self._gui.add_number("drawn to (m)", REACH_M, min=0.05, max=300.0, step=0.05)
+            reach.on_update(lambda _: fields.draw(reach.value))
+            self._blocked = self._gui.add_checkbox("blocked rays", initial_value=False)
+            self._blocked.on_update(lambda _: self._show_blocked())
+            self.blocked = self._gui.add_markdown("")
+
+    def _show_field(self, sensor: str, box: Any, _event: Any) -> None:
+        self.scene.fields.show(sensor, visible=box.value)
+        self._show_blocked()
+
+    def _show_blocked(self) -> None:
+        """Draw the rays that are blocked, and say how many, if that is wanted."""
+        lines = self.scene.fields.show_blocked(self.session.robot if self._blocked.value else None)
+        self.blocked.content = "\n".join(f"- {line}" for line in lines)
 
     def _add_joints(self, robot: Robot) -> None:
         joints = [edge.joint for edge in robot.edges if edge.joint and edge.joint.mimic is None]
@@ -159,8 +185,13 @@ class Panel:
 
     def _again(self, has_moved: bool) -> None:  # noqa: FBT001 (what undo and redo return)
         if has_moved:
-            self.refresh()
+            self._show_moved()
             self._select()
+
+    def _show_moved(self) -> None:
+        self.refresh()
+        if self._blocked is not None and self._blocked.value:
+            self._show_blocked()
 
     def _show_mount(self) -> None:
         """Show the numbers that the file has for the selected frame, and a gizmo where they put it."""
@@ -213,7 +244,7 @@ class Panel:
             self.report.content = str(error)
             return
         self.session.move(mount.edge.child, mount.of_edge(given))
-        self.refresh()
+        self._show_moved()
 
     def save(self) -> None:
         """Save what was moved, and report it."""

@@ -11,6 +11,7 @@ import trimesh
 
 from tfcompose.geometry import Pose
 from tfcompose.meshes import read_mesh
+from tfcompose.view.fields import FieldsOfView
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -99,6 +100,7 @@ class RobotScene:
             shapes = link.visuals or link.collisions
             if shapes and frame in robot.frames:
                 self._add_body(frame, f"/body/{index}", shapes)
+        self.fields = FieldsOfView(scene, robot)
 
     def _add_body(self, frame: str, name: str, shapes: tuple[Shape, ...]) -> None:
         self._bodies[frame] = self._scene.add_frame(name, show_axes=False)
@@ -114,6 +116,7 @@ class RobotScene:
         """Put every frame where it is in the root of its tree."""
         for frame, body in self._bodies.items():
             body.wxyz, body.position = wxyz(poses[frame]), poses[frame].xyz
+        self.fields.update(poses)
         rotations = np.array([wxyz(poses[frame]) for frame in robot.frames], np.float32).reshape(-1, 4)
         positions = np.array([poses[frame].xyz for frame in robot.frames], np.float32).reshape(-1, 3)
         if self._axes is None:

@@ -8,7 +8,7 @@ import pytest
 
 from tests.support.findings import expect
 from tests.support.machine_history import GUARD, History, begin, run_process
-from tfcompose.ipc import Absent, Clear, DownRequest, GateOpen, Live, OwnerReady, Present, ProcessRequest
+from tfcompose.ipc import Absent, Clear, DownRequest, GateOpen, Live, OwnerReady, Present, ProcessRequest, Unloaded
 from tfcompose.launcher.components import writer_of
 from tfcompose.launcher.events import Exited, LoadComponent, NewPlan, UnloadComponent
 from tfcompose.launcher.readiness import waits_for
@@ -169,9 +169,12 @@ def test_components_of_a_container_that_is_external_are_unloaded_at_the_end() ->
 
 def test_a_guard_that_follows_another_is_given_what_is_not_answered_yet() -> None:
     history = begin(GUARD, BOX, component("a"), component("b")).feed(Clear(), GateOpen("box", "there")).answer("b")
-    first = history.requested[0]
+    first, second = history.requested
     history.feed(Exited("guard", 1)).wait(1.0)
-    assert history.requested[2:] == [LoadComponent("a", first.number, again=True)]
+    again = [LoadComponent(name, number, again=True) for name, number in (("a", first.number), ("b", second.number))]
+    assert history.requested[2:] == again
+    history.answer("b")
+    assert history.states("b") == ["STARTING", "RUNNING"], "it runs already"
 
 
 def test_a_component_that_its_container_does_not_answer_for_is_reported_once() -> None:
@@ -211,3 +214,27 @@ def test_a_line_of_a_container_is_of_the_component_whose_logger_wrote_it() -> No
     }
     assert {line: writer_of(state, "box", line) for line in lines} == lines
     assert writer_of(state, "guard", "[a]") == "guard"
+
+
+def gone(history: History, name: str) -> History:
+    number = history.state.tracked[name].order
+    return history.feed(Unloaded(name, number, f"/box has no /{name} any more"))
+
+
+def test_a_component_that_somebody_unloads_has_ended_and_is_loaded_again_as_its_policy_says() -> None:
+    history = gone(loaded(component("a")), "a")
+    expect(history.only(), "TF808", "a", "/box")
+    assert [name for name, _ in history.killed] == ["box"]
+    history = gone(loaded(component("a", restart="on-failure", owns=(("odom", "base"),))), "a")
+    assert history.found() == []
+    assert history.orders[-1] == Absent("a")
+    history.wait(1.0).answer("a")
+    assert history.states("a")[-3:] == ["BACKOFF", "STARTING", "RUNNING"]
+
+
+def test_a_load_that_fails_slowly_is_given_up_as_one_that_fails_at_once() -> None:
+    history = begin(GUARD, BOX, component("a", restart="on-failure", max_restarts=1))
+    history.feed(Clear(), GateOpen("box", "there"))
+    for _ in range(2):
+        history.wait(25).answer("a", why="no device").wait(1.0)
+    assert history.state.tracked["a"].state == "FATAL"

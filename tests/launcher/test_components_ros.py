@@ -236,11 +236,16 @@ def test_a_component_that_sends_another_ones_edge_is_named_with_its_container(tm
     expect(found(notices)[0], "TF801", "/robot1/thief", "odometry", "thief", "box")
 
 
-@pytest.fixture
-def theirs(stand_in: Path, domain: Domain) -> Path:  # noqa: ARG001 (the container is in that domain)
-    """A container that somebody else started, with the node ``/robot1/box``."""
+def start_box() -> None:
+    """Start a container that has the node ``/robot1/box``."""
     names = ("--ros-args", "-r", "__node:=box", "-r", "__ns:=/robot1")
     processes.start([sys.executable, "-m", "tests.support.stand_in_container", *names])
+
+
+@pytest.fixture
+def theirs(stand_in: Path, domain: Domain) -> Path:  # noqa: ARG001 (the container is in that domain)
+    """A container that somebody else started."""
+    start_box()
     return stand_in
 
 
@@ -251,6 +256,27 @@ def test_components_are_unloaded_from_a_container_that_is_external(tmp_path: Pat
     notices = run(tmp_path, EXTERNAL, are_ready)
     assert [one["unloaded"] for one in requested(theirs) if "unloaded" in one] == [2, 1]
     assert found(notices) == []
+
+
+def test_components_come_back_with_an_external_container_that_somebody_starts_again(
+    tmp_path: Path, theirs: Path
+) -> None:
+    def change(notices: list[Notice]) -> bool:
+        if are_ready(notices):
+            os.kill(requested(theirs)[-1]["pid"], SIGKILL)
+            start_box()
+        return are_ready(notices)
+
+    def are_back(notices: list[Notice]) -> bool:
+        return all(states(notices, name)[-2:] == ["STARTING", "RUNNING"] for name in ("rectify", "odometry")) and (
+            "BACKOFF" in states(notices, "rectify")
+        )
+
+    restart = "container: box\n    restart: on-failure\n"
+    notices = run(tmp_path, EXTERNAL.replace("container: box\n", restart), change, are_back)
+    loads = [one["node"] for one in requested(theirs) if "node" in one]
+    assert sorted(loads) == ["/robot1/front/rectify"] * 2 + ["/robot1/odometry"] * 2
+    assert {one.code for one in found(notices)} <= {"TF804"}, "the edge of a container that died is silent"
 
 
 def test_a_component_whose_node_a_container_has_already_is_refused(tmp_path: Path, theirs: Path) -> None:

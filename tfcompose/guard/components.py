@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 ANSWER_S = 5.0
 #: An answer that is not there by then may be lost: what the container has says it, too; seconds.
 LIST_AFTER_S = 2.0
-#: A component that was to be loaded and is not there so often, without an answer: the request was lost.
+#: More often than this a component is not missing by chance: it was unloaded, or the request to load it was lost.
 ABSENT_AT_MOST = 1
-#: How often the guard looks, without a launcher, whether a container has its components; seconds.
+#: How often the guard looks whether a container has its components; seconds.
 CHECK_EVERY_S = 2.0
 
 
@@ -54,13 +54,20 @@ class _Job:
 
 
 class Components:
-    """The orders that are not carried out yet, by container."""
+    """The orders that are not carried out yet, by container, and the components that were loaded.
+
+    A component that a container does not have any more, because somebody unloaded it, or because a container that the
+    launcher did not start is another one now, is reported as unloaded.
+    """
 
     def __init__(self, node: Node, emit: Callable[[GuardEvent], None]) -> None:
         self._node = node
         self._emit = emit
         self._containers: dict[str, Container] = {}
         self._jobs: dict[str, deque[_Job]] = {}
+        self._loaded: dict[str, tuple[Load, LoadRequest]] = {}
+        self._absent: dict[str, int] = {}
+        self._due = 0.0
 
     def take(self, order: Load | Unload) -> None:
         """Carry out an order of the launcher: it replaces one for the same component."""
@@ -81,6 +88,7 @@ class Components:
         jobs = self._jobs.setdefault(request.container, deque())
         for job in [job for job in jobs if job.order.process == order.process]:
             jobs.remove(job)
+        self._loaded.pop(order.process, None)
         jobs.append(_Job(order, request, since=time.monotonic()))
 
     def has(self, process: str) -> bool:
@@ -93,6 +101,24 @@ class Components:
         for name, jobs in self._jobs.items():
             while jobs and self._is_done(jobs[0], self._containers[name], now):
                 jobs.popleft()
+        if now >= self._due:
+            self._due = now + CHECK_EVERY_S
+            for name, container in self._containers.items():
+                if not self._jobs[name]:
+                    self._check_loaded(name, container)
+
+    def _check_loaded(self, name: str, container: Container) -> None:
+        """Take what a container has, which was asked for the last time, and ask again."""
+        loaded = [one for one in self._loaded.values() if one[1].container == name]
+        there, is_there = container.list.answer(), container.list.is_there
+        for order, request in loaded if there or not is_there else ():
+            is_absent = there is None or request.node not in there.full_node_names
+            self._absent[order.process] = is_absent * (self._absent.get(order.process, 0) + 1)
+            if self._absent[order.process] > ABSENT_AT_MOST:
+                del self._loaded[order.process]
+                self._emit(Unloaded(order.process, order.number, f"{name} has no {request.node} any more"))
+        if loaded and is_there:
+            container.list.ask()
 
     def _container(self, name: str) -> Container:
         from tfcompose.ros.composition import Container  # noqa: PLC0415 (its messages come with containers only)
@@ -116,12 +142,13 @@ class Components:
             return not self._begins(job, container, now, "look")
         if job.step == "load" and (answer := container.load.answer()) is not None:
             words = answer.error_message or "it does not say why"
-            self._answer(order, "" if answer.success else f"{container.name} did not load {job.request.what}: {words}")
+            why = "" if answer.success else f"{container.name} did not load {job.request.what}: {words}"
+            self._loaded_or_not(job, order, why)
             return True
         if (there := container.list.answer()) is not None:
             if job.request.node in there.full_node_names:
                 before = job.step == "look" and not order.again
-                self._answer(order, _already(job.request, there) if before else "")
+                self._loaded_or_not(job, order, _already(job.request, there) if before else "")
                 return True
             job.absent += 1
             if job.step == "look" or job.absent > ABSENT_AT_MOST:  # it carries out one request after the other
@@ -165,6 +192,12 @@ class Components:
             self._answer(order, "" if answer.success else f"{container.name}: {answer.error_message}")
             return True
         return False
+
+    def _loaded_or_not(self, job: _Job, order: Load, why: str) -> None:
+        if not why:
+            self._loaded[order.process] = order, job.request
+            self._absent[order.process] = 0
+        self._answer(order, why)
 
     def _answer(self, order: Load | Unload, why: str) -> None:
         if isinstance(order, Unload):

@@ -7,11 +7,12 @@ container has answered, and goes with the container; a guard that follows anothe
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from tfcompose.findings import finding
 from tfcompose.ipc import Loaded, NotLoaded, Unloaded
 from tfcompose.launcher.events import LoadComponent, UnloadComponent
-from tfcompose.launcher.failures import not_started
 from tfcompose.launcher.readiness import order_gate
 from tfcompose.launcher.stopping import left, lose_edges, schedule_restart
 
@@ -28,7 +29,9 @@ def component_answered(step: Transition, event: Loaded | NotLoaded | Unloaded) -
             step.enter(event.process, "RUNNING", pid=container.pid if container else None, began=step.now)
             order_gate(step, step.state.tracked[event.process])
         case NotLoaded(why=why) if one.state == "STARTING":
-            _not_loaded(step, one, why)
+            _ended(step, replace(one, since=step.now), why, f"{one.process.name} could not be started: {why}")
+        case Unloaded(why=why) if one.state == "RUNNING":
+            _ended(step, one, why, f"{one.process.name} has ended: {why}")
         case Unloaded(why=why) if one.state == "STOPPING" and step.state.stop:
             step.enter(event.process, "STOPPED", why)
         case Unloaded(why=why) if one.state == "STOPPING":
@@ -37,7 +40,8 @@ def component_answered(step: Transition, event: Loaded | NotLoaded | Unloaded) -
             pass
 
 
-def _not_loaded(step: Transition, one: Tracked, why: str) -> None:
+def _ended(step: Transition, one: Tracked, why: str, message: str) -> None:
+    """Take a component that was not loaded, or is not there any more: it is loaded again, or has failed."""
     name = one.process.name
     if step.state.stop:
         step.enter(name, "STOPPED", why)
@@ -48,15 +52,15 @@ def _not_loaded(step: Transition, one: Tracked, why: str) -> None:
         left(step, one, why)
     elif one.process.restart == "no":
         step.enter(name, "FATAL", why)
-        step.fail_process(name, not_started(name, why))
+        step.fail_process(name, finding("TF808", message, None))
     else:
-        schedule_restart(step, one, why, lambda when: not_started(name, f"{why}{when}"))
+        schedule_restart(step, one, why, lambda when: finding("TF808", f"{message}{when}", None))
 
 
 def order_components(step: Transition) -> None:
     """Tell a guard that has just started what the one before it may have been told, and not done."""
     for name, one in step.state.tracked.items():
-        if one.process.component and one.state == "STARTING":
+        if one.process.component and one.state in ("STARTING", "RUNNING"):  # it watches over those that run
             step.actions.append(LoadComponent(name, one.order, again=True))
         elif one.process.component and one.state == "STOPPING":
             step.actions.append(UnloadComponent(name, one.order))

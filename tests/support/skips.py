@@ -13,6 +13,7 @@ ACCEPTED = {
     "tests/importing/test_real_launch.py": "launch comes with a distribution only",
     "tests/importing/test_round_trip.py::test_every_robot_that_is_listed": "pybullet_data is not on every Python",
     "tests/adversary/test_rogues_ros.py::test_a_program_of_another_dds": "cyclonedds is not on every Python",
+    "tests/view/test_browser_live_ros.py": "as below",
     "tests/view/test_browser.py": "Chromium is no Python package: .ci/run installs Debian's, or says that it cannot",
     "tests/cli/test_bad_input.py::test_what_cannot_be_read": "root may read everything",
 }

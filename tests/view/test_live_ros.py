@@ -76,9 +76,29 @@ def view(tmp_path: Path) -> Iterator[View]:
         yield shown
 
 
-def test_frames_are_where_a_tf_listener_has_them(view: View, nodes: Any) -> None:
+def wheel_process(folder: Path, start: Callable[..., Any]) -> Session:
+    """Start what publishes the wheel's frame from joint states; return the robot's session."""
+    file = folder / "rover.yaml"
+    file.write_text(WHEEL, "utf-8")
+    session = session_of(file)
+    (folder / "plan.json").write_text(write_plan(plan_of(session.robot)), "utf-8")
+    (folder / "robot.full.urdf").write_text("<robot name='r'/>", "utf-8")
+    start("tfcompose.publishers.joints", folder / "plan.json", "joints")
+    return session
+
+
+def pose_in(buffer: Any, parent: str, child: str) -> Pose | None:
+    """Return the newest pose that a tf listener has, or None."""
     from rclpy.time import Time  # noqa: PLC0415 (as above)
 
+    if not buffer.can_transform(parent, child, Time()):
+        return None
+    found = buffer.lookup_transform(parent, child, Time()).transform
+    xyz, quat = found.translation, found.rotation
+    return Pose((xyz.x, xyz.y, xyz.z), (quat.x, quat.y, quat.z, quat.w))
+
+
+def test_frames_are_where_a_tf_listener_has_them(view: View, nodes: Any) -> None:
     from tfcompose.tf2 import Buffer, TransformListener  # noqa: PLC0415 (as above)
 
     panel = view.panel
@@ -87,11 +107,9 @@ def test_frames_are_where_a_tf_listener_has_them(view: View, nodes: Any) -> None
     with TransformListener(buffer := Buffer()):
 
         def is_there() -> bool:
-            if not buffer.can_transform("odom", "lidar", Time()) or panel.published is None:
+            pose = pose_in(buffer, "odom", "lidar")
+            if pose is None or panel.published is None:
                 return False
-            found = buffer.lookup_transform("odom", "lidar", Time()).transform
-            xyz, quat = found.translation, found.rotation
-            pose = Pose((xyz.x, xyz.y, xyz.z), (quat.x, quat.y, quat.z, quat.w))
             return max(offset_of(pose, panel.published["lidar"])) < 1e-6
 
         assert until(is_there)
@@ -125,30 +143,22 @@ def test_a_rogue_publisher_makes_its_edge_red_within_a_second(view: View, nodes:
 def test_a_slider_moves_the_wheel_as_a_tf_listener_has_it_until_somebody_else_moves_it(
     tmp_path: Path, start: Callable[..., Any], nodes: Any
 ) -> None:
-    from rclpy.time import Time  # noqa: PLC0415 (as above)
     from sensor_msgs.msg import JointState  # noqa: PLC0415 (as above)
 
     from tfcompose.tf2 import Buffer, TransformListener  # noqa: PLC0415 (as above)
 
-    file, angle = tmp_path / "rover.yaml", math.radians(40)
-    file.write_text(WHEEL, "utf-8")
-    session = session_of(file)
-    (tmp_path / "plan.json").write_text(write_plan(plan_of(session.robot)), "utf-8")
-    (tmp_path / "robot.full.urdf").write_text("<robot name='r'/>", "utf-8")
-    start("tfcompose.publishers.joints", tmp_path / "plan.json", "joints")
+    session, angle = wheel_process(tmp_path, start), math.radians(40)
     with following(session, joints=True) as view, TransformListener(buffer := Buffer()):
 
         def is_at(expected: float) -> bool:
-            if not buffer.can_transform("base_link", "wheel", Time()) or view.panel.published is None:
+            pose = pose_in(buffer, "base_link", "wheel")
+            if pose is None or view.panel.published is None:
                 return False
-            found = buffer.lookup_transform("base_link", "wheel", Time()).transform
-            turned = 2 * math.atan2(found.rotation.y, found.rotation.w)
             shown = view.panel.published["wheel"]
-            return abs(turned - expected) < 1e-6 and abs(shown.rpy[1] - expected) < 1e-6
+            return pose.xyz == shown.xyz == (0, 0.2, 0) and pose.rpy[1] == pytest.approx(expected) == shown.rpy[1]
 
         view.panel.set_joint("w", angle)
         assert until(lambda: is_at(angle))
-        assert buffer.lookup_transform("base_link", "wheel", Time()).transform.translation.y == 0.2
         nodes.typed(nodes.node("jsp"), JointState, "/joint_states", lambda _: JointState(name=["w"], position=[-0.5]))
         assert until(lambda: [one.state for one in view.following.senders] == ["stopped"])
-        assert view.following.senders[0].others_found == ("/jsp",)
+        assert until(lambda: view.following.senders[0].others_found == ("/jsp",))

@@ -17,6 +17,7 @@ from tfcompose.launcher.control import RefusedError, ask
 from tfcompose.launcher.procfs import UsageMeter
 from tfcompose.launcher.runtime_dir import RuntimeDirError, domain_of
 from tfcompose.live.edges import SETTLE_S, TreeObserver
+from tfcompose.live.state import NAMELESS
 from tfcompose.plan.topics import parts_of
 from tfcompose.ros.environment import RosError
 from tfcompose.signals import Stop
@@ -134,9 +135,9 @@ class Following:
         stamp_ns = clock_ns if self._plan.ros.clock == "sim" else time.time_ns()
         panel = self._shown.panel
         for sender in self.senders:
-            before = sender.state
+            before = sender.text
             sender.step(now, stamp_ns, panel.session.robot, panel.positions)
-            if sender.state != before and sender.others_found:
+            if sender.others_found and sender.text != before and NAMELESS not in sender.others_found:
                 warn(sender.text)
         if self.senders:
             self._panel.show_joints([sender.text for sender in self.senders])
@@ -163,7 +164,7 @@ def _status(name: str) -> RobotStatus | None:
 
 
 def _sender(node: Node, topic: str, names: Mapping[str, str]) -> JointSender:
-    from tfcompose.ros.graph import ids_say_who, writers
+    from tfcompose.ros.graph import UNKNOWN_NODE, ids_say_who, writers
     from tfcompose.ros.sensor_data import JointStatePublisher
 
     own: set[bytes] = set()
@@ -175,7 +176,8 @@ def _sender(node: Node, topic: str, names: Mapping[str, str]) -> JointSender:
 
     def others() -> list[str]:
         name = "" if ids_say_who(node) else node.get_fully_qualified_name()
-        return sorted({one.node for one in writers(node, topic) if one.gid not in own and one.node != name})
+        found = {one.node for one in writers(node, topic) if one.gid not in own and one.node != name}
+        return sorted(NAMELESS if one.endswith(UNKNOWN_NODE) else one for one in found)
 
     return JointSender(topic, names, make, others)
 

@@ -88,15 +88,11 @@ class JointSender:
         ``positions`` are those of sliders, in rad or m; joints that mimic others follow.
         """
         self._begun = now if self._begun is None else self._begun
-        if self.state in {"refused", "stopped"}:
-            return
         if now >= self._ask_at:
             self._ask_at = now + _ASK_EVERY_S
-            if found := self.others():
-                self.others_found = tuple(found)
-                self.state = "refused" if self.state == "waiting" else "stopped"
-                self.close()
-                return
+            self._give_way(self.others())
+        if self.state in {"refused", "stopped"}:
+            return
         if self.state == "waiting" and now < self._begun + FOUND_S:
             return
         if self._publisher is None:
@@ -106,6 +102,15 @@ class JointSender:
             self._send_at = now + _SEND_EVERY_S
             where = joint_positions(robot, positions)
             self._publisher.publish(stamp_ns, [where[name] for name in self.names.values()])
+
+    def _give_way(self, others: Sequence[str]) -> None:
+        """Leave the topic to others; a node that has just come may have no name yet."""
+        if not others:
+            return
+        self.others_found = tuple(others)
+        if self.state in {"waiting", "sending"}:
+            self.state = "refused" if self.state == "waiting" else "stopped"
+            self.close()
 
     def close(self) -> None:
         """Leave the topic."""

@@ -413,3 +413,17 @@ def test_a_plan_whose_component_nobody_can_load_is_refused(old: str, new: str, w
         read_plan(text.replace(old, new), "plan.json")
     assert [one.code for one in error.value.findings] == ["TF902"]
     assert word in error.value.findings[0].message
+
+
+def test_a_sensors_driver_may_be_a_component_with_the_parameters_of_its_preset() -> None:
+    head = with_box().replace("map: {}", "base: {}").replace("processes:", "sensors:")
+    driver = "component: 'realsense2_camera/realsense2_camera::RealSenseNodeFactory', container: box, params: {x: 1}"
+    plan = read_plan(
+        files_of(f"eye: {{preset: realsense/d435i, parent: base, driver: {{{driver}}}}}", head)["plan.json"], "p"
+    )
+    eye = plan.process("eye")
+    assert eye.component
+    assert (eye.component.container, eye.component.plugin) == ("box", "realsense2_camera::RealSenseNodeFactory")
+    assert eye.component.params.items() >= {"x": 1, "camera_name": "eye", "publish_tf": True}.items()
+    assert ("eye_link", "eye_depth_frame") in eye.owns
+    assert [one.sensor for one in eye.drives] == ["eye"]

@@ -79,7 +79,10 @@ def component_findings(path: Path, process: Process, validated: Validated) -> It
         return
     name, known = component.container, spec.containers
     if name not in known and ("containers", name) not in validated.broken:
-        advice = did_you_mean(name, known, f"containers: {{{name}: {{}}}}")
+        otherwise = f"containers: {{{name}: {{}}}}"
+        if any(name in section for section in (spec.processes, spec.sensors)):
+            otherwise = f"name a container: {', '.join(known)}" if known else "containers: {NAME: {}}"
+        advice = did_you_mean(name, known, otherwise)
         message = f"the container of {process.name} is {name}, which is not a container"
         yield finding("TF813", message, source.at((*path, "container")), help=advice)
     if process.ready and process.ready.kind in {"exit", "log"}:

@@ -59,9 +59,9 @@ def test_a_rogue_publisher_makes_its_edge_red_within_a_second(tmp_path: Path, no
                 begun = time.monotonic()
                 page.get_by_text(re.compile(f"TF801.*/rogue{number}")).first.wait_for()
                 took_s = time.monotonic() - begun
-                assert until(lambda: red_pixels(page) > 2 * before)
+                assert until(lambda: red_pixels(page) > 1.3 * before)
             page.get_by_text("all edges as expected").wait_for()
-            assert until(lambda: red_pixels(page) < 2 * before)
+            assert until(lambda: red_pixels(page) < 1.3 * before)
             return took_s < 1
 
         assert in_one_of_a_few(becomes_red)
@@ -97,7 +97,7 @@ def test_a_recording_is_scrubbed_forward_and_back_in_the_browser(tmp_path: Path)
         with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
             for at_s in (8.0, 3.0):
                 enter(page, "time (s)", str(at_s))
-                assert until(lambda at_s=at_s: panel.poses()["base_link"].xyz[0] == pytest.approx(at_s))  # type: ignore[misc]
+                assert until(lambda at_s=at_s: panel.poses()["odom"].xyz[0] == pytest.approx(-at_s))  # type: ignore[misc]
             enter(page, "search", "wheel")
             page.get_by_text("in base_link, 20 Hz, recorded").wait_for()
             enter(page, "time (s)", "1")

@@ -208,6 +208,23 @@ def test_what_tf2_does_not_take_moves_nothing_and_is_red() -> None:
     assert all(math.isfinite(value) for pose in picture.poses.values() for value in pose.xyz)
 
 
+def test_what_is_in_one_tree_with_the_fixed_frame_is_shown_from_there() -> None:
+    live = Live()
+    live.run(mast=Pose((0, 0, 0.6), quat_from_rpy(0, 0, math.pi / 2)))
+    live.send(ROGUE, 4.0, ("island", "palm", Pose((7, 0, 0))))
+    live.tree.judge(FOUND_S)
+    assert live.tree.moved()
+    live.tree.fixed = "mast"
+    picture = live.tree.moved()
+    assert picture
+    assert picture.poses["mast"].xyz == pytest.approx((0, 0, 0))
+    assert picture.poses["lidar"].xyz == pytest.approx((0.1, 0, 0.3))
+    assert picture.poses["odom"].xyz == pytest.approx((0, 1, -0.6))
+    assert picture.ghosts["mast"].xyz == pytest.approx((0, 0, -0.1))
+    assert picture.further["palm"].xyz == (7, 0, 0)
+    assert live.tree.moved() is None
+
+
 def test_a_loop_is_shown_all_the_same() -> None:
     live = Live()
     live.run()

@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 
 #: How often the scene is moved, the tree judged, and the launcher asked for its state; seconds.
 _SHOW_EVERY_S, _JUDGE_EVERY_S, _ASK_EVERY_S = 0.04, 0.25, 2.0
+#: What the panel has room for of what ``ps`` lists.
+_COLUMNS = ("PROCESS", "STATE", "CPU", "MEMORY", "EDGES")
 #: Rates and gaps are those of the last one to two of these; seconds.
 _WINDOW_S = 5.0
 
@@ -149,7 +151,9 @@ class Following:
             return
         used = self._meter.usage([one.pid for one in status.processes if one.pid])
         state = "stopping" if status.stopping else "tree complete" if status.complete else "tree not complete"
-        rows = [HEAD, *(row(process, used) for process in status.processes)]
+        columns = [HEAD.index(name) for name in _COLUMNS]
+        table = [HEAD, *(row(process, used) for process in status.processes)]
+        rows = [[cells[column] for column in columns] for cells in table]
         self._panel.show_processes(f"{self._plan.robot}: {state}, since {uptime(status.uptime)}", rows)
 
 

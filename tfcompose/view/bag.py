@@ -120,6 +120,15 @@ class BagTree:
             self._pictures.name(edge.child): edge.timing.rate for state in states.values() for edge in state.edges
         }
 
+    @property
+    def fixed(self) -> str:
+        """The frame from which its tree is shown; empty: the root."""
+        return self._pictures.fixed
+
+    @fixed.setter
+    def fixed(self, frame: str) -> None:
+        self._pictures.fixed = frame
+
     def moved(self) -> Picture | None:
         """Return where everything was at the time if that is not what was returned before; else None."""
         return self._pictures.next(self._newest(), self.judgement)

@@ -34,6 +34,9 @@ class Forest:
                 by_depth.setdefault(depth, []).append((self.index[frame], self.index[parents[frame]]))
         self._levels = [np.array(by_depth[depth], np.intp).T for depth in sorted(by_depth)]
         self._roots = np.array([self.index[frame] for frame, depth in depths.items() if not depth], np.intp)
+        self._root_of = np.arange(len(self.frames))
+        for rows, above in self._levels:
+            self._root_of[rows] = self._root_of[above]
 
     def in_roots(self, local: Rows) -> Rows:
         """Return the pose of each frame in its root from those in the parents, shape (frames, 7)."""
@@ -42,6 +45,14 @@ class Forest:
         for rows, above in self._levels:
             composed[rows] = _product(composed[above], local[rows])
         return composed
+
+    def in_frame(self, frame: str, in_roots: Rows, others: Rows) -> Rows:
+        """Return ``others`` with those in the frame's tree as poses in the frame, whose own pose is in ``in_roots``."""
+        same = self._root_of == self._root_of[self.index[frame]]
+        inverse = np.array([row_of(pose_of(in_roots[self.index[frame]].tolist()).inverse())])
+        found: Rows = others.copy()
+        found[same] = _product(np.repeat(inverse, int(same.sum()), axis=0), others[same])
+        return found
 
     def below(self, frames: set[str]) -> set[str]:
         """Return these frames and all below them."""

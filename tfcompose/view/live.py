@@ -50,6 +50,15 @@ class LiveTree:
         self._pictures = Pictures(robot)
         self._states: dict[str, list[EdgeState]] = {}
 
+    @property
+    def fixed(self) -> str:
+        """The frame from which its tree is shown; empty: the root."""
+        return self._pictures.fixed
+
+    @fixed.setter
+    def fixed(self, frame: str) -> None:
+        self._pictures.fixed = frame
+
     def moved(self) -> Picture | None:
         """Return where everything is if something moved, or is judged otherwise, since the last time; else None."""
         return self._pictures.next(self._newest(), self.judgement)

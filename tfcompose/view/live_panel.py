@@ -38,12 +38,18 @@ class LivePanel:
         self._ghosts = Ghosts(server.scene, tree.robot)
         self._wrong = _Lines(server.scene, "/live/wrong", _RED)
         self._further: dict[str, Any] = {}
+        tree.fixed = tree.robot.base or tree.robot.roots()[0]  # what drives off stays in the picture
         with server.gui.add_folder(title, order=-1):
+            self.fixed: Any = server.gui.add_dropdown("fixed frame", tuple(tree.robot.frames), initial_value=tree.fixed)
             self._edge = server.gui.add_html("")
             self._found = server.gui.add_html("")
             self._joints = server.gui.add_html("")
             self._processes = server.gui.add_html("")
         panel.frames.on_update(lambda _: self.show_text())
+        self.fixed.on_update(lambda _: self._fix())
+
+    def _fix(self) -> None:
+        self.tree.fixed = self.fixed.value
 
     def show(self) -> None:
         """Put the scene where the tree is now; nothing is sent for what stays."""
@@ -93,7 +99,8 @@ class BagPanel:
                 "time (s)", 0.0, max(length_s, _STEP_S), _STEP_S, min(tree.at_s, length_s)
             )
         self._panel = LivePanel(server, panel, tree, "Tree")
-        self.slider.on_update(lambda _: self.show())
+        for control in (self.slider, self._panel.fixed):
+            control.on_update(lambda _: self.show())
         self.show()
 
     def show(self) -> None:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from tfcompose.model import Robot
     from tfcompose.ros.tf_codec import Row
+    from tfcompose.view.forest import Rows
     from tfcompose.view.judgement import Judgement
 
 _TURNING = frozenset({"revolute", "continuous"})
@@ -22,7 +23,7 @@ _TURNING = frozenset({"revolute", "continuous"})
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """Where everything is, in the roots of its trees.
+    """Where everything is, in the roots of its trees, or in the fixed frame.
 
     Attributes:
         robot: the robot with the parents that were published.
@@ -40,10 +41,14 @@ class Picture:
 
 
 class Pictures:
-    """Makes pictures of a robot; frames have the names of its file, which may be others on the tree."""
+    """Makes pictures of a robot; frames have the names of its file, which may be others on the tree.
+
+    What is in one tree with the ``fixed`` frame is shown as seen from there; empty: from its root.
+    """
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
+        self.fixed = ""
         self.edges = {edge.child: edge for edge in reversed(robot.edges)}  # of several parents the first
         self._names = {robot.final(frame): frame for frame in robot.frames}
         self._rows: dict[str, Row] = {}
@@ -61,7 +66,7 @@ class Pictures:
         if parents != self._parents or not self._rows.keys() <= newest.keys():
             self._grow(parents)
         changed = {child: row for child, row in newest.items() if self._rows.get(child) is not row}
-        judged = (judgement.wrong, frozenset(judgement.off))
+        judged = (judgement.wrong, frozenset(judgement.off), self.fixed)
         if not changed and self._judged == judged:
             return None
         self._judged = judged
@@ -85,14 +90,19 @@ class Pictures:
         self._shown = replace(self.robot, edges=edges)
 
     def _picture(self, judgement: Judgement) -> Picture:
-        placed = dict(zip(self._forest.frames, map(pose_of, self._forest.in_roots(self._local).tolist()), strict=True))
+        in_roots = self._forest.in_roots(self._local)
+        rows = self._in_fixed(in_roots, in_roots)
+        placed = dict(zip(self._forest.frames, map(pose_of, rows.tolist()), strict=True))
         known = self.robot.frames
         poses = {frame: placed[frame] for frame in known}
         further = {frame: pose for frame, pose in placed.items() if frame not in known}
         wrong = tuple((self._parents[frame], frame) for frame in sorted(judgement.wrong) if frame in self._parents)
-        return Picture(self._shown, poses, further, self._ghosts(judgement), wrong)
+        return Picture(self._shown, poses, further, self._ghosts(judgement, in_roots), wrong)
 
-    def _ghosts(self, judgement: Judgement) -> dict[str, Pose]:
+    def _in_fixed(self, in_roots: Rows, others: Rows) -> Rows:
+        return self._forest.in_frame(self.fixed, in_roots, others) if self.fixed in self._forest.index else others
+
+    def _ghosts(self, judgement: Judgement, in_roots: Rows) -> dict[str, Pose]:
         off = judgement.off.keys() & self.edges.keys() & self._forest.index.keys()
         if not off:
             return {}
@@ -100,7 +110,7 @@ class Pictures:
         for child in off:
             row = self._forest.index[child]
             meant[row] = row_of(self._meant(child, pose_of(self._local[row].tolist())))
-        placed = self._forest.in_roots(meant)
+        placed = self._in_fixed(in_roots, self._forest.in_roots(meant))
         frames = self._forest.below(set(off))
         return {one: pose_of(placed[self._forest.index[one]].tolist()) for one in sorted(frames)}
 

@@ -33,8 +33,13 @@ class View:
     """A view that follows a tree."""
 
     server: viser.ViserServer
-    panel: Panel
+    shown: ReloadedPanel
     following: Following
+    changed: threading.Event
+
+    @property
+    def panel(self) -> Panel:
+        return self.shown.panel
 
     @property
     def is_red(self) -> bool:
@@ -52,15 +57,17 @@ joints: {w: {type: continuous, parent: base_link, child: wheel, xyz: [0, 0.2, 0]
 @contextmanager
 def following(session: Session, *, joints: bool = False) -> Iterator[View]:
     """Show the robot that runs in the test's domain."""
-    files = Files(lambda one: Path(one).read_text("utf-8"))
+    files, changed = Files(lambda one: Path(one).read_text("utf-8")), threading.Event()
+    for file in session.texts:
+        files(file)
     server, ending = started("127.0.0.1", 0, "test"), Stop()
     shown = ReloadedPanel(server, session, files, edit=False, joints=joints)
-    follows = Following(server, shown, threading.Event(), Offset(1e-3, 1e-3), joints=joints)
+    follows = Following(server, shown, changed, Offset(1e-3, 1e-3), joints=joints)
     observers = observers_of(plan_of(session.robot))
     thread = threading.Thread(target=follows.run, args=(observers, ending))
     thread.start()
     try:
-        yield View(server, shown.panel, follows)
+        yield View(server, shown, follows, changed)
     finally:
         ending.request()
         thread.join()
@@ -161,3 +168,20 @@ def test_a_slider_moves_the_wheel_as_a_tf_listener_has_it_until_somebody_else_mo
         nodes.typed(nodes.node("jsp"), JointState, "/joint_states", lambda _: JointState(name=["w"], position=[-0.5]))
         assert until(lambda: [one.state for one in view.following.senders] == ["stopped"])
         assert until(lambda: view.following.senders[0].others_found == ("/jsp",))
+
+
+def test_a_file_that_changes_is_followed_from_then_on(view: View, nodes: Any, tmp_path: Path) -> None:
+    nodes.latched(nodes.node("tfcompose_static"), ("base_link", "lidar", (0.0, 0.0, 0.3), (0.0, 0.0, 0.0, 1.0)))
+    nodes.moving(nodes.node("diff_drive"), "odom base_link")
+    assert until(lambda: view.panel.published is not None)
+    moved = EXTERNAL.replace("xyz: [0, 0, 0.3]", "xyz: [0, 0, 0.4]")
+    (tmp_path / "rover.yaml").write_text(moved, "utf-8")
+    view.changed.set()
+    assert until(lambda: [one.code for one in view.following.tree.judgement.found] == ["TF846"])
+    assert until(lambda: view.server.scene.get_handle_by_name("/ghost/2") is not None)
+    (tmp_path / "rover.yaml").write_text(EXTERNAL + "  odom2: [\n", "utf-8")
+    view.changed.set()
+    assert until(lambda: "TF" in view.shown.found)
+    (tmp_path / "rover.yaml").write_text(EXTERNAL, "utf-8")
+    view.changed.set()
+    assert until(lambda: not view.following.tree.judgement.found and not view.shown.found)

@@ -28,7 +28,7 @@ from tfcompose.plan.file import read_plan
 from tfcompose.urdf.packages import Packages
 from tfcompose.view.panel import Panel
 from tfcompose.view.plan_robot import robot_of_plan
-from tfcompose.view.scene import RobotScene
+from tfcompose.view.scene import RobotScene, colours_of
 from tfcompose.view.server import started, stop
 from tfcompose.view.session import Session, poses_in_roots
 
@@ -168,6 +168,17 @@ joints:
     poses = poses_in_roots(robot, {"one": 0.25})
     assert poses["b"].xyz == (0.25, 0, 0)
     assert poses["c"].xyz == (0, -0.4, 0)
+
+
+def test_no_owner_has_the_red_of_wrong_edges() -> None:
+    frames = "".join(f"  f{n}: {{parent: base, owner: o{n}, rate: 1 Hz}}\n" for n in range(100))
+    owners = "".join(f"  o{n}: {{external: true, node: n{n}}}\n" for n in range(100))
+    text = f"tfcompose: 1\nrobot: r\nframes:\n  base: {{}}\n{frames}processes:\n{owners}"
+    robot = compile_robot(text, "r.yaml", PRESETS).robot
+    assert robot
+    colours = colours_of(robot)
+    assert len(set(colours.values())) == 100
+    assert not [owner for owner, (red, green, blue) in colours.items() if red > 150 and green < 80 and blue < 80]
 
 
 def test_html_is_one_small_file(rover: Path) -> None:

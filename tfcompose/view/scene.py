@@ -20,8 +20,10 @@ if TYPE_CHECKING:
 
     from tfcompose.model import Robot, Shape
 
-#: Where a colour begins on the wheel, and how far the next one is: the golden angle keeps neighbours apart.
+#: Where a colour begins on the wheel, and how far the next one is: the golden angle keeps neighbours apart. Reds are
+#: left out at both ends, as they say that an edge is wrong.
 _FIRST_HUE, _NEXT_HUE = 0.58, 0.381966
+_NO_RED = 0.1
 _GREY = (105, 112, 122)
 _AXES_M = 0.08
 _GHOST = (60, 120, 220)
@@ -41,7 +43,8 @@ def colours_of(robot: Robot) -> dict[str, tuple[int, int, int]]:
     owners = dict.fromkeys(edge.owner for edge in robot.edges)
     colours = {}
     for index, owner in enumerate(owners):
-        rgb = colorsys.hsv_to_rgb((_FIRST_HUE + index * _NEXT_HUE) % 1, 0.85, 0.85)
+        hue = _NO_RED + (1 - 2 * _NO_RED) * ((_FIRST_HUE + index * _NEXT_HUE) % 1)
+        rgb = colorsys.hsv_to_rgb(hue, 0.85, 0.85)
         colours[owner] = (round(rgb[0] * 255), round(rgb[1] * 255), round(rgb[2] * 255))
     return colours
 

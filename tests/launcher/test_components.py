@@ -8,9 +8,21 @@ import pytest
 
 from tests.support.findings import expect
 from tests.support.machine_history import GUARD, History, begin, run_process
-from tfcompose.ipc import Absent, Clear, DownRequest, GateOpen, Live, OwnerReady, Present, ProcessRequest, Unloaded
+from tfcompose.ipc import (
+    Absent,
+    Clear,
+    DownRequest,
+    GateOpen,
+    Live,
+    OwnerReady,
+    Present,
+    ProcessRequest,
+    Remember,
+    Unloaded,
+)
 from tfcompose.launcher.components import writer_of
-from tfcompose.launcher.events import Exited, LoadComponent, NewPlan, UnloadComponent
+from tfcompose.launcher.events import Exited, LoadComponent, NewPlan, Order, Start, Started, Tick, UnloadComponent
+from tfcompose.launcher.machine import step
 from tfcompose.launcher.readiness import waits_for
 from tfcompose.plan import Component, PlanProcess, Ready
 
@@ -97,7 +109,9 @@ def test_an_answer_of_the_container_before_says_nothing_about_the_one_after() ->
     box = replace(BOX, restart="on-failure")
     history = begin(GUARD, box, component("a")).feed(Clear(), GateOpen("box", "there"))
     before = history.requested[-1]
-    history.feed(Exited("box", -SIGKILL)).wait(1.0).feed(GateOpen("box", "there"))
+    history.feed(Exited("box", -SIGKILL))
+    assert history.orders[-1] == Absent("a"), "the guard forgets what it was ordered"
+    history.wait(1.0).feed(GateOpen("box", "there"))
     assert history.requested[-1].number != before.number
     history.requested.append(before)
     history.answer("a", why="went away")
@@ -238,3 +252,14 @@ def test_a_load_that_fails_slowly_is_given_up_as_one_that_fails_at_once() -> Non
     for _ in range(2):
         history.wait(25).answer("a", why="no device").wait(1.0)
     assert history.state.tracked["a"].state == "FATAL"
+
+
+def test_a_guard_that_follows_another_hears_of_an_owner_before_it_is_to_load_it() -> None:
+    history = begin(GUARD, BOX, component("a", owns=(("odom", "base"),))).feed(Clear(), Remember({"x": 1}))
+    history.feed(GateOpen("box", "there"), Exited("guard", 1))
+    actions = step(history.wait(0.9).state, Tick(), history.now + 0.1)[1]
+    again = step(step(history.state, Tick(), history.now + 0.1)[0], Started("guard", 9), history.now + 0.1)[1]
+    assert Start("guard") in actions
+    orders = [one.order if isinstance(one, Order) else one for one in again]
+    load = next(one for one in orders if isinstance(one, LoadComponent))
+    assert orders.index(load) > orders.index(Present("a")) > orders.index(Absent("a"))

@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import sys
+import threading
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -209,6 +210,46 @@ def test_a_component_that_takes_its_time_is_loaded_once_and_another_container_do
     assert sorted(plugins) == ["demo/demo::Empty", "drive/demo::Moving", "image_proc/demo::Slow"]
     running = [one.process for one in notices if isinstance(one, ProcessState) and one.state == "RUNNING"]
     assert running.index("other") < running.index("rectify") < running.index("odometry")
+
+
+def run_and_kill(folder: Path, log: Path, name: str) -> list[Notice]:
+    """Run the robot with a component that takes its time, and kill a process once its load was requested."""
+    given: list[list[Notice]] = []
+
+    def kill() -> None:
+        until(partial(has_requests, log, 1))
+        states = [one for one in given[0] if isinstance(one, ProcessState) and one.process == name and one.pid]
+        os.kill(states[-1].pid or 0, SIGKILL)
+
+    def begin(notices: list[Notice]) -> bool:
+        given.append(notices)
+        return True
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    try:
+        return run(folder, ROBOT.replace("demo::Empty", "demo::Slow"), begin, are_ready)
+    finally:
+        killer.join()
+
+
+@pytest.mark.usefixtures("domain")
+def test_a_container_that_is_killed_in_the_middle_of_a_load_comes_back_with_all(tmp_path: Path, stand_in: Path) -> None:
+    notices = run_and_kill(tmp_path, stand_in, "box")
+    plugins = ["image_proc/demo::Slow", "drive/demo::Moving"]
+    assert [one["plugin"] for one in requested(stand_in)] == [plugins[0], *plugins]
+    for name in ("rectify", "odometry"):
+        assert states(notices, name) == ["STARTING", "STOPPED", "STARTING", "RUNNING"]
+    assert found(notices) == []
+
+
+@pytest.mark.usefixtures("domain")
+def test_a_guard_that_is_killed_in_the_middle_of_a_load_has_nothing_loaded_twice(
+    tmp_path: Path, stand_in: Path
+) -> None:
+    notices = run_and_kill(tmp_path, stand_in, "guard")
+    assert [one["plugin"] for one in requested(stand_in)] == ["image_proc/demo::Slow", "drive/demo::Moving"]
+    assert [one.code for one in found(notices)] == ["TF808"], "of the guard"
 
 
 @pytest.mark.usefixtures("domain")

@@ -81,6 +81,7 @@ class OrderReader:
                     for judge in self._judges:
                         judge.absent(process)
                     self._gates.forget(process)
+                    self._components.forget(process)
                 case Present(process):
                     for judge in self._judges:
                         judge.live.present(process)

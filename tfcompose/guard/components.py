@@ -85,11 +85,15 @@ class Components:
         except ImportError:
             self._answer(order, "composition_interfaces cannot be imported, which comes with the containers")
             return
+        self.forget(order.process)
         jobs = self._jobs.setdefault(request.container, deque())
-        for job in [job for job in jobs if job.order.process == order.process]:
-            jobs.remove(job)
-        self._loaded.pop(order.process, None)
         jobs.append(_Job(order, request, since=time.monotonic()))
+
+    def forget(self, process: str) -> None:
+        """Carry out no order about the component any more: it is stopped, or its container has ended."""
+        self._loaded.pop(process, None)
+        for name, jobs in self._jobs.items():
+            self._jobs[name] = deque(job for job in jobs if job.order.process != process)
 
     def has(self, process: str) -> bool:
         """Return whether an order about the component is not carried out yet."""

@@ -58,7 +58,10 @@ def _ended(step: Transition, one: Tracked, why: str, message: str) -> None:
 
 
 def order_components(step: Transition) -> None:
-    """Tell a guard that has just started what the one before it may have been told, and not done."""
+    """Tell a guard that has just started what the one before it may have been told, and not done.
+
+    It has to hear first who is absent: it forgets what it was ordered about those.
+    """
     for name, one in step.state.tracked.items():
         if one.process.component and one.state in ("STARTING", "RUNNING"):  # it watches over those that run
             step.actions.append(LoadComponent(name, one.order, again=True))

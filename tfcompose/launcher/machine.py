@@ -166,12 +166,12 @@ def _started(step: Transition, name: str, pid: int) -> None:
         return
     _expect_no_sign_of_life(step)
     step.update(silent=frozenset())  # it reports itself what is
-    order_components(step)
     if step.state.clear is not None:  # it joins the others
         for other in step.state.tracked.values():
             _introduce(step, other)
             if not other.ready and other.state in ("RUNNING", "EXPECTED"):
                 order_gate(step, other)
+    order_components(step)
 
 
 def _introduce(step: Transition, owner: Tracked) -> None:

@@ -112,6 +112,8 @@ def lose_components(step: Transition, container: str) -> None:
     for one in step.state.components_of(container):
         if one.alive or one.state == "BACKOFF":
             lose_edges(step, one)
+            if not one.process.owns and step.state.guard is not None:  # what was ordered holds for that container
+                step.actions.append(Order(Absent(one.process.name)))
             one = step.state.tracked[one.process.name]  # noqa: PLW2901 (the same, without its edges)
             left(step, replace(one, leaving=one.leaving or ("again" if one.wanted else "stop")), f"with {container}")
 

@@ -64,6 +64,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "publishers": {"files", "geometry", "plan", "process", "ros", "signals", "text"},
     "tf2": {"geometry", "ros"},
     "compile": FOUNDATIONS | STAGES,
+    "provenance": {"load", "model"},
     "pages": {"catalogue", "check"},
     "importing": {
         "compile",
@@ -91,6 +92,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "model",
         "numbers",
         "plan",
+        "provenance",
         "rays",
         "ros",
         "text",

@@ -75,3 +75,43 @@ def test_a_slider_in_the_browser_moves_its_wheel_only(rover: Path, server: viser
     )
     assert max(off.xyz_m, off.rot_rad) < 1e-6
     assert panel.scene.body_pose("front_right_wheel_link") == right
+
+
+def tick(page: Page, label: str) -> None:
+    """Click on the box of that label."""
+    control = "xpath=ancestor::div[1]/following-sibling::div"
+    page.locator("label").get_by_text(label, exact=True).locator(control).locator("input").last.click(force=True)
+
+
+def test_a_click_selects_a_body_whose_subtree_can_be_hidden(rover: Path, server: viser.ViserServer) -> None:
+    panel = Panel(server, session_of(rover), edit=False)
+    with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
+        page.get_by_text("odom is a root").wait_for()
+        until(lambda: clicked_body(page, panel) == "base_link")
+        page.get_by_text("by ekf").wait_for()
+        tick(page, "hide it and what is below")
+        until(lambda: not panel.scene.is_shown("front_left_wheel_link"))
+        assert not panel.scene.is_shown("base_link")
+        tick(page, "hide it and what is below")
+        until(lambda: panel.scene.is_shown("front_left_wheel_link"))
+
+
+def clicked_body(page: Page, panel: Panel) -> str:
+    """Click where the camera looks, and return the frame that is selected then."""
+    page.mouse.click(690, 470)
+    page.wait_for_timeout(300)
+    return str(panel.frames.value)
+
+
+def test_a_sweep_moves_every_joint_until_it_is_switched_off(rover: Path, server: viser.ViserServer) -> None:
+    panel = Panel(server, session_of(rover), edit=False)
+    joints = dict(panel.positions)
+    with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
+        page.get_by_text("sweep", exact=True).wait_for()
+        tick(page, "sweep")
+        until(lambda: all(abs(panel.positions[name] - joints[name]) > 0.5 for name in joints))
+        tick(page, "sweep")
+        until(lambda: not panel.is_sweeping)
+        wheel = panel.scene.body_pose("rear_left_wheel_link")
+        page.wait_for_timeout(300)
+        assert panel.scene.body_pose("rear_left_wheel_link") == wheel

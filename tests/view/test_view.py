@@ -319,6 +319,7 @@ def test_elsewhere_than_on_this_machine_a_token_lets_in(rover: Path) -> None:
             with pytest.raises(urllib.error.HTTPError) as caught:
                 urllib.request.urlopen(refused, timeout=30)  # noqa: S310 (on this machine)
             assert caught.value.code == http.HTTPStatus.FORBIDDEN
+            caught.value.close()
         with urllib.request.urlopen(address, timeout=30) as answer:  # noqa: S310
             assert answer.status == http.HTTPStatus.OK
             cookie = answer.headers["Set-Cookie"].partition(";")[0]

@@ -118,6 +118,7 @@ class FieldsOfView:
         self._streams = list(streams(robot))
         self._frames: list[Any] = []
         self._blocked: dict[int, Any] = {}
+        self._hidden: frozenset[str] = frozenset()
         self.sensors = tuple(dict.fromkeys(sensor.name for sensor, _ in self._streams))
         cameras = {sensor.name for sensor, optics in self._streams if optics.kind == "camera"}
         self.shown = {name: name in cameras for name in self.sensors}
@@ -154,9 +155,13 @@ class FieldsOfView:
     def show(self, sensor: str, *, visible: bool) -> None:
         """Show or hide what a sensor sees."""
         self.shown[sensor] = visible
-        for handle, (one, _) in zip(self._frames, self._streams, strict=True):
-            if one.name == sensor:
-                handle.visible = visible
+        self.hide(self._hidden)
+
+    def hide(self, frames: frozenset[str]) -> None:
+        """Hide the fields of view of these frames, and show those of all others whose sensor is shown."""
+        self._hidden = frames
+        for handle, (sensor, optics) in zip(self._frames, self._streams, strict=True):
+            handle.visible = self.shown[sensor.name] and optics.frame not in frames
 
     def show_blocked(self, robot: Robot | None) -> list[str]:
         """Draw the rays of the shown sensors that bodies of the robot block, as TF641 counts them; None: draw none.

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+import threading
+import time
 from functools import partial
 from html import escape
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.geometry import Pose, quat_from_rpy
 from tfcompose.numbers import clean_rpy
+from tfcompose.provenance import values_of
 from tfcompose.view.edit import ImmovableError
 from tfcompose.view.fields import REACH_M
 from tfcompose.view.scene import RobotScene, wxyz
@@ -25,6 +28,23 @@ if TYPE_CHECKING:
 #: How far a joint without limits can be moved, in radians or metres, and the step of the gizmo in millimetres, degrees.
 _UNLIMITED = math.pi
 _SNAP_MM, _SNAP_DEG = 1.0, 1.0
+#: The frame in which a pose is shown, unless another is chosen.
+_PARENT = "its parent"
+#: How long a sweep of the joints takes, and the time between two of its steps, in seconds.
+_SWEEP_S, _SWEEP_STEP_S = 6.0, 0.05
+
+
+def numbers(pose: Pose) -> str:
+    """Return a pose as people read it, in mm and degrees."""
+    x, y, z = (f"{value * 1000:.4g}" for value in pose.xyz)
+    roll, pitch, yaw = (f"{math.degrees(angle):.4g}" for angle in clean_rpy(pose.quat_xyzw))
+    return f"{x}, {y}, {z} mm · {roll}, {pitch}, {yaw} deg"
+
+
+def _phase(slider: Any) -> float:
+    """Return where a slider is in its sweep, in radians: 0 in its middle."""
+    half = (slider.max - slider.min) / 2
+    return math.asin(max(-1.0, min(1.0, (slider.value - slider.min) / half - 1)))
 
 
 class Panel:
@@ -53,13 +73,25 @@ class Panel:
         self._numbers: list[Any] = []
         self._showing = False
         self._blocked: Any = None
+        #: Whether the joints are being moved to and fro.
+        self.is_sweeping = False
+        #: Whether another panel has taken its place.
+        self.is_gone = False
         server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
         with server.gui.add_folder("Frame"):
-            self._search = server.gui.add_text("search", "")
+            self._search: Any = server.gui.add_text("search", "")
             self.frames: Any = server.gui.add_dropdown("frame", tuple(session.robot.frames))
+            self._base: Any = server.gui.add_dropdown("in", (_PARENT, *session.robot.frames))
             self._about = server.gui.add_markdown("")
+            self._hide: Any = server.gui.add_checkbox("hide it and what is below", initial_value=False)
+            self._names = server.gui.add_checkbox("names of all frames", initial_value=False)
+        self._hidden: set[str] = set()
         self._search.on_update(self._filter)
         self.frames.on_update(lambda _: self._select())
+        self._base.on_update(lambda _: self._select())
+        self._hide.on_update(lambda _: self._hide_below())
+        self._names.on_update(lambda _: self.scene.label(self.poses(), visible=self._names.value))
+        self.scene.clicked = self.select
         if edit:
             self._add_editor()
         self._add_owners()
@@ -85,20 +117,35 @@ class Panel:
         if names:
             self.frames.options = tuple(names)
 
+    def select(self, frame: str) -> None:
+        """Select a frame."""
+        self._search.value = ""
+        self.frames.options = tuple(self.session.robot.frames)
+        self.frames.value = frame
+
     def _select(self) -> None:
         robot, frame = self.session.robot, self.frames.value
+        self._hide.value = frame in self._hidden
         edge = robot.parent_edge(frame)
-        if edge is None:
-            self._about.content = f"**{frame}** is a root ({robot.frames[frame]})"
-        else:
-            x, y, z = (f"{value * 1000:.4g}" for value in edge.pose.xyz)
-            roll, pitch, yaw = (f"{math.degrees(angle):.4g}" for angle in clean_rpy(edge.pose.quat_xyzw))
-            self._about.content = (
-                f"**{frame}** in **{edge.parent}**, {edge.kind}, by **{edge.owner}**\n\n"
-                f"{x}, {y}, {z} mm · {roll}, {pitch}, {yaw} deg\n\n{edge.at}"
-            )
+        lines = [f"**{frame}** is a root ({robot.frames[frame]})"]
+        if edge is not None:
+            lines = [f"**{frame}** in **{edge.parent}**, {edge.kind}, by **{edge.owner}**", numbers(edge.pose)]
+            values = values_of(edge, self.session.state.sources)
+            lines += [f"- {value}" for value in values] or [str(edge.at)]
+        base, poses = self._base.value, self.poses()
+        if base != _PARENT and {base, frame} <= poses.keys():
+            lines += [f"in **{base}**, as shown:", numbers(poses[base].inverse() @ poses[frame])]
+        self._about.content = "\n\n".join(lines)
         if self._numbers:
             self._show_mount()
+
+    def _hide_below(self) -> None:
+        """Hide the selected frame and all below it, or show them again."""
+        robot, frame = self.session.robot, self.frames.value
+        below = robot.below(frame)
+        self._hidden = self._hidden | below if self._hide.value else self._hidden - below
+        self.scene.hide(robot, self._hidden)
+        self.refresh()
 
     def _add_owners(self) -> None:
         with self._gui.add_folder("Owners"):
@@ -140,6 +187,8 @@ class Panel:
         with self._gui.add_folder("Joints"):
             sliders = [self._slider(joint) for joint in joints]
             self._gui.add_button("zero").on_click(lambda _: self._zero(sliders))
+            self._sweeps = self._gui.add_checkbox("sweep", initial_value=False)
+            self._sweeps.on_update(lambda _: self._sweep(sliders))
 
     def _slider(self, joint: Joint) -> Any:
         slides = joint.type == "prismatic"
@@ -164,7 +213,28 @@ class Panel:
     def set_joint(self, name: str, position: float) -> None:
         """Move a joint, in radians or metres."""
         self.positions[name] = position
-        self.refresh()
+        if not self.is_sweeping:
+            self.refresh()
+
+    def _sweep(self, sliders: list[Any]) -> None:
+        """Move each joint to and fro between its limits, until that is switched off or the panel is gone."""
+        if self._sweeps.value and not self.is_sweeping:
+            self.is_sweeping = True
+            threading.Thread(target=self._sweep_until_over, args=(sliders,), daemon=True).start()
+
+    def _sweep_until_over(self, sliders: list[Any]) -> None:
+        begin, starts = time.monotonic(), [_phase(slider) for slider in sliders]
+        try:
+            while self._sweeps.value and not self.is_gone:
+                angle = (time.monotonic() - begin) / _SWEEP_S * math.tau
+                with self._server.atomic():
+                    for slider, start in zip(sliders, starts, strict=True):
+                        middle, half = (slider.max + slider.min) / 2, (slider.max - slider.min) / 2
+                        slider.value = middle + half * math.sin(angle + start)
+                    self.refresh()
+                time.sleep(_SWEEP_STEP_S)
+        finally:
+            self.is_sweeping = False
 
     def _zero(self, sliders: list[Any]) -> None:
         for slider in sliders:

@@ -113,6 +113,10 @@ class ReloadedPanel:
         self._broken: Any = None
         self.panel = Panel(server, session, edit=edit, joints=joints)
 
+    def end(self) -> None:
+        """Let the panel move nothing any more."""
+        self.panel.is_gone = True
+
     def reload(self) -> bool:
         """Read the files again; return whether there is another panel now, that of the robot which they describe."""
         if not self.files.differ():
@@ -129,6 +133,7 @@ class ReloadedPanel:
             return False
         self.session.replace(texts, state)
         before = self.panel
+        before.is_gone = True
         with self._server.atomic():
             self._server.gui.reset()
             self._server.scene.reset()

@@ -14,7 +14,7 @@ from tfcompose.meshes import read_mesh
 from tfcompose.view.fields import FieldsOfView
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     import viser
 
@@ -67,11 +67,11 @@ def mesh_of(shape: Shape) -> Any:
 
 
 def _add_shape(scene: viser.SceneApi, name: str, shape: Shape, colour: tuple[int, int, int], opacity: float) -> Any:
-    """Add a shape to the scene, and return its mesh in the shape's own frame; None if it has none to show."""
+    """Add a shape to the scene; return its mesh in its own frame, and its handle, or None if it has nothing to show."""
     mesh = mesh_of(shape)
     if mesh is None or mesh.is_empty:
         return None
-    scene.add_mesh_simple(
+    handle = scene.add_mesh_simple(
         name,
         np.asarray(mesh.vertices, np.float32),
         np.asarray(mesh.faces, np.uint32),
@@ -84,7 +84,7 @@ def _add_shape(scene: viser.SceneApi, name: str, shape: Shape, colour: tuple[int
         wxyz=wxyz(shape.pose),
         position=shape.pose.xyz,
     )
-    return mesh
+    return mesh, handle
 
 
 class RobotScene:
@@ -97,6 +97,10 @@ class RobotScene:
         self._corners: dict[str, list[Any]] = {}
         self._axes: Any = None
         self._lines: dict[str, Any] = {}
+        self._labels: dict[str, Any] = {}
+        self._hidden: frozenset[str] = frozenset()
+        #: What is called with the frame of a body that is clicked.
+        self.clicked: Callable[[str], None] = lambda _: None
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
         for index, (frame, link) in enumerate(robot.links.items()):
@@ -110,8 +114,10 @@ class RobotScene:
         for number, shape in enumerate(shapes):
             rgba = shape.material.rgba if shape.material else None
             colour = (round(rgba[0] * 255), round(rgba[1] * 255), round(rgba[2] * 255)) if rgba else _GREY
-            mesh = _add_shape(self._scene, f"{name}/{number}", shape, colour, 0.8)
-            if mesh is not None:
+            added = _add_shape(self._scene, f"{name}/{number}", shape, colour, 0.8)
+            if added is not None:
+                mesh, handle = added
+                handle.on_click(lambda _, frame=frame: self.clicked(frame))
                 corners = itertools.product(*mesh.bounds.T.tolist())
                 self._corners.setdefault(frame, []).extend((shape.pose @ Pose(one)).xyz for one in corners)
 
@@ -119,16 +125,20 @@ class RobotScene:
         """Put every frame where it is in the root of its tree."""
         for frame, body in self._bodies.items():
             body.wxyz, body.position = wxyz(poses[frame]), poses[frame].xyz
+        for frame, label in self._labels.items():
+            label.position = poses[frame].xyz
         self.fields.update(poses)
         rotations = np.array([wxyz(poses[frame]) for frame in robot.frames], np.float32).reshape(-1, 4)
         positions = np.array([poses[frame].xyz for frame in robot.frames], np.float32).reshape(-1, 3)
         if self._axes is None:
             self._axes = self._scene.add_batched_axes(
-                "/frames", rotations, positions, axes_length=_AXES_M, axes_radius=_AXES_M / 20
-            )
+                "/frames", rotations, positions, axes_length=_AXES_M, axes_radius=_AXES_M / 20,
+                batched_scales=self._scales(robot),
+            )  # fmt: skip
         else:
             self._axes.batched_wxyzs, self._axes.batched_positions = rotations, positions
-        edges = [edge for edge in robot.edges if edge.parent in poses and edge.child in poses]
+        shown = poses.keys() - self._hidden
+        edges = [edge for edge in robot.edges if edge.parent in poses and edge.child in shown]
         for index, (owner, colour) in enumerate(self.colours.items()):
             ends = [(poses[edge.parent].xyz, poses[edge.child].xyz) for edge in edges if edge.owner == owner]
             points = np.array(ends, np.float32).reshape(-1, 2, 3)
@@ -158,9 +168,34 @@ class RobotScene:
             position=(0.0, 0.0, float(least[2])),
         )
 
+    def hide(self, robot: Robot, frames: Iterable[str]) -> None:
+        """Hide these frames with their bodies, labels and the edges to them, and show all others again."""
+        self._hidden = frozenset(frames)
+        for frame, handle in (*self._bodies.items(), *self._labels.items()):
+            handle.visible = frame not in self._hidden
+        self._axes.batched_scales = self._scales(robot)
+        self.fields.hide(self._hidden)
+
+    def _scales(self, robot: Robot) -> Any:
+        return np.array([frame not in self._hidden for frame in robot.frames], np.float32)
+
+    def label(self, poses: Mapping[str, Pose], *, visible: bool) -> None:
+        """Write the names of the frames next to them, or take them away."""
+        for handle in self._labels.values():
+            handle.remove()
+        self._labels = {}
+        for index, (frame, pose) in enumerate(poses.items() if visible else ()):
+            self._labels[frame] = self._scene.add_label(
+                f"/labels/{index}", frame, position=pose.xyz, visible=frame not in self._hidden, anchor="bottom-left"
+            )
+
     def show_owner(self, owner: str, *, visible: bool) -> None:
         """Show or hide the edges of an owner."""
         self._lines[owner].visible = visible
+
+    def is_shown(self, frame: str) -> bool:
+        """Return whether the scene shows the body of a frame."""
+        return bool(self._bodies[frame].visible)
 
     def body_pose(self, frame: str) -> Pose:
         """Return where the scene has the body of a frame."""

@@ -114,6 +114,8 @@ def _serve(session: Session, files: Files, arguments: Namespace) -> int:
                 if shown.reload() and bag is not None:
                     bag.show(server, shown)
     finally:
+        if shown is not None:
+            shown.end()
         stop(server)
 
 

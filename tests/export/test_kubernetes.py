@@ -91,6 +91,9 @@ def test_what_is_waited_for_until_it_is_done_is_a_job_and_each_runs_on_its_host(
     (spawner,) = [name for name in kinds if name.startswith("big-rover-spawner-")]
     assert kinds[spawner] == "Job"
     assert workloads(made)[spawner]["spec"]["template"]["spec"]["restartPolicy"] == "OnFailure"
+    fewer, _ = manifests(HOSTED.replace("spawner: {", "spawner: {restart: on-failure, max_restarts: 2, "))
+    (job,) = [one for one in workloads(fewer).values() if one["kind"] == "Job"]
+    assert job["spec"]["backoffLimit"] == 2
     assert {kinds[f"big-rover-{name}"] for name in ("static", "drive", "late", "guard")} == {"StatefulSet"}
     hosts = {
         name: pod_of(made, f"big-rover-{name}")["spec"].get("nodeSelector") for name in ("static", "drive", "guard")

@@ -10,7 +10,6 @@ from tfcompose.cli.plans import PLAN, built_plan, is_plan, plan_to_start
 from tfcompose.cli.reading import read_text
 from tfcompose.cli.terminal import printable
 from tfcompose.findings import RejectedError
-from tfcompose.launcher.state import MAX_RESTARTS
 from tfcompose.plan import StopRule
 from tfcompose.plan.file import read_plan
 from tfcompose.plan.hosts import describe_share
@@ -138,9 +137,8 @@ def _times(process: PlanProcess) -> Iterator[str]:
         late = f", late after {ready.timeout_s:g} s" if ready.timeout_s is not None else ""
         yield f"  ready    {ready.kind} {what}{late}".rstrip()
     if process.restart != "no":
-        most = MAX_RESTARTS if process.max_restarts is None else process.max_restarts
         delay = f", {process.restart_delay:g} s after its end" if process.restart_delay is not None else ""
-        yield f"  restart  {process.restart}, {counted(most, 'time')} in a row{delay}"
+        yield f"  restart  {process.restart}, {counted(process.restart_limit, 'time')} in a row{delay}"
     if process.required is not None:
         yield "  required its end ends everything" if process.required else "  optional the rest goes on when it fails"
     if process.stop != StopRule():

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.export.supervisors import (
     INSIDE,
-    MAX_RESTARTS,
     STOP_S,
     after,
     command_of,
@@ -85,9 +84,10 @@ def kubernetes(plan: Plan, cluster: Cluster, texts: Mapping[str, str]) -> tuple[
     if not cluster.folder:
         manifests["plan"] = _config_map(robot, texts)
     for process in plan.started:
-        workload = _job if process.name in awaited else _stateful_set
-        pod = _pod(plan, process, _labels(robot, names[process.name]), cluster, texts)
-        manifests[names[process.name]] = workload(names[process.name], robot, pod)
+        name = names[process.name]
+        pod = _pod(plan, process, _labels(robot, name), cluster, texts)
+        is_job = process.name in awaited
+        manifests[name] = _job(name, robot, pod, process.restart_limit) if is_job else _stateful_set(name, robot, pod)
     files = [File(f"{name}.yaml", yaml_text(manifest)) for name, manifest in manifests.items()]
     kustomization = {
         "apiVersion": "kustomize.config.k8s.io/v1beta1",
@@ -158,11 +158,11 @@ def _stateful_set(name: str, robot: str, pod: dict[str, Any]) -> dict[str, Any]:
     return _manifest("StatefulSet", "apps/v1", name, robot, {"spec": spec})
 
 
-def _job(name: str, robot: str, pod: dict[str, Any]) -> dict[str, Any]:
+def _job(name: str, robot: str, pod: dict[str, Any], restart_limit: int) -> dict[str, Any]:
     """Return a workload that ends; its name changes with its content, because a job cannot be changed."""
     content = pod["metadata"]["annotations"][_CONTENT]
     template = {**pod, "spec": {**pod["spec"], "restartPolicy": "OnFailure"}}
-    spec = {"backoffLimit": MAX_RESTARTS, "template": template}
+    spec = {"backoffLimit": restart_limit, "template": template}
     return _manifest("Job", "batch/v1", f"{name}-{content[:8]}", robot, {"spec": spec})
 
 

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from tfcompose.plan import Plan, PlanProcess
 
 
-#: How often a process is started again in a row, where the plan leaves that to the launcher.
-MAX_RESTARTS = 5
 #: How long a process has to end, in seconds: SIGINT and SIGTERM, five each, in the launcher's hands.
 STOP_S = 10.0
 
@@ -226,7 +224,6 @@ def _unit_text(plan: Plan, process: PlanProcess, machine: Machine, names: Mappin
     """Return the unit of a process; ``names`` are those of all units, by process."""
     target = _target_name(plan)
     before = [names[name] for name in after(plan, process)]
-    most = MAX_RESTARTS if process.max_restarts is None else process.max_restarts
     kind = "oneshot" if done else "exec" if process.kind == "run" else "notify"
     restart = restart_of(process)
     settling_s = _settling_s(plan, process)
@@ -234,7 +231,7 @@ def _unit_text(plan: Plan, process: PlanProcess, machine: Machine, names: Mappin
         f"Description={_plain(process.name)} of robot {plan.robot}",
         f"PartOf={target}",
         *(f"{key}={' '.join(before)}" for key in ("After", "Wants") if before),
-        *([] if restart == "no" else ["StartLimitIntervalSec=300", f"StartLimitBurst={most + 1}"]),
+        *([] if restart == "no" else ["StartLimitIntervalSec=300", f"StartLimitBurst={process.restart_limit + 1}"]),
     ]
     service = [
         f"Type={kind}",
@@ -357,7 +354,7 @@ def _discovery(plan: Plan) -> dict[str, str]:
 
 def _restart(process: PlanProcess) -> str:
     restart = restart_of(process)
-    most = MAX_RESTARTS if process.max_restarts is None else process.max_restarts
+    most = process.restart_limit
     return f"on-failure:{most}" if restart == "on-failure" and most else "no" if restart == "on-failure" else restart
 
 

@@ -53,7 +53,6 @@ class Times:
     """two signals closer than this are one: ``timeout`` and closing terminals send theirs twice"""
 
 
-MAX_RESTARTS = 5
 #: The exit code when nobody reads the output any more: what a shell says of a program that SIGPIPE ended.
 UNREAD = 141
 

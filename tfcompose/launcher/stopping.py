@@ -14,7 +14,7 @@ from tfcompose.findings import did_you_mean
 from tfcompose.ipc import Absent, DownRequest, Replanned
 from tfcompose.launcher.events import Kill, Order, OutputLost, Signalled, TimeUp, UnloadComponent
 from tfcompose.launcher.failures import ended_by_itself, guard_lost, how_ended, never_published, signal_name
-from tfcompose.launcher.state import MAX_RESTARTS, UNREAD, Stop, Tracked, by_owner
+from tfcompose.launcher.state import UNREAD, Stop, Tracked, by_owner
 from tfcompose.text import counted
 
 if TYPE_CHECKING:
@@ -141,7 +141,7 @@ def _restart_after(step: Transition, one: Tracked, event: Exited) -> None:
 def schedule_restart(step: Transition, one: Tracked, how: str, failure: Callable[[str], Finding]) -> None:
     """Have a process started again after a while, unless it was too often; ``failure`` makes the finding then."""
     name, times = one.process.name, step.state.times
-    most = MAX_RESTARTS if one.process.max_restarts is None else one.process.max_restarts
+    most = one.process.restart_limit
     failures = 1 if step.now - one.since >= times.steady_s else one.failures + 1
     if failures > most:
         step.enter(name, "FATAL", how)

@@ -68,6 +68,8 @@ SILENT_AT_LEAST_S = 0.6
 SILENT_PERIODS = 4.0
 #: It is too slow below this part of the rate that is declared.
 SLOW_BELOW = 0.8
+#: How often a process is started again in a row, unless it says so itself.
+MAX_RESTARTS = 5
 
 
 def _unit_quaternion(pose: Pose) -> None:
@@ -275,8 +277,7 @@ class PlanProcess:
 
     ``nodes`` are full names; ``lifecycle`` says of some of them into which state they are brought after the start.
     ``required`` says what ends the plan: True, this process's end; None, its failure; False, neither.
-    ``max_restarts`` None is the launcher's default, as is ``ready`` None: the edges that the process owns, or that it
-    was started.
+    ``max_restarts`` None is the default, as is ``ready`` None: the edges that the process owns, or that it was started.
     ``drives`` are the sensors that it is the driver of, by their presets. ``switches`` holds, by the full names of its
     nodes, the parameters that were written for them and decide what they publish.
     ``description`` is the file beside the plan that a publisher sends as ``robot_description``; None: the plan's.
@@ -319,6 +320,11 @@ class PlanProcess:
     def topics(self) -> tuple[str, str]:
         """The topics (moving, fixed) on which it publishes TF."""
         return self.remap.get("/tf", "/tf"), self.remap.get("/tf_static", "/tf_static")
+
+    @property
+    def restart_limit(self) -> int:
+        """How often it is started again in a row."""
+        return MAX_RESTARTS if self.max_restarts is None else self.max_restarts
 
 
 def known_at_launch(value: Any) -> bool:

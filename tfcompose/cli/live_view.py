@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     Topics = tuple[str, str]
 
 #: How often the scene is moved, the tree judged, and the launcher asked for its state; seconds.
-_SHOW_EVERY_S, _JUDGE_EVERY_S, _ASK_EVERY_S = 0.04, 0.25, 2.0
+_SHOW_EVERY_S, _JUDGE_EVERY_S, _ASK_EVERY_S = 0.04, 0.35, 2.0
 #: What the panel has room for of what ``ps`` lists.
 _COLUMNS = ("PROCESS", "STATE", "CPU", "MEMORY", "EDGES")
 #: Rates and gaps are those of the last one to two of these; seconds.

@@ -107,6 +107,11 @@ def pose_of(row: Any) -> Pose:
     return Pose((x, y, z), (qx, qy, qz, qw))
 
 
+def poses_of(rows: Rows) -> list[Pose]:
+    """Return rows as poses."""
+    return [Pose((x, y, z), (qx, qy, qz, qw)) for x, y, z, qx, qy, qz, qw in rows.tolist()]
+
+
 def row_of(pose: Pose) -> tuple[float, ...]:
     """Return a pose as a row."""
     return (*pose.xyz, *pose.quat_xyzw)

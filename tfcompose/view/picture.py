@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tfcompose.geometry import Pose
-from tfcompose.view.forest import Forest, pose_of, row_of
+from tfcompose.view.forest import Forest, pose_of, poses_of, row_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -92,7 +92,7 @@ class Pictures:
     def _picture(self, judgement: Judgement) -> Picture:
         in_roots = self._forest.in_roots(self._local)
         rows = self._in_fixed(in_roots, in_roots)
-        placed = dict(zip(self._forest.frames, map(pose_of, rows.tolist()), strict=True))
+        placed = dict(zip(self._forest.frames, poses_of(rows), strict=True))
         known = self.robot.frames
         poses = {frame: placed[frame] for frame in known}
         further = {frame: pose for frame, pose in placed.items() if frame not in known}

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     import viser
 
+    from tfcompose.geometry import Vector
     from tfcompose.model import Robot, Shape
 
 #: Where a colour begins on the wheel, and how far the next one is: the golden angle keeps neighbours apart. Reds are
@@ -128,8 +129,10 @@ class RobotScene:
         for frame, label in self._labels.items():
             label.position = poses[frame].xyz
         self.fields.update(poses)
-        rotations = np.array([wxyz(poses[frame]) for frame in robot.frames], np.float32).reshape(-1, 4)
-        positions = np.array([poses[frame].xyz for frame in robot.frames], np.float32).reshape(-1, 3)
+        rows = np.array([poses[frame].xyz + poses[frame].quat_xyzw for frame in robot.frames], np.float32).reshape(
+            -1, 7
+        )
+        rotations, positions = rows[:, [6, 3, 4, 5]], rows[:, :3]
         if self._axes is None:
             self._axes = self._scene.add_batched_axes(
                 "/frames", rotations, positions, axes_length=_AXES_M, axes_radius=_AXES_M / 20,
@@ -138,10 +141,12 @@ class RobotScene:
         else:
             self._axes.batched_wxyzs, self._axes.batched_positions = rotations, positions
         shown = poses.keys() - self._hidden
-        edges = [edge for edge in robot.edges if edge.parent in poses and edge.child in shown]
+        ends: dict[str, list[tuple[Vector, Vector]]] = {owner: [] for owner in self.colours}
+        for edge in robot.edges:
+            if edge.parent in poses and edge.child in shown:
+                ends[edge.owner].append((poses[edge.parent].xyz, poses[edge.child].xyz))
         for index, (owner, colour) in enumerate(self.colours.items()):
-            ends = [(poses[edge.parent].xyz, poses[edge.child].xyz) for edge in edges if edge.owner == owner]
-            points = np.array(ends, np.float32).reshape(-1, 2, 3)
+            points = np.array(ends[owner], np.float32).reshape(-1, 2, 3)
             if owner in self._lines:
                 self._lines[owner].points = points
             else:

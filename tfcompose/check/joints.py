@@ -104,11 +104,11 @@ def inverted_limits(robot: Robot) -> Iterator[Finding]:
 
 @rule("TF706", of_urdf=True)
 def zero_limit(robot: Robot) -> Iterator[Finding]:
-    """A joint's velocity or effort limit is 0.
+    """A joint's velocity or effort limit is 0 or negative.
 
     With velocity 0 the joint never moves: MoveIt cannot time a path, and simulators hold the joint. With effort 0 its
-    motor has no force. Give the motor's values, or remove the key: then there is no limit. Mimic joints and wheels that
-    turn freely may have an effort of 0.
+    motor has no force. Give the motor's values, or remove the key: then there is no limit. Mimic joints and continuous
+    joints, such as free wheels, may have an effort of 0.
     """
     for edge in robot.edges:
         joint = edge.joint
@@ -131,8 +131,9 @@ _AXIS_TOLERANCE = 0.02
 def axis_not_unit(robot: Robot) -> Iterator[Finding]:
     """A joint's axis does not have length 1.
 
-    An axis is a direction. tfcompose normalises it, but other URDF readers scale the motion by its length. Often a
-    digit or a sign was lost. Write [0, 0, 1], or [0.7071, 0, 0.7071].
+    An axis is a direction, and URDF asks for a unit vector. tfcompose normalises it, but other readers, such as
+    yourdfpy, scale a prismatic joint's motion by its length. Often a digit or a sign was lost. Write [0, 0, 1], or
+    [0.7071, 0, 0.7071].
     """
     for edge in robot.edges:
         joint = edge.joint

@@ -121,9 +121,10 @@ def view_blocked(robot: Robot) -> Iterator[Finding]:
 def blind_sector(robot: Robot) -> Iterator[Finding]:
     """A laser scanner in one plane is blind in a sector: the robot's own bodies block it.
 
-    The scan holds the robot there, which navigation takes for an obstacle unless the driver or a filter leaves the
-    sector out. Move the scanner, raise it, or set the sector that is known under ``sensors.NAME.optics.STREAM``, and
-    the limit: ``rules: {TF642: {limit: 120 deg}}``. Angles are those of the LaserScan: counter-clockwise from x of its
+    In that sector the scan shows the robot itself, which navigation takes for an obstacle unless the driver or a filter
+    drops those points. Move the scanner, or raise it. If the driver leaves the sector out, say what the scan still
+    covers, under ``sensors.NAME.optics.STREAM``: ``horizontal: [-120 deg, 120 deg]``; if the rest is enough, raise the
+    limit: ``rules: {TF642: {limit: 120 deg}}``. Angles are those of the LaserScan: counter-clockwise from x of its
     frame. Bodies count as for TF641.
     """
     limit = _limit(robot, "TF642")
@@ -288,9 +289,9 @@ def _distance_in_sight(
 def zone_not_covered(robot: Robot) -> Iterator[Finding]:
     """A zone under ``coverage`` is not seen by the sensors that have to see it.
 
-    Points all over the box are looked at from each stream of the sensors that ``by`` names: a point is seen if it is in
-    the field of view and in range, and no body of the robot is in between. A scanner in one plane sees a point if its
-    plane goes through the box below or above it. What is not known of a stream does not cover anything: give
+    tfcompose samples points all over the box for each stream of the sensors that ``by`` names: a point is seen if it is
+    in the field of view and in range, and no body of the robot is in between. A scanner in one plane sees a point if
+    its plane goes through the box below or above it. What is not known of a stream does not cover anything: give
     ``sensors.NAME.optics``. Bodies count as for TF641.
     """
     for zone in robot.zones:

@@ -151,8 +151,9 @@ def _in_call(found: Finding, file: str, use: Use) -> Finding:
     named = [word for word in _WORD.findall(found.message) if word in use.places]
     macros, at = macros_in(Path(file).read_text("utf-8", "replace")), use.at
     if use.macro in macros:
-        advice = f"{use.macro} takes {macros[use.macro] or 'nothing'}"
-        advice += "; parameters with * take {xyz, rpy} or XML" if "*" in macros[use.macro] else ""
+        takes = macros[use.macro]
+        advice = f"the params of {use.macro}: {takes}" if takes else f"{use.macro} has no params"
+        advice += "; those with * take {xyz, rpy} or XML" if "*" in takes else ""
         at = use.places[named[-1]] if named else at
     else:
         advice = did_you_mean(use.macro, macros, f"{file} defines {', '.join(macros)}" if macros else "")

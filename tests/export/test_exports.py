@@ -253,8 +253,9 @@ def load(text: str, file: Path, monkeypatch: pytest.MonkeyPatch) -> list[Recorde
         return lambda *words, **given: Recorded(kind=name, words=words, **given)
 
     for module in (
-        "ament_index_python", "ament_index_python.packages", "launch", "launch.actions", "launch.event_handlers",
-        "launch.events", "launch.launch_description_sources", "launch_ros", "launch_ros.actions",
+        "ament_index_python", "ament_index_python.packages", "launch", "launch.actions", "launch.conditions",
+        "launch.event_handlers", "launch.events", "launch.launch_description_sources", "launch.substitutions",
+        "launch_ros", "launch_ros.actions",
         "launch_ros.event_handlers", "launch_ros.events", "launch_ros.events.lifecycle",
         "launch_ros.parameter_descriptions",
     ):  # fmt: skip
@@ -330,7 +331,7 @@ def test_a_launch_file_has_prefixes_and_delays_and_what_has_a_schedule_is_starte
 def test_a_driver_is_a_node_with_its_name_parameters_and_remappings(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    _, actions = launched(DRIVEN, tmp_path, monkeypatch)
+    plan, actions = launched(DRIVEN, tmp_path, monkeypatch)
     (drive,) = (action for action in actions if action.kind == "LifecycleNode")
     assert (drive.package, drive.executable, drive.name, drive.namespace) == ("base", "drive_node", "drive", "/r1")
     assert drive.arguments == ["--fast"]
@@ -340,7 +341,7 @@ def test_a_driver_is_a_node_with_its_name_parameters_and_remappings(
     assert drive.additional_env == {"GREETING": '100 % "sure" $HOME'}
     assert drive.respawn
     (slam,) = (action for action in actions if action.kind == "ExecuteProcess")
-    assert slam.cmd[1:] == ["-m", "tfcompose.launcher.exec", str(tmp_path / "plan.json"), "slam"]
+    assert (slam.cmd, slam.name) == (list(plan.process("slam").argv), "slam")
     handlers = [action for action in actions if action.kind == "RegisterEventHandler"]
     assert len(handlers) == 2, "configured when it was started, and activated when it is inactive"
     variables = [action.words for action in actions if action.kind == "SetEnvironmentVariable"]
@@ -481,7 +482,8 @@ def test_a_launch_file_of_the_plan_is_included(below: str, tmp_path: Path, monke
     plan, actions = launched(INCLUDING, tmp_path, monkeypatch)
     assert not [action for action in actions if action.kind == "ExecuteProcess"]
     (group,) = (action for action in actions if action.kind == "GroupAction")
-    *settings, include = group.words[0]
+    *settings, found = group.words[0]
+    (include,) = found.function(None)
     assert [(each.kind, each.words) for each in settings] == [
         ("SetEnvironmentVariable", ("LEVEL", "debug")),
         ("PushRosNamespace", ("r1/eyes",)),

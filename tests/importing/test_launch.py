@@ -10,7 +10,6 @@ import socket
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
@@ -18,7 +17,6 @@ import yaml
 from tests.support.bringups import compiled, import_of, places, printed_errors
 from tests.support.importing import PRESETS
 from tfcompose.cli import compiling, main, reading
-from tfcompose.geometry import angle_between
 from tfcompose.importing import launch
 from tfcompose.load import load
 
@@ -527,35 +525,3 @@ def test_no_launch_file_makes_a_traceback(tmp_path: Path, capsys: pytest.Capture
             printed = printed_errors(capsys)
             assert code in {0, 1, 2}
             assert "Traceback" not in printed, "".join(lines)
-
-
-#: All but the fleet: its export starts tfcompose's own publishers, whose edges stand in the plan alone.
-ROBOTS = sorted(
-    set(Path(__file__).parents[2].glob("robots/*.yaml")) - set(Path(__file__).parents[2].glob("robots/two_*.yaml"))
-)
-
-
-def edges_of(text: str, folder: Path) -> dict[str, Any]:
-    robot = compiled(text, folder).robot
-    assert robot
-    return {edge.name: edge for edge in robot.edges}
-
-
-@pytest.mark.parametrize("robot", ROBOTS, ids=[file.stem for file in ROBOTS])
-def test_the_import_of_an_export_is_the_same_robot(robot: Path, tmp_path: Path) -> None:
-    """All that tfcompose's own publishers send is there again, to 1e-9."""
-    words = [sys.executable, "-m", "tfcompose", "export", "launch", str(robot), "-o", str(tmp_path / "out")]
-    done = subprocess.run(words, check=False, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    (file,) = (tmp_path / "out/launch").glob("*.launch.py")
-    text, data = import_of(file, code=None)
-    before, after = edges_of(robot.read_text("utf-8"), robot.parent), edges_of(text, file.parent)
-    own = {name: edge for name, edge in before.items() if edge.owner in {"static", "joints"}}
-    assert own.keys() <= after.keys()
-    for name, edge in own.items():
-        assert (edge.kind, edge.joint_name if edge.joint else "") == (
-            after[name].kind, after[name].joint_name if after[name].joint else "")  # fmt: skip
-        off = max(abs(a - b) for a, b in zip(edge.pose.xyz, after[name].pose.xyz, strict=True))
-        assert off < 1e-9
-        assert angle_between(edge.pose.quat_xyzw, after[name].pose.quat_xyzw) < 1e-9
-    assert data

@@ -9,16 +9,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
+from tests.importing.test_exported import ARGUED, COMBINATIONS
 from tests.importing.test_launch import MORE, WITH_ARGUMENTS, XML, YAML
-from tests.support.bringups import compiled, import_of
-from tfcompose.model import AsInFile
+from tests.support.bringups import compiled, exported, flat, import_of, started_with
+from tfcompose.model import Robot
 
 pytestmark = pytest.mark.skipif(find_spec("launch_ros") is None, reason="launch is not installed")
 SCRIPT = Path(__file__).parents[1] / "support/real_launch.py"
 #: XML without what launch refuses.
-SOUND_XML, SOUND_YAML = XML.replace("  <bogus/>\n", ""), YAML.replace("- bogus: {}\n", "")
+SOUND_XML = XML.replace("  <bogus/>\n", "")
+SOUND_YAML = YAML.replace("- bogus: {}\n", "").replace("respawn: true", 'respawn: "true"')
 
 
 def started(file: Path, *words: str) -> dict[str, dict[str, Any]]:
@@ -30,7 +31,7 @@ def started(file: Path, *words: str) -> dict[str, dict[str, Any]]:
 
 
 def one_of(words: list[str], files: list[dict[str, Any]]) -> tuple[str, dict[str, Any]]:
-    program = next((word for word in words if "/" in word), words[0])
+    program = next((word for word in words if "/" in word and not word.startswith("-")), words[0])
     rest = words[words.index(program) + 1 :]
     at = rest.index("--ros-args") if "--ros-args" in rest else len(rest)
     rules = [right for left, right in zip(rest[at:], rest[at + 1 :], strict=False) if left == "-r"]
@@ -39,17 +40,21 @@ def one_of(words: list[str], files: list[dict[str, Any]]) -> tuple[str, dict[str
     params: dict[str, Any] = {}
     for file in files:
         for node in file.values():
-            params |= {key: _plain(value) for key, value in node["ros__parameters"].items()}
+            params |= flat(node["ros__parameters"])
+    typed = {key: repr(list(value) if isinstance(value, tuple) else value) for key, value in sorted(params.items())}
     return name or program, {"program": program, "words": rest[:at], "namespace": namespace.strip("/"), "remap": remap,
-                             "params": params}  # fmt: skip
+                             "params": typed}  # fmt: skip
 
 
-def _plain(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
-
-
-def _as_read(value: Any) -> Any:
-    return yaml.safe_load(value) if isinstance(value, AsInFile) else value
+def of_robot(robot: Robot) -> dict[str, dict[str, Any]]:
+    """Return the same of a robot's processes, by their nodes' names, or by their programs."""
+    nodes = {
+        process.name: process.ros_nodes[0].name.rpartition("/")[2] for process in robot.processes if process.package
+    }
+    return {
+        nodes.get(name, one["program"]): {key: value for key, value in one.items() if key != "env"}
+        for name, one in started_with(robot).items()
+    }
 
 
 def imported(file: Path, *words: str) -> dict[str, dict[str, Any]]:
@@ -57,19 +62,7 @@ def imported(file: Path, *words: str) -> dict[str, dict[str, Any]]:
     text, _ = import_of(file, *words, code=None)
     robot = compiled(text, file.parent).robot
     assert robot
-    several = {}
-    for process in robot.processes:
-        if process.kind != "run":
-            continue
-        program = f"{process.package}/{process.executable}" if process.package else process.argv[0]
-        several[process.name if process.package else program] = {
-            "program": program,
-            "words": list(process.argv if process.package else process.argv[1:]),
-            "namespace": process.ros_nodes[0].name.rpartition("/")[0].strip("/"),
-            "remap": process.remap,
-            "params": {key: _as_read(value) for key, value in process.ros_nodes[0].params.items()},
-        }
-    return several
+    return of_robot(robot)
 
 
 @pytest.mark.parametrize(
@@ -99,3 +92,42 @@ def test_each_process_is_started_as_launch_would(
     assert found.keys() == expected.keys()
     for key, one in expected.items():
         assert found[key] == one, key
+
+
+@pytest.mark.parametrize("given", COMBINATIONS, ids=lambda given: "-".join(given.values()))
+def test_launch_starts_of_an_export_what_the_plan_of_the_same_arguments_has(
+    given: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """But for what waits for another one's end: here no process is started."""
+    prefix = tmp_path / "install"
+    index, share = prefix / "share/ament_index/resource_index/packages", prefix / "share/nav2_bringup"
+    index.mkdir(parents=True)
+    share.mkdir()
+    (index / "nav2_bringup").touch()
+    (share / "navigation_launch.py").write_text(INCLUDED, encoding="utf-8")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", f"{prefix}:{os.environ.get('AMENT_PREFIX_PATH', '')}")
+    (tmp_path / "argued.yaml").write_text(ARGUED, encoding="utf-8")
+    file = exported(tmp_path / "argued.yaml", tmp_path / "out")
+    found = started(file, *(f"{name}:={value}" for name, value in given.items()))
+    robot = compiled(ARGUED, tmp_path, **given).robot
+    assert robot
+    expected = of_robot(robot)
+    is_included = expected.pop("nav2_bringup/navigation_launch.py", None) is not None
+    assert (found.pop("included", {}).get("words") == [given["mode"], "3"]) is is_included
+    assert found.pop("robot_state_publisher")["params"].keys() == {
+        "publish_frequency",
+        "robot_description",
+        "use_sim_time",
+    }
+    expected.pop("toolbox", None)
+    assert found == expected
+
+
+INCLUDED = """
+from launch import LaunchDescription
+from launch.actions import ExecuteProcess
+from launch.substitutions import LaunchConfiguration
+def generate_launch_description():
+    return LaunchDescription([
+        ExecuteProcess(cmd=["included", LaunchConfiguration("mode"), LaunchConfiguration("n")])])
+"""

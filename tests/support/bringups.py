@@ -1,16 +1,24 @@
 """Importing what starts a robot, and compiling what import writes."""
 
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from tests.support.importing import PRESETS
 from tfcompose.cli import main
 from tfcompose.cli.compiling import disk
 from tfcompose.cli.reading import read_text
 from tfcompose.compile import Compiled, compile_robot
+from tfcompose.findings import Span
+from tfcompose.language import Given, GivenArg
 from tfcompose.load import load
+from tfcompose.model import AsInFile, Robot
+
+#: What a build writes of the parameters of a process.
+_PARAMETER_FILE = re.compile(r"/[^ ]*/params/\w+\.yaml")
 
 
 def import_of(source: Path, *words: str, code: int | None = 0) -> tuple[str, dict[str, Any]]:
@@ -22,8 +30,57 @@ def import_of(source: Path, *words: str, code: int | None = 0) -> tuple[str, dic
     return text, load(text, str(out)).data
 
 
-def compiled(text: str, folder: Path) -> Compiled:
-    return compile_robot(text, str(folder / "imported.yaml"), PRESETS, read=read_text, disk=disk())
+def compiled(text: str, folder: Path, **args: str) -> Compiled:
+    """Compile a robot file with the values of its arguments."""
+    given = Given({name: GivenArg(value, Span("test")) for name, value in args.items()})
+    return compile_robot(text, str(folder / "imported.yaml"), PRESETS, read=read_text, disk=disk(), given=given)
+
+
+def exported(robot: Path, out: Path) -> Path:
+    """Return the launch file that a robot file is exported to."""
+    assert main(["export", "launch", str(robot), "-o", str(out)]) == 0
+    (file,) = (out / "launch").glob("*.launch.py")
+    return file
+
+
+def _as_read(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_as_read(item) for item in value]
+    return yaml.safe_load(value) if isinstance(value, AsInFile) else value
+
+
+def flat(params: dict[str, Any], above: str = "") -> dict[str, Any]:
+    """Return parameters by their full names."""
+    several: dict[str, Any] = {}
+    for key, value in params.items():
+        several |= flat(value, f"{above}{key}.") if isinstance(value, dict) else {f"{above}{key}": _as_read(value)}
+    return several
+
+
+def started_with(robot: Robot) -> dict[str, dict[str, Any]]:
+    """Return what each process is started with, by its name; launch files, which have none in launch, by theirs.
+
+    Parameters have their types: 20.0 is not 20.
+    """
+    several: dict[str, dict[str, Any]] = {}
+    for process in robot.processes:
+        if process.kind != "run":
+            continue
+        program = f"{process.package}/{process.executable}" if process.package else process.launch or process.argv[0]
+        params = flat(process.ros_nodes[0].params)
+        own = process.package or process.launch
+        same = sum(one["program"] == program for one in several.values())
+        several[f"{program} {same}" if process.launch else process.name] = {
+            "program": program,
+            "words": [
+                _PARAMETER_FILE.sub("${params_file}", word) for word in (process.argv if own else process.argv[1:])
+            ],
+            "namespace": process.ros_nodes[0].name.rpartition("/")[0].strip("/") if process.package else "",
+            "remap": process.remap,
+            "env": process.env,
+            "params": {} if process.launch else {key: repr(value) for key, value in sorted(params.items())},
+        }
+    return several
 
 
 def places(printed: str, code: str) -> list[str]:

@@ -3,72 +3,68 @@
 from __future__ import annotations
 
 import graphlib
+import io
 import json
 import re
 import shlex
-from dataclasses import dataclass
+import tokenize
 from itertools import pairwise
+from keyword import iskeyword
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
+from tfcompose.export.code import Code, call, items, keyword
+from tfcompose.export.launch_values import LaunchValues, condition_code, parameter_code, text_code
 from tfcompose.export.supervisors import plain_name, waiting_s
 from tfcompose.files import File
 from tfcompose.numbers import number
 from tfcompose.plan.stock import MOST_HZ, OWN_KINDS, STATE_PUBLISHER, static_names
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Collection, Iterable, Iterator, Mapping
 
+    from tfcompose.export.launch_values import Text
     from tfcompose.export.supervisors import Machine
     from tfcompose.plan import Plan, PlanEdge, PlanProcess
 
 _EXECUTABLE = re.compile(r"\$\{executable:([^/}]+)/([^/}]+)\}")
 _LAUNCH = re.compile(r"\$\{launch:([^/}]+)/([^}]+)\}")
+_PLACEHOLDER = re.compile(r"\$\{(?:executable:|launch:|plan\})")
 _MOVED = ("-r", "--params-file")
-#: No line is longer, unless a single word is.
-_WIDTH = 100
-
-_HEAD = '''\
-"""The TF tree and the processes of {robot}, for ros2 launch."""
-
-import sys
-from pathlib import Path
-
-from ament_index_python.packages import get_package_share_directory
-from launch import LaunchDescription
-from launch.actions import (
-    EmitEvent,
-    ExecuteProcess,
-    GroupAction,
-    IncludeLaunchDescription,
-    RegisterEventHandler,
-    SetEnvironmentVariable,
-    Shutdown,
-    TimerAction,
-)
-from launch.event_handlers import OnProcessStart
-from launch.events import matches_action
-from launch.launch_description_sources import AnyLaunchDescriptionSource
-from launch_ros.actions import LifecycleNode, Node, PushRosNamespace, SetParameter, SetRemap
-from launch_ros.event_handlers import OnStateTransition
-from launch_ros.events.lifecycle import ChangeState
-from launch_ros.parameter_descriptions import ParameterValue
-from lifecycle_msgs.msg import Transition
-
-BUILD = (Path(__file__).resolve().parent / {folder!r}).resolve()
-
-
+#: What the launch file needs of which module.
+_IMPORTS = {
+    "launch.actions": (
+        "DeclareLaunchArgument", "EmitEvent", "ExecuteProcess", "GroupAction", "IncludeLaunchDescription",
+        "OpaqueFunction", "RegisterEventHandler", "SetEnvironmentVariable", "Shutdown", "TimerAction",
+    ),
+    "launch.conditions": ("IfCondition", "UnlessCondition"),
+    "launch.event_handlers": ("OnProcessExit", "OnProcessStart"),
+    "launch.events": ("matches_action",),
+    "launch.launch_description_sources": ("AnyLaunchDescriptionSource",),
+    "launch.substitutions": (
+        "AndSubstitution", "EnvironmentVariable", "EqualsSubstitution", "LaunchConfiguration",
+        "NotEqualsSubstitution", "NotSubstitution", "OrSubstitution", "PythonExpression",
+    ),
+    "launch_ros.actions": ("LifecycleNode", "Node", "PushRosNamespace", "SetParameter", "SetRemap"),
+    "launch_ros.event_handlers": ("OnStateTransition",),
+    "launch_ros.events.lifecycle": ("ChangeState",),
+    "launch_ros.parameter_descriptions": ("ParameterValue",),
+    "lifecycle_msgs.msg": ("Transition",),
+}  # fmt: skip
+#: Functions that a launch file has where it calls them.
+_HELPERS = {
+    "process": '''
 def process(name, **more):
     """One of tfcompose's own, or one that only the plan knows how to start."""
     command = [sys.executable, "-m", "tfcompose.launcher.exec", str(BUILD / "plan.json"), name]
     return ExecuteProcess(cmd=command, name=name, output="screen", **more)
-
-
+''',
+    "description": '''
 def description():
     """What robot_state_publisher is given."""
     return ParameterValue((BUILD / "robot.urdf").read_text(encoding="utf-8"), value_type=str)
-
-
+''',
+    "fixed": '''
 def fixed(name, parent, child, xyz, quat_xyzw, **more):
     """A fixed edge that is not in the URDF."""
     keys = ("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw")
@@ -76,8 +72,8 @@ def fixed(name, parent, child, xyz, quat_xyzw, **more):
     ends = ["--frame-id", parent, "--child-frame-id", child]
     program = {"package": "tf2_ros", "executable": "static_transform_publisher"}
     return Node(**program, name=name, arguments=pose + ends, output="screen", **more)
-
-
+''',
+    "managed": '''
 def change(node, transition):
     return EmitEvent(event=ChangeState(lifecycle_node_matcher=matches_action(node), transition_id=transition))
 
@@ -93,100 +89,274 @@ def managed(node, active):
         )
         yield RegisterEventHandler(then)
     yield RegisterEventHandler(OnProcessStart(target_action=node, on_start=[configure]))
-
-
-def included(package, name, arguments, settings):
+''',
+    "included": '''
+def included(package, name, arguments, settings, **more):
     """A package's launch file, in its share folder or anywhere below, in a group with what holds for all its nodes."""
-    share = Path(get_package_share_directory(package))
-    direct = [file for file in (share / name, share / "launch" / name) if file.is_file()]
-    file = (direct or sorted(share.rglob(name)) or [share / name])[0]
-    source = AnyLaunchDescriptionSource(str(file))
-    return GroupAction([*settings, IncludeLaunchDescription(source, launch_arguments=arguments)])
+
+    def found(context):
+        share = Path(get_package_share_directory(package))
+        direct = [file for file in (share / name, share / "launch" / name) if file.is_file()]
+        file = (direct or sorted(share.rglob(name)) or [share / name])[0]
+        return [IncludeLaunchDescription(AnyLaunchDescriptionSource(str(file)), launch_arguments=arguments)]
+
+    return GroupAction([*settings, OpaqueFunction(function=found)], **more)
+''',
+}
 
 
-def generate_launch_description():
-    return LaunchDescription([
-'''
-
-
-@dataclass(frozen=True, slots=True)
-class _Code:
-    """An expression in brackets: what is before its parts, the parts, and what is behind them."""
-
-    begin: str
-    parts: tuple[_Code | str, ...]
-    end: str
-
-    def __str__(self) -> str:
-        return f"{self.begin}{', '.join(map(str, self.parts))}{self.end}"
-
-    def lines(self, indent: str = "") -> Iterator[str]:
-        """Yield it in lines, in one if that is short enough; each part on a line of its own otherwise."""
-        if len(indent) + len(str(self)) <= _WIDTH:
-            yield f"{indent}{self}"
-            return
-        yield f"{indent}{self.begin}"
-        for part in self.parts:
-            *most, last = [f"{indent}    {part}"] if isinstance(part, str) else part.lines(f"{indent}    ")
-            yield from (*most, f"{last},")
-        yield f"{indent}{self.end}"
-
-
-def _call(name: str, *parts: _Code | str) -> _Code:
-    return _Code(f"{name}(", parts, ")")
-
-
-def _list(items: Iterable[_Code | str], keyword: str = "") -> _Code:
-    return _Code(f"{keyword}=[" if keyword else "[", tuple(items), "]")
-
-
-def launch(plan: Plan, machine: Machine, urdf: str) -> tuple[tuple[File, ...], list[str]]:
+def launch(
+    plan: Plan, machine: Machine, urdf: str, values: LaunchValues | None = None
+) -> tuple[tuple[File, ...], list[str]]:
     """Return the launch file, and what it does not keep of the plan. ``urdf`` is the text of the plan's robot.urdf.
 
     A stock robot_state_publisher sends what that URDF holds as fixed or jointed, and a static_transform_publisher each
     fixed edge elsewhere; where the URDF is not all of what tfcompose's own publishers send, these are started instead.
+    ``values`` are what the launch file decides itself.
     """
-    actions: list[_Code] = [
-        _call("SetEnvironmentVariable", repr(name), repr(value)) for name, value in _variables(plan)
-    ]
-    gaps = []
-    delays_s = _delays_s(plan)
-    known = {process.name: process for process in plan.processes}
+    export = _Export(plan, values or LaunchValues())
     stock = _stock(plan, urdf)
-    if stock is not None:
-        names = static_names(plan)
-        actions += [_state_publisher(plan), *(_fixed(plan, edge, names[edge.child]) for edge in stock)]
-        gaps.append("robot_description is robot.urdf, in which edges of other owners are floating joints")
-    for process in plan.started:
-        if process.kind == "guard":
-            gaps.append("the guard is left out: it belongs to tfcompose up")
-        elif process.kind not in OWN_KINDS or stock is None:
+    actions = list(export.actions(stock))
+    text = _text(plan, machine, actions, export.named)
+    left_out = [f"{process.name} is a component, and left out: tfcompose up loads it" for process in plan.components]
+    return (File(f"{plain_name(plan.robot)}.launch.py", text),), [*export.gaps, *left_out]
+
+
+def _text(plan: Plan, machine: Machine, actions: list[Code], named: Mapping[str, Code]) -> str:
+    """Return the launch file: what it imports, the functions that it calls, and its actions.
+
+    ``named`` are actions that others refer to, by their variables' names.
+    """
+    body = "".join(f"{line}\n" for name, action in named.items() for line in _assigned(name, action))
+    body += "    return LaunchDescription([\n"
+    body += "".join(f"{line}\n" for action in actions for line in action.lines(" " * 8, ",")) + "    ])\n"
+    helpers = "".join(f"\n{text}" for name, text in _HELPERS.items() if re.search(rf"\b{name}\(", body))
+    used = set(re.findall(r"\w+", helpers + body))
+    lines = [f'"""The TF tree and the processes of {plan.robot}, for ros2 launch."""', ""]
+    lines += ["import sys"] if "sys" in used else []
+    lines += ["from pathlib import Path", ""]
+    if "get_package_share_directory" in used:
+        lines.append("from ament_index_python.packages import get_package_share_directory")
+    lines.append("from launch import LaunchDescription")
+    for module, names in _IMPORTS.items():
+        several = [name for name in names if name in used]
+        imported = Code(f"from {module} import ", tuple(several), "")
+        if len(str(imported)) > 100:  # noqa: PLR2004 (as long as lines of code are)
+            imported = Code(f"from {module} import (", tuple(several), ")")
+        lines += imported.lines() if several else []
+    for name in ("BUILD", "HERE"):
+        if name in used:
+            folder = f"Path(__file__).resolve().parent / {machine.folder!r}"
+            lines += [
+                "",
+                f"BUILD = ({folder}).resolve()" if name == "BUILD" else "HERE = Path(__file__).resolve().parent",
+            ]
+    begin = "\n\ndef generate_launch_description():\n"
+    return _in_double_quotes("\n".join(lines).replace("\n\nHERE", "\nHERE") + f"\n{helpers}{begin}{body}")
+
+
+def _in_double_quotes(text: str) -> str:
+    """Return Python's source with double quotes around all texts that hold none."""
+    lines = text.splitlines(keepends=True)
+    for token in reversed(list(tokenize.generate_tokens(io.StringIO(text).readline))):
+        (line, begin), (last, end) = token.start, token.end
+        if token.type == tokenize.STRING and token.string[0] == "'" and line == last and '"' not in token.string:
+            inside = token.string[1:-1]
+            lines[line - 1] = f'{lines[line - 1][:begin]}"{inside}"{lines[line - 1][end:]}'
+    return "".join(lines)
+
+
+def _assigned(name: str, action: Code) -> Iterator[str]:
+    return Code(f"{name} = {action.begin}", action.parts, action.end).lines("    ")
+
+
+class _Export:
+    """The actions of a launch file; ``gaps`` are what they do not keep, ``named`` those that others refer to."""
+
+    def __init__(self, plan: Plan, values: LaunchValues) -> None:
+        self.plan, self.values = plan, values
+        self.processes = (*plan.started, *values.more)
+        self.known = {process.name: process for process in (*plan.processes, *values.more)}
+        self.gaps: list[str] = []
+        self.named: dict[str, Code] = {}
+        self._variables: dict[str, str] = {}
+
+    def actions(self, stock: list[PlanEdge] | None) -> Iterator[Code]:
+        """Yield the actions in order; ``stock`` are the edges of static_transform_publishers, None without such."""
+        plan = self.plan
+        yield from (argument.code() for argument in self.values.arguments)
+        yield from (call("SetEnvironmentVariable", repr(name), repr(value)) for name, value in _variables(plan))
+        if stock is not None:
+            names = static_names(plan)
+            yield from (_state_publisher(plan), *(_fixed(plan, edge, names[edge.child]) for edge in stock))
+            self.gaps.append("robot_description is robot.urdf, in which edges of other owners are floating joints")
+        delays_s = _delays_s(self.known)
+        for name in self._awaited(stock):
+            self._variables[name] = _variable_name(name, self._variables.values())
+        for process in self.processes:
+            if process.kind == "guard":
+                self.gaps.append("the guard is left out: it belongs to tfcompose up")
+                continue
+            if process.kind in OWN_KINDS and stock is not None:
+                continue
+            before = [name for name, what in process.after.items() if what == "done" and name in self._variables]
+            action = self._started(process)
+            if process.name in self._variables:
+                self.named[self._variables[process.name]] = action
+                action = Code(self._variables[process.name], (), "")
             delay_s = delays_s[process.name]
-            action = _started(plan, process)
-            delayed = _call("TimerAction", f"period={delay_s!r}", _list([action], "actions"))
-            actions.append(delayed if delay_s else action)
-        unheeded = [name for name, what in process.after.items() if not waiting_s(known[name], what)]
-        if unheeded and process.kind != "guard":
-            gaps.append(f"{process.name} does not wait for {', '.join(unheeded)}: launch knows no readiness")
-        gaps += _unlike(process)
-    gaps += [f"{process.name} is a component, and left out: tfcompose up loads it" for process in plan.components]
-    head = _HEAD.replace("{robot}", plan.robot).replace("{folder!r}", repr(machine.folder))
-    text = head + "".join(f"{line}\n" for action in actions for line in _element(action)) + "    ])\n"
-    return (File(f"{plain_name(plan.robot)}.launch.py", text),), gaps
+            action = call("TimerAction", f"period={delay_s!r}", items([action], "actions")) if delay_s else action
+            if before:
+                ended = f"target_action={self._variables[before[0]]}"
+                action = call("RegisterEventHandler", call("OnProcessExit", ended, items([action], "on_exit")))
+            yield action
+            self._waits(process, before[:1])
+            self.gaps += _unlike(process)
+
+    def _awaited(self, stock: list[PlanEdge] | None) -> list[str]:
+        """Return the processes for whose end others wait and which are actions of their own."""
+        own = set() if stock is None else OWN_KINDS
+        names = {name for process in self.processes for name, what in process.after.items() if what == "done"}
+        return [
+            process.name for process in self.processes
+            if process.name in names and process.kind not in {"guard", *own}
+            and not _is_launch(process) and not process.lifecycle
+        ]  # fmt: skip
+
+    def _waits(self, process: PlanProcess, before: list[str]) -> None:
+        """Say for what the process does not wait as it does under ``up``."""
+        rest = [
+            name for name, what in process.after.items()
+            if name in self.known and name not in before and not waiting_s(self.known[name], what)
+        ]  # fmt: skip
+        if rest:
+            self.gaps.append(f"{process.name} does not wait for {', '.join(rest)}: launch knows no readiness")
+        self.gaps += [f"{process.name} is started also when {name} fails" for name in before]
+
+    def _texts_of(self, process: PlanProcess, place: str) -> dict[str, Text]:
+        """Return the texts of a place, args, env, params or remap, that the launch file makes itself."""
+        several = self.values.texts.get(process.name, {})
+        return {key.removeprefix(f"{place}."): text for key, text in several.items() if key.startswith(f"{place}.")}
+
+    def _condition(self, process: PlanProcess) -> list[Code | str]:
+        expression = self.values.conditions.get(process.name)
+        return [keyword("condition", condition_code(expression, self.values.kinds))] if expression else []
+
+    def _started(self, process: PlanProcess) -> Code:
+        if _is_launch(process):
+            return self._included(process)
+        delay = 1.0 if process.restart_delay is None else process.restart_delay
+        again = () if process.restart == "no" else ("respawn=True", f"respawn_delay={delay}")
+        ends = ("on_exit=Shutdown()",) if process.required else ()
+        more = [*again, *ends, *self._condition(process)]
+        if _is_node(process):
+            return self._node(process, more)
+        if _is_command(process):
+            words = self._filled(process, process.argv)
+            for index, text in self._texts_of(process, "args").items():
+                words[int(index)] = text_code(text)
+            run = [items(words, "cmd"), f"name={process.name!r}", *self._surroundings(process), "output='screen'"]
+            return call("ExecuteProcess", *run, *more)
+        return call("process", repr(process.name), *more)
+
+    def _file(self, process: PlanProcess) -> str:
+        """Return Python that gives the process's parameter file."""
+        return f"{'HERE' if process in self.values.more else 'BUILD'} / {process.params_file!r}"
+
+    def _filled(self, process: PlanProcess, words: Iterable[str]) -> list[Code | str]:
+        return [_filled(word, self._file(process)) for word in words]
+
+    def _environment(self, process: PlanProcess) -> dict[str, Code | str]:
+        """Return the process's variables, as Python."""
+        env: dict[str, Code | str] = {
+            name: _filled(value, self._file(process)) for name, value in process.env.items()
+        }  # fmt: skip
+        return env | {name: text_code(text) for name, text in self._texts_of(process, "env").items()}
+
+    def _surroundings(self, process: PlanProcess) -> Iterator[Code | str]:
+        """Yield the keywords that any process takes."""
+        env = self._environment(process)
+        if process.cwd is not None:
+            yield f"cwd={_filled(process.cwd, '')}"
+        if env:
+            yield _mapping(env, "additional_env")
+        if process.prefix:
+            yield f"prefix={shlex.join(process.prefix)!r}"
+
+    def _node(self, process: PlanProcess, more: list[Code | str]) -> Code:
+        package = _EXECUTABLE.fullmatch(process.argv[0])
+        own, ros_words = _rest(process)
+        words = self._filled(process, own)
+        for index, text in self._texts_of(process, "args").items():
+            words[int(index)] = text_code(text)
+        namespace, _, node = process.nodes[0].rpartition("/")
+        remap: dict[str, Code | str] = {old: repr(new) for old, new in process.remap.items()}
+        remap |= {old: text_code(text) for old, text in self._texts_of(process, "remap").items()}
+        texts = {name: parameter_code(text) for name, text in self._texts_of(process, "params").items()}
+        given: list[Code | str] = [f"str({self._file(process)})"] if "--params-file" in process.argv else []
+        given += [_mapping(texts)] if texts else []
+        named = [] if node == process.name else [f"exec_name={process.name!r}"]
+        parts: list[Code | str] = [
+            f"package={package[1]!r}" if package else "", f"executable={package[2]!r}" if package else "",
+            f"name={node!r}", f"namespace={namespace or '/'!r}", *named,
+            *([items((f"({old!r}, {new})" for old, new in remap.items()), "remappings")] if remap else []),
+            *([items(words, "arguments")] if words else []),
+            *([items(self._filled(process, ros_words), "ros_arguments")] if ros_words else []),
+            *([items(given, "parameters")] if given else []),
+            *self._surroundings(process), "output='screen'", *more,
+        ]  # fmt: skip
+        state = process.lifecycle.get(process.nodes[0])
+        if not state:
+            return call("Node", *parts)
+        return call("*managed", call("LifecycleNode", *parts), f"active={state == 'active'}")
+
+    def _included(self, process: PlanProcess) -> Code:
+        """Return the launch file with its arguments, and what ``up`` sets for all of its nodes."""
+        plan, meant = self.plan, _LAUNCH.fullmatch(process.argv[0])
+        package, file = (meant[1], meant[2]) if meant else ("", "")
+        texts = self._texts_of(process, "args")
+        pairs = [word.split(":=", 1) for word in process.argv[1:]]
+        arguments = [(name, texts.get(str(index)), value) for index, (name, value) in enumerate(pairs)]
+        namespace = plan.ros.namespace if process.namespace is None else process.namespace
+        settings = [
+            *(call("SetEnvironmentVariable", repr(name), value) for name, value in self._environment(process).items()),
+            *([call("PushRosNamespace", repr(namespace))] if namespace else []),
+            *(call("SetRemap", repr(old), repr(new)) for old, new in process.remap.items()),
+            *([call("SetParameter", "'use_sim_time'", "True")] if plan.ros.clock == "sim" else []),
+        ]
+        given = items(
+            f"({name!r}, {text_code(text) if text else _filled(value, self._file(process))})"
+            for name, text, value in arguments
+        )
+        return call("included", repr(package), repr(file), given, items(settings), *self._condition(process))
 
 
-def _element(action: _Code) -> Iterator[str]:
-    """Yield the action in lines, as an element of the list of all."""
-    *most, last = action.lines(" " * 8)
-    yield from (*most, f"{last},")
+def _variable_name(name: str, taken: Collection[str]) -> str:
+    plain = re.sub(r"\W", "_", name)
+    plain = plain if plain.isidentifier() and not iskeyword(plain) else f"process_{plain}"
+    while plain in taken:
+        plain += "_"
+    return plain
 
 
-def _delays_s(plan: Plan) -> dict[str, float]:
+def _mapping(values: Mapping[str, Code | str], name: str = "") -> Code:
+    """Return a dict, or a keyword with one."""
+    several = (
+        f"{key!r}: {value}" if isinstance(value, str) else Code(f"{key!r}: {value.begin}", value.parts, value.end)
+        for key, value in values.items()
+    )
+    return Code(f"{name}={{" if name else "{", tuple(several), "}")
+
+
+def _delays_s(known: Mapping[str, PlanProcess]) -> dict[str, float]:
     """Return how long after the launch each is started: when all for which it waits so many seconds have had them."""
-    known = {process.name: process for process in plan.processes}
     delays: dict[str, float] = {}
-    for name in graphlib.TopologicalSorter({name: process.after for name, process in known.items()}).static_order():
-        waits = (delays[other] + waiting_s(known[other], what) for other, what in known[name].after.items())
+    waiting = {
+        name: {other: what for other, what in process.after.items() if other in known}
+        for name, process in known.items()
+    }  # fmt: skip
+    for name in graphlib.TopologicalSorter(waiting).static_order():
+        waits = (delays[other] + waiting_s(known[other], what) for other, what in waiting[name].items())
         delays[name] = max(waits, default=0.0)
     return delays
 
@@ -245,13 +415,16 @@ def _package(process: PlanProcess) -> str:
     return meant[1] if meant else ""
 
 
-def _keywords(plan: Plan) -> tuple[str, _Code]:
-    """Return the keywords of stock nodes: namespace, and the publishers' remappings."""
+def _keywords(plan: Plan) -> Iterator[str | Code]:
+    """Yield the keywords of stock nodes: namespace, and the publishers' remappings."""
     remap = {old: new for one in plan.started if one.kind in OWN_KINDS for old, new in one.remap.items()}
-    return f"namespace={plan.ros.namespace!r}", _list(map(repr, remap.items()), "remappings")
+    if plan.ros.namespace:
+        yield f"namespace={plan.ros.namespace!r}"
+    if remap:
+        yield items(map(repr, remap.items()), "remappings")
 
 
-def _state_publisher(plan: Plan) -> _Code:
+def _state_publisher(plan: Plan) -> Code:
     """Return robot_state_publisher, which passes on as many joint states as the plan's publisher does."""
     joints = next((process for process in plan.started if process.kind == "joints"), None)
     given = _params(joints.argv) if joints else {}
@@ -259,9 +432,9 @@ def _state_publisher(plan: Plan) -> _Code:
     values["use_sim_time"] = plan.ros.clock == "sim"
     if plan.ros.frame_prefix:
         values["frame_prefix"] = plan.ros.frame_prefix
-    params = _Code("{", ('"robot_description": description()', *(f"{k!r}: {v!r}" for k, v in values.items())), "}")
+    params = Code("{", ('"robot_description": description()', *(f"{k!r}: {v!r}" for k, v in values.items())), "}")
     named = (f"package={STATE_PUBLISHER!r}", f"executable={STATE_PUBLISHER!r}", f"name={STATE_PUBLISHER!r}")
-    return _call("Node", *named, *_keywords(plan), _list([params], "parameters"), "output='screen'")
+    return call("Node", *named, *_keywords(plan), items([params], "parameters"), "output='screen'")
 
 
 def _params(argv: tuple[str, ...]) -> dict[str, Any]:
@@ -270,63 +443,25 @@ def _params(argv: tuple[str, ...]) -> dict[str, Any]:
     return {name: json.loads(value) for name, _, value in (word.partition(":=") for word in words)}
 
 
-def _fixed(plan: Plan, edge: PlanEdge, name: str) -> _Code:
+def _fixed(plan: Plan, edge: PlanEdge, name: str) -> Code:
     ends = (repr(name), repr(edge.parent), repr(edge.child))
-    numbers = (_Code("(", tuple(map(number, part)), ")") for part in (edge.pose.xyz, edge.pose.quat_xyzw))
-    return _call("fixed", *ends, *numbers, *_keywords(plan))
-
-
-def _started(plan: Plan, process: PlanProcess) -> _Code:
-    if _is_launch(process):
-        return _included(plan, process)
-    delay = 1.0 if process.restart_delay is None else process.restart_delay
-    again = () if process.restart == "no" else ("respawn=True", f"respawn_delay={delay}")
-    ends = ("on_exit=Shutdown()",) if process.required else ()
-    package = _EXECUTABLE.fullmatch(process.argv[0]) if process.argv else None
-    if package is None or not _is_node(process) or process.schedule:
-        return _call("process", repr(process.name), *again, *ends)
-    own, ros_words = _rest(process)
-    namespace, _, node = process.nodes[0].rpartition("/")
-    parts: list[_Code | str] = [
-        f"package={package[1]!r}", f"executable={package[2]!r}", f"name={node!r}", f"namespace={namespace or '/'!r}",
-        _list(map(repr, process.remap.items()), "remappings"),
-        _list(map(_filled, own), "arguments"),
-        *([_list(map(_filled, ros_words), "ros_arguments")] if ros_words else []),
-        *([f"parameters=[str(BUILD / {process.params_file!r})]"] if process.params_file else []),
-        *([_Code("additional_env={", _environment(process), "}")] if process.env else []),
-        *([f"prefix={shlex.join(process.prefix)!r}"] if process.prefix else []),
-        "output='screen'", *again, *ends,
-    ]  # fmt: skip
-    state = process.lifecycle.get(process.nodes[0])
-    if not state:
-        return _call("Node", *parts)
-    return _call("*managed", _call("LifecycleNode", *parts), f"active={state == 'active'}")
+    numbers = (Code("(", tuple(map(number, part)), ")") for part in (edge.pose.xyz, edge.pose.quat_xyzw))
+    return call("fixed", *ends, *numbers, *_keywords(plan))
 
 
 def _is_launch(process: PlanProcess) -> bool:
     return bool(process.argv) and _LAUNCH.fullmatch(process.argv[0]) is not None
 
 
-def _included(plan: Plan, process: PlanProcess) -> _Code:
-    """Return the launch file with its arguments, and what ``up`` sets for all of its nodes."""
-    meant = _LAUNCH.fullmatch(process.argv[0])
-    package, file = (meant[1], meant[2]) if meant else ("", "")
-    arguments = [word.split(":=", 1) for word in process.argv[1:]]
-    namespace = plan.ros.namespace if process.namespace is None else process.namespace
-    settings = [
-        *(_call("SetEnvironmentVariable", repr(name), _filled(value)) for name, value in process.env.items()),
-        *([_call("PushRosNamespace", repr(namespace))] if namespace else []),
-        *(_call("SetRemap", repr(old), repr(new)) for old, new in process.remap.items()),
-        *([_call("SetParameter", "'use_sim_time'", "True")] if plan.ros.clock == "sim" else []),
-    ]
-    given = _list(f"({name!r}, {_filled(value)})" for name, value in arguments)
-    return _call("included", repr(package), repr(file), given, _list(settings))
-
-
 def _is_node(process: PlanProcess) -> bool:
     """Return whether launch can start the process as one node, and not only as a process."""
-    names_file = any("${params_file}" in word for word in (*process.env.values(), *_rest(process)[0]))
-    return bool(_package(process)) and len(process.nodes) == 1 and process.cwd is None and not names_file
+    return bool(_package(process)) and len(process.nodes) == 1 and not process.schedule
+
+
+def _is_command(process: PlanProcess) -> bool:
+    """Return whether the process's command is one that launch can start as it is."""
+    words = (*process.argv, *process.env.values())
+    return process.kind == "run" and not process.schedule and not any(map(_PLACEHOLDER.search, words))
 
 
 def _rest(process: PlanProcess) -> tuple[list[str], list[str]]:
@@ -342,12 +477,13 @@ def _rest(process: PlanProcess) -> tuple[list[str], list[str]]:
     return words[:at], kept
 
 
-def _environment(process: PlanProcess) -> tuple[str, ...]:
-    return tuple(f"{name!r}: {_filled(value)}" for name, value in process.env.items())
+#: What a word of the plan stands for in the launch file.
+_WORDS = {"${build_dir}": "str(BUILD)", "${python}": "sys.executable", "${params_file}": "str({file})"}
 
 
-def _filled(word: str) -> str:
-    """Return the word as Python that knows the plan's folder."""
-    if "${build_dir}" not in word:
-        return repr(word)
-    return f"{word!r}.replace('${{build_dir}}', str(BUILD))"
+def _filled(word: str, file: str) -> str:
+    """Return the word as Python that knows the plan's folder; ``file`` is Python that gives the parameter file."""
+    found = {mark: code.replace("{file}", file) for mark, code in _WORDS.items() if mark in word}
+    if word in found:
+        return found[word]
+    return repr(word) + "".join(f".replace({mark!r}, {code})" for mark, code in found.items())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import posixpath
 import re
@@ -191,11 +192,13 @@ class _Work:
             explained = f" ({record['description'].strip()})" if record["description"].strip() else ""
             if name in used:
                 typed = scalar_of(value)
-                keys: dict[str, Any] = {"type": "string"} if isinstance(typed, str) else {}
+                kind = {str: "string", float: "float"}.get(type(typed))
+                keys: dict[str, Any] = {"type": kind} if kind else {}
                 keys |= {"default": typed}
                 choices = [scalar_of(one) for one in record["choices"]]
                 keys |= {"choices": choices} if choices and {type(one) for one in choices} == {type(typed)} else {}
                 keys |= {"description": " ".join(record["description"].split())} if explained else {}
+                keys |= {"env": record["env"]} if record["env"] else {}
                 self.draft.sections["args"][name] = keys
                 self.draft.note(at, where(span))
             if name in decided or name not in used:
@@ -356,6 +359,7 @@ class _Work:
         keys |= {"env": env} if env else {}
         name = posixpath.basename(file).partition(".")[0]
         name = self.draft.process(name, keys, where(span, "an included launch file, which runs as one process"))
+        self._conditions(record, ("processes", name))
         if record.get("after"):
             self._after.append((name, record["after"]))
         if record.get("period"):
@@ -381,13 +385,14 @@ class _Work:
         """Let what a timer starts wait: for a process that counts as ready after that time."""
         processes = self.draft.sections["processes"]
         gates: dict[float, str] = {}
-        delayed = {name for name, _ in self._delays}
+        unfit = {name for name, _ in self._delays}
+        unfit |= {self._names.get(key, "") for _, after in self._after for key in after}
         for name, period_s in self._delays:
             if period_s not in gates:
                 free = [
                     one for one in self._names.values()
-                    if one not in delayed and one not in gates.values() and "run" in processes[one]
-                    and "ready" not in processes[one] and "after" not in processes[one]
+                    if one not in unfit and one not in gates.values() and "run" in processes[one]
+                    and not {"ready", "after", "when"} & processes[one].keys()
                 ]  # fmt: skip
                 if free:
                     gates[period_s] = free[0]
@@ -395,7 +400,6 @@ class _Work:
                 else:
                     text = number(period_s)
                     gate = self.draft.process(f"delay_{text}", {"run": ["sleep", text]}, "the time of a timer")
-                    processes[gate]["required"] = False
                     gates[period_s] = gate
             gate = gates[period_s]
             what = "done" if processes[gate]["run"] == ["sleep", number(period_s)] else "ready"
@@ -420,7 +424,7 @@ def _split_description(params: list[Any], todo: list[str]) -> tuple[list[Any], D
                 description = _description(value)
             elif isinstance(value, str) and marks(value):
                 todo.append(f"the parameter {key}, which is the text of {_description(value).file}")
-            elif value is None or value == [] or (isinstance(value, list) and not _is_uniform(value)):
+            elif value is None or value == [] or not _is_finite(value) or not _is_uniform(value):
                 todo.append(f"the parameter {key}: {value!r}")
             else:
                 own[key] = value
@@ -429,8 +433,15 @@ def _split_description(params: list[Any], todo: list[str]) -> tuple[list[Any], D
     return kept, description
 
 
-def _is_uniform(value: list[Any]) -> bool:
+def _is_uniform(value: Any) -> bool:
+    if not isinstance(value, list):
+        return True
     return len({type(one) for one in value}) == 1 and isinstance(value[0], (bool, int, float, str))
+
+
+def _is_finite(value: Any) -> bool:
+    several = value if isinstance(value, list) else [value]
+    return all(math.isfinite(one) for one in several if isinstance(one, float))
 
 
 def _description(value: str) -> Description:

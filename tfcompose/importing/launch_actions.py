@@ -17,6 +17,7 @@ from tfcompose.importing.launch_substitutions import (
     MODULE,
     PACKAGE,
     Context,
+    EnvironmentVariable,
     FailedError,
     Missing,
     parameter_value,
@@ -137,7 +138,14 @@ class DeclareLaunchArgument(Action):
             if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
                 context.declared[name] = kinds[type(scalar_of(known))]
             context.record("argument", self.at, name=name, default=default, value=known, choices=choices,
-                           description=str(self.description or ""))  # fmt: skip
+                           description=str(self.description or ""), env=self._variable(context))  # fmt: skip
+
+    def _variable(self, context: Context) -> str:
+        """Return the environment variable that is its default, or nothing."""
+        value = self.default_value
+        value = value[0] if isinstance(value, (list, tuple)) and len(value) == 1 else value
+        is_variable = isinstance(value, EnvironmentVariable) and value.default_value is not None
+        return text_of(value.name, context) if is_variable else ""
 
     def described(self, context: Context) -> str:
         return f"the launch argument {plain([self.name])}"

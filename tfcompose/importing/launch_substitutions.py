@@ -9,6 +9,7 @@ arguments that the import is given.
 
 from __future__ import annotations
 
+import ast
 import json
 import math
 import os
@@ -525,7 +526,66 @@ def expression_of(value: Any, context: Context) -> str | None:
     if isinstance(one, EqualsSubstitution) and isinstance(one.args[0], LaunchConfiguration):
         word = "!=" if isinstance(one, NotEqualsSubstitution) else "=="
         return _comparison(plain([one.args[0].variable_name]), word, one.args[1], context)
+    return _python_expression(one, context) if isinstance(one, PythonExpression) else None
+
+
+#: What stands for an argument in an expression: within quotes, and without.
+_QUOTED, _BARE = "quoted_", "bare_"
+_SIGNS: dict[type[ast.cmpop], str] = {
+    ast.Eq: "==", ast.NotEq: "!=", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="
+}  # fmt: skip
+
+
+def _python_expression(given: PythonExpression, context: Context) -> str | None:
+    """Return a condition in Python as an expression of a robot file, or None where it cannot be one."""
+    pieces = given.expression if isinstance(given.expression, (list, tuple)) else [given.expression]
+    text = ""
+    for piece in pieces:
+        if isinstance(piece, LaunchConfiguration):
+            text += f"{BEGIN}{plain([piece.variable_name])}{END}"
+        elif isinstance(piece, (str, TextSubstitution)):
+            text += piece if isinstance(piece, str) else str(piece.text)
+        else:
+            return None
+    text = re.sub(rf"(['\"]){BEGIN}(\w+){END}\1", rf"{_QUOTED}\2", text)
+    text = re.sub(rf"{BEGIN}(\w+){END}", rf"{_BARE}\1", text)
+    try:
+        return _of_python(ast.parse(text.strip(), mode="eval").body, context)
+    except (SyntaxError, ValueError):
+        return None
+
+
+def _of_python(node: ast.expr, context: Context) -> str | None:
+    match node:
+        case ast.BoolOp(op=op, values=values):
+            several = [_of_python(one, context) for one in values]
+            word = " and " if isinstance(op, ast.And) else " or "
+            return word.join(f"({inner})" for inner in several) if all(several) else None
+        case ast.UnaryOp(op=ast.Not(), operand=operand):
+            inner = _of_python(operand, context)
+            return inner and f"not ({inner})"
+        case ast.Name(id=word) if word.startswith(_BARE):
+            name = word.removeprefix(_BARE)
+            return f"args.{name}" if context.declared.get(name) == "bool" else None
+        case ast.Compare(left=left, ops=[op], comparators=[ast.Constant(value=value)]) if type(op) in _SIGNS:
+            return _python_comparison(left, _SIGNS[type(op)], value, context)
     return None
+
+
+def _python_comparison(left: ast.expr, sign: str, value: Any, context: Context) -> str | None:
+    match left:
+        case ast.Call(func=ast.Attribute(value=ast.Name() as inner, attr="lower"), args=[]):
+            left = inner
+    if not isinstance(left, ast.Name):
+        return None
+    if left.id.startswith(_QUOTED) and isinstance(value, str) and sign in {"==", "!="}:
+        return _comparison(left.id.removeprefix(_QUOTED), sign, value, context)
+    name = left.id.removeprefix(_BARE)
+    if left.id.startswith(_BARE) and isinstance(value, bool) and sign in {"==", "!="}:
+        return _comparison(name, sign, str(value).lower(), context)
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    known = context.declared.get(name) in {"int", "float"}
+    return f"args.{name} {sign} {value}" if left.id.startswith(_BARE) and is_number and known else None
 
 
 def _comparison(name: str, word: str, expected: Any, context: Context) -> str | None:
@@ -559,12 +619,27 @@ class ParameterValue:
             return self.value
         if self.value_type is None:
             return _typed_or_symbolic(self.value, context)
+        if (symbolic := self._symbolic(context)) is not None:
+            return symbolic
         text = text_of(self.value, context)
         if self.value_type is str or marks(text):
             return text
         return _typed(text)
 
     evaluate = perform
+
+    def _symbolic(self, context: Context) -> str | None:
+        """Return the text in which arguments stand for themselves, if these have the value's type."""
+        text = symbolic_text(self.value, context)
+        names = arguments_in(text)
+        alone = [name for name in names if text == argument(name, with_values(text))]
+        kinds = {bool: "bool", int: "int", float: "float", str: "string"}
+        if alone and context.declared.get(alone[0]) == kinds.get(self.value_type):
+            return text
+        if names and not alone and self.value_type is str:
+            return text
+        context.decided |= names
+        return None
 
 
 class ParameterFile:

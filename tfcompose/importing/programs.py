@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from tfcompose.importing.static_transforms import PROGRAM, RefusedError, reader_of, static_transform
-from tfcompose.importing.yaml_text import Bare
+from tfcompose.importing.yaml_text import Bare, parameter
 from tfcompose.numbers import number
 from tfcompose.resolve.presets import node_preset, node_preset_names
 
@@ -234,7 +234,7 @@ def _add_process(draft: Draft, program: Program, target: Target) -> str:
     at, todo, advice = program.at, list(program.todo), ""
     run = _run(program)
     usual = _usual_name(program.package) if program.package and not program.name else None
-    wanted = program.name or usual or program.label or _plain(program) or "process"
+    wanted = (program.name and program.label) or program.name or usual or program.label or _plain(program) or "process"
     name = draft.free_name(wanted)
     keys: dict[str, Any] = {"run": run}
     keys |= {"shell": True} if program.shell else {}
@@ -316,4 +316,4 @@ def _params(given: Sequence[Mapping[str, Any] | str], target: Target) -> tuple[d
             if own:
                 left.append(f"{one} is laid over the parameters before it: here they are laid over the file")
     named: dict[str, Any] = {"file": files[0] if len(files) == 1 else files} if files else {}
-    return named | own, left
+    return named | {key: parameter(value) for key, value in own.items()}, left

@@ -87,6 +87,18 @@ def flow(value: Any) -> str:
     return text(value)
 
 
+def parameter(value: Any) -> Any:
+    """Return a node's parameter such that it is written with its type: 20.0 is a double, and 20 an integer."""
+    if isinstance(value, list):
+        return [parameter(item) for item in value]
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return value
+    if isinstance(value, int):
+        return Bare(value)
+    mantissa, exponent, power = repr(value).partition("e")
+    return Bare(f"{mantissa}{'' if '.' in mantissa else '.0'}{exponent}{power}")
+
+
 def _as_people_write(value: float) -> float:
     """Return the number without what computing left in its last digits: 0.010267499999999999 was 0.0102675."""
     near = float(f"{value:.{_DIGITS}g}")

@@ -110,10 +110,18 @@ def _exported(plan: Plan, file: Path, folder: Path, arguments: Namespace) -> tup
 
     relative = Path(os.path.relpath(file.parent, folder)).as_posix()
     if arguments.kind == "launch":
+        from tfcompose.cli.plans import is_plan
         from tfcompose.cli.reading import read_text
         from tfcompose.export.launch import launch
 
-        return launch(plan, Machine(relative), read_text(str(file.parent / "robot.urdf")))
+        urdf = read_text(str(file.parent / "robot.urdf"))
+        if is_plan(arguments.file):
+            return launch(plan, Machine(relative), urdf)
+        from tfcompose.cli.launch_values import launch_values
+
+        values, further, fixed = launch_values(arguments, plan)
+        files, gaps = launch(plan, Machine(relative), urdf, values)
+        return (*files, *further), [*gaps, *fixed]
     if arguments.kind == "compose":
         from tfcompose.export.supervisors import compose
 

@@ -1,0 +1,290 @@
+"""What of a robot file its export for ros2 launch decides itself: which arguments stay arguments.
+
+An argument stays one where it decides no more than whether processes are started, and words, parameters, remappings and
+variables that they are given. One that decides anything else has the value that the export was given, or its default.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import defaultdict
+from dataclasses import dataclass, field
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+from tfcompose.cli.combinations import MOST
+from tfcompose.cli.compiling import disk, given_by, library, overlays_of
+from tfcompose.cli.reading import read_text
+from tfcompose.cli.writing import destination
+from tfcompose.compile import Compiled, compile_robot
+from tfcompose.emit import emit
+from tfcompose.export.launch_values import (
+    Argument,
+    ArgumentValue,
+    LaunchValues,
+    Text,
+    VariableValue,
+    condition_code,
+)
+from tfcompose.findings import Span
+from tfcompose.language import Given, GivenArg, composed, profiles_in, validate, with_includes
+from tfcompose.language.args import as_given
+from tfcompose.language.expressions import environment_in, evaluate, names_in
+from tfcompose.language.values import plain
+from tfcompose.load import load
+from tfcompose.plan.file import read_plan
+from tfcompose.plan.stock import OWN_KINDS
+
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Iterator, Mapping
+
+    from tfcompose.files import File
+    from tfcompose.language import ArgSpec
+    from tfcompose.load import Path, Source
+    from tfcompose.plan import Plan, PlanProcess
+
+_HOLE = re.compile(r"\$\{([^{}]*)\}")
+_ARGUMENT = re.compile(r"\s*args\.([A-Za-z_][A-Za-z0-9_]*)\s*")
+_CONSTANT = re.compile(r"'([^']*)'|\"([^\"]*)\"|(?<![\w.])(-?\d+(?:\.\d+)?)")
+#: What of a process launch can compute, by the key.
+_PLACES = ("env", "params", "remap")
+
+
+@dataclass(slots=True)
+class _Uses:
+    """Where a robot file names what it is built with.
+
+    ``texts`` are those of processes that launch can compute, by process and place, ``conditions`` those of processes;
+    ``fixed`` are arguments and variables that something else needs.
+    """
+
+    texts: dict[tuple[str, str], str] = field(default_factory=dict)
+    conditions: dict[str, str] = field(default_factory=dict)
+    fixed: set[str] = field(default_factory=set)
+
+
+def launch_values(arguments: Namespace, plan: Plan) -> tuple[LaunchValues, tuple[File, ...], list[str]]:
+    """Return what the launch file decides itself, files that it needs beside it, and what is fixed and why.
+
+    ``plan`` is the built one. The robot file has no errors.
+    """
+    source = composed(
+        with_includes(load(read_text(arguments.file), arguments.file), read_text),
+        arguments.profiles, overlays_of(arguments), given_by(arguments),
+    )  # fmt: skip
+    validated = validate(source, profiles_in(source), given_by(arguments))
+    specs, values = validated.spec.args, validated.args
+    kinds = {name: spec.kind for name, spec in specs.items()}
+    uses = _uses(source, kinds)
+    there = {process.name: process for process in plan.started}
+    combined = _Combinations(arguments, plan, specs, values)
+    missing = {name: expression for name, expression in uses.conditions.items() if name not in there}
+    more = {name: found for name, expression in missing.items() if (found := combined.process(name, expression))}
+    for name, expression in uses.conditions.items():
+        if name not in there and name not in more:
+            uses.fixed |= set(names_in(f"${{{expression}}}"))
+    kept, conditions = _settled(uses, kinds)
+    texts: dict[str, dict[str, Text]] = defaultdict(dict)
+    for (process, place), text in kept.items():
+        if process in there or process in more:
+            texts[process][place] = _text(text, kinds)
+    used = {part.name for several in texts.values() for text in several.values() for part in text
+            if isinstance(part, ArgumentValue)}  # fmt: skip
+    used |= {name.removeprefix("args.") for text in conditions.values() for name in names_in(f"${{{text}}}")}
+    defaults = {name: plain(spec.value(spec.default)) for name, spec in specs.items() if spec.default is not None}
+    defaults |= {name: values[name] for name in values if name in arguments.given or name not in defaults}
+    declared = tuple(_argument(name, spec, defaults[name]) for name, spec in specs.items() if name in used)
+    lines = [f"{name} is {as_given(value)}: something depends on it that a launch file does not decide"
+             for name, value in values.items() if name not in used and f"args.{name}" in uses.fixed]  # fmt: skip
+    added = {name: found for name, found in more.items() if name in conditions}
+    files = tuple(file for _, several in added.values() for file in several)
+    return LaunchValues(declared, conditions, texts, tuple(process for process, _ in added.values())), files, lines
+
+
+def _argument(name: str, spec: ArgSpec, value: Any) -> Argument:
+    return Argument(
+        name, spec.kind, as_given(value), tuple(map(as_given, spec.choices)),
+        " ".join((spec.description or "").split()), spec.env,
+    )  # fmt: skip
+
+
+def _uses(source: Source, kinds: Mapping[str, str]) -> _Uses:
+    uses = _Uses()
+    for path, text in _strings({key: value for key, value in source.data.items() if key != "profiles"}):
+        place = _place(path, source.data)
+        if place is None:
+            uses.fixed |= set(names_in(text)) | _variables_in(text)
+        elif place[1] == "when":
+            try:
+                expression = text.strip().removeprefix("${").removesuffix("}")
+                condition_code(expression, kinds)
+                uses.conditions[place[0]] = expression
+            except ValueError:
+                uses.fixed |= set(names_in(text)) | _variables_in(text)
+        else:
+            uses.texts[place] = text
+    for _, text in _strings(source.data.get("profiles")):
+        uses.fixed |= set(names_in(text)) | _variables_in(text)
+    return uses
+
+
+def _strings(value: Any, path: Path = ()) -> Iterator[tuple[Path, str]]:
+    """Yield the texts with expressions, keys as well, with their paths."""
+    if isinstance(value, str) and "${" in value:
+        yield path, value
+    elif isinstance(value, (dict, list)):
+        for step, item in value.items() if isinstance(value, dict) else enumerate(value):
+            if isinstance(step, str) and "${" in step:
+                yield (), step
+            yield from _strings(item, (*path, step))
+
+
+def _place(path: Path, data: Mapping[str, Any]) -> tuple[str, str] | None:
+    """Return the process and the place in it, or None where launch cannot compute what stands there."""
+    if len(path) < 3 or path[0] != "processes":  # noqa: PLR2004 (the section, the process, its key)
+        return None
+    process = data["processes"][path[1]]
+    name, key = str(path[1]), path[2]
+    if not isinstance(process, dict) or "for" in process or not isinstance(process.get("run"), (dict, list)):
+        return None
+    if key == "when":
+        return name, "when"
+    if key == "run":
+        match path[3:]:
+            case ("args", step) if isinstance(process["run"], dict):
+                step = list(process["run"]["args"]).index(step) if isinstance(step, str) else step
+                return name, f"args.{step}"
+            case (int(step),) if isinstance(process["run"], list):
+                return name, f"args.{step}"
+        return None
+    is_launch = isinstance(process["run"], dict) and "launch" in process["run"]
+    is_node = isinstance(process["run"], dict) and not is_launch
+    if key == "env" or (key in _PLACES and is_node and path[3] != "file" and "nodes" not in process):
+        return (name, f"{key}.{'.'.join(map(str, path[3:]))}") if not isinstance(path[-1], int) else None
+    return None
+
+
+def _settled(uses: _Uses, kinds: Mapping[str, str]) -> tuple[dict[tuple[str, str], str], dict[str, str]]:
+    """Return the texts and conditions that launch computes: those of which nothing else needs an argument."""
+    texts, conditions = dict(uses.texts), dict(uses.conditions)
+    for at, text in uses.texts.items():
+        if _parts(text, kinds) is None:
+            del texts[at]
+            uses.fixed |= set(names_in(text)) | _variables_in(text)
+    before = -1
+    while before != len(uses.fixed):
+        before = len(uses.fixed)
+        for at, text in list(texts.items()):
+            if uses.fixed & (set(names_in(text)) | _variables_in(text)):
+                uses.fixed |= set(names_in(texts.pop(at))) | _variables_in(text)
+        for name, text in list(conditions.items()):
+            if uses.fixed & set(names_in(f"${{{text}}}")):
+                uses.fixed |= set(names_in(f"${{{conditions.pop(name)}}}"))
+    return texts, conditions
+
+
+def _variables_in(text: str) -> set[str]:
+    """Return the environment variables that a text reads, as ``env(NAME)``."""
+    found = (environment_in(hole.strip()) for hole in _HOLE.findall(text))
+    return {f"env({one[0]})" for one in found if one}
+
+
+def _parts(text: str, kinds: Mapping[str, str]) -> Text | None:
+    """Return what a text consists of, or None where launch cannot compute something of it."""
+    parts: list[str | ArgumentValue | VariableValue] = []
+    end = 0
+    for hole in _HOLE.finditer(text):
+        parts += [text[end : hole.start()]] if text[end : hole.start()] else []
+        end = hole.end()
+        argument, variable = _ARGUMENT.fullmatch(hole[1]), environment_in(hole[1].strip())
+        if argument and argument[1] in kinds:
+            parts.append(ArgumentValue(argument[1], kinds[argument[1]]))
+        elif variable:
+            parts.append(VariableValue(*variable))
+        else:
+            return None
+    return (*parts, text[end:]) if text[end:] else tuple(parts)
+
+
+def _text(text: str, kinds: Mapping[str, str]) -> Text:
+    return _parts(text, kinds) or (text,)
+
+
+class _Combinations:
+    """Processes that are there with other values of the arguments alone."""
+
+    def __init__(
+        self, arguments: Namespace, plan: Plan, specs: Mapping[str, ArgSpec], values: Mapping[str, Any]
+    ) -> None:
+        self.arguments, self.plan, self.specs = arguments, plan, specs
+        self.values = {name: as_given(value) for name, value in values.items()}
+        self._built: dict[tuple[tuple[str, str], ...], tuple[Plan, tuple[File, ...]] | None] = {}
+
+    def process(self, name: str, expression: str) -> tuple[PlanProcess, tuple[File, ...]] | None:
+        """Return a process as it is where its condition holds, with its parameter file; None where it cannot be added.
+
+        It cannot where the robot has errors or another tree then, or launch would need its plan.
+        """
+        for values in self._where(expression):
+            plan, files = self._build(values) or (self.plan, ())
+            found = next((process for process in plan.started if process.name == name), None)
+            if found is not None and found.kind == "run" and _own_edges(plan) == _own_edges(self.plan):
+                needed = tuple(file for file in files if file.path == found.params_file)
+                return found, needed
+        return None
+
+    def _where(self, expression: str) -> Iterator[dict[str, str]]:
+        """Yield values with which an expression is true, of the arguments that it names."""
+        names = [name.removeprefix("args.") for name in dict.fromkeys(names_in(f"${{{expression}}}"))]
+        names = [name for name in names if name in self.specs]
+        constants = [next(filter(None, found), "") for found in _CONSTANT.findall(expression)]
+        several = [dict.fromkeys([self.values[name], *self._values(name, constants)]) for name in names]
+        for index, row in enumerate(product(*several)):
+            if index >= MOST:
+                return
+            given = dict(zip(names, row, strict=True))
+            try:
+                known = {f"args.{name}": self.specs[name].value(word) for name, word in given.items()}
+                holds = evaluate(expression, lambda name, known=known: known[name])  # type: ignore[misc]
+            except ValueError:
+                continue
+            if holds is True:
+                yield given
+
+    def _values(self, name: str, constants: list[str]) -> Iterator[str]:
+        spec = self.specs[name]
+        yield from spec.alternatives
+        if not spec.choices:
+            yield from constants
+        if spec.kind == "int":
+            numbers = [int(word) for word in constants if word.lstrip("-").isdigit()]
+            yield from (str(number + step) for number in numbers for step in (1, -1))
+
+    def _build(self, values: dict[str, str]) -> tuple[Plan, tuple[File, ...]] | None:
+        key = tuple(sorted(values.items()))
+        if key not in self._built:
+            self._built[key] = self._compiled(values)
+        return self._built[key]
+
+    def _compiled(self, values: dict[str, str]) -> tuple[Plan, tuple[File, ...]] | None:
+        arguments = self.arguments
+        args = {name: GivenArg(value, Span(f"{name}:={value}")) for name, value in (self.values | values).items()}
+        compiled: Compiled = compile_robot(
+            read_text(arguments.file), arguments.file, library(), arguments.profiles,
+            overlays=overlays_of(arguments), read=read_text, disk=disk(), given=Given(args, os.environ),
+        )  # fmt: skip
+        if compiled.robot is None or compiled.errors:
+            return None
+        files = emit(compiled.robot, destination(arguments, compiled.robot)[1])
+        return read_plan(files[0].text, files[0].path), files
+
+
+def _own_edges(plan: Plan) -> set[tuple[Any, ...]]:
+    """Return what tfcompose's own publishers send."""
+    own = {process.name for process in plan.started if process.kind in OWN_KINDS}
+    return {
+        (edge.parent, edge.child, edge.kind, edge.pose.xyz, edge.pose.quat_xyzw)
+        for edge in plan.edges if edge.owner in own
+    }  # fmt: skip

@@ -63,7 +63,7 @@ def test_a_process_runs_on_its_processors_with_its_policy_and_below_its_prefix(t
     process = replace(PROCESS, schedule=Schedule((last,), "batch"), prefix=("nice", "-n", "5"))
     cpus, policy, nice = answer(tmp_path, process)
     assert (cpus, policy) == ([last], os.SCHED_BATCH)
-    assert nice == os.nice(0) + 5
+    assert nice == min(os.nice(0) + 5, 19), "a suite that is nice itself"
     assert (os.sched_getaffinity(0), os.sched_getscheduler(0)) == before
 
 

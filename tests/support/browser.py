@@ -28,7 +28,7 @@ def page_of(address: str) -> Iterator[Page]:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=_SOFTWARE)
         try:
-            page = browser.new_page(viewport={"width": 1400, "height": 900})
+            page = browser.new_page(viewport={"width": 1000, "height": 700})
             page.set_default_timeout(TIMEOUT_MS)
             page.goto(address, wait_until="load")
             yield page

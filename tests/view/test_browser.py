@@ -98,7 +98,7 @@ def test_a_click_selects_a_body_whose_subtree_can_be_hidden(rover: Path, server:
 
 def clicked_body(page: Page, panel: Panel) -> str:
     """Click where the camera looks, and return the frame that is selected then."""
-    page.mouse.click(690, 470)
+    page.mouse.click(490, 365)
     page.wait_for_timeout(300)
     return str(panel.frames.value)
 

@@ -65,6 +65,17 @@ def imported(file: Path, *words: str) -> dict[str, dict[str, Any]]:
     return of_robot(robot)
 
 
+def installed(package: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the folder of what a package shares that is installed below the folder."""
+    prefix = folder / "install"
+    index, share = prefix / "share/ament_index/resource_index/packages", prefix / "share" / package
+    index.mkdir(parents=True)
+    share.mkdir()
+    (index / package).touch()
+    monkeypatch.setenv("AMENT_PREFIX_PATH", f"{prefix}:{os.environ.get('AMENT_PREFIX_PATH', '')}")
+    return share
+
+
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
@@ -76,13 +87,8 @@ def imported(file: Path, *words: str) -> dict[str, dict[str, Any]]:
 def test_each_process_is_started_as_launch_would(
     name: str, text: str, words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    prefix = tmp_path / "install"
-    index, share = prefix / "share/ament_index/resource_index/packages", prefix / "share/rover"
-    index.mkdir(parents=True)
-    share.mkdir()
-    (index / "rover").touch()
+    share = installed("rover", tmp_path, monkeypatch)
     (share / "drive.yaml").write_text("/**: {ros__parameters: {speed: 1.5}}\n", encoding="utf-8")
-    monkeypatch.setenv("AMENT_PREFIX_PATH", f"{prefix}:{os.environ.get('AMENT_PREFIX_PATH', '')}")
     (tmp_path / "more.launch.xml").write_text(MORE, encoding="utf-8")
     file = tmp_path / name
     file.write_text(text, encoding="utf-8")
@@ -99,13 +105,8 @@ def test_launch_starts_of_an_export_what_the_plan_of_the_same_arguments_has(
     given: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """But for what waits for another one's end: here no process is started."""
-    prefix = tmp_path / "install"
-    index, share = prefix / "share/ament_index/resource_index/packages", prefix / "share/nav2_bringup"
-    index.mkdir(parents=True)
-    share.mkdir()
-    (index / "nav2_bringup").touch()
+    share = installed("nav2_bringup", tmp_path, monkeypatch)
     (share / "navigation_launch.py").write_text(INCLUDED, encoding="utf-8")
-    monkeypatch.setenv("AMENT_PREFIX_PATH", f"{prefix}:{os.environ.get('AMENT_PREFIX_PATH', '')}")
     (tmp_path / "argued.yaml").write_text(ARGUED, encoding="utf-8")
     file = exported(tmp_path / "argued.yaml", tmp_path / "out")
     found = started(file, *(f"{name}:={value}" for name, value in given.items()))

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from tfcompose.importing import launch_actions as actions
+from tfcompose.importing import launch_conditions as conditions
 from tfcompose.importing import launch_substitutions as substitutions
 from tfcompose.importing import launch_texts as texts
 from tfcompose.importing.confinement import confine, limit
@@ -142,7 +143,7 @@ _ALIASES = {
 }  # fmt: skip
 _CLASSES = {
     name: one
-    for name, one in {**vars(substitutions), **vars(actions)}.items()
+    for name, one in {**vars(substitutions), **vars(conditions), **vars(actions)}.items()
     if isinstance(one, type) and name[:1].isupper()
 }
 
@@ -157,7 +158,7 @@ def _known(module: str, name: str) -> Any:
     functions = {
         "perform_substitutions": lambda context, several: substitutions.text_of(several, context),
         "normalize_to_list_of_substitutions": lambda value: value if isinstance(value, list) else [value],
-        "evaluate_condition_expression": substitutions.evaluate_condition_expression,
+        "evaluate_condition_expression": conditions.evaluate_condition_expression,
         "matches_action": actions.matches_action,
     }
     return _CLASSES.get(_ALIASES.get(name, name)) or functions.get(name)

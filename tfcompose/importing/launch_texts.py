@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from tfcompose.findings import RejectedError
 from tfcompose.importing import launch_actions as actions
+from tfcompose.importing import launch_conditions as conditions
 from tfcompose.importing import launch_substitutions as substitutions
 from tfcompose.importing.launch_substitutions import Context, FailedError, text_of
 from tfcompose.load import load
@@ -288,9 +289,9 @@ def _made(entity: Entity, context: Context) -> Iterator[Any]:
     several = make(entity, context)
     condition: Any = None
     if (given := entity.get("if")) is not None:
-        condition = substitutions.IfCondition(substituted(given))
+        condition = conditions.IfCondition(substituted(given))
     elif (given := entity.get("unless")) is not None:
-        condition = substitutions.UnlessCondition(substituted(given))
+        condition = conditions.UnlessCondition(substituted(given))
     for one in several:
         one.condition = condition
         yield one
@@ -402,7 +403,7 @@ def _component(entity: Entity) -> actions.ComposableNode:
         package=_need(entity, "pkg"), plugin=_need(entity, "plugin"), name=_optional(entity, "name"),
         namespace=_optional(entity, "namespace"), parameters=_parameters(entity),
         remappings=[(_need(rule, "from"), _need(rule, "to")) for rule in entity.all("remap")], extra_arguments=extra,
-        condition=substitutions.IfCondition(substituted(condition)) if condition is not None else None,
+        condition=conditions.IfCondition(substituted(condition)) if condition is not None else None,
     )  # fmt: skip
     one.at = entity.at
     return one

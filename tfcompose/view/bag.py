@@ -17,7 +17,7 @@ from tfcompose.text import duration
 from tfcompose.tf2.exceptions import rejection_of
 from tfcompose.verdict.verify import state_of
 from tfcompose.view.judgement import Judge, Judgement
-from tfcompose.view.picture import Pictures
+from tfcompose.view.picture import ShownTree
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from tfcompose.model import Robot
     from tfcompose.plan import Plan
     from tfcompose.ros.tf_codec import Row
-    from tfcompose.view.picture import Picture
 
     Topics = tuple[str, str]
 
@@ -98,7 +97,7 @@ class Recorded:
         return (self.end_ns - self.begin_ns) / _SECOND_NS
 
 
-class BagTree:
+class BagTree(ShownTree):
     """A recorded tree at a time, ``at_s`` seconds after the first transform.
 
     Args:
@@ -109,29 +108,15 @@ class BagTree:
     """
 
     def __init__(self, robot: Robot, plan: Plan, recorded: Recorded, tolerance: Offset) -> None:
-        self.robot = robot
+        super().__init__(robot)
         self.at_s = 0.0
         self._recorded = recorded
-        self._pictures = Pictures(robot)
         self._rows: dict[str, tuple[_Track, int, Row]] = {}
         states = {topics: state_of(one, topics) for topics, one in recorded.observers.items()}
         self.judgement: Judgement = Judge(robot, plan, tolerance).judge(states, lambda _: True)
         self._rates = {
             self._pictures.name(edge.child): edge.timing.rate for state in states.values() for edge in state.edges
         }
-
-    @property
-    def fixed(self) -> str:
-        """The frame from which its tree is shown; empty: the root."""
-        return self._pictures.fixed
-
-    @fixed.setter
-    def fixed(self, frame: str) -> None:
-        self._pictures.fixed = frame
-
-    def moved(self) -> Picture | None:
-        """Return where everything was at the time if that is not what was returned before; else None."""
-        return self._pictures.next(self._newest(), self.judgement)
 
     @property
     def _at_ns(self) -> int:

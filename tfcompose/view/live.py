@@ -12,7 +12,7 @@ from tfcompose.live.state import who
 from tfcompose.text import duration
 from tfcompose.verdict.verify import state_of
 from tfcompose.view.judgement import Judge, Judgement
-from tfcompose.view.picture import Pictures
+from tfcompose.view.picture import ShownTree
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from tfcompose.plan import Plan
     from tfcompose.ros.tf_codec import Row
     from tfcompose.verdict.verify import Difference
-    from tfcompose.view.picture import Picture
 
     Topics = tuple[str, str]
 
@@ -32,7 +31,7 @@ FOUND_S = 2.5
 _MISSING = frozenset({"TF804", "TF811"})
 
 
-class LiveTree:
+class LiveTree(ShownTree):
     """Follows a running robot.
 
     Args:
@@ -43,25 +42,11 @@ class LiveTree:
     """
 
     def __init__(self, robot: Robot, plan: Plan, observers: Mapping[Topics, TreeObserver], tolerance: Offset) -> None:
-        self.robot = robot
+        super().__init__(robot)
         self.judgement = Judgement()
         self._observers = observers
         self._judge = Judge(robot, plan, tolerance)
-        self._pictures = Pictures(robot)
         self._states: dict[str, list[EdgeState]] = {}
-
-    @property
-    def fixed(self) -> str:
-        """The frame from which its tree is shown; empty: the root."""
-        return self._pictures.fixed
-
-    @fixed.setter
-    def fixed(self, frame: str) -> None:
-        self._pictures.fixed = frame
-
-    def moved(self) -> Picture | None:
-        """Return where everything is if something moved, or is judged otherwise, since the last time; else None."""
-        return self._pictures.next(self._newest(), self.judgement)
 
     def _newest(self) -> dict[str, Row]:
         """Return what came last of each frame, as tf2 has it: without what it does not take."""

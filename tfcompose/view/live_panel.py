@@ -17,9 +17,8 @@ if TYPE_CHECKING:
     import viser
 
     from tfcompose.view.bag import BagTree
-    from tfcompose.view.live import LiveTree
     from tfcompose.view.panel import Panel
-    from tfcompose.view.picture import Picture
+    from tfcompose.view.picture import Picture, ShownTree
 
 _RED = (220, 30, 30)
 #: What the slider of a recording moves by, in seconds.
@@ -31,7 +30,7 @@ _MOST = 40
 class LivePanel:
     """Shows a tree that runs, or was recorded, beside the panel of its robot."""
 
-    def __init__(self, server: viser.ViserServer, panel: Panel, tree: LiveTree | BagTree, title: str = "Live") -> None:
+    def __init__(self, server: viser.ViserServer, panel: Panel, tree: ShownTree, title: str = "Live") -> None:
         self.tree = tree
         self._panel = panel
         self._scene = server.scene

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -122,3 +123,34 @@ class Pictures:
         if edge.joint.type in _TURNING:
             return Pose(edge.pose.xyz, live.quat_xyzw)
         return Pose(live.xyz, edge.pose.quat_xyzw)
+
+
+class ShownTree(ABC):
+    """A tree of transforms that is shown, and judged, as it runs or at a time of a recording."""
+
+    judgement: Judgement
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self._pictures = Pictures(robot)
+
+    @property
+    def fixed(self) -> str:
+        """The frame from which its tree is shown; empty: the root."""
+        return self._pictures.fixed
+
+    @fixed.setter
+    def fixed(self, frame: str) -> None:
+        self._pictures.fixed = frame
+
+    def moved(self) -> Picture | None:
+        """Return where everything is if something moved, or is judged otherwise, since the last time; else None."""
+        return self._pictures.next(self._newest(), self.judgement)
+
+    @abstractmethod
+    def about(self, frame: str) -> list[str]:
+        """Return what is known of the edge above a frame, then what is wrong with it."""
+
+    @abstractmethod
+    def _newest(self) -> Mapping[str, Row]:
+        """Return the newest transform of each frame, by its name in the robot's file."""

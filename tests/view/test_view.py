@@ -353,3 +353,12 @@ def test_a_running_tree_takes_neither_edit_nor_html(rover: Path, option: tuple[s
     assert done.returncode == 2
     assert done.stderr.startswith("tfcompose: --live")
     assert not (rover.parent / "r.html").exists()
+
+
+@for_each([(["--at", "3"],), (["--at", "0"],), (["--html", "r.html", "--edit"],)])
+def test_an_option_without_what_it_is_for_is_refused(words: list[str], tmp_path: Path) -> None:
+    (tmp_path / "r.yaml").write_bytes(ROVER.read_bytes())
+    done = tfcompose_in(tmp_path, "view", "r.yaml", "--port", "0", *words)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(f"tfcompose: {words[0]} ")
+    assert not (tmp_path / "r.html").exists()

@@ -45,7 +45,7 @@ def arguments(parser: ArgumentParser) -> None:
     )
     add_bag(parser)
     parser.add_argument(
-        "--at", type=_seconds, default=0.0, metavar="S",
+        "--at", type=_seconds, metavar="S",
         help="with --bag: the time to begin with, in seconds after its first transform, or since the epoch; default: 0",
     )  # fmt: skip
     add_tolerance(parser)
@@ -78,6 +78,10 @@ def run(arguments: Namespace) -> int:
     if (arguments.live or arguments.bag) and (arguments.html or arguments.edit):
         given = "--live" if arguments.live else "--bag"
         fail(f"{given} shows what is published: leave out --html and --edit", UNREADABLE)
+    if arguments.at is not None and not arguments.bag:
+        fail("--at is a time of a recording: give --bag, too", UNREADABLE)
+    if arguments.edit and arguments.html:
+        fail("--html writes a page, in which nothing is moved: leave out --edit", UNREADABLE)
     file = arguments.file or _running_plan(arguments) or DEFAULT_FILE
     if arguments.html:
         _check_output(Path(arguments.html), [file, *arguments.overlays])
@@ -122,7 +126,7 @@ def _serve(session: Session, files: Files, arguments: Namespace) -> int:
 def _bag_view(session: Session, arguments: Namespace) -> BagView:
     from tfcompose.cli.bag_view import BagView
 
-    return BagView(arguments.bag, arguments.at, session, arguments.tolerance)
+    return BagView(arguments.bag, arguments.at or 0.0, session, arguments.tolerance)
 
 
 def _write(session: Session, path: Path) -> None:

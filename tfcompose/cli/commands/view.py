@@ -8,7 +8,6 @@ somebody else are red. With --bag they are where they were recorded, at the time
 
 from __future__ import annotations
 
-import secrets
 import sys
 from argparse import ArgumentTypeError
 from pathlib import Path
@@ -95,6 +94,8 @@ def run(arguments: Namespace) -> int:
 
 def _serve(session: Session, files: Files, arguments: Namespace) -> int:
     """Show the session in the browser until Ctrl-C; return the exit code."""
+    import secrets
+
     from tfcompose.view.reload import ReloadedPanel, Watcher
     from tfcompose.view.server import started, stop
 

@@ -253,6 +253,8 @@ CATALOGUE: dict[str, Code] = {
         Code("TF854", "other_robot", "guard", "error"),
         Code("TF855", "component_elsewhere", "processes", "error"),
         Code("TF856", "container_without_components", "processes", "warning"),
+        Code("TF857", "host_not_declared", "processes", "error"),
+        Code("TF858", "host_without_processes", "processes", "warning"),
         # ROS, plans, bags, extras
         Code("TF901", "no_ros", "environment", "error"),
         Code("TF902", "bad_plan", "environment", "error"),

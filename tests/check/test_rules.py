@@ -34,7 +34,7 @@ NOT_OF_A_LINE |= {"TF726"}
 #: Of what is imported: tests/importing/test_shell.py.
 NOT_OF_A_LINE |= {"TF020"}
 #: Codes of the running robot, of its plan and of its surroundings.
-OF_THE_FILE = {"TF812", "TF813", "TF818", "TF847", "TF848", "TF851"}
+OF_THE_FILE = {"TF812", "TF813", "TF818", "TF847", "TF848", "TF851", "TF857", "TF858"}
 LIVE = {code for code in CATALOGUE if code.startswith(("TF8", "TF9"))} - OF_THE_FILE
 
 

@@ -100,6 +100,10 @@ def test_what_is_waited_for_until_it_is_done_is_a_job_and_each_runs_on_its_host(
     }
     on = "kubernetes.io/hostname"
     assert hosts == {"static": {on: "brain"}, "drive": {on: "rear.local"}, "guard": None}
+    declared = "hosts: {brain: {node_selector: {computer: big}}, rear.local: {}}\nprocesses:\n"
+    labelled, _ = manifests(HOSTED.replace("processes:\n", declared))
+    hosts = {name: pod_of(labelled, f"big-rover-{name}")["spec"].get("nodeSelector") for name in ("static", "drive")}
+    assert hosts == {"static": {"computer": "big"}, "drive": {on: "rear.local"}}
     unseen = {tuple(name for name in ("late", "drive") if name in line) for line in gaps if "wait for spawner" in line}
     assert unseen == {("late",), ("drive",)}, "a pod cannot see that another was started, or is done"
 

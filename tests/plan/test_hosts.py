@@ -10,9 +10,9 @@ import pytest
 from tests.support.findings import expect
 from tests.support.plans import compiled_plan
 from tests.support.robots import ON_TWO_HOSTS
-from tfcompose.findings import Finding
+from tfcompose.findings import Finding, RejectedError
 from tfcompose.launcher.runtime_dir import runtime_dir_of
-from tfcompose.plan import Plan, Ready
+from tfcompose.plan import Plan, PlanHost, Ready
 from tfcompose.plan.file import read_plan, write_plan
 from tfcompose.plan.hosts import describe_share, hosts_of, share_of
 from tfcompose.plan.topics import partition_of
@@ -147,3 +147,21 @@ def test_what_only_the_own_launcher_sees_is_not_waited_for_from_elsewhere() -> N
         assert isinstance(share, Plan)
         arm = share.process("arm_drive")
         assert (arm.ready, arm.lifecycle) == (expected, {})
+
+
+def test_the_plan_has_the_computers_that_the_robot_declares() -> None:
+    declared = "hosts: {main: {}, jetson: {ssh: pi@10.0.0.3, port: 2222, python: /opt/py, setup: ros.sh}}\nprocesses:\n"
+    plan = compiled_plan(NAMED.replace("processes:\n", declared))
+    assert plan.hosts == {
+        "main": PlanHost("main"),
+        "jetson": PlanHost("pi@10.0.0.3", 2222, "/opt/py", ("ros.sh",)),
+    }
+    assert read_plan(write_plan(plan), "plan.json") == plan
+    assert compiled_plan(NAMED).hosts == {}
+
+
+def test_a_plan_whose_host_names_no_folder_is_refused() -> None:
+    plan = replace(compiled_plan(NAMED), hosts={"../main": PlanHost("main")})
+    with pytest.raises(RejectedError) as refused:
+        read_plan(write_plan(plan), "plan.json")
+    expect(refused.value.findings[0], "TF902", "../main")

@@ -7,7 +7,8 @@ from graphlib import CycleError, TopologicalSorter
 from typing import TYPE_CHECKING
 
 from tfcompose.check.rule import rule
-from tfcompose.findings import Finding, Note, finding
+from tfcompose.findings import Finding, Note, did_you_mean, finding
+from tfcompose.model import left_out_by
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -161,3 +162,34 @@ def container_without_components(robot: Robot) -> Iterator[Finding]:
         if process.loads and process.name not in used:
             advice = f"processes: {{NAME: {{component: PACKAGE/CLASS, container: {process.name}}}}}, or remove it"
             yield finding("TF856", f"the container {process.name} has no components", process.at, help=advice)
+
+
+@rule("TF857")
+def host_not_declared(robot: Robot) -> Iterator[Finding]:
+    """A process names a host that is not among ``hosts``.
+
+    Nothing would start it: ``deploy`` goes to the computers under ``hosts``, and each starts what names it. Correct the
+    name, or declare the host. A robot without ``hosts`` may name any.
+    """
+    for process in robot.processes if robot.hosts else ():
+        name = process.host
+        if name is None or process.host_at is None or name in robot.hosts or ("hosts", name) in robot.broken:
+            continue
+        otherwise = left_out_by(robot.conditions, name) or f"hosts: {{{name}: {{ssh: user@address}}}}"
+        advice = did_you_mean(name, robot.hosts, otherwise)
+        message = f"{process.name} is on {name}, which is not among hosts"
+        yield finding("TF857", message, process.host_at, help=advice)
+
+
+@rule("TF858", idle=True)
+def host_without_processes(robot: Robot) -> Iterator[Finding]:
+    """A host has no process.
+
+    Nothing names it as its ``host``, so nothing is deployed to it. What names no host runs where ``static`` does. Name
+    it, ``processes: {NAME: {host: HOST}}``, or remove it.
+    """
+    used = {process.host for process in robot.processes}
+    for name, host in robot.hosts.items():
+        if name not in used and ("hosts", name) not in robot.broken:
+            advice = f"processes: {{static: {{host: {name}}}}} runs all that names no other host, or remove it"
+            yield finding("TF858", f"no process runs on the host {name}", host.at, help=advice)

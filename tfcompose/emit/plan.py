@@ -60,6 +60,7 @@ def plan_of(robot: Robot, target: Target = AS_IN_SOURCE) -> Plan:
         claims=tuple(claim.planned() for claim in robot.claims),
         args=robot.args,
         environment=robot.environment,
+        hosts={name: host.planned() for name, host in robot.hosts.items()},
     )
 
 

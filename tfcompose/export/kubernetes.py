@@ -192,13 +192,19 @@ def _pod(
         "hostNetwork": True,
         "hostIPC": True,
         "dnsPolicy": "ClusterFirstWithHostNet",
-        **({"nodeSelector": {"kubernetes.io/hostname": process.host}} if process.host else {}),
+        **({"nodeSelector": _node_selector(plan, process.host)} if process.host else {}),
         "terminationGracePeriodSeconds": math.ceil(stop_s),
         **({"initContainers": waits} if waits else {}),
         "containers": [container],
         "volumes": [{"name": "plan", **_volume(plan, process, labels[_ROBOT], cluster, texts)}],
     }
     return {"metadata": {"labels": labels, "annotations": {_CONTENT: _digest(plan, process, texts)}}, "spec": spec}
+
+
+def _node_selector(plan: Plan, host: str) -> dict[str, str]:
+    """Return the labels of the node that is the host: those that the robot file gives it, else its host name."""
+    declared = plan.hosts.get(host)
+    return declared.node_selector if declared and declared.node_selector else {"kubernetes.io/hostname": host}
 
 
 def _digest(plan: Plan, process: PlanProcess, texts: Mapping[str, str]) -> str:

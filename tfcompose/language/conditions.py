@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tfcompose.load import Path, Place, Source
 
 #: The sections whose entries may have ``when`` and ``for``.
-SECTIONS = ("links", "joints", "ros2_control", "frames", "sensors", "parts", "containers", "processes")
+SECTIONS = ("links", "joints", "ros2_control", "frames", "sensors", "parts", "containers", "processes", "hosts")
 _KEYS = frozenset({"when", "for"})
 Scope = dict[str, "Value"]
 

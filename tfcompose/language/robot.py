@@ -12,6 +12,7 @@ from pydantic_core import PydanticCustomError
 
 from tfcompose.language.args import Args
 from tfcompose.language.bodies import LinkSpec
+from tfcompose.language.hosts import HostName, HostSpec
 from tfcompose.language.optics import OpticsSpec
 from tfcompose.language.pose import EdgeKeys, MountKeys, Parents, Posed, Rotated
 from tfcompose.language.process import ContainerSpec, Driver, ProcessSpec
@@ -403,6 +404,9 @@ class RobotSpec(Spec):
     )
     processes: dict[str, ProcessSpec] = key(
         {}, "what is started, simulated, or expected to run", {"base_drive": {"external": True}}
+    )
+    hosts: dict[HostName, HostSpec] = key(
+        {}, "the computers that processes name as their host", {"brain": {"ssh": "robot@10.0.0.2"}}
     )
     profiles: Parameters = key(
         {}, "named overlays, chosen with --profile", {"demo": {"sensors": {"laser": {"driver": "none"}}}}

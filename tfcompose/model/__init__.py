@@ -20,7 +20,19 @@ from tfcompose.model.edge import (
     SafetyController,
 )
 from tfcompose.model.optics import Optics, OpticsKind, OpticsSource, Projection, Shutter
-from tfcompose.model.process import BUILT_IN, GUARD, JOINTS, ROS2_LAUNCH, SHELL, STATIC, AsInFile, Claim, Node, Process
+from tfcompose.model.process import (
+    BUILT_IN,
+    GUARD,
+    JOINTS,
+    ROS2_LAUNCH,
+    SHELL,
+    STATIC,
+    AsInFile,
+    Claim,
+    Host,
+    Node,
+    Process,
+)
 from tfcompose.model.robot import (
     OPTICAL_ENDINGS,
     MountedSensor,
@@ -50,6 +62,7 @@ __all__ = [
     "Claim",
     "Dynamics",
     "Edge",
+    "Host",
     "Inertial",
     "Joint",
     "Limit",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tfcompose.plan import PlanClaim, PlanProcess, switch_text
+from tfcompose.plan import PlanClaim, PlanHost, PlanProcess, switch_text
 from tfcompose.plan.codec import narrowed
 
 STATIC, JOINTS, GUARD = "static", "joints", "guard"
@@ -80,7 +80,7 @@ class Process(PlanProcess):
     for the others holds the arguments, until ``planned`` makes the whole command of them. ``part`` is the ``Part`` that
     it belongs to, if any. ``loads`` says that it is a container of components, ``describes`` that its parameter
     ``robot_description`` is the URDF for a stock robot_state_publisher. ``rate`` is that of the joint states that
-    it sends.
+    it sends. ``host_at`` is where its host was named, if it was.
     """
 
     nodes: tuple[str, ...] = field(init=False)
@@ -94,6 +94,7 @@ class Process(PlanProcess):
     part: str = field(default="", kw_only=True)
     describes: bool = field(default=False, kw_only=True)
     loads: bool = field(default=False, kw_only=True)
+    host_at: Span | None = field(default=None, kw_only=True, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "nodes", tuple(node.name for node in self.ros_nodes))
@@ -118,6 +119,17 @@ class Process(PlanProcess):
     def params(self) -> dict[str, Any]:
         """The parameters of the first node."""
         return self.ros_nodes[0].params if self.ros_nodes else {}
+
+
+@dataclass(frozen=True, slots=True)
+class Host(PlanHost):
+    """A computer of the plan, with the place of its name."""
+
+    at: Span = field(kw_only=True, compare=False)
+
+    def planned(self) -> PlanHost:
+        """Return the computer as the plan has it."""
+        return narrowed(PlanHost, self)
 
 
 @dataclass(frozen=True, slots=True)

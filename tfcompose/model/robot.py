@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tfcompose.model.edge import Edge
     from tfcompose.model.hardware import Block, Hardware
     from tfcompose.model.optics import Optics
-    from tfcompose.model.process import Claim, Process
+    from tfcompose.model.process import Claim, Host, Process
     from tfcompose.plan import ParameterValue
 
 #: How names of optical frames end: REP-103's suffix, the spelling of newer ZED wrappers, a link's, and a short one.
@@ -156,7 +156,7 @@ class Robot:
     to findings in a part's file. ``foreign`` are files of other tools, in which nothing can be fixed here. A robot that
     ``is_variant`` is a file's with profiles or overlays merged over it. ``zones`` are those that sensors have to see,
     ``limits`` what the file sets instead of the limits of codes, ``conditions`` those of the entries that they leave
-    out, by (section, name).
+    out, by (section, name). ``hosts`` are the computers that it may run on, its parts' among them; empty: not declared.
     """
 
     name: str
@@ -187,6 +187,7 @@ class Robot:
     zones: tuple[Zone, ...] = ()
     limits: dict[str, float] = field(default_factory=dict, compare=False)
     conditions: dict[tuple[str, str], str] = field(default_factory=dict, compare=False)
+    hosts: dict[str, Host] = field(default_factory=dict)
 
     def final(self, frame: str) -> str:
         """Return the frame's name on the live tree: with the prefix, unless it is shared."""

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 #: A robot's name, which becomes part of topics, units and programs; and a process's, in a part with the part's name.
 _ROBOT = re.compile(r"[a-z][a-z0-9_]*")
 _PROCESS = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(?:/[A-Za-z0-9_][A-Za-z0-9_.-]*)*")
+#: A host's, which becomes part of folders, units and nodes.
+_HOST = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 #: Control characters, and halves of characters.
 _CONTROL = re.compile("[\\x00-\\x1f\\x7f-\\x9f\\ud800-\\udfff]")
 #: Keys below which text may hold lines and tabs: what programs are given.
@@ -104,6 +106,7 @@ def _wrong_names(plan: Plan) -> Iterator[str]:
             yield f"{name} is ready at {shown(ready.text)}, not a regular expression: {error}"
     yield from _wrong_components(plan)
     yield from _wrong_files(plan)
+    yield from (f"a host is named {shown(name)}, not with letters, digits, _, - and ." for name in _wrong_hosts(plan))
 
 
 def _wrong_components(plan: Plan) -> Iterator[str]:
@@ -132,6 +135,11 @@ def _wrong_files(plan: Plan) -> Iterator[str]:
         path = PurePosixPath(file)
         if path.is_absolute() or ".." in path.parts:
             yield f"the file {shown(file)} is not in the plan's folder"
+
+
+def _wrong_hosts(plan: Plan) -> Iterator[str]:
+    """Yield the hosts whose names cannot be part of folders and units."""
+    return (name for name in plan.hosts if not _HOST.fullmatch(name))
 
 
 def _regex_error(pattern: str) -> str:

@@ -348,6 +348,21 @@ class RosSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class PlanHost:
+    """A computer that processes run on: how ssh reaches it, and what runs tfcompose there.
+
+    ``ssh`` is user@address, or a name that ssh knows; ``python`` is a program or its path, ``setup`` are files that are
+    sourced before it. ``node_selector`` are the labels of its node in Kubernetes; empty: its host name is the host's.
+    """
+
+    ssh: str
+    port: int | None = field(default=None, metadata=OMITTED)
+    python: str | None = field(default=None, metadata=OMITTED)
+    setup: tuple[str, ...] = field(default=(), metadata=OMITTED)
+    node_selector: dict[str, str] = field(default_factory=dict, metadata=OMITTED)
+
+
+@dataclass(frozen=True, slots=True)
 class GuardPolicy:
     """What watches the live tree."""
 
@@ -395,7 +410,8 @@ class Plan:
 
     ``host`` is the machine whose share of the processes this is: it starts those that are not ``external``. None is
     the whole plan, and empty the share of the machine that the plan does not name. ``args`` are the values of the robot
-    file's arguments that it was built with, ``environment`` those of the variables that the file names.
+    file's arguments that it was built with, ``environment`` those of the variables that the file names. ``hosts`` are
+    the computers that processes may name; empty: the file does not say how they are reached.
     """
 
     version: Literal[1] = field(default=VERSION, kw_only=True)
@@ -411,6 +427,7 @@ class Plan:
     guard: GuardPolicy = field(default_factory=GuardPolicy)
     args: dict[str, ParameterValue] = field(default_factory=dict, kw_only=True, metadata=OMITTED)
     environment: dict[str, str] = field(default_factory=dict, kw_only=True, metadata=OMITTED)
+    hosts: dict[str, PlanHost] = field(default_factory=dict, kw_only=True, metadata=OMITTED)
 
     def process(self, name: str) -> PlanProcess:
         """Return the process of that name.

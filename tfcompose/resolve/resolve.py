@@ -17,6 +17,7 @@ from tfcompose.model import Edge, Process, Robot, may_be_refused
 from tfcompose.resolve.bodies import Bodies, with_colours
 from tfcompose.resolve.containers import component_findings, component_process, container_process
 from tfcompose.resolve.edges import Drafts, source_numbers
+from tfcompose.resolve.hosts import hosts_of, with_host_place
 from tfcompose.resolve.isolation import isolate, settings_of
 from tfcompose.resolve.poses import Solver
 from tfcompose.resolve.presets import sensor_of
@@ -105,7 +106,7 @@ class _Work:
             self._measured(drafts), drafts.frames, self.validated.broken, excuses, self.validated.conditions
         )
         edges = solver.solve()
-        own += drafts.drivers
+        own = [with_host_place(process, self.source) for process in (*own, *drafts.drivers)]
         self.found += [*drafts.found, *bodies.found, *solver.found, *self._wrong_names(own)]
         self.found += unnamed_nodes(edges, own, self.spec, self.broken)
         robot = self._take(with_positions(self._robot(drafts, edges, self._everybody(own)), self.spec, self.source))
@@ -269,6 +270,7 @@ class _Work:
             zones=zones_of(self.spec, self.source) + tuple(zone for part in in_tree for zone in part.zones),
             limits=self._limits(),
             conditions=self.validated.conditions,
+            hosts=reduce(or_, (part.hosts for part in parts[::-1]), {}) | hosts_of(self.spec, self.source),
         )
 
 

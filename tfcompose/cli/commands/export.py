@@ -47,11 +47,14 @@ def arguments(parser: ArgumentParser) -> None:
         help="the plan's folder on the robot; default: systemd: as here; k8s: none, a ConfigMap holds the plan",
     )  # fmt: skip
     parser.add_argument(
-        "--python", metavar="FILE", default=sys.executable, help="systemd: Python on the robot; default: this one"
+        "--python",
+        metavar="FILE",
+        help="systemd: Python on the robot; default: that of the host under hosts, or this one",
     )
     parser.add_argument(
         "--setup", action="append", default=[], metavar="FILE",
-        help="systemd: source it first, as /opt/ros/jazzy/setup.bash; repeatable; default: this shell's variables",
+        help="systemd: source it first, as /opt/ros/jazzy/setup.bash; repeatable; default: as the host under hosts, or "
+        "this shell's variables",
     )  # fmt: skip
     parser.add_argument(
         "--image", default="", metavar="NAME",
@@ -130,9 +133,12 @@ def _exported(plan: Plan, file: Path, folder: Path, arguments: Namespace) -> tup
         return _for_kubernetes(plan, file.parent, arguments)
     from tfcompose.export.supervisors import systemd
 
-    own = {} if arguments.setup else {name: os.environ[name] for name in ROS_VARIABLES if os.environ.get(name)}
+    host = plan.hosts.get(plan.host or "")
+    setup = tuple(arguments.setup) or (host.setup if host else ())
+    python = arguments.python or (host.python if host else None) or sys.executable
+    own = {} if setup else {name: os.environ[name] for name in ROS_VARIABLES if os.environ.get(name)}
     at = Path(arguments.at or file.parent).absolute().as_posix()
-    return systemd(plan, Machine(at, arguments.python, tuple(arguments.setup), own))
+    return systemd(plan, Machine(at, python, setup, own))
 
 
 def _for_kubernetes(plan: Plan, folder: Path, arguments: Namespace) -> tuple[tuple[File, ...], list[str]]:

@@ -24,6 +24,12 @@ args:
   rate: {type: float, default: 20.0}
   height: {default: 0.5}
 links: {base_link: {}}
+containers:
+  box: {isolation: isolated, executor: multi, namespace: front, args: ["--x"], remap: {a: "${args.mode}"},
+        params: {k: 1}, restart: always, output: log, emulate_tty: true}
+  plain: {executor: multi, node: plain_box, when: "${args.cameras > 1}", stop: {timeout: 3 s, kill_timeout: 9 s}}
+  mine: {package: my_package, executable: my_container}
+  elsewhere: {external: true, namespace: /somewhere}
 frames:
   mast: {parent: base_link, xyz: [0, 0, "${args.height}"]}
 processes:
@@ -52,6 +58,18 @@ processes:
   calibrate: {run: [python3, calibrate.py]}
   late: {run: [python3, late.py], after: {waits: ready}}
   waits: {run: {package: w, executable: w}, ready: {time: 3 s}, required: true}
+  rectify:
+    component: image_proc/image_proc::RectifyNode
+    container: box
+    namespace: left
+    params: {queue_size: 5, rate: "${args.rate}", a: {b: [1.0, 2.0]}, who: "is ${args.mode}"}
+    remap: {image: image_raw, camera_info: "/cam/${args.mode}"}
+    extra_arguments: {use_intra_process_comms: true}
+    when: ${args.sim}
+  crop: {component: image_proc/image_proc::CropNode, container: plain, when: "${args.cameras > 1}"}
+  once: {component: a/a::Once, container: mine, after: {calibrate: done}}
+  then: {component: a/a::Then, container: mine, after: {waits: ready}}
+  talker: {component: demo/demo::Talker, container: elsewhere}
   navigation_launch:
     run: {launch: nav2_bringup/navigation_launch.py, args: {mode: "${args.mode}", n: 3}}
     when: ${args.cameras >= 1 and args.mode != 'slam'}

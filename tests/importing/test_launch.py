@@ -105,8 +105,10 @@ def test_each_action_of_a_python_launch_file_has_its_entry(package: Path, monkey
     _, data = import_of(source(package, "rover.launch.py", PYTHON), code=None)
     assert data["frames"]["laser"] == {"parent": "base_link", "xyz": [0.1, 0, 0.3], "rpy": [-0.2, 0, 0.5]}
     processes = data["processes"]
-    order = ["camera_0", "camera_1", "keys", "drive", "map_server", "calibrate", "mapper", "late", "stop", "perception"]
+    order = ["camera_0", "camera_1", "keys", "drive", "map_server", "calibrate", "mapper", "late", "stop", "rectify"]
     assert list(processes) == order
+    assert data["containers"] == {"perception": {"env": {"LEVEL": "3"}}}
+    assert processes.pop("rectify") == {"component": "image_proc/image_proc::RectifyNode", "container": "perception"}
     assert all(process["env"] == {"LEVEL": "3"} for process in processes.values())
     assert [processes[f"camera_{i}"]["params"] for i in range(2)] == [{"id": 0}, {"id": 1}]
     drive = processes["drive"]
@@ -128,7 +130,7 @@ def test_each_action_of_a_python_launch_file_has_its_entry(package: Path, monkey
 def test_what_is_not_taken_is_named_with_its_line(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text, _ = import_of(source(package, "rover.launch.py", PYTHON), code=None)
     lines = PYTHON.splitlines()
-    wanted = ['"cameras", default', '"rviz", default', 'executable="rviz2"', 'plugin="image_proc']
+    wanted = ['"cameras", default', '"rviz", default', 'executable="rviz2"']
     found = places(printed_errors(capsys), "TF020")
     for words in wanted:
         line = next(number for number, one in enumerate(lines, start=1) if words in one)
@@ -525,3 +527,106 @@ def test_no_launch_file_makes_a_traceback(tmp_path: Path, capsys: pytest.Capture
             printed = printed_errors(capsys)
             assert code in {0, 1, 2}
             assert "Traceback" not in printed, "".join(lines)
+
+
+COMPOSED = """
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, GroupAction, TimerAction
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import ComposableNodeContainer, LoadComposableNodes, Node, PushRosNamespace, SetParameter
+from launch_ros.descriptions import ComposableNode
+
+def generate_launch_description():
+    mine = ComposableNodeContainer(name="mine", namespace="rear", package="my_package", executable="my_container")
+    return LaunchDescription([
+        DeclareLaunchArgument("rectify", default_value="false"),
+        LoadComposableNodes(target_container="/front/box", composable_node_descriptions=[
+            ComposableNode(package="early", plugin="early::HTTPServerNode")]),
+        ComposableNodeContainer(
+            name="box", namespace="front", package="rclcpp_components", executable="component_container_isolated",
+            arguments=["--use_multi_threaded_executor", "--ros-args", "--log-level", "info"], output="log",
+            emulate_tty=True, respawn=True, sigterm_timeout="3", sigkill_timeout="9",
+            composable_node_descriptions=[
+                ComposableNode(
+                    package="image_proc", plugin="image_proc::RectifyNode", name="rectify", namespace="left",
+                    remappings=[("image", "image_raw")], parameters=[{"size": 5, "a": {"b": [1.0, 2.0]}}],
+                    extra_arguments=[{"use_intra_process_comms": True}],
+                    condition=IfCondition(LaunchConfiguration("rectify"))),
+                ComposableNode(package="image_proc", plugin="image_proc::CropNode", name="crop"),
+            ]),
+        Node(package="rclcpp_components", executable="component_container_mt", name="plain"),
+        TimerAction(period=4.0, actions=[LoadComposableNodes(
+            target_container="plain", composable_node_descriptions=[
+                ComposableNode(package="depth", plugin="depth::Cloud", name="cloud")])]),
+        LoadComposableNodes(target_container="some/where", composable_node_descriptions=[
+            ComposableNode(package="demo", plugin="demo::Talker", name="talker")]),
+        GroupAction([PushRosNamespace("g"), SetParameter("speed", 2), mine, LoadComposableNodes(
+            target_container=mine, composable_node_descriptions=[
+                ComposableNode(package="demo", plugin="demo::Talker", name="talker")])]),
+    ])
+"""
+BOX = {
+    "isolation": "isolated", "executor": "multi", "namespace": "front", "restart": "always",
+    "stop": {"timeout": "3 s", "kill_timeout": "9 s"}, "output": "log", "emulate_tty": True, "log_level": "info",
+}  # fmt: skip
+
+
+def test_containers_have_their_components_whoever_loads_them(package: Path) -> None:
+    file = source(package, "composed.launch.py", COMPOSED)
+    _, data = import_of(file, code=None)
+    assert data["containers"] == {
+        "box": BOX,
+        "plain": {"executor": "multi"},
+        "mine": {"package": "my_package", "executable": "my_container", "namespace": "g/rear", "params": {"speed": 2}},
+        "where": {"external": True, "namespace": "some"},
+    }
+    processes = data["processes"]
+    (gate,) = processes["cloud"].pop("after")
+    assert processes.pop(gate) == {"run": ["sleep", "4"]}
+    assert processes == {
+        "http_server_node": {"component": "early/early::HTTPServerNode", "container": "box"},
+        "crop": {"component": "image_proc/image_proc::CropNode", "container": "box"},
+        "cloud": {"component": "depth/depth::Cloud", "container": "plain"},
+        "talker": {"component": "demo/demo::Talker", "container": "where"},
+        "talker_2": {"component": "demo/demo::Talker", "container": "mine", "node": "talker", "namespace": "g",
+                     "params": {"speed": 2}},
+    }  # fmt: skip
+    _, data = import_of(file, "--all-branches", code=None)
+    assert data["processes"]["rectify"] == {
+        "component": "image_proc/image_proc::RectifyNode", "container": "box", "namespace": "left",
+        "params": {"size": 5, "a.b": [1.0, 2.0]}, "remap": {"image": "image_raw"},
+        "extra_arguments": {"use_intra_process_comms": True}, "when": "${args.rectify}",
+    }  # fmt: skip
+
+
+COMPOSED_XML = """<launch>
+  <arg name="rectify" default="true"/>
+  <node_container pkg="rclcpp_components" exec="component_container" name="box" namespace="front">
+    <composable_node pkg="image_proc" plugin="image_proc::RectifyNode" name="rectify" unless="$(var rectify)">
+      <param name="size" value="5"/>
+      <remap from="image" to="image_raw"/>
+      <extra_arg name="use_intra_process_comms" value="true"/>
+    </composable_node>
+  </node_container>
+  <load_composable_node target="/front/box" if="$(var rectify)">
+    <composable_node pkg="image_proc" plugin="image_proc::CropNode" name="crop"/>
+  </load_composable_node>
+</launch>
+"""
+
+
+def test_containers_of_an_xml_launch_file_too(package: Path) -> None:
+    file = source(package, "composed.launch.xml", COMPOSED_XML)
+    _, data = import_of(file, "--all-branches", code=None)
+    assert data["containers"] == {"box": {"namespace": "front"}}
+    assert data["processes"] == {
+        "rectify": {
+            "component": "image_proc/image_proc::RectifyNode", "container": "box", "params": {"size": 5},
+            "remap": {"image": "image_raw"}, "extra_arguments": {"use_intra_process_comms": True},
+            "when": "${not (args.rectify)}",
+        },
+        "crop": {
+            "component": "image_proc/image_proc::CropNode", "container": "box", "when": "${args.rectify}",
+        },
+    }  # fmt: skip

@@ -64,10 +64,22 @@ def started_with(robot: Robot) -> dict[str, dict[str, Any]]:
     """
     several: dict[str, dict[str, Any]] = {}
     for process in robot.processes:
+        params = flat(process.ros_nodes[0].params) if process.ros_nodes else {}
+        if process.component:
+            (container,) = (
+                one for one in robot.processes if process.component and one.name == process.component.container
+            )
+            several[process.name] = {
+                "program": f"{process.component.package}/{process.component.plugin}",
+                "container": container.node,
+                "node": process.node,
+                "remap": process.remap,
+                "params": {key: repr(value) for key, value in sorted(params.items())},
+                "extra_arguments": process.component.extra_arguments,
+            }
         if process.kind != "run":
             continue
         program = f"{process.package}/{process.executable}" if process.package else process.launch or process.argv[0]
-        params = flat(process.ros_nodes[0].params)
         own = process.package or process.launch
         same = sum(one["program"] == program for one in several.values())
         several[f"{program} {same}" if process.launch else process.name] = {
@@ -78,6 +90,7 @@ def started_with(robot: Robot) -> dict[str, dict[str, Any]]:
             "namespace": process.ros_nodes[0].name.rpartition("/")[0].strip("/") if process.package else "",
             "remap": process.remap,
             "env": process.env,
+            "output": (process.output, process.emulate_tty, process.stop.timeout_s, process.stop.kill_timeout_s),
             "params": {} if process.launch else {key: repr(value) for key, value in sorted(params.items())},
         }
     return several

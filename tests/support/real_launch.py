@@ -5,6 +5,7 @@
 
 import json
 import sys
+from array import array
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,9 @@ from launch import LaunchDescription, LaunchService
 from launch.actions import IncludeLaunchDescription
 from launch.actions.execute_local import ExecuteLocal
 from launch.launch_description_sources import AnyLaunchDescriptionSource
+from launch_ros.actions import LoadComposableNodes
 from launch_ros.substitutions.executable_in_package import ExecutableInPackage
+from rclpy.parameter import parameter_value_to_python
 
 STARTED: list[dict[str, Any]] = []
 
@@ -25,6 +28,22 @@ def record(action: Any, context: Any) -> None:
     words = list(action.process_description.final_cmd)
     files = [Path(file).read_text("utf-8") for word, file in pairwise(words) if word == "--params-file"]
     STARTED.append({"words": words, "params": [yaml.unsafe_load(text) for text in files]})
+
+
+def record_loaded(action: Any, requests: list[Any], _context: Any) -> None:
+    """Stand in the place of the calls that load components."""
+    container = action._LoadComposableNodes__final_target_container_name
+    for one in requests:
+        values, extra = (
+            {one.name: parameter_value_to_python(one.value) for one in several}
+            for several in (one.parameters, one.extra_arguments)
+        )
+        STARTED.append({
+            "component": f"{one.package_name}/{one.plugin_name}", "container": f"/{container.strip('/')}",
+            "node": f"{one.node_namespace.rstrip('/')}/{one.node_name}", "extra_arguments": extra,
+            "remap": dict(rule.split(":=", 1) for rule in one.remap_rules),
+            "params": {name: list(value) if isinstance(value, array) else value for name, value in values.items()},
+        })  # fmt: skip
 
 
 def executable(substitution: Any, context: Any) -> str:
@@ -38,6 +57,7 @@ def main(out: str, file: str, *arguments: str) -> None:
     """Record what a launch file starts."""
     ExecuteLocal.execute = record
     ExecutableInPackage.perform = executable
+    LoadComposableNodes._load_in_sequence = record_loaded
     service = LaunchService(noninteractive=True)
     given = [tuple(word.split(":=", 1)) for word in arguments]
     included = IncludeLaunchDescription(AnyLaunchDescriptionSource(file), launch_arguments=given)

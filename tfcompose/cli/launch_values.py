@@ -78,7 +78,7 @@ def launch_values(arguments: Namespace, plan: Plan) -> tuple[LaunchValues, tuple
     specs, values = validated.spec.args, validated.args
     kinds = {name: spec.kind for name, spec in specs.items()}
     uses = _uses(source, kinds)
-    there = {process.name: process for process in plan.started}
+    there = {process.name: process for process in plan.managed}
     combined = _Combinations(arguments, plan, specs, values)
     missing = {name: expression for name, expression in uses.conditions.items() if name not in there}
     more = {name: found for name, expression in missing.items() if (found := combined.process(name, expression))}
@@ -143,11 +143,14 @@ def _strings(value: Any, path: Path = ()) -> Iterator[tuple[Path, str]]:
 
 def _place(path: Path, data: Mapping[str, Any]) -> tuple[str, str] | None:
     """Return the process and the place in it, or None where launch cannot compute what stands there."""
-    if len(path) < 3 or path[0] != "processes":  # noqa: PLR2004 (the section, the process, its key)
+    if len(path) < 3 or path[0] not in {"processes", "containers"}:  # noqa: PLR2004 (the section, the process, its key)
         return None
-    process = data["processes"][path[1]]
+    process = data[path[0]][path[1]]
     name, key = str(path[1]), path[2]
-    if not isinstance(process, dict) or "for" in process or not isinstance(process.get("run"), (dict, list)):
+    if not isinstance(process, dict) or "for" in process:
+        return None
+    is_composition = path[0] == "containers" or "component" in process
+    if not is_composition and not isinstance(process.get("run"), (dict, list)):
         return None
     if key == "when":
         return name, "when"
@@ -159,8 +162,7 @@ def _place(path: Path, data: Mapping[str, Any]) -> tuple[str, str] | None:
             case (int(step),) if isinstance(process["run"], list):
                 return name, f"args.{step}"
         return None
-    is_launch = isinstance(process["run"], dict) and "launch" in process["run"]
-    is_node = isinstance(process["run"], dict) and not is_launch
+    is_node = is_composition or (isinstance(process["run"], dict) and "launch" not in process["run"])
     if key == "env" or (key in _PLACES and is_node and path[3] != "file" and "nodes" not in process):
         return (name, f"{key}.{'.'.join(map(str, path[3:]))}") if not isinstance(path[-1], int) else None
     return None
@@ -229,8 +231,8 @@ class _Combinations:
         """
         for values in self._where(expression):
             plan, files = self._build(values) or (self.plan, ())
-            found = next((process for process in plan.started if process.name == name), None)
-            if found is not None and found.kind == "run" and _own_edges(plan) == _own_edges(self.plan):
+            found = next((process for process in plan.managed if process.name == name), None)
+            if found is not None and found.kind in {"run", "component"} and _own_edges(plan) == _own_edges(self.plan):
                 needed = tuple(file for file in files if file.path == found.params_file)
                 return found, needed
         return None

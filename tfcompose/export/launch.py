@@ -45,7 +45,11 @@ _IMPORTS = {
         "AndSubstitution", "EnvironmentVariable", "EqualsSubstitution", "LaunchConfiguration",
         "NotEqualsSubstitution", "NotSubstitution", "OrSubstitution", "PythonExpression",
     ),
-    "launch_ros.actions": ("LifecycleNode", "Node", "PushRosNamespace", "SetParameter", "SetRemap"),
+    "launch_ros.actions": (
+        "ComposableNodeContainer", "LifecycleNode", "LoadComposableNodes", "Node", "PushRosNamespace", "SetParameter",
+        "SetRemap",
+    ),
+    "launch_ros.descriptions": ("ComposableNode",),
     "launch_ros.event_handlers": ("OnStateTransition",),
     "launch_ros.events.lifecycle": ("ChangeState",),
     "launch_ros.parameter_descriptions": ("ParameterValue",),
@@ -118,8 +122,7 @@ def launch(
     stock = _stock(plan, urdf)
     actions = list(export.actions(stock))
     text = _text(plan, machine, actions, export.named)
-    left_out = [f"{process.name} is a component, and left out: tfcompose up loads it" for process in plan.components]
-    return (File(f"{plain_name(plan.robot)}.launch.py", text),), [*export.gaps, *left_out]
+    return (File(f"{plain_name(plan.robot)}.launch.py", text),), export.gaps
 
 
 def _text(plan: Plan, machine: Machine, actions: list[Code], named: Mapping[str, Code]) -> str:
@@ -175,11 +178,12 @@ class _Export:
 
     def __init__(self, plan: Plan, values: LaunchValues) -> None:
         self.plan, self.values = plan, values
-        self.processes = (*plan.started, *values.more)
+        self.processes = (*plan.managed, *values.more)
         self.known = {process.name: process for process in (*plan.processes, *values.more)}
         self.gaps: list[str] = []
         self.named: dict[str, Code] = {}
         self._variables: dict[str, str] = {}
+        self._delays_s = _delays_s(self.known)
 
     def actions(self, stock: list[PlanEdge] | None) -> Iterator[Code]:
         """Yield the actions in order; ``stock`` are the edges of static_transform_publishers, None without such."""
@@ -190,7 +194,6 @@ class _Export:
             names = static_names(plan)
             yield from (_state_publisher(plan), *(_fixed(plan, edge, names[edge.child]) for edge in stock))
             self.gaps.append("robot_description is robot.urdf, in which edges of other owners are floating joints")
-        delays_s = _delays_s(self.known)
         for name in self._awaited(stock):
             self._variables[name] = _variable_name(name, self._variables.values())
         for process in self.processes:
@@ -199,19 +202,36 @@ class _Export:
                 continue
             if process.kind in OWN_KINDS and stock is not None:
                 continue
-            before = [name for name, what in process.after.items() if what == "done" and name in self._variables]
+            before = self._before(process)
+            self._waits(process, before[:1])
+            self.gaps += self._unlike(process)
+            if self._comes_with_container(process):
+                continue
             action = self._started(process)
             if process.name in self._variables:
                 self.named[self._variables[process.name]] = action
                 action = Code(self._variables[process.name], (), "")
-            delay_s = delays_s[process.name]
+            delay_s = self._delays_s[process.name]
             action = call("TimerAction", f"period={delay_s!r}", items([action], "actions")) if delay_s else action
             if before:
                 ended = f"target_action={self._variables[before[0]]}"
                 action = call("RegisterEventHandler", call("OnProcessExit", ended, items([action], "on_exit")))
             yield action
-            self._waits(process, before[:1])
-            self.gaps += _unlike(process)
+
+    def _before(self, process: PlanProcess) -> list[str]:
+        """Return the processes for whose end it waits."""
+        return [name for name, what in process.after.items() if what == "done" and name in self._variables]
+
+    def _comes_with_container(self, process: PlanProcess) -> bool:
+        """Return whether the action of its container loads it: it waits for nothing else, and launch starts that."""
+        container = self.known.get(process.component.container) if process.component else None
+        return (
+            container is not None
+            and container.kind == "run"
+            and _is_node(container)
+            and not self._before(process)
+            and self._delays_s[process.name] == self._delays_s[container.name]
+        )
 
     def _awaited(self, stock: list[PlanEdge] | None) -> list[str]:
         """Return the processes for whose end others wait and which are actions of their own."""
@@ -225,9 +245,10 @@ class _Export:
 
     def _waits(self, process: PlanProcess, before: list[str]) -> None:
         """Say for what the process does not wait as it does under ``up``."""
+        container = process.component.container if process.component else ""
         rest = [
             name for name, what in process.after.items()
-            if name in self.known and name not in before and not waiting_s(self.known[name], what)
+            if name in self.known and name not in {*before, container} and not waiting_s(self.known[name], what)
         ]  # fmt: skip
         if rest:
             self.gaps.append(f"{process.name} does not wait for {', '.join(rest)}: launch knows no readiness")
@@ -242,7 +263,21 @@ class _Export:
         expression = self.values.conditions.get(process.name)
         return [keyword("condition", condition_code(expression, self.values.kinds))] if expression else []
 
+    def _unlike(self, process: PlanProcess) -> Iterator[str]:
+        """Yield what launch does otherwise with a process."""
+        yield from _unlike(process)
+        loads = [one.name for one in self._loaded_by(process)]
+        if loads and process.restart != "no":
+            yield f"when {process.name} is started again, it has none of its components: {', '.join(loads)}"
+
+    def _loaded_by(self, container: PlanProcess) -> list[PlanProcess]:
+        return [one for one in self.processes if one.component and one.component.container == container.name]
+
     def _started(self, process: PlanProcess) -> Code:
+        if process.component:
+            container = self.known[process.component.container].nodes[0]
+            several = items([self._component(process)], "composable_node_descriptions")
+            return call("LoadComposableNodes", f"target_container={container!r}", several, *self._condition(process))
         if _is_launch(process):
             return self._included(process)
         delay = 1.0 if process.restart_delay is None else process.restart_delay
@@ -255,7 +290,7 @@ class _Export:
             words = self._filled(process, process.argv)
             for index, text in self._texts_of(process, "args").items():
                 words[int(index)] = text_code(text)
-            run = [items(words, "cmd"), f"name={process.name!r}", *self._surroundings(process), "output='screen'"]
+            run = [items(words, "cmd"), f"name={process.name!r}", *self._surroundings(process)]
             return call("ExecuteProcess", *run, *more)
         return call("process", repr(process.name), *more)
 
@@ -282,6 +317,12 @@ class _Export:
             yield _mapping(env, "additional_env")
         if process.prefix:
             yield f"prefix={shlex.join(process.prefix)!r}"
+        for word, value in (("sigterm", process.stop.timeout_s), ("sigkill", process.stop.kill_timeout_s)):
+            if value is not None:
+                yield f"{word}_timeout={number(value)!r}"
+        if process.emulate_tty:
+            yield "emulate_tty=True"
+        yield f"output={process.output!r}"
 
     def _node(self, process: PlanProcess, more: list[Code | str]) -> Code:
         package = _EXECUTABLE.fullmatch(process.argv[0])
@@ -289,26 +330,53 @@ class _Export:
         words = self._filled(process, own)
         for index, text in self._texts_of(process, "args").items():
             words[int(index)] = text_code(text)
-        namespace, _, node = process.nodes[0].rpartition("/")
-        remap: dict[str, Code | str] = {old: repr(new) for old, new in process.remap.items()}
-        remap |= {old: text_code(text) for old, text in self._texts_of(process, "remap").items()}
         texts = {name: parameter_code(text) for name, text in self._texts_of(process, "params").items()}
         given: list[Code | str] = [f"str({self._file(process)})"] if "--params-file" in process.argv else []
         given += [_mapping(texts)] if texts else []
-        named = [] if node == process.name else [f"exec_name={process.name!r}"]
+        named = [] if process.nodes[0].endswith(f"/{process.name}") else [f"exec_name={process.name!r}"]
         parts: list[Code | str] = [
             f"package={package[1]!r}" if package else "", f"executable={package[2]!r}" if package else "",
-            f"name={node!r}", f"namespace={namespace or '/'!r}", *named,
-            *([items((f"({old!r}, {new})" for old, new in remap.items()), "remappings")] if remap else []),
+            *_named(process), *named, *self._remapped(process),
             *([items(words, "arguments")] if words else []),
             *([items(self._filled(process, ros_words), "ros_arguments")] if ros_words else []),
             *([items(given, "parameters")] if given else []),
-            *self._surroundings(process), "output='screen'", *more,
+            *self._surroundings(process), *more,
         ]  # fmt: skip
+        if loaded := self._loaded_by(process):
+            components = [self._component(one) for one in loaded if self._comes_with_container(one)]
+            return call("ComposableNodeContainer", *parts, items(components, "composable_node_descriptions"))
         state = process.lifecycle.get(process.nodes[0])
         if not state:
             return call("Node", *parts)
         return call("*managed", call("LifecycleNode", *parts), f"active={state == 'active'}")
+
+    def _component(self, process: PlanProcess) -> Code:
+        """Return the description of a component; its condition is here if its container's action loads it."""
+        if process.component is None:
+            raise ValueError(f"{process.name} is no component")
+        found = process.component
+        params = {name: self._value(process, value) for name, value in found.params.items()}
+        params |= {name: parameter_code(text) for name, text in self._texts_of(process, "params").items()}
+        extra = {name: repr(value) for name, value in found.extra_arguments.items()}
+        also, conditions = self._comes_with_container(process), self.values.conditions
+        needed = also and conditions.get(process.name) != conditions.get(found.container)
+        condition = self._condition(process) if needed else []
+        return call(
+            "ComposableNode", f"package={found.package!r}", f"plugin={found.plugin!r}", *_named(process),
+            *self._remapped(process), *([items([_mapping(params)], "parameters")] if params else []),
+            *([items([_mapping(extra)], "extra_arguments")] if extra else []), *condition,
+        )  # fmt: skip
+
+    def _value(self, process: PlanProcess, value: Any) -> Code | str:
+        if isinstance(value, list):
+            return items([self._value(process, one) for one in value])
+        return _filled(value, self._file(process)) if isinstance(value, str) else repr(value)
+
+    def _remapped(self, process: PlanProcess) -> Iterator[Code]:
+        remap: dict[str, Code | str] = {old: repr(new) for old, new in process.remap.items()}
+        remap |= {old: text_code(text) for old, text in self._texts_of(process, "remap").items()}
+        if remap:
+            yield items((f"({old!r}, {new})" for old, new in remap.items()), "remappings")
 
     def _included(self, process: PlanProcess) -> Code:
         """Return the launch file with its arguments, and what ``up`` sets for all of its nodes."""
@@ -329,6 +397,12 @@ class _Export:
             for name, text, value in arguments
         )
         return call("included", repr(package), repr(file), given, items(settings), *self._condition(process))
+
+
+def _named(process: PlanProcess) -> Iterator[str]:
+    namespace, _, node = process.nodes[0].rpartition("/")
+    yield f"name={node!r}"
+    yield f"namespace={namespace or '/'!r}"
 
 
 def _variable_name(name: str, taken: Collection[str]) -> str:
@@ -362,7 +436,8 @@ def _delays_s(known: Mapping[str, PlanProcess]) -> dict[str, float]:
 
 
 def _unlike(process: PlanProcess) -> Iterator[str]:
-    """Yield what launch does otherwise with a process."""
+    if process.component and process.lifecycle:
+        yield f"{process.name} is a component, and is not brought into its lifecycle state"
     if process.kind == "run" and process.lifecycle and not _is_node(process):
         yield f"{', '.join(process.lifecycle)} of {process.name} is not brought into its lifecycle state"
     if _is_launch(process):

@@ -79,12 +79,16 @@ class Draft:
         self.note(("frames", child), *notes)
         return True
 
-    def process(self, wanted: str, keys: Mapping[str, Any], *notes: str) -> str:
-        """Add a process under a name that is free, and return that."""
+    def process(self, wanted: str, keys: Mapping[str, Any], *notes: str, section: str = "processes") -> str:
+        """Add a process, or another entry whose names are those of processes, under a free name, and return that."""
         name = self.free_name(wanted)
-        self.sections["processes"][name] = dict(keys)
-        self.note(("processes", name), *notes)
+        self.sections[section][name] = dict(keys)
+        self.note((section, name), *notes)
         return name
+
+    def at(self, name: str) -> Entry:
+        """Return where the process or container of that name is, which is there."""
+        return ("containers" if name in self.sections["containers"] else "processes"), name
 
     def free_name(self, wanted: str) -> str:
         """Return a name for a process or sensor, made of letters, digits and _; a number makes it one of its own."""

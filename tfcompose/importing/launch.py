@@ -23,7 +23,9 @@ from tfcompose.importing.programs import (
     PACKAGE,
     STATE_PUBLISHER,
     Description,
+    LoadedNode,
     Program,
+    add_component,
     add_program,
     one_clock,
     where,
@@ -136,7 +138,7 @@ class _Work:
         self._after: list[tuple[str, dict[str, str]]] = []
         self._delays: list[tuple[str, float]] = []
         self._missing: dict[str, Span] = {}
-        self._containers: dict[str, str] = {}
+        self._components: list[tuple[dict[str, Any], Span]] = []
         self._only_when = ""
         self._arguments: dict[str, tuple[dict[str, Any], Span]] = {}
 
@@ -147,8 +149,8 @@ class _Work:
         several: dict[str, Callable[[dict[str, Any], Span], None]] = {
             "node": self._node,
             "process": self._node,
-            "container": self._container,
-            "load": self._load,
+            "container": self._node,
+            "component": self._component,
             "include": self._include,
             "argument": self._argument,
             "lifecycle": self._lifecycle,
@@ -165,12 +167,13 @@ class _Work:
 
     def finish(self, decided: list[str]) -> None:
         """Add what depends on all records; ``decided`` are arguments whose values stand in what was added."""
+        for record, span in self._components:
+            self._load(record, span)
         self._args(decided)
-        processes = self.draft.sections["processes"]
         for name, after in self._after:
             known = {self._names[key]: what for key, what in after.items() if key in self._names}
             if known:
-                processes[name].setdefault("after", {}).update(known)
+                self._entry(name).setdefault("after", {}).update(known)
         self._delay()
         one_clock(self.draft)
         for package, span in self._missing.items():
@@ -225,11 +228,20 @@ class _Work:
                 self._conditions(record, ("frames", child))
             return
         self._names[str(record.get("id"))] = name
-        self._conditions(record, ("processes", name))
+        self._waits(record, name)
+
+    def _waits(self, record: dict[str, Any], name: str) -> None:
+        """Add when a process is there, and after what."""
+        self._conditions(record, self.draft.at(name))
         if record.get("after"):
             self._after.append((name, record["after"]))
         if record.get("period"):
             self._delays.append((name, record["period"]))
+
+    def _entry(self, name: str) -> dict[str, Any]:
+        section, key = self.draft.at(name)
+        entry: dict[str, Any] = self.draft.sections[section][key]
+        return entry
 
     def _conditions(self, record: dict[str, Any], at: tuple[str, str]) -> None:
         for text in record.get("when", ()):
@@ -253,6 +265,7 @@ class _Work:
             record.get("name"), record.get("label"), record.get("namespace"), tuple(params),
             tuple((old, new) for old, new in record.get("remap", ())), self._env(record), keys,
             record.get("period", 0.0), reader, description, tuple(todo),  # type: ignore[arg-type]
+            record["kind"] == "container",
         )  # fmt: skip
 
     def _env(self, record: dict[str, Any]) -> dict[str, str]:
@@ -285,11 +298,10 @@ class _Work:
                 todo.append(f"the prefix {record['prefix']}")
         if record.get("only_env"):
             todo.append("env replaces the environment: here its variables are added to it")
-        if record.get("sigterm_timeout"):
-            try:
-                keys["stop"] = {"timeout": _seconds(float(record["sigterm_timeout"]))}
-            except ValueError:
-                todo.append(f"sigterm_timeout {record['sigterm_timeout']}")
+        stop = _stop(record, todo)
+        keys |= {"stop": stop} if stop else {}
+        keys |= {"output": "log"} if record.get("output") == "log" else {}
+        keys |= {"emulate_tty": True} if record.get("emulate_tty") else {}
         return keys
 
     def _describe(self, program: Program, span: Span) -> None:
@@ -331,21 +343,52 @@ class _Work:
         for one in program.todo:
             self.draft.todo(one, span)
 
-    def _container(self, record: dict[str, Any], span: Span) -> None:
-        components = record["components"]
-        self._node(record, span)
-        name = self._names.get(str(record.get("id")), "")
-        self._containers[str(record.get("id"))] = name
-        self._components(components, name)
+    def _component(self, record: dict[str, Any], span: Span) -> None:
+        """Keep a component until all containers are known: a launch file may load it first."""
+        self._components.append((record, span))
 
-    def _load(self, record: dict[str, Any], _span: Span) -> None:
-        container = str(record["container"])
-        self._components(record["components"], self._containers.get(container, container))
+    def _load(self, record: dict[str, Any], span: Span) -> None:
+        todo: list[str] = []
+        params, description = _split_description(record["params"], todo)
+        if description is not None:
+            todo.append("the parameter robot_description")
+        extra: dict[str, Any] = {}
+        for one in record["extra"]:
+            if isinstance(one, str):
+                todo.append(f"extra arguments of {one}")
+            else:
+                extra |= one
+        container = self._container(str(record["container"]), span)
+        node = LoadedNode(
+            span, container, record["package"], record["plugin"], record["name"], record["namespace"], tuple(params),
+            tuple((old, new) for old, new in record["remap"]), extra, tuple(todo),
+        )  # fmt: skip
+        self._waits(record, add_component(self.draft, node, self.target))
 
-    def _components(self, components: list[dict[str, Any]], container: str) -> None:
-        for one in components:
-            at = ("processes", container) if container in self.draft.sections["processes"] else ("", "")
-            self.draft.todo(f"the component {one['plugin']} of {one['package']}", self._span(one["at"]), at)
+    def _container(self, wanted: str, span: Span) -> str:
+        """Return the container that a component names by its node, or by the action that starts it."""
+        full = f"/{wanted.strip('/')}"
+        containers, processes = self.draft.sections["containers"], self.draft.sections["processes"]
+        nodes = ((name, keys) for name, keys in processes.items() if "package" in keys.get("run", ()))
+        for name, keys in [*containers.items(), *nodes]:
+            node = "/".join(["", *filter(None, [keys.get("namespace"), keys.get("node", name)])])
+            if self._names.get(wanted) == name or (wanted not in self._names and node == full):
+                if name in processes:
+                    self._let_load(name)
+                return name
+        namespace, _, node = full.strip("/").rpartition("/")
+        name = self.draft.free_name(node)
+        keys = {"external": True, **({"node": node} if node != name else {})}
+        keys |= {"namespace": namespace} if namespace else {}
+        note = "the source starts no such container: it is started elsewhere"
+        return self.draft.process(name, keys, where(span, note), section="containers")
+
+    def _let_load(self, name: str) -> None:
+        """Make a container of a process: something is loaded into it."""
+        keys = self.draft.sections["processes"].pop(name)
+        run = keys.pop("run", {})
+        self.draft.sections["containers"][name] = (run if isinstance(run, dict) else {}) | keys
+        self.draft.notes[("containers", name)] = self.draft.notes.pop(("processes", name), [])
 
     def _include(self, record: dict[str, Any], span: Span) -> None:
         """Add a launch file of a package that is not found as one process."""
@@ -359,18 +402,14 @@ class _Work:
         keys |= {"env": env} if env else {}
         name = posixpath.basename(file).partition(".")[0]
         name = self.draft.process(name, keys, where(span, "an included launch file, which runs as one process"))
-        self._conditions(record, ("processes", name))
-        if record.get("after"):
-            self._after.append((name, record["after"]))
-        if record.get("period"):
-            self._delays.append((name, record["period"]))
+        self._waits(record, name)
 
     def _lifecycle(self, record: dict[str, Any], span: Span) -> None:
         name = self._names.get(str(record["node"]))
         if name is None:
             self.draft.todo("a change of a lifecycle node's state", span)
         else:
-            process = self.draft.sections["processes"][name]
+            process = self._entry(name)
             if process.get("lifecycle") != "active":
                 process["lifecycle"] = record["state"]
 
@@ -379,7 +418,7 @@ class _Work:
         if name is None:
             self.draft.todo("the end of a process ends all", span)
         else:
-            self.draft.sections["processes"][name]["required"] = True
+            self._entry(name)["required"] = True
 
     def _delay(self) -> None:
         """Let what a timer starts wait: for a process that counts as ready after that time."""
@@ -391,7 +430,7 @@ class _Work:
             if period_s not in gates:
                 free = [
                     one for one in self._names.values()
-                    if one not in unfit and one not in gates.values() and "run" in processes[one]
+                    if one not in unfit and one not in gates.values() and "run" in processes.get(one, {})
                     and not {"ready", "after", "when"} & processes[one].keys()
                 ]  # fmt: skip
                 if free:
@@ -403,7 +442,7 @@ class _Work:
                     gates[period_s] = gate
             gate = gates[period_s]
             what = "done" if processes[gate]["run"] == ["sleep", number(period_s)] else "ready"
-            processes[name].setdefault("after", {})[gate] = what
+            self._entry(name).setdefault("after", {})[gate] = what
 
 
 def _seconds(value: float) -> Bare:
@@ -447,6 +486,18 @@ def _is_finite(value: Any) -> bool:
 def _description(value: str) -> Description:
     found = marks(value)
     return Description(found[0]["file"], found[0]["args"]) if found else Description(text=value)
+
+
+def _stop(record: dict[str, Any], todo: list[str]) -> dict[str, Any]:
+    """Return how long a process that is ended has until the next signal, and the one after it."""
+    stop = {}
+    for given, key in (("sigterm_timeout", "timeout"), ("sigkill_timeout", "kill_timeout")):
+        if record.get(given):
+            try:
+                stop[key] = _seconds(float(record[given]))
+            except ValueError:
+                todo.append(f"{given} {record[given]}")
+    return stop
 
 
 def _restarts(record: dict[str, Any]) -> dict[str, Any]:

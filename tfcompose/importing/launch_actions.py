@@ -607,37 +607,39 @@ class LifecycleTransition(Action):
     pass
 
 
-class ComposableNode:
-    def __init__(
-        self,
-        *,
-        package: Any,
-        plugin: Any,
-        name: Any = None,
-        namespace: Any = None,
-        parameters: Any = None,
-        remappings: Any = None,
-        extra_arguments: Any = None,
-        condition: Any = None,
-        **kwargs: Any,
-    ) -> None:
-        self.at, self.condition = place(), condition
+class ComposableNode(Action):
+    """A description of a component. Who has it loaded visits it, so that its condition counts as an action's does."""
+
+    def __init__(self, *, package: Any, plugin: Any = None, name: Any = None, namespace: Any = None,
+                 parameters: Any = None, remappings: Any = None, extra_arguments: Any = None,
+                 **kwargs: Any) -> None:  # fmt: skip
+        plugin = kwargs.pop("node_plugin", plugin)
+        name, namespace = kwargs.pop("node_name", name), kwargs.pop("node_namespace", namespace)
+        super().__init__(**kwargs)
         self.package, self.plugin, self.name, self.namespace = package, plugin, name, namespace
         self.parameters, self.remappings, self.extra = parameters, remappings, extra_arguments
+        self.container: Any = None
+        self.waits: dict[str, Any] = {}
 
-    def record(self, context: Context) -> dict[str, Any] | None:
-        """Return what the container loads, or None where its condition does not hold."""
-        if self.condition is not None and not self.condition.evaluate(context):
-            context.record("skipped", self.at, text=f"{plain([self.plugin])} only if {self.condition.describe()}")
-            return None
-        return {
-            "at": self.at, "package": text_of(self.package, context), "plugin": text_of(self.plugin, context),
-            "name": _optional(self.name, context),
-            "namespace": below(context.namespace, _optional(self.namespace, context)),
-            "params": [*context.params, *parameters_of(self.parameters, context, self.at)],
-            "remap": [*context.remaps, *rules_of(self.remappings, context)],
-            "extra": parameters_of(self.extra, context, self.at),
-        }  # fmt: skip
+    def execute(self, context: Context) -> None:
+        context.record(
+            "component", self.at, container=self.container, package=text_of(self.package, context),
+            plugin=text_of(self.plugin, context), name=_optional(self.name, context),
+            namespace=below(context.namespace, _optional(self.namespace, context)),
+            params=[*context.params, *parameters_of(self.parameters, context, self.at)],
+            remap=[*context.remaps, *rules_of(self.remappings, context)],
+            extra=parameters_of(self.extra, context, self.at), **self.waits,
+        )  # fmt: skip
+
+    def described(self, context: Context) -> str:
+        return f"the component {plain([self.package])}/{plain([self.plugin])}"
+
+
+def _load(components: Any, container: Any, context: Context, **waits: Any) -> None:
+    for one in components if isinstance(components, (list, tuple)) else ():
+        if isinstance(one, ComposableNode):
+            one.container, one.waits = container, waits
+            one.visit(context)
 
 
 class ComposableNodeContainer(Node):
@@ -646,8 +648,8 @@ class ComposableNodeContainer(Node):
         self.components = composable_node_descriptions
 
     def execute(self, context: Context) -> None:
-        several = [one.record(context) for one in self.components or () if isinstance(one, ComposableNode)]
-        self.record(context, "container", components=[one for one in several if one])
+        self.record(context, "container")
+        _load(self.components, id(self), context)
 
 
 class LoadComposableNodes(Action):
@@ -656,10 +658,9 @@ class LoadComposableNodes(Action):
         self.components, self.container = composable_node_descriptions, target_container
 
     def execute(self, context: Context) -> None:
-        several = [one.record(context) for one in self.components or () if isinstance(one, ComposableNode)]
         container = self.container
         target = id(container) if isinstance(container, Node) else text_of(container, context)
-        context.record("load", self.at, container=target, components=[one for one in several if one])
+        _load(self.components, target, context, period=context.period_s, after=dict(context.after))
 
 
 class Unknown(Action):

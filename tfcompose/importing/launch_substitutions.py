@@ -127,7 +127,7 @@ class Context:
     def record(self, kind: str, at: Any, **what: Any) -> None:
         """Keep what an action does."""
         more: dict[str, Any] = {"when": list(self.conditions)} if self.conditions else {}
-        more |= {"only_when": " and ".join(self.whens)} if self.whens else {}
+        more |= {"only_when": " and ".join(dict.fromkeys(self.whens))} if self.whens else {}
         self.records.append({"kind": kind, "at": at, **more, **what})
 
     def todo(self, at: Any, text: str) -> None:

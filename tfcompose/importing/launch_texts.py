@@ -287,14 +287,18 @@ def _made(entity: Entity, context: Context) -> Iterator[Any]:
         entity.used.update(entity.attributes)
         raise FailedError("it is not known here")
     several = make(entity, context)
-    condition: Any = None
-    if (given := entity.get("if")) is not None:
-        condition = conditions.IfCondition(substituted(given))
-    elif (given := entity.get("unless")) is not None:
-        condition = conditions.UnlessCondition(substituted(given))
+    condition = _condition(entity)
     for one in several:
         one.condition = condition
         yield one
+
+
+def _condition(entity: Entity) -> Any:
+    if (given := entity.get("if")) is not None:
+        return conditions.IfCondition(substituted(given))
+    if (given := entity.get("unless")) is not None:
+        return conditions.UnlessCondition(substituted(given))
+    return None
 
 
 def _need(entity: Entity, *names: str) -> Any:
@@ -398,12 +402,11 @@ class _OfRos1(actions.Action):
 
 def _component(entity: Entity) -> actions.ComposableNode:
     extra = [dict([_parameter(one)]) for one in entity.all("extra_arg")]
-    condition = entity.get("if")
     one = actions.ComposableNode(
         package=_need(entity, "pkg"), plugin=_need(entity, "plugin"), name=_optional(entity, "name"),
         namespace=_optional(entity, "namespace"), parameters=_parameters(entity),
         remappings=[(_need(rule, "from"), _need(rule, "to")) for rule in entity.all("remap")], extra_arguments=extra,
-        condition=conditions.IfCondition(substituted(condition)) if condition is not None else None,
+        condition=_condition(entity),
     )  # fmt: skip
     one.at = entity.at
     return one

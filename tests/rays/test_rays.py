@@ -20,7 +20,7 @@ from tfcompose.findings import Span
 from tfcompose.geometry import Pose, matrix_from_quat, normalised, quat_from_rpy
 from tfcompose.model import Asset, Optics, Robot, Shape
 from tfcompose.rays import Body, View, cast, contains, directions, view_of
-from tfcompose.view.scene import mesh_of
+from tfcompose.view.shapes import mesh_of
 
 HEAD = "tfcompose: 1\nrobot: r\n"
 SIZES = {"box": (0.6, 0.4, 0.2), "sphere": (0.3,), "cylinder": (0.2, 0.5), "capsule": (0.15, 0.4)}

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
+import trimesh
 import viser
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
@@ -20,7 +21,7 @@ from websockets.typing import Origin, Subprotocol
 from tests.support import processes
 from tests.support.cli import tfcompose_in
 from tests.support.tables import for_each
-from tfcompose.cli.compiling import library
+from tfcompose.cli.compiling import disk, library
 from tfcompose.cli.fixing import ChangedError, rewrite
 from tfcompose.compile import Compiled, compile_robot
 from tfcompose.geometry import Pose, offset_of, quat_from_rpy
@@ -31,6 +32,7 @@ from tfcompose.view.plan_robot import robot_of_plan
 from tfcompose.view.scene import RobotScene, colours_of
 from tfcompose.view.server import started, stop
 from tfcompose.view.session import Session, poses_in_roots
+from tfcompose.view.shapes import MOST_TRIANGLES
 
 ROVER = Path(__file__).parents[2] / "robots" / "field_rover.yaml"
 PRESETS = library()
@@ -249,6 +251,46 @@ links: {base_link: {}, car: {parent: base_link, xyz: [2, 0, 0.5], visual: {box: 
     grid = server.scene.get_handle_by_name("/grid")
     assert grid
     assert grid.position[2] == pytest.approx(-0.5)
+
+
+HEAVY = """tfcompose: 1
+robot: r
+links:
+  base_link: {visual: {mesh: heavy.stl}}
+  arm: {parent: base_link, xyz: [1, 0, 0], visual: {mesh: heavy.stl}, collision: [{box: [2, 2, 2]}]}
+"""
+
+
+def test_a_mesh_has_few_triangles_and_visual_ones_come_after_collision_shapes(
+    tmp_path: Path, server: viser.ViserServer
+) -> None:
+    trimesh.creation.icosphere(subdivisions=6).export(tmp_path / "heavy.stl")
+    robot = compile_robot(HEAVY, str(tmp_path / "r.yaml"), PRESETS, disk=disk()).robot
+    assert robot
+    scene = RobotScene(server.scene, robot)
+    heavy = server.scene.get_handle_by_name("/body/0/first/0")
+    assert isinstance(heavy, viser.MeshHandle)
+    assert 0.9 * MOST_TRIANGLES < len(heavy.faces) <= MOST_TRIANGLES
+    extent = heavy.vertices.max(axis=0) - heavy.vertices.min(axis=0)
+    assert extent == pytest.approx([2.0, 2.0, 2.0], abs=0.01)
+    box = server.scene.get_handle_by_name("/body/1/first/0")
+    assert isinstance(box, viser.MeshHandle)
+    assert len(box.faces) == 12
+    scene.add_meshes()
+    assert server.scene.get_handle_by_name("/body/1/first/0") is None
+    later = server.scene.get_handle_by_name("/body/1/visual/0")
+    assert isinstance(later, viser.MeshHandle)
+    assert len(later.faces) == len(heavy.faces)
+
+
+def test_a_scene_that_has_ended_gets_no_meshes(tmp_path: Path, server: viser.ViserServer) -> None:
+    trimesh.creation.icosphere(subdivisions=1).export(tmp_path / "heavy.stl")
+    robot = compile_robot(HEAVY, str(tmp_path / "r.yaml"), PRESETS, disk=disk()).robot
+    assert robot
+    scene = RobotScene(server.scene, robot)
+    scene.end()
+    scene.add_meshes()
+    assert server.scene.get_handle_by_name("/body/1/visual/0") is None
 
 
 def test_the_server_answers_until_ctrl_c_and_a_taken_port_names_the_next(rover: Path) -> None:

@@ -119,6 +119,7 @@ class FieldsOfView:
         self._frames: list[Any] = []
         self._blocked: dict[int, Any] = {}
         self._hidden: frozenset[str] = frozenset()
+        self._at: Mapping[str, Pose] = {}
         self.sensors = tuple(dict.fromkeys(sensor.name for sensor, _ in self._streams))
         cameras = {sensor.name for sensor, optics in self._streams if optics.kind == "camera"}
         self.shown = {name: name in cameras for name in self.sensors}
@@ -142,9 +143,10 @@ class FieldsOfView:
     def update(self, poses: Mapping[str, Pose]) -> None:
         """Put every field of view where its frame is, in the root of its tree."""
         for handle, (_, optics) in zip(self._frames, self._streams, strict=True):
-            if optics.frame in poses:
+            if optics.frame in poses and poses[optics.frame] != self._at.get(optics.frame):
                 x, y, z, w = poses[optics.frame].quat_xyzw
                 handle.wxyz, handle.position = (w, x, y, z), poses[optics.frame].xyz
+        self._at = poses
 
     def pose(self, index: int) -> Pose:
         """Return where the scene has the frame of a stream."""

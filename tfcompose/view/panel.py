@@ -102,6 +102,12 @@ class Panel:
         self.refresh()
         self.scene.frame_camera(server, poses_in_roots(session.robot, self.positions))
         self._select()
+        threading.Thread(target=self.scene.add_meshes, name="meshes", daemon=True).start()
+
+    def end(self) -> None:
+        """Move nothing any more: another panel takes this one's place, or none."""
+        self.is_gone = True
+        self.scene.end()
 
     def refresh(self) -> None:
         """Put the scene where joints and mounts are now."""

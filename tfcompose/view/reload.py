@@ -115,7 +115,7 @@ class ReloadedPanel:
 
     def end(self) -> None:
         """Let the panel move nothing any more."""
-        self.panel.is_gone = True
+        self.panel.end()
 
     def reload(self) -> bool:
         """Read the files again; return whether there is another panel now, that of the robot which they describe."""
@@ -133,7 +133,7 @@ class ReloadedPanel:
             return False
         self.session.replace(texts, state)
         before = self.panel
-        before.is_gone = True
+        before.end()
         with self._server.atomic():
             self._server.gui.reset()
             self._server.scene.reset()

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import colorsys
 import itertools
+import threading
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import trimesh
 
 from tfcompose.geometry import Pose
-from tfcompose.meshes import read_mesh
 from tfcompose.view.fields import FieldsOfView
+from tfcompose.view.shapes import mesh_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -50,23 +50,6 @@ def colours_of(robot: Robot) -> dict[str, tuple[int, int, int]]:
     return colours
 
 
-def mesh_of(shape: Shape) -> Any:
-    """Return the triangles of a shape in its own frame, or None for a mesh that is not there or cannot be read."""
-    size = shape.size
-    if shape.kind == "box":
-        return trimesh.creation.box(extents=size)
-    if shape.kind == "cylinder":
-        return trimesh.creation.cylinder(radius=size[0], height=size[1], sections=32)
-    if shape.kind == "sphere":
-        return trimesh.creation.icosphere(subdivisions=2, radius=size[0])
-    if shape.kind == "capsule":
-        return trimesh.creation.capsule(radius=size[0], height=size[1], count=[24, 24])
-    try:
-        return read_mesh(shape.mesh.path if shape.mesh else "", (size[0], size[1], size[2]))
-    except Exception:  # noqa: BLE001 (readers of a dozen formats: anything can come out of them)
-        return None
-
-
 def _add_shape(scene: viser.SceneApi, name: str, shape: Shape, colour: tuple[int, int, int], opacity: float) -> Any:
     """Add a shape to the scene; return its mesh in its own frame, and its handle, or None if it has nothing to show."""
     mesh = mesh_of(shape)
@@ -89,16 +72,24 @@ def _add_shape(scene: viser.SceneApi, name: str, shape: Shape, colour: tuple[int
 
 
 class RobotScene:
-    """What a scene shows of one robot; ``update`` moves it."""
+    """What a scene shows of one robot; ``update`` moves it.
+
+    Reading the meshes of an arm takes seconds. A link that has collision shapes is shown by these until ``add_meshes``
+    has read what its visual ones need.
+    """
 
     def __init__(self, scene: viser.SceneApi, robot: Robot) -> None:
         self._scene = scene
         self.colours = colours_of(robot)
         self._bodies: dict[str, Any] = {}
+        self._later: list[tuple[str, str, tuple[Shape, ...], list[Any]]] = []
+        self._lock = threading.Lock()
+        self._is_gone = False
         self._corners: dict[str, list[Any]] = {}
         self._axes: Any = None
         self._lines: dict[str, Any] = {}
         self._labels: dict[str, Any] = {}
+        self._at: Mapping[str, Pose] = {}
         self._hidden: frozenset[str] = frozenset()
         #: What is called with the frame of a body that is clicked.
         self.clicked: Callable[[str], None] = lambda _: None
@@ -106,28 +97,56 @@ class RobotScene:
         scene.world_axes.visible = False
         for index, (frame, link) in enumerate(robot.links.items()):
             shapes = link.visuals or link.collisions
-            if shapes and frame in robot.frames:
-                self._add_body(frame, f"/body/{index}", shapes)
+            if not shapes or frame not in robot.frames:
+                continue
+            name = f"/body/{index}"
+            self._bodies[frame] = scene.add_frame(name, show_axes=False)
+            is_later = link.collisions and any(shape.kind == "mesh" for shape in link.visuals)
+            handles = self._add_shapes(frame, f"{name}/first", link.collisions if is_later else shapes)
+            if is_later:
+                self._later.append((frame, f"{name}/visual", shapes, handles))
         self.fields = FieldsOfView(scene, robot)
 
-    def _add_body(self, frame: str, name: str, shapes: tuple[Shape, ...]) -> None:
-        self._bodies[frame] = self._scene.add_frame(name, show_axes=False)
+    def add_meshes(self) -> None:
+        """Show visual meshes in the place of collision shapes; a mesh that cannot be read leaves them."""
+        for frame, name, shapes, before in self._later:
+            if any(mesh_of(shape) is None for shape in shapes):
+                continue
+            with self._lock:
+                if self._is_gone:
+                    return
+                self._add_shapes(frame, name, shapes)
+                for handle in before:
+                    handle.remove()
+
+    def end(self) -> None:
+        """Let ``add_meshes`` change nothing any more: another scene takes this one's place, or none."""
+        with self._lock:
+            self._is_gone = True
+
+    def _add_shapes(self, frame: str, name: str, shapes: tuple[Shape, ...]) -> list[Any]:
+        handles = []
         for number, shape in enumerate(shapes):
             rgba = shape.material.rgba if shape.material else None
             colour = (round(rgba[0] * 255), round(rgba[1] * 255), round(rgba[2] * 255)) if rgba else _GREY
             added = _add_shape(self._scene, f"{name}/{number}", shape, colour, 0.8)
             if added is not None:
                 mesh, handle = added
+                handles.append(handle)
                 handle.on_click(lambda _, frame=frame: self.clicked(frame))
                 corners = itertools.product(*mesh.bounds.T.tolist())
                 self._corners.setdefault(frame, []).extend((shape.pose @ Pose(one)).xyz for one in corners)
+        return handles
 
     def update(self, robot: Robot, poses: Mapping[str, Pose]) -> None:
         """Put every frame where it is in the root of its tree."""
         for frame, body in self._bodies.items():
-            body.wxyz, body.position = wxyz(poses[frame]), poses[frame].xyz
+            if poses[frame] != self._at.get(frame):
+                body.wxyz, body.position = wxyz(poses[frame]), poses[frame].xyz
         for frame, label in self._labels.items():
-            label.position = poses[frame].xyz
+            if poses[frame] != self._at.get(frame):
+                label.position = poses[frame].xyz
+        self._at = poses
         self.fields.update(poses)
         rows = np.array([poses[frame].xyz + poses[frame].quat_xyzw for frame in robot.frames], np.float32).reshape(
             -1, 7

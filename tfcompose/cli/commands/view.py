@@ -141,6 +141,7 @@ def _write(session: Session, path: Path) -> None:
     server = started(_HOST, 0, robot.name)
     try:
         scene = RobotScene(server.scene, robot)
+        scene.add_meshes()
         scene.update(robot, poses)
         scene.frame_camera(server, poses)
         replace_file(path, server.scene.as_html().encode())

@@ -255,6 +255,10 @@ CATALOGUE: dict[str, Code] = {
         Code("TF856", "container_without_components", "processes", "warning"),
         Code("TF857", "host_not_declared", "processes", "error"),
         Code("TF858", "host_without_processes", "processes", "warning"),
+        Code("TF870", "not_with_this_rmw", "processes", "error"),
+        Code("TF871", "other_rmw", "processes", "error"),
+        Code("TF872", "second_router", "processes", "error"),
+        Code("TF873", "router_out_of_reach", "processes", "error"),
         # ROS, plans, bags, extras
         Code("TF901", "no_ros", "environment", "error"),
         Code("TF902", "bad_plan", "environment", "error"),

@@ -102,7 +102,7 @@ There are several ways to write a rotation, to run a process or to give a shape:
     "TF304": """A robot has isolate, but no namespace.
 
 isolate moves topics into the namespace, or prefixes frames with it. Add ros: {namespace: robot1}.""",
-    "TF312": """A part has another clock, domain or discovery range than the robot that contains it.
+    "TF312": """A part has another clock, domain, discovery range or middleware than the robot that contains it.
 
 All processes of a plan share them. Set them in the robot that contains the part, and remove them from the part's
 file.""",
@@ -452,6 +452,22 @@ and not one for each edge. It is a warning where all of them are frames that thi
 frame of the same name, tf2 takes whatever came last. Give one of them a domain of its own, ros: {domain_id: N}, or TF
 topics of its own, ros: {namespace: NAME, isolate: topics}; two robots that belong together are parts of one robot file.
 """,
+    "TF870": """The robot has a setting that its middleware does not have.
+
+A partition, behind which a strict guard fences processes off, exists on Fast DDS alone: without fence, strict remaps
+/tf and /tf_static elsewhere. Zenoh cannot switch discovery off; its router can be kept to its own computer.""",
+    "TF871": """A process is given another middleware than the robot has.
+
+Nodes of different middlewares do not find each other: edges of this process reach nobody. Remove RMW_IMPLEMENTATION
+from its env, or change ros: {rmw}.""",
+    "TF872": """A robot on Zenoh has two routers.
+
+All processes find each other through one. tfcompose adds zenoh_router itself; a process of the file that runs
+rmw_zenohd, or is called zenoh_router, takes its place.""",
+    "TF873": """Processes run on other computers than the Zenoh router, and cannot find it.
+
+A session of rmw_zenoh looks for the router on its own computer. Say where it is for all of them:
+ros: {router: tcp/10.0.0.2:7447}.""",
     "TF901": """ROS 2 is missing, or cannot be used.
 
 pip install 'tfcompose[ros]' brings it on x86-64 Linux; elsewhere source your distribution's setup file.""",
@@ -475,11 +491,12 @@ MCAP and SQLite bags can be read, as folders with metadata.yaml or as single .mc
 Processes reach each other with the same ROS_DOMAIN_ID, if neither has ROS_AUTOMATIC_DISCOVERY_RANGE=OFF, and reliably
 only with the same RMW_IMPLEMENTATION. The settings of your own processes are read from /proc; those of other machines
 and of containers are not visible.""",
-    "TF909": """Environment variables of ROS contradict each other, exclude every other process, or are invalid.
+    "TF909": """Environment variables of ROS contradict each other or the robot, exclude every process, or are invalid.
 
 A domain is an integer from 0 to 232. RMW_IMPLEMENTATION names a middleware that must be installed: ROS ends a process
 that requests another. ROS_LOCALHOST_ONLY=1 overrides ROS_AUTOMATIC_DISCOVERY_RANGE and is deprecated since Iron; OFF
-discovers nobody, not even on the same machine.""",
+discovers nobody, not even on the same machine. With ros: {rmw} in the robot file, its processes have that middleware;
+tools that are started with another do not see them.""",
     "TF910": """A URDF that was to be written does not read back as the same robot.
 
 build --read-back has yourdfpy read each description and compares links, joints, poses, limits, masses, shapes and

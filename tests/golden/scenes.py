@@ -523,6 +523,14 @@ def surroundings() -> Iterator[Finding]:
     with mock.patch.object(environment, "no_ros", return_value=None), mock.patch.dict(os.environ, LD_LIBRARY_PATH=""):
         for settings in ({"ROS_DOMAIN_ID": "300"}, {"RMW_IMPLEMENTATION": "rmw_none_cpp"}):
             yield environment.ros_trouble(settings) or AN_EXAMPLE
+        zenoh = RosSettings(rmw="zenoh")
+        yield environment.ros_trouble({"RMW_IMPLEMENTATION": "rmw_zenoh_cpp"}, zenoh) or AN_EXAMPLE
+        yield environment.other_middleware({"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}, zenoh) or AN_EXAMPLE
+        with mock.patch("ctypes.CDLL"):
+            for name in ("rmw_cyclonedds_cpp", "rmw_zenoh_cpp"):
+                session = {"RMW_IMPLEMENTATION": name, "ZENOH_SESSION_CONFIG_URI": "/no/such.json5"}
+                with mock.patch.object(environment, "find_spec", return_value=None if "dds" in name else True):
+                    yield environment.ros_trouble(session) or AN_EXAMPLE
     yield from check(Robot("r", "r.yaml", {}, (), {}, (), None), [two_parents])
     with mock.patch.object(live, "reject", side_effect=_rejected):
         with mock.patch.object(live, "missing_rosbags", return_value="rosbags is not installed: pip install it"):

@@ -32,6 +32,7 @@ from tfcompose.launcher.events import (
     Exited,
     Finish,
     Kill,
+    LogMatched,
     OutputLost,
     Signalled,
     Start,
@@ -59,6 +60,23 @@ def test_the_guard_is_started_first_and_the_rest_only_after_it_is_clear_in_the_p
     assert history.started == ["guard"]
     history.feed(Clear())
     assert history.started == ["guard", "slam", "static"]
+
+
+def test_what_the_guard_waits_for_is_started_before_it_and_the_guard_once_that_is_ready() -> None:
+    router = PlanProcess("router", "run", ready=Ready("log", "listens"))
+    history = begin(SLAM, router, replace(GUARD, after={"router": "ready"}))
+    assert history.started == ["router"]
+    history.feed(LogMatched("router", "it listens"))
+    assert history.started == ["router", "guard"]
+    history.feed(Clear())
+    assert history.started == ["router", "guard", "slam"]
+
+
+def test_a_guard_whose_router_fails_is_not_started() -> None:
+    router = PlanProcess("router", "run", ready=Ready("log", "listens"))
+    history = begin(SLAM, router, replace(GUARD, after={"router": "ready"}))
+    history.feed(Exited("router", 1))
+    assert (history.started, history.exit_code) == (["router"], 1)
 
 
 def test_without_a_guard_everything_starts_at_once() -> None:

@@ -11,6 +11,8 @@ from tfcompose.ros.environment import (
     FASTDDS_PROFILE_LOCALHOST,
     child_environment,
     missing_ros,
+    other_middleware,
+    ros_trouble,
 )
 
 SPACE = "{http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles}"
@@ -73,3 +75,57 @@ def test_the_parts_that_need_no_ros_import_none() -> None:
     code = "import sys; " + "; ".join(f"import tfcompose.ros.{name}" for name in names)
     code += "; import tfcompose.publishers.simulate, tfcompose.guard.__main__; sys.exit('rclpy' in sys.modules)"
     assert processes.run([sys.executable, "-c", code]).returncode == 0
+
+
+def test_other_middlewares_get_no_profile_of_fast_dds() -> None:
+    for ros, base in (
+        (RosSettings(rmw="cyclonedds"), {}),
+        (RosSettings(rmw="zenoh"), {}),
+        (RosSettings(), {"RMW_IMPLEMENTATION": "rmw_zenoh_cpp"}),
+    ):
+        found = child_environment(base, ros, own=True)
+        assert not [name for name in found if "PROFILES" in name]
+    assert child_environment({"RMW_IMPLEMENTATION": "rmw_zenoh_cpp"}, RosSettings(rmw="fastdds"), own=True) == {
+        "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
+        "PYTHONUNBUFFERED": "1",
+        "FASTRTPS_DEFAULT_PROFILES_FILE": str(FASTDDS_PROFILE),
+    }
+
+
+def test_a_middleware_that_is_not_installed_is_named_as_the_robot_file_names_it() -> None:
+    ros = RosSettings(rmw="zenoh")
+    found = ros_trouble(child_environment({}, ros, own=True), ros)
+    assert found is not None
+    assert (found.code, "rmw: zenoh" in found.message, "rmw_zenoh_cpp" in found.message) == ("TF909", True, True)
+    assert "ros-jazzy-rmw-zenoh-cpp" in found.help
+
+
+def test_other_middlewares_need_tf2_msgs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tfcompose.ros.environment.ctypes.CDLL", lambda _: None)
+    monkeypatch.setattr("tfcompose.ros.environment.find_spec", lambda name: None if name == "tf2_msgs" else name)
+    assert ros_trouble({"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}) is None
+    found = ros_trouble({"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"})
+    assert found is not None
+    assert (found.code, "tf2_msgs" in found.message) == ("TF901", True)
+
+
+def test_a_configuration_of_zenoh_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("tfcompose.ros.environment.ctypes.CDLL", lambda _: None)
+    monkeypatch.setattr("tfcompose.ros.environment.find_spec", lambda name: name)
+    file = tmp_path / "session.json5"
+    environment = {"RMW_IMPLEMENTATION": "rmw_zenoh_cpp", "ZENOH_SESSION_CONFIG_URI": str(file)}
+    found = ros_trouble(environment)
+    assert found is not None
+    assert (found.code, str(file) in found.message) == ("TF909", True)
+    assert ros_trouble({**environment, "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}) is None
+    file.touch()
+    assert ros_trouble(environment) is None
+
+
+@pytest.mark.parametrize(("here", "warned"), [("rmw_fastrtps_cpp", True), ("rmw_zenoh_cpp", False), ("", False)])
+def test_an_environment_with_another_middleware_is_warned_of(here: str, *, warned: bool) -> None:
+    found = other_middleware({"RMW_IMPLEMENTATION": here}, RosSettings(rmw="zenoh"))
+    assert (found is not None) == warned
+    if found:
+        assert (found.code, found.severity) == ("TF909", "warning")
+    assert other_middleware({"RMW_IMPLEMENTATION": here}, RosSettings()) is None

@@ -26,6 +26,7 @@ TOPICS = {
     "strict": "holding back what a process does not own",
     "background": "robots without a terminal: ps, logs, restart, down",
     "hosts": "a robot on several computers",
+    "rmw": "Fast DDS, Cyclone DDS or Zenoh",
     "exports": "systemd, docker compose, Kubernetes and launch files",
     "ci": "lint, diff and verify in CI; exit codes",
     "python": "the TF buffer in Python",

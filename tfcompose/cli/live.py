@@ -121,7 +121,7 @@ def set_up_ros(ros: RosSettings | None = None) -> None:
         SystemExit: after saying why ROS cannot be started so.
     """
     os.environ.update(child_environment(os.environ, ros or RosSettings(), own=True))
-    trouble = ros_trouble(os.environ)
+    trouble = ros_trouble(os.environ, ros)
     if trouble:
         reject([trouble])
 

@@ -35,6 +35,7 @@ from tfcompose.cli.terminal import (
     can_redraw,
     coloured,
     fail,
+    print_findings,
     reject,
     size_of,
     warn,
@@ -47,7 +48,7 @@ from tfcompose.launcher.output import Logs, NonBlockingOutput
 from tfcompose.launcher.preflight import commands_of
 from tfcompose.launcher.runtime_dir import Lock, RuntimeDirError, runtime_dir_of
 from tfcompose.launcher.supervisor import ENDING, Session, supervise
-from tfcompose.ros.environment import child_environment, ros_trouble
+from tfcompose.ros.environment import child_environment, other_middleware, ros_trouble
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -66,10 +67,7 @@ def start(file: Path, arguments: Namespace, built_with: Sequence[Finding] = ()) 
     plan = plan_to_start(built_plan(file), arguments)
     if plan.guard.mode == "off" and arguments.settle is not None:
         fail("the guard is off, so --settle has no effect: leave it out", UNREADABLE)
-    trouble = ros_trouble(child_environment(os.environ, plan.ros, own=True))
-    found = [trouble] if trouble else commands_of(plan, plan.managed, file, os.environ, child_environment)[1]
-    if found:
-        reject([_with_profiles(one, arguments) for one in found])
+    _refuse_trouble(plan, file, arguments)
     try:
         place = runtime_dir_of(plan, os.environ)
         lock = Lock(place)
@@ -98,6 +96,20 @@ def start(file: Path, arguments: Namespace, built_with: Sequence[Finding] = ()) 
         session.output = NonBlockingOutput(sys.stdout.fileno())
         stack.callback(session.output.close)
         return _run(plan, place, session, session.output, arguments.duration)
+
+
+def _refuse_trouble(plan: Plan, file: Path, arguments: Namespace) -> None:
+    """Print what is odd here, and end the command where anything is in the way of the start.
+
+    Raises:
+        SystemExit: after saying all of it.
+    """
+    trouble = ros_trouble(child_environment(os.environ, plan.ros, own=True), plan.ros)
+    found = [trouble] if trouble else commands_of(plan, plan.managed, file, os.environ, child_environment)[1]
+    if found:
+        reject([_with_profiles(one, arguments) for one in found])
+    if other := other_middleware(os.environ, plan.ros):
+        print_findings([other], sys.stderr)
 
 
 def _run(plan: Plan, place: RuntimeDir, session: Session, output: NonBlockingOutput, duration_s: float | None) -> int:

@@ -28,6 +28,7 @@ from tfcompose.export.supervisors import (
     yaml_text,
 )
 from tfcompose.files import File
+from tfcompose.plan.middleware import middleware_variables
 from tfcompose.plan.stock import OWN_KINDS
 
 if TYPE_CHECKING:
@@ -216,7 +217,7 @@ def _digest(plan: Plan, process: PlanProcess, texts: Mapping[str, str]) -> str:
 def _environment(plan: Plan) -> dict[str, str]:
     """Return what the probes need as well as the process, which has more from the plan."""
     discovery = {"ROS_AUTOMATIC_DISCOVERY_RANGE": plan.ros.discovery.upper()} if plan.ros.discovery else {}
-    return {"ROS_DOMAIN_ID": str(plan.ros.domain_id or 0), **discovery}
+    return {"ROS_DOMAIN_ID": str(plan.ros.domain_id or 0), **discovery, **middleware_variables(plan.ros, {})}
 
 
 def _probes(plan: Plan, process: PlanProcess) -> dict[str, Any]:

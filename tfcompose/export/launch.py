@@ -18,6 +18,7 @@ from tfcompose.export.launch_values import LaunchValues, condition_code, paramet
 from tfcompose.export.supervisors import plain_name, waiting_s
 from tfcompose.files import File
 from tfcompose.numbers import number
+from tfcompose.plan.middleware import middleware_variables
 from tfcompose.plan.stock import MOST_HZ, OWN_KINDS, STATE_PUBLISHER, static_names
 
 if TYPE_CHECKING:
@@ -458,6 +459,7 @@ def _variables(plan: Plan) -> Iterator[tuple[str, str]]:
         yield "ROS_DOMAIN_ID", str(plan.ros.domain_id)
     if plan.ros.discovery is not None:
         yield "ROS_AUTOMATIC_DISCOVERY_RANGE", plan.ros.discovery.upper()
+    yield from middleware_variables(plan.ros, {}).items()
 
 
 def published_by(urdf: str, prefix: str) -> set[tuple[str, str]]:

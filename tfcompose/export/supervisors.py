@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from tfcompose.files import File
+from tfcompose.plan.middleware import middleware_variables
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
@@ -349,7 +350,8 @@ def _compose_service(plan: Plan, process: PlanProcess, machine: Machine, names: 
 
 def _discovery(plan: Plan) -> dict[str, str]:
     """Return what the health check needs; the process itself has it from the plan."""
-    return {"ROS_AUTOMATIC_DISCOVERY_RANGE": plan.ros.discovery.upper()} if plan.ros.discovery else {}
+    discovery = {"ROS_AUTOMATIC_DISCOVERY_RANGE": plan.ros.discovery.upper()} if plan.ros.discovery else {}
+    return discovery | middleware_variables(plan.ros, {})
 
 
 def _restart(process: PlanProcess) -> str:

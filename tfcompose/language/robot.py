@@ -35,6 +35,7 @@ from tfcompose.load import Path
 from tfcompose.model import Dynamics, Limit, ReferencePositions, SafetyController
 from tfcompose.plan import GuardPolicy, Isolation, JointType, RosSettings, SensorPublisher, StatePublisher
 from tfcompose.plan.codec import documented
+from tfcompose.plan.middleware import ENDPOINT
 from tfcompose.units import (
     NUMBER,
     JointPosition,
@@ -340,6 +341,9 @@ class RosSpec(RosSettings):
 
     namespace: Namespace = inherited(RosSettings, "namespace")
     domain_id: Annotated[int, Strict(), Field(ge=0, le=232), Integral] | None = inherited(RosSettings, "domain_id")
+    router: Annotated[Text, Matches(ENDPOINT, "an endpoint of Zenoh such as tcp/10.0.0.2:7447")] | None = inherited(
+        RosSettings, "router"
+    )
     isolate: Isolation = documented(
         "none", "topics: /tf moves below the namespace; frames: the namespace is the prefix, unless one is given"
     )

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, finding
 from tfcompose.launcher.fastdds_profile import with_partitions
+from tfcompose.plan.middleware import middleware_variables
 from tfcompose.plan.topics import GLOBAL, fence_file, judged_topics, partition_of, private_topics, takes_remappings
-from tfcompose.ros.environment import PROFILE_VARIABLES, RosError
+from tfcompose.ros.environment import PROFILE_VARIABLES, RMW, RosError, is_fastdds
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -32,21 +33,14 @@ if TYPE_CHECKING:
 _LEAVES = re.compile(rf"\b({'|'.join(PROFILE_VARIABLES)})\b(=(?P<file>[^\s;&|]*))?")
 
 
-def can_fence(env: Mapping[str, str]) -> bool:
-    """Return whether the processes' rmw knows partitions: rmw_fastrtps, which is the default."""
-    return (env.get("RMW_IMPLEMENTATION") or "rmw_fastrtps_cpp").startswith("rmw_fastrtps")
-
-
-RMW = "RMW_IMPLEMENTATION"
-
-
 def way_of(plan: Plan, base: Mapping[str, str]) -> Way:
     """Return how the plan's processes are fenced off; empty: they are not. ``base`` is their common environment."""
     if plan.guard.mode != "strict":
         return ""
     if plan.guard.fence != "auto":
         return plan.guard.fence
-    return "partition" if all(can_fence({**base, **process.env}) for process in plan.processes) else "remap"
+    common = {**base, **middleware_variables(plan.ros, base)}
+    return "partition" if all(is_fastdds({**common, **process.env}) for process in plan.processes) else "remap"
 
 
 def remapped(plan: Plan, process: PlanProcess) -> PlanProcess:
@@ -121,7 +115,7 @@ def _profile(plan: Plan, command: Command, topics: list[str], *, reads: bool) ->
     if moved:
         message = f"guard: strict needs full names of TF's topics, not {_all(moved)}, which has"
         raise _CannotFenceError(message, "write the remapping with a leading slash")
-    if not can_fence(env):
+    if not is_fastdds(env):
         message = f"guard: {{fence: partition}} needs rmw_fastrtps_cpp, and {env[RMW]} is what they are started with"
         raise _CannotFenceError(message, f"let it fence off by remapping: leave fence out; or unset {RMW}")
     named = next((env[name] for name in PROFILE_VARIABLES if env.get(name)), None)

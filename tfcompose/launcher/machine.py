@@ -1,10 +1,10 @@
 """What the launcher does next: a pure function of what is known, what happened, and the time.
 
-The guard is started first and listens; once it reports that nobody publishes a planned edge, the others follow in the
-plan's order, each when what it waits for is there. A guard that is switched off only reports which edges are live, and
-nothing waits for it. Whatever goes wrong, or is requested, everything is stopped: a process when all that wait for it
-are gone, the guard last of all. What the guard reports while everything stops is ignored, because an owner that is
-stopped falls silent.
+The guard is started first, after what it waits for itself, and listens; once it reports that nobody publishes a
+planned edge, the others follow in the plan's order, each when what it waits for is there. A guard that is switched
+off only reports which edges are live, and nothing waits for it. Whatever goes wrong, or is requested, everything is
+stopped: a process when all that wait for it are gone, the guard last of all. What the guard reports while everything
+stops is ignored, because an owner that is stopped falls silent.
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ def _begin(step: Transition) -> None:
     guard = step.state.guard
     judges = guard is not None and step.state.plan.guard.mode != "off"
     step.update(begun=step.now, clear=None if judges else step.now)
-    if guard:
+    if guard and not unmet(step.state, step.state.tracked[guard]):
         step.start(guard)
     for name, tracked in step.state.tracked.items():
         if tracked.state == "EXPECTED":
@@ -332,7 +332,8 @@ def _go_on(step: Transition) -> None:
     for name, one in step.state.tracked.items():
         if one.state not in ("STOPPED", "BACKOFF"):
             continue
-        fresh = one.state == "STOPPED" and one.wanted and step.state.clear is not None and not unmet(step.state, one)
+        may_start = step.state.clear is not None or name in _before_clear(step.state)
+        fresh = one.state == "STOPPED" and one.wanted and may_start and not unmet(step.state, one)
         again = one.state == "BACKOFF" and step.now >= one.since + backoff_s(
             step.state.times, one.process, one.failures
         )
@@ -347,6 +348,11 @@ def _go_on(step: Transition) -> None:
     tracked = step.state.tracked.values()
     if step.state.stop is None and all(one.failed or one.state in ("EXITED", "EXPECTED") for one in tracked):
         step.finish(1 if step.state.given_up else 0)
+
+
+def _before_clear(state: State) -> tuple[str, ...]:
+    """Return what starts before the guard has listened: itself, and what it waits for, such as a Zenoh router."""
+    return (state.guard, *state.tracked[state.guard].process.after) if state.guard else ()
 
 
 def _reminder_due(state: State) -> float | None:

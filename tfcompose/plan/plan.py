@@ -46,6 +46,8 @@ PoseKnowledge = Literal["exact", "nominal", "unknown"]
 Clock = Literal["wall", "sim"]
 #: How far ROS looks for other nodes; None in a plan: as far as the environment says.
 Discovery = Literal["localhost", "subnet", "off"]
+#: The middleware that all processes use.
+Rmw = Literal["fastdds", "cyclonedds", "zenoh"]
 #: What keeps several robots in one domain apart: topics below their namespaces, or frames with a prefix.
 Isolation = Literal["none", "topics", "frames", "both"]
 #: Who publishes what is ours below the base.
@@ -342,6 +344,15 @@ class RosSettings:
     namespace: str = documented("", "the namespace of nodes and topics without a leading slash", "robot1")
     domain_id: int | None = documented(None, "the ROS domain; default: the environment's", 7)
     discovery: Discovery | None = documented(None, "how far discovery reaches; default: the environment's")
+    rmw: Rmw | None = documented(
+        None, "the middleware of all processes; default: the environment's", "zenoh", **OMITTED
+    )
+    router: str | None = documented(
+        None,
+        "with rmw: zenoh, where every process reaches the router; default: port 7447 of its own computer",
+        "tcp/10.0.0.2:7447",
+        **OMITTED,
+    )
     clock: Clock = documented("wall", "one clock for the whole plan; sim: the time of /clock")
     frame_prefix: str = documented("", "written in front of every frame as it is, with its slash", "robot1/")
     shared_frames: tuple[str, ...] = documented((), "frames that never get the prefix", ["map"])

@@ -11,6 +11,8 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 from zlib import crc32
 
+from tfcompose.plan.middleware import ROUTER_PROGRAM
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -90,7 +92,7 @@ def takes_remappings(process: PlanProcess) -> bool:
     """
     if process.kind != "run":
         return process.kind in ("static", "joints", "simulate", "component")
-    if not process.argv or process.argv[:2] == ("/bin/sh", "-c"):
+    if not process.argv or process.argv[:2] == ("/bin/sh", "-c") or process.argv[0] == ROUTER_PROGRAM:
         return False
     return process.argv[0].startswith("${") or bool(process.owns) or "--ros-args" in process.argv
 

@@ -19,10 +19,12 @@ from tfcompose.resolve.containers import component_findings, component_process, 
 from tfcompose.resolve.edges import Drafts, source_numbers
 from tfcompose.resolve.hosts import hosts_of, with_host_place
 from tfcompose.resolve.isolation import isolate, settings_of
+from tfcompose.resolve.middleware import is_own_router, own_router, with_router, wrong_middleware
 from tfcompose.resolve.poses import Solver
 from tfcompose.resolve.presets import sensor_of
 from tfcompose.resolve.processes import (
     built_in,
+    built_in_keys,
     has_claims,
     idle_keys,
     name_clashes,
@@ -93,7 +95,7 @@ class _Work:
     def resolved(self) -> Resolved:
         """Return the robot and what was found; each step knows what the ones before it refused."""
         self.broken.update(self.validated.broken)
-        own = _processes(self.validated, self.found)
+        own = _processes(self.validated, self.found, is_part=self.holder is not None)
         packages = self._packages()
         self._join_parts(packages)
         bodies = Bodies(self.source, packages)
@@ -131,6 +133,9 @@ class _Work:
             robot = self._take(settled(robot, self.spec, self.source))
         self.found += [one for process in robot.processes for one in unreached(process, self.source)]
         self.found += self._wrong_components(robot)
+        if self.holder is None:
+            self.found += wrong_middleware(robot, self.spec, self.source)
+            robot = with_router(robot)
         return Resolved(robot, (*self.of_parts, *self.found), self.collected)
 
     def _wrong_components(self, robot: Robot) -> Iterator[Finding]:
@@ -288,11 +293,15 @@ def _has_calibrations(spec: RobotSpec) -> bool:
     return bool(spec.calibrations) or any(entry.calibration for entry in entries)
 
 
-def _processes(validated: Validated, found: list[Finding]) -> list[Process]:
+def _processes(validated: Validated, found: list[Finding], *, is_part: bool) -> list[Process]:
     processes = built_in(validated.spec, validated.source)
     spec = validated.spec
+    processes += [] if is_part else own_router(spec, validated.source)
     processes += [container_process(name, declared, validated) for name, declared in spec.containers.items()]
     for name, declared in spec.processes.items():
+        if is_own_router(name, declared, spec):
+            found += built_in_keys(name, declared, validated.source)
+            continue
         process, refused = user_process(name, declared, validated)
         found += refused
         if process and process.kind == "component":

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tfcompose.findings import Finding, finding
+from tfcompose.plan.middleware import IMPLEMENTATIONS, ZENOH_FILES, middleware_variables
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -50,23 +51,40 @@ def child_environment(base: Mapping[str, str], ros: RosSettings, *, own: bool) -
     """Return ``base`` with what the plan says about ROS.
 
     What the plan leaves open stays as it is in ``base``. With ``own`` the process is one of tfcompose's and announces
-    itself by ``FASTDDS_PROFILE``, or the one for this machine alone, unless ``base`` names a profile file already.
-    Other processes keep their profile.
+    itself by ``FASTDDS_PROFILE``, or the one for this machine alone, unless ``base`` names a profile file already, or
+    the middleware is not Fast DDS. Other processes keep their profile.
     """
-    environment = {**base, "PYTHONUNBUFFERED": "1"}
+    environment = {**base, "PYTHONUNBUFFERED": "1", **middleware_variables(ros, base)}
     if ros.domain_id is not None:
         environment[DOMAIN] = str(ros.domain_id)
     if ros.discovery is not None:
         environment[RANGE] = ros.discovery.upper()
-    if own and not any(base.get(name) for name in PROFILE_VARIABLES):
+    if own and is_fastdds(environment) and not any(base.get(name) for name in PROFILE_VARIABLES):
         alone = environment.get(RANGE) == "LOCALHOST"
         environment[PROFILE_VARIABLES[0]] = str(FASTDDS_PROFILE_LOCALHOST if alone else FASTDDS_PROFILE)
     return environment
 
 
-def ros_trouble(environment: Mapping[str, str]) -> Finding | None:
-    """Return what keeps a process with this environment from starting a node, or None."""
-    return no_ros() or _domain(environment.get(DOMAIN, "")) or _middleware(environment.get(RMW, ""))
+def is_fastdds(environment: Mapping[str, str]) -> bool:
+    """Return whether processes with this environment use Fast DDS, which is the default."""
+    return (environment.get(RMW) or IMPLEMENTATIONS["fastdds"]).startswith("rmw_fastrtps")
+
+
+def ros_trouble(environment: Mapping[str, str], ros: RosSettings | None = None) -> Finding | None:
+    """Return what keeps a process with this environment from starting a node, or None; ``ros`` are the plan's words."""
+    named = environment.get(RMW, "")
+    return no_ros() or _domain(environment.get(DOMAIN, "")) or _middleware(named, ros) or _configuration(environment)
+
+
+def other_middleware(environment: Mapping[str, str], ros: RosSettings) -> Finding | None:
+    """Return a warning where the environment names another middleware than the plan: tools see no process then."""
+    here, wanted = environment.get(RMW), IMPLEMENTATIONS[ros.rmw] if ros.rmw else None
+    if not here or wanted in {None, here}:
+        return None
+    message = (
+        f"{RMW}={here} in this environment, and the robot has ros: {{rmw: {ros.rmw}}}: tools from here do not see it"
+    )
+    return finding("TF909", message, None, severity="warning", help=f"export {RMW}={wanted}, or change rmw")
 
 
 def no_ros() -> Finding | None:
@@ -94,7 +112,7 @@ def _domain(domain: str) -> Finding | None:
     return finding("TF909", f"{DOMAIN}={domain} is not a domain: domains are 0 to {LAST_DOMAIN}", None, help=advice)
 
 
-def _middleware(name: str) -> Finding | None:
+def _middleware(name: str, ros: RosSettings | None) -> Finding | None:
     """Look for the library as ROS does; where it is not, ROS ends the process as soon as it is imported."""
     if not name:
         return None
@@ -103,9 +121,27 @@ def _middleware(name: str) -> Finding | None:
     except OSError:
         found = {file.stem.removeprefix("lib") for folder in _folders() for file in folder.glob("librmw_*_cpp.so")}
         here = sorted(name for name in found if "_shared_" not in name and "__" not in name)
-        advice = f"unset {RMW}, or install ros-jazzy-{name.replace('_', '-')}"
+        package = f"ros-jazzy-{name.replace('_', '-')}"
+        advice, message = f"unset {RMW}, or install {package}", f"{RMW}={name}, and this ROS has no such middleware"
+        if ros and ros.rmw:
+            advice, message = (
+                f"install {package}, or change rmw",
+                f"rmw: {ros.rmw} needs {name}, which this ROS has not",
+            )
         advice += f"; here is {', '.join(here)}" if here else ""
-        return finding("TF909", f"{RMW}={name}, and this ROS has no such middleware", None, help=advice)
+        return finding("TF909", message, None, help=advice)
+    if not is_fastdds({RMW: name}) and find_spec("tf2_msgs") is None:
+        advice = f"install ros-jazzy-tf2-msgs, or use {IMPLEMENTATIONS['fastdds']}"
+        return finding("TF901", f"with {name} the package tf2_msgs is needed, and is not installed", None, help=advice)
+    return None
+
+
+def _configuration(environment: Mapping[str, str]) -> Finding | None:
+    """Look for the files that Zenoh is configured by; without one, every session ends at once."""
+    for name in ZENOH_FILES if environment.get(RMW) == IMPLEMENTATIONS["zenoh"] else ():
+        file = environment.get(name)
+        if file and not Path(file).is_file():
+            return finding("TF909", f"{name}={file}, and there is no such file", None, help=f"unset {name}")
     return None
 
 

@@ -42,15 +42,17 @@ def run(arguments: Namespace) -> int:
     """Look and print the findings; exit code 0 where nothing is wrong, 1 with findings, 2 for wrong use."""
     from tfcompose.findings import finding
     from tfcompose.plan import RosSettings
-    from tfcompose.ros.environment import RosError, child_environment, no_ros, ros_trouble
+    from tfcompose.ros.environment import RosError, child_environment, no_ros, other_middleware, ros_trouble
     from tfcompose.signals import Stop
 
     missing = no_ros()
     if missing:
         return _print([missing], arguments.format)
     plan = _plan(arguments)
-    os.environ.update(child_environment(os.environ, plan.ros if plan else RosSettings(), own=True))
-    trouble = ros_trouble(os.environ)
+    ros = plan.ros if plan else RosSettings()
+    other = other_middleware(os.environ, ros)
+    os.environ.update(child_environment(os.environ, ros, own=True))
+    trouble = ros_trouble(os.environ, ros)
     if trouble:
         return _print([trouble], arguments.format)
     from tfcompose.cli.live import check_early_end
@@ -65,11 +67,12 @@ def run(arguments: Namespace) -> int:
             return _print([finding("TF901", str(error), None)], arguments.format)
         if stop.requested:
             check_early_end(found.seconds, arguments.duration, heard=bool(found.edges))
-    code = _print(found.findings, arguments.format)
+    findings = [*([other] if other else []), *found.findings]
+    code = _print(findings, arguments.format)
     if arguments.format == "text":
         observed = f"{counted(found.edges, 'edge')} from {counted(found.nodes, 'node')}"
         observed += f" below {printable(', '.join(found.roots[:MOST_ROOTS]))}" if found.roots else ""
-        print(f"looked for {found.seconds:.1f} s at {observed}: {_summary(found.findings)}")
+        print(f"looked for {found.seconds:.1f} s at {observed}: {_summary(findings)}")
         if found.edges and found.elsewhere:
             words = namespace_options(found.elsewhere)
             print(f"there is TF on {', '.join(found.elsewhere[:MOST_ROOTS])} too: {words}")

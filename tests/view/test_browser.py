@@ -63,6 +63,56 @@ def test_a_mount_that_is_moved_in_the_browser_is_saved_as_one_line(rover: Path, 
     assert tfcompose_in(rover.parent, "lint", rover.name).returncode == 0
 
 
+def test_a_mount_that_is_dragged_by_its_gizmo_moves_along_that_axis(rover: Path, server: viser.ViserServer) -> None:
+    session = session_of(rover)
+    panel = Panel(server, session, edit=True)
+    with page_of(f"http://127.0.0.1:{server.get_port()}") as page:
+        enter(page, "search", "front_link")
+        until(lambda: panel.frames.value == "front_link")
+        page.get_by_text("pose of front_link in base_link").wait_for()
+        before = session.mount("front_link").given(session.mount("front_link").edge.pose)
+
+        def is_dragged() -> bool:
+            """Draw the tip of the arrow along z 10 cm on."""
+            (client,) = server.get_clients().values()
+            tip, on = (pixel(client, before @ Pose((0, 0, at))) for at in (0.2, 0.3))
+            page.mouse.move(*tip)
+            page.wait_for_timeout(200)
+            page.mouse.down()
+            page.mouse.move(*on, steps=8)
+            page.mouse.up()
+            page.wait_for_timeout(500)
+            return bool(session.moved)
+
+        until(is_dragged)
+        after = session.mount("front_link").given(session.mount("front_link").edge.pose)
+        page.get_by_role("button", name="undo").click()
+        until(lambda: not session.moved)
+        page.get_by_role("button", name="redo").click()
+        until(lambda: bool(session.moved))
+        page.get_by_role("button", name="save").click()
+        page.get_by_text("+    xyz: [").first.wait_for()
+    off = before.inverse() @ after
+    assert after.xyz[1] == before.xyz[1] == 0.0475, "what is not dragged is not snapped either"
+    assert after.quat_xyzw == pytest.approx(before.quat_xyzw)
+    assert off.xyz == pytest.approx((0, 0, 0.1), abs=0.01)
+    old, new = ROVER.read_text("utf-8").splitlines(), rover.read_text("utf-8").splitlines()
+    (changed,) = [(one, other) for one, other in zip(old, new, strict=True) if one != other]
+    assert changed[0].partition("#")[2] == changed[1].partition("#")[2] != ""
+    assert changed[1].split("#")[0].strip() == f"xyz: [{after.xyz[0]:g}, 0.0475, {after.xyz[2]:g}]"
+    assert tfcompose_in(rover.parent, "lint", rover.name).returncode == 0
+
+
+def pixel(client: viser.ClientHandle, pose: Pose) -> tuple[float, float]:
+    """Return where a client's camera has the origin of a frame in its picture."""
+    camera = client.camera
+    w, x, y, z = (float(one) for one in camera.wxyz)
+    px, py, pz = (float(one) for one in camera.position)
+    right, down, forward = (Pose((px, py, pz), (x, y, z, w)).inverse() @ pose).xyz
+    focal = camera.image_height / 2 / math.tan(camera.fov / 2)
+    return camera.image_width / 2 + focal * right / forward, camera.image_height / 2 + focal * down / forward
+
+
 def test_a_slider_in_the_browser_moves_its_wheel_only(rover: Path, server: viser.ViserServer) -> None:
     panel = Panel(server, session_of(rover), edit=False)
     wheels = ("front_left_wheel_link", "front_right_wheel_link")

@@ -41,6 +41,18 @@ def numbers(pose: Pose) -> str:
     return f"{x}, {y}, {z} mm · {roll}, {pitch}, {yaw} deg"
 
 
+def _snapped(pose: Pose, before: Pose) -> Pose:
+    """Return a pose in whole mm and degrees; a number that is less than half of one off keeps the value before."""
+
+    def snap(new: float, old: float, step: float) -> float:
+        return old if abs(new - old) < step / 2 else round(new / step) * step
+
+    x, y, z = (snap(*pair, _SNAP_MM / 1000) for pair in zip(pose.xyz, before.xyz, strict=True))
+    angles = zip(clean_rpy(pose.quat_xyzw), clean_rpy(before.quat_xyzw), strict=True)
+    roll, pitch, yaw = (snap(*pair, math.radians(_SNAP_DEG)) for pair in angles)
+    return Pose((x, y, z), quat_from_rpy(roll, pitch, yaw))
+
+
 def _phase(slider: Any) -> float:
     """Return where a slider is in its sweep, in radians: 0 in its middle."""
     half = (slider.max - slider.min) / 2
@@ -305,11 +317,7 @@ class Panel:
         px, py, pz = (float(value) for value in self._gizmo.position)
         base = self.poses()[mount.relative_to]
         given = base.inverse() @ Pose((px, py, pz), (qx, qy, qz, w))
-        if self._snap.value:
-            rpy = (math.radians(round(math.degrees(a) / _SNAP_DEG) * _SNAP_DEG) for a in clean_rpy(given.quat_xyzw))
-            gx, gy, gz = (round(value * 1000 / _SNAP_MM) * _SNAP_MM / 1000 for value in given.xyz)
-            given = Pose((gx, gy, gz), quat_from_rpy(*rpy))
-        self.move(given)
+        self.move(_snapped(given, mount.given(mount.edge.pose)) if self._snap.value else given)
         self._select()
 
     def move(self, given: Pose) -> None:
